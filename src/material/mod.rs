@@ -1,0 +1,76 @@
+//! Strain energies, their stress, tangent and parameter derivatives.
+
+use serde::{Deserialize, Serialize};
+
+/// One Ogden term.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OgdenTerm {
+    /// μ, kPa.
+    pub mu_kpa: f64,
+    /// α.
+    pub alpha: f64,
+}
+
+/// N-term compressible Ogden material (`ogden/1`), Ψ = Σ μᵢ/αᵢ (λ̄₁^αᵢ + λ̄₂^αᵢ + λ̄₃^αᵢ − 3) + κ/2 (ln J)².
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ogden {
+    /// Always `ogden/1`.
+    pub schema: String,
+    /// κ, kPa.
+    pub bulk_kpa: f64,
+    /// Terms.
+    pub terms: Vec<OgdenTerm>,
+}
+
+/// A material parameter. Order everywhere: κ, μ₁, α₁, μ₂, α₂, …
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Parameter {
+    /// κ, kPa.
+    Kappa,
+    /// μ of the term with this index (from 0), kPa.
+    Mu(usize),
+    /// α of the term with this index (from 0).
+    Alpha(usize),
+}
+
+impl Parameter {
+    /// `kappa`, `mu_1`, `alpha_1`, …
+    pub fn name(self) -> String {
+        match self {
+            Parameter::Kappa => "kappa".into(),
+            Parameter::Mu(i) => format!("mu_{}", i + 1),
+            Parameter::Alpha(i) => format!("alpha_{}", i + 1),
+        }
+    }
+}
+
+impl Ogden {
+    /// κ, μ₁, α₁, μ₂, α₂, …
+    pub fn parameters(&self) -> Vec<Parameter> {
+        let mut all = vec![Parameter::Kappa];
+        for i in 0..self.terms.len() {
+            all.extend([Parameter::Mu(i), Parameter::Alpha(i)]);
+        }
+        all
+    }
+
+    /// Value of a parameter.
+    pub fn value(&self, parameter: Parameter) -> f64 {
+        match parameter {
+            Parameter::Kappa => self.bulk_kpa,
+            Parameter::Mu(i) => self.terms[i].mu_kpa,
+            Parameter::Alpha(i) => self.terms[i].alpha,
+        }
+    }
+
+    /// Sets a parameter.
+    pub fn set(&mut self, parameter: Parameter, value: f64) {
+        match parameter {
+            Parameter::Kappa => self.bulk_kpa = value,
+            Parameter::Mu(i) => self.terms[i].mu_kpa = value,
+            Parameter::Alpha(i) => self.terms[i].alpha = value,
+        }
+    }
+}

@@ -1,0 +1,49 @@
+//! Meshes: a section (quadrilaterals or triangles, quadratic, following the hole walls as curves) extruded.
+
+mod element;
+
+pub use element::ElementKind;
+
+/// Which mirror planes through the origin the mesh uses. A mirrored mesh covers the half with the positive
+/// coordinate only; normal displacement is zero on the plane.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Mirror {
+    /// y = 0 (uniaxial only).
+    pub y: bool,
+    /// z = 0.
+    pub z: bool,
+}
+
+/// A mesh of one element kind. Coordinates in mm in the specimen's frame.
+#[derive(Clone, Debug)]
+pub struct Mesh {
+    /// The element; its node order is described there.
+    pub element_kind: ElementKind,
+    /// Reference positions of the nodes, mm.
+    pub nodes: Vec<[f64; 3]>,
+    /// `num_elements × nodes_per_element` node indices, element after element.
+    pub connectivity: Vec<u32>,
+    /// Mirror planes in use.
+    pub mirror: Mirror,
+    /// Nodes on the fixed plate or grip (−y or −x).
+    pub fixed_nodes: Vec<u32>,
+    /// Nodes on the moved plate or grip (+y or +x).
+    pub moved_nodes: Vec<u32>,
+    /// Nodes on y = 0 where `mirror.y`, else empty.
+    pub mirror_y_nodes: Vec<u32>,
+    /// Nodes on z = 0 where `mirror.z`, else empty.
+    pub mirror_z_nodes: Vec<u32>,
+}
+
+impl Mesh {
+    /// Number of elements.
+    pub fn num_elements(&self) -> usize {
+        self.connectivity.len() / self.element_kind.num_nodes()
+    }
+
+    /// Node indices of an element, in the order of [`ElementKind`].
+    pub fn element(&self, element: usize) -> &[u32] {
+        let n = self.element_kind.num_nodes();
+        &self.connectivity[element * n..(element + 1) * n]
+    }
+}

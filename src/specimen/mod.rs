@@ -1,0 +1,95 @@
+//! The specimen: what is cast, how it is held and how far it is pulled.
+//!
+//! Frame (reference): origin at the centre of the undeformed block; x along its length (the pull direction),
+//! y along its thickness, z along its width. Lengths in mm.
+
+use serde::{Deserialize, Serialize};
+
+/// How the specimen is held and moved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TestKind {
+    /// Faces y = ±thickness/2 bonded to rigid plates; the one at +y moves by +drive along x.
+    DoubleLapShear,
+    /// Faces x = ±length/2 bonded to rigid grips; the one at +x moves by +drive along x.
+    Uniaxial,
+}
+
+/// The bounding block, mm.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Block {
+    /// Extent along x, mm.
+    pub length_mm: f64,
+    /// Extent along y, mm.
+    pub thickness_mm: f64,
+    /// Extent along z, mm.
+    pub width_mm: f64,
+}
+
+/// The direction of a hole's axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum HoleAxis {
+    /// Along y, centred at (x, z).
+    Thickness,
+    /// Along z, centred at (x, y).
+    Width,
+}
+
+/// A circular hole through the whole block.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Hole {
+    /// Direction of the axis.
+    pub axis: HoleAxis,
+    /// Centre, mm: (x, z) for `thickness`, (x, y) for `width`.
+    pub center_mm: [f64; 2],
+    /// Diameter, mm.
+    pub diameter_mm: f64,
+}
+
+/// The outline in the (x, z) section, extruded along the thickness.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Outline {
+    /// The plain block.
+    #[default]
+    #[serde(rename = "block")]
+    Block,
+    /// ISO 37 type 4 dumb-bell.
+    #[serde(rename = "iso37_type4")]
+    Iso37Type4,
+}
+
+/// A specimen (`specimen/1`).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Specimen {
+    /// Always `specimen/1`.
+    pub schema: String,
+    /// Free name.
+    pub name: String,
+    /// How it is held and moved.
+    pub test: TestKind,
+    /// Bounding block.
+    pub block: Block,
+    /// Outline in the (x, z) section.
+    #[serde(default, skip_serializing_if = "is_block")]
+    pub outline: Outline,
+    /// Holes; all with the same axis.
+    #[serde(default)]
+    pub holes: Vec<Hole>,
+    /// Drives at which the specimen is scanned, mm, increasing.
+    pub drive_mm: Vec<f64>,
+    /// How many identical samples share the load cell.
+    #[serde(default = "one")]
+    pub samples_in_parallel: u32,
+}
+
+fn is_block(outline: &Outline) -> bool {
+    *outline == Outline::Block
+}
+
+fn one() -> u32 {
+    1
+}
