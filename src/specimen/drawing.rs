@@ -422,7 +422,7 @@ fn wrap(text: &str, per_line: usize, max_lines: usize) -> Vec<String> {
             lines.push(rest[..per_line - 1].iter().chain(['…'].iter()).collect());
             break;
         }
-        let space = rest[..per_line].iter().rposition(|c| *c == ' ').filter(|at| *at > 0);
+        let space = rest[..=per_line].iter().rposition(|c| *c == ' ').filter(|at| *at > 0);
         let cut = space.unwrap_or(per_line);
         lines.push(rest[..cut].iter().collect());
         rest = &rest[if space.is_some() { cut + 1 } else { cut }..];
