@@ -100,7 +100,7 @@ const BELOW_OTHER: f64 = 6.0;
 /// More distinct ordinates than this are left to the table.
 const MAX_ORDINATES: usize = 24;
 /// Usual scales, largest first.
-const SCALES: [f64; 12] = [50.0, 20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01];
+const SCALES: [f64; 14] = [50.0, 20.0, 10.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01];
 
 /// A length with up to three decimals, without trailing zeros.
 pub(super) fn format_mm(value: f64) -> String {
@@ -229,14 +229,10 @@ impl Drawing {
             self.line(Layer::Centre, [x - mark, y], [x + mark, y]);
             self.line(Layer::Centre, [x, y - mark], [x, y + mark]);
         }
-        let labels: Vec<String> = specimen
-            .holes
-            .iter()
-            .enumerate()
-            .map(|(i, hole)| format!("{} ⌀{}", i + 1, format_mm(hole.diameter_mm)))
-            .collect();
+        let details: Vec<String> =
+            specimen.holes.iter().map(|hole| format!("⌀{}", format_mm(hole.diameter_mm))).collect();
         let bounds = [[center[0] - hx, center[1] - hb], [center[0] + hx, center[1] + hb]];
-        for label in place_labels(&circles, &labels, bounds, center) {
+        for label in place_labels(&circles, &details, bounds, center) {
             if let Some((from, to)) = label.leader {
                 self.line(Layer::Dimensions, from, to);
             }
@@ -400,7 +396,7 @@ impl Drawing {
             format!("Block {length} × {thickness} × {breadth} (x, y, z)"),
             faces,
             format!("Samples of this kind in one test: {}", specimen.samples_in_parallel),
-            format!("Dimensions in mm    Scale {ratio} on {sheet}"),
+            format!("Dimensions in mm. Scale {ratio} on {sheet}."),
         ] {
             self.text(Layer::Sheet, [left + 1.0, y], TEXT_HEIGHT, Anchor::Start, false, line);
             y -= 4.6;
