@@ -373,7 +373,8 @@ impl Drawing {
         self.line(Layer::Sheet, [left - 2.0, 5.0], [left - 2.0, 5.0 + TITLE_HEIGHT]);
         self.line(Layer::Sheet, [left - 2.0, 5.0 + TITLE_HEIGHT], [width - 5.0, 5.0 + TITLE_HEIGHT]);
         let mut y = 5.0 + TITLE_HEIGHT - 6.5;
-        let per_line = ((TABLE_WIDTH + 3.0) / (3.5 * CHARACTER_WIDTH)) as usize;
+        // Names have wide letters: a little more room than for numbers.
+        let per_line = (TABLE_WIDTH / (3.6 * CHARACTER_WIDTH)) as usize;
         for line in wrap(&specimen.name, per_line, 2) {
             self.text(Layer::Sheet, [left + 1.0, y], 3.5, Anchor::Start, false, line);
             y -= 5.0;

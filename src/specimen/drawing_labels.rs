@@ -80,7 +80,7 @@ fn place_one(
     taken: &Taken,
 ) -> Option<Label> {
     let (middle, radius) = circles[index];
-    let inside = text_at(middle.map(|c| c + CLEARANCE), height, content);
+    let inside = text_at(middle.map(|c| c + 1.5 * CLEARANCE), height, content);
     if fits_in_circle(inside.bounds(), middle, radius - CLEARANCE) && taken.is_free(inside.bounds()) {
         return Some(Label { text: inside, leader: None });
     }
