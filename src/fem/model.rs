@@ -18,7 +18,7 @@ pub struct ForwardModel {
     pub(super) topology: Topology,
     pub(super) system: LinearSystem,
     pub(super) output: Box<ElementOutput>,
-    /// Per element: B and κ R_p of the last assembly, from which the pressure follows after a solve.
+    /// Per element: B, D and the pressure gap of the last assembly, from which the pressure follows after a solve.
     pub(super) condensation: Vec<Condensation>,
     /// Affine displacement along x per unit of drive at each node: the first guess of a load step.
     pub(super) lift: Vec<f64>,
@@ -52,6 +52,7 @@ pub struct Statistics {
 pub(super) struct Condensation {
     divergence: [[[f64; MAX_NODES]; 3]; 4],
     pressure_gap: [f64; 4],
+    bulk: [[f64; 4]; 4],
 }
 
 impl ForwardModel {
@@ -83,7 +84,11 @@ impl ForwardModel {
             system,
             output: Box::default(),
             condensation: (0..num_elements)
-                .map(|_| Condensation { divergence: [[[0.0; MAX_NODES]; 3]; 4], pressure_gap: [0.0; 4] })
+                .map(|_| Condensation {
+                    divergence: [[[0.0; MAX_NODES]; 3]; 4],
+                    pressure_gap: [0.0; 4],
+                    bulk: [[0.0; 4]; 4],
+                })
                 .collect(),
             lift,
             driven_elements,
@@ -217,6 +222,7 @@ impl ForwardModel {
             scatter(self.mesh.element(e), &out.residual, residual);
             let kept = &mut self.condensation[e];
             kept.pressure_gap = out.pressure_gap;
+            kept.bulk = out.bulk;
             for m in 0..4 {
                 for i in 0..3 {
                     for a in 0..self.tables.num_nodes() {
@@ -296,21 +302,23 @@ impl ForwardModel {
         }
     }
 
-    /// δp of every element from δu: κ (B δu + R_p), with the B of the last tangent.
-    pub(super) fn pressure_update(&self, kappa: f64, delta: &[[f64; 3]]) -> Vec<[f64; 4]> {
+    /// δp of every element from δu: D B δu + gap, with the B and D of the last tangent.
+    pub(super) fn pressure_update(&self, delta: &[[f64; 3]]) -> Vec<[f64; 4]> {
         let mut update = Vec::with_capacity(self.condensation.len());
         for (e, kept) in self.condensation.iter().enumerate() {
             let nodes = self.mesh.element(e);
             let mut p = kept.pressure_gap;
-            for (m, p) in p.iter_mut().enumerate() {
-                let mut s = 0.0;
+            for m in 0..4 {
+                let mut dilation = 0.0;
                 for (a, &v) in nodes.iter().enumerate() {
                     let d = &delta[v as usize];
                     for i in 0..3 {
-                        s += kept.divergence[m][i][a] * d[i];
+                        dilation += kept.divergence[m][i][a] * d[i];
                     }
                 }
-                *p += kappa * s;
+                for (n, p) in p.iter_mut().enumerate() {
+                    *p += kept.bulk[n][m] * dilation;
+                }
             }
             update.push(p);
         }
