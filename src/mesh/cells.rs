@@ -14,8 +14,8 @@ use super::section::{Section, dot, sub};
 /// Choices in making cells.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Style {
-    /// Cell edges shorter than this times the element size are collapsed.
-    pub shortest: f64,
+    /// Cell edges shorter than this are collapsed, mm.
+    pub shortest_mm: f64,
     /// How far the lines from a cell's corners to the hole bend towards the corner's bisector: 0 = straight, 1 = fully.
     pub bend: f64,
 }
@@ -27,8 +27,7 @@ pub(super) fn holed_section(
     inner: Rectangle,
     style: Style,
 ) -> Result<Option<Section>, MeshError> {
-    let shortest = style.shortest * options.section_size_mm;
-    let Some(diagram) = PowerDiagram::new(inner, &domain.discs, shortest) else { return Ok(None) };
+    let Some(diagram) = PowerDiagram::new(inner, &domain.discs, style.shortest_mm) else { return Ok(None) };
     let layout = Layout { domain, options, inner, diagram, bend: style.bend };
     let edges = layout.divide_edges()?;
     let mut builder = Builder::new(domain);

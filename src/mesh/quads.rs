@@ -10,8 +10,9 @@ use super::section::{PointMerger, Section};
 
 /// The best section of quadrilaterals for `domain`, or `None` where quadrilaterals are no use.
 ///
-/// With holes, several inner rectangles around them are tried (what is outside becomes structured strips), and the
-/// section with the best shape for its size is taken.
+/// With holes, several inner rectangles around them (what is outside becomes structured strips) and several ways to make
+/// cells in them are ranked on a coarse section by shape and number of cells; the first that is good enough at the size
+/// asked for is taken. So the layout of cells hardly depends on the size.
 ///
 /// # Errors
 /// [`MeshError::TooManyElements`].
@@ -23,32 +24,47 @@ pub(super) fn quad_section(domain: &Domain, options: &MeshOptions) -> Result<Opt
         return Ok(None);
     }
     let area = domain.area();
-    let mut best: Option<(f64, Section)> = None;
-    for rectangle in inner_rectangles(domain, options) {
-        for style in STYLES {
-            let Some(section) = holed_section(domain, options, rectangle, style)? else { continue };
+    limit_cells((area / options.section_size_mm.powi(2)) as usize, options)?;
+    let size = (area / RANKING_CELLS).sqrt().max(options.section_size_mm);
+    let coarse = MeshOptions {
+        section_size_mm: size,
+        hole_segments: options.hole_segments.min(8),
+        radial_layers: options.radial_layers.min(2),
+        ..*options
+    };
+    let mut ranking: Vec<(f64, Rectangle, Style)> = Vec::new();
+    for rectangle in inner_rectangles(domain, size) {
+        for (shortest, bend) in STYLES {
+            let style = Style { shortest_mm: shortest * size, bend };
+            let Some(section) = holed_section(domain, &coarse, rectangle, style)? else { continue };
             let (worst, _) = section.min_scaled_jacobian();
+            let excess = (section.num_cells() as f64 * size * size / area).max(1.0).ln();
+            ranking.push((worst.min(0.5) + section.mean_shape() - 0.2 * excess, rectangle, style));
             if worst < options.min_scaled_jacobian {
-                continue;
-            }
-            let expected = area / options.section_size_mm.powi(2);
-            let excess = (section.num_cells() as f64 / expected).max(1.0).ln();
-            let score = worst.min(0.5) + section.mean_shape() - 0.2 * excess;
-            if best.as_ref().is_none_or(|(s, _)| score > s + 1e-9) {
-                best = Some((score, section));
+                // Only if nothing else is left: its size may still make it better.
+                ranking.last_mut().into_iter().for_each(|r| r.0 -= 10.0);
             }
         }
     }
-    Ok(best.map(|(_, section)| section))
+    // Stable: of equals the first stays first. Scores are rounded so that mirror images rank alike.
+    ranking.sort_by_key(|r| -((r.0 * 1e6).round() as i64));
+    for &(_, rectangle, style) in ranking.iter().take(MAX_ATTEMPTS) {
+        if let Some(section) = holed_section(domain, options, rectangle, style)?
+            && section.min_scaled_jacobian().0 >= options.min_scaled_jacobian
+        {
+            return Ok(Some(section));
+        }
+    }
+    Ok(None)
 }
 
-/// How cells are made; every one is tried.
-const STYLES: [Style; 4] = [
-    Style { shortest: 0.45, bend: 0.0 },
-    Style { shortest: 0.15, bend: 0.0 },
-    Style { shortest: 0.45, bend: 0.7 },
-    Style { shortest: 0.15, bend: 0.7 },
-];
+/// About so many cells have the sections that layouts are ranked by.
+const RANKING_CELLS: f64 = 60.0;
+/// So many layouts are tried at the size asked for.
+const MAX_ATTEMPTS: usize = 8;
+/// Ways to make cells: edges shorter than this many element sizes are collapsed, and the lines to the cells' corners bend
+/// by this fraction.
+const STYLES: [(f64, f64); 4] = [(0.45, 0.0), (0.15, 0.0), (0.45, 0.7), (0.15, 0.7)];
 
 /// Number of parts for a length, refused if absurd.
 pub(super) fn count(length: f64, options: &MeshOptions) -> Result<usize, MeshError> {
@@ -104,7 +120,7 @@ fn structured_section(domain: &Domain, options: &MeshOptions) -> Result<Section,
 }
 
 /// Rectangles around all holes, the whole section first. The distance kept from a hole is a multiple of its radius.
-fn inner_rectangles(domain: &Domain, options: &MeshOptions) -> Vec<Rectangle> {
+fn inner_rectangles(domain: &Domain, size: f64) -> Vec<Rectangle> {
     const RADII: [f64; 4] = [f64::INFINITY, 3.4, 2.5, 1.8];
     let outer = Rectangle { low: [-domain.half[0], domain.bottom], high: domain.half };
     let reach = |c: usize, sign: f64, k: f64| {
@@ -116,7 +132,7 @@ fn inner_rectangles(domain: &Domain, options: &MeshOptions) -> Vec<Rectangle> {
         let limit = if upper { outer.high[c] } else { -outer.low[c] };
         let position = reach(c, sign, k);
         // A strip thinner than half an element is not worth its own layer.
-        let no_strip = limit - position < 0.5 * options.section_size_mm || (c == 1 && !upper && has_half);
+        let no_strip = limit - position < 0.5 * size || (c == 1 && !upper && has_half);
         sign * if no_strip { limit } else { position }
     };
     let mut rectangles: Vec<Rectangle> = Vec::new();
