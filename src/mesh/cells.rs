@@ -11,6 +11,9 @@ use super::power::{PowerDiagram, Rectangle};
 use super::quads::{Builder, count, limit_cells, line};
 use super::section::{Section, dot, sub};
 
+/// Points of each edge by its vertices, the smaller index first.
+type EdgePoints = BTreeMap<(usize, usize), Vec<[f64; 2]>>;
+
 /// Choices in making cells.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Style {
@@ -83,7 +86,7 @@ impl Layout<'_> {
     }
 
     /// Points of every edge, from its vertex with the smaller index to the other, with middles: the same for both cells.
-    fn divide_edges(&self) -> Result<BTreeMap<(usize, usize), Vec<[f64; 2]>>, MeshError> {
+    fn divide_edges(&self) -> Result<EdgePoints, MeshError> {
         let vertices = &self.diagram.vertices;
         // Per edge: parts asked for, feet of the centres, product of their distances, number of cells.
         let mut facts: BTreeMap<(usize, usize), (usize, f64, f64, u32)> = BTreeMap::new();
@@ -146,13 +149,7 @@ impl Layout<'_> {
     }
 
     /// Patches between the hole's arc and each edge of its cell.
-    fn o_grid(
-        &self,
-        index: usize,
-        layers: usize,
-        edges: &BTreeMap<(usize, usize), Vec<[f64; 2]>>,
-        builder: &mut Builder,
-    ) {
+    fn o_grid(&self, index: usize, layers: usize, edges: &EdgePoints, builder: &mut Builder) {
         let disc = &self.domain.discs[index];
         let wall = self.domain.grading.holes;
         let inner_steps = with_middles(&divide(layers, wall, 1.0));
@@ -231,7 +228,7 @@ impl Layout<'_> {
     }
 
     /// Structured grids outside the inner rectangle, continuing the divisions of its sides.
-    fn strips(&self, edges: &BTreeMap<(usize, usize), Vec<[f64; 2]>>, builder: &mut Builder) -> Result<(), MeshError> {
+    fn strips(&self, edges: &EdgePoints, builder: &mut Builder) -> Result<(), MeshError> {
         let domain = self.domain;
         let (low, high) = ([-domain.half[0], domain.bottom], domain.half);
         let lower_ratio = if domain.bottom < 0.0 { domain.grading.sides } else { 1.0 };
