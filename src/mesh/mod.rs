@@ -1,6 +1,7 @@
 //! Meshes: a section (quadrilaterals or triangles, quadratic, following the hole walls as curves) extruded.
 
 mod build;
+mod cells;
 mod check;
 mod domain;
 mod element;
@@ -13,6 +14,11 @@ mod power;
 mod quads;
 mod section;
 mod triangles;
+
+#[cfg(test)]
+mod layout_tests;
+#[cfg(test)]
+mod test_specimens;
 
 pub use build::mesh_specimen;
 pub use check::MeshQuality;

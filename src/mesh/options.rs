@@ -19,7 +19,7 @@ pub struct MeshOptions {
     /// Smallest element size next to a graded boundary (bonded faces and their edges, hole walls) relative to the size
     /// in the interior; 1 = uniform. The number of elements does not depend on it.
     pub grading: f64,
-    /// Least number of elements around a whole hole.
+    /// Least number of elements around a whole hole, at least 8.
     pub hole_segments: usize,
     /// Least number of element layers between a hole and the edge of its cell.
     pub radial_layers: usize,
@@ -35,7 +35,7 @@ pub struct MeshOptions {
 }
 
 /// Elements in the unmirrored block at standard size.
-const STANDARD_ELEMENTS: f64 = 820.0;
+const STANDARD_ELEMENTS: f64 = 720.0;
 
 impl MeshOptions {
     /// Coarse meshes for a search: about 2–4 thousand free unknowns in half of a two-hole block.
@@ -60,11 +60,13 @@ impl MeshOptions {
         let size = (volume / STANDARD_ELEMENTS).cbrt() * factor;
         let along_width = specimen.holes.first().is_some_and(|h| h.axis == crate::specimen::HoleAxis::Width);
         let depth = if along_width { block.width_mm } else { block.thickness_mm };
+        // Through the plates' gap shear is not uniform. Along holes fields change slowly but for the free faces.
+        let layers = if along_width { 0.6 } else { 1.25 };
         // `as` saturates and maps NaN to 0: bad numbers are reported by `validate`, not here.
         let segments = ((12.0 / factor).round() as usize).clamp(8, 64);
         MeshOptions {
             section_size_mm: size,
-            levels: ((depth / size).round() as usize).clamp(2, 400),
+            levels: ((layers * depth / size).round() as usize).clamp(2, 400),
             grading: 0.3,
             hole_segments: segments,
             radial_layers: if factor > 1.3 { 2 } else { ((3.0 / factor).round() as usize).clamp(2, 20) },
@@ -83,7 +85,7 @@ impl MeshOptions {
         in_range("section_size_mm", self.section_size_mm, 1e-6, 1e6)?;
         in_range("levels", self.levels as f64, 1.0, 1e4)?;
         in_range("grading", self.grading, 0.01, 1.0)?;
-        in_range("hole_segments", self.hole_segments as f64, 4.0, 1e4)?;
+        in_range("hole_segments", self.hole_segments as f64, 8.0, 1e4)?;
         in_range("radial_layers", self.radial_layers as f64, 1.0, 1e3)?;
         in_range("min_scaled_jacobian", self.min_scaled_jacobian, 0.0, 0.9)?;
         in_range("max_elements", self.max_elements as f64, 1.0, 2e7)
