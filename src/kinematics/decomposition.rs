@@ -40,7 +40,8 @@ impl Decomposition {
 pub fn decompose(deformation_gradient: &Tensor) -> Decomposition {
     let jacobian = determinant(deformation_gradient);
     let stretches = principal_stretches(deformation_gradient);
-    if !(jacobian > 0.0 && stretches[2] > 0.0) {
+    let is_admissible = jacobian > 0.0 && stretches[2] > 0.0;
+    if !is_admissible {
         return Decomposition {
             jacobian,
             principal_stretches: stretches,

@@ -10,7 +10,7 @@ pub use decomposition::{
     Decomposition, MODE_TOLERANCE, compose, decompose, mode_exponent_derivatives, mode_exponents,
     stretch_amplitude_and_mode,
 };
-pub use stretches::{determinant, isochoric_principal_stretches, principal_stretches};
+pub use stretches::{determinant, inverse, isochoric_principal_stretches, principal_stretches};
 
 /// A second-order tensor, `[row][column]`.
 pub type Tensor = [[f64; 3]; 3];

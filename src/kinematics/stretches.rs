@@ -8,6 +8,22 @@ pub fn determinant(tensor: &Tensor) -> f64 {
     a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0])
 }
 
+/// Inverse of a tensor; none where its determinant is zero, subnormal or not finite.
+pub fn inverse(tensor: &Tensor) -> Option<Tensor> {
+    let determinant = determinant(tensor);
+    if !determinant.is_normal() {
+        return None;
+    }
+    let mut inverse = [[0.0; 3]; 3];
+    for (i, row) in inverse.iter_mut().enumerate() {
+        for (j, entry) in row.iter_mut().enumerate() {
+            let (a, b, c, d) = ((j + 1) % 3, (j + 2) % 3, (i + 1) % 3, (i + 2) % 3);
+            *entry = (tensor[a][c] * tensor[b][d] - tensor[a][d] * tensor[b][c]) / determinant;
+        }
+    }
+    Some(inverse)
+}
+
 /// Principal stretches λ₁ ≥ λ₂ ≥ λ₃ ≥ 0: the singular values of F.
 ///
 /// One-sided Jacobi: columns of F are rotated in pairs until they are orthogonal; their lengths are then the singular
@@ -51,7 +67,7 @@ pub fn principal_stretches(deformation_gradient: &Tensor) -> [f64; 3] {
 /// Isochoric principal stretches λ̄ᵢ = J^(−1/3) λᵢ, largest first. NaN where J ≤ 0 or F is not finite.
 pub fn isochoric_principal_stretches(deformation_gradient: &Tensor) -> [f64; 3] {
     let jacobian = determinant(deformation_gradient);
-    if !(jacobian > 0.0) {
+    if jacobian.is_nan() || jacobian <= 0.0 {
         return [f64::NAN; 3];
     }
     let stretches = principal_stretches(deformation_gradient);
@@ -136,6 +152,19 @@ pub(crate) mod tests {
             assert!((a[i] - b[i]).abs() < 1e-14);
         }
         assert!((a[0] * a[1] * a[2] - 1.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn inverse_inverts() {
+        let f = [[1.2, 0.4, 0.0], [0.1, 0.9, -0.2], [0.0, 0.3, 1.1]];
+        let one = product(&f, &inverse(&f).unwrap());
+        for i in 0..3 {
+            for j in 0..3 {
+                // A few operations on numbers of order one.
+                assert!((one[i][j] - if i == j { 1.0 } else { 0.0 }).abs() < 1e-15);
+            }
+        }
+        assert_eq!(inverse(&[[1.0; 3]; 3]), None);
     }
 
     /// Bad input is NaN, never a panic.

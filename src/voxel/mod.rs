@@ -7,8 +7,6 @@ mod mask;
 mod operator;
 mod sampling;
 mod section;
-mod stand_in;
-mod tracker;
 
 pub use filter::HammingFilter;
 pub use grid::VoxelGrid;

@@ -1,10 +1,9 @@
 //! What a voxel measures of a nodal field: its average, and that of its gradient, over the voxel's material part.
 
 use super::section::Section;
-use super::tracker::{Tracker, inverted};
 use super::{Sampling, VoxelError, VoxelMask};
-use crate::kinematics::{IDENTITY, Tensor};
-use crate::mesh::Mesh;
+use crate::kinematics::{IDENTITY, Tensor, inverse};
+use crate::mesh::{Locator, Mesh};
 use crate::specimen::Specimen;
 
 /// Sparse operator from nodal fields to voxel averages.
@@ -41,7 +40,7 @@ impl VoxelOperator {
     pub fn new(specimen: &Specimen, mesh: &Mesh, mask: &VoxelMask, sampling: Sampling) -> Result<Self, VoxelError> {
         sampling.check()?;
         let section = Section::new(specimen);
-        let mut tracker = Tracker::new(mesh);
+        let locator = Locator::new(mesh);
         let mut operator = VoxelOperator {
             num_nodes: mesh.nodes.len(),
             offsets: Vec::with_capacity(mask.num_voxels() + 1),
@@ -60,7 +59,7 @@ impl VoxelOperator {
             sampling.points(&section, &mask.grid, voxel as usize, &mut points);
             let mut total = 0.0;
             for &(point, weight) in &points {
-                if operator.add_point(mesh, &mut tracker, &mut place, first, point, weight) {
+                if operator.add_point(mesh, &locator, &mut place, first, point, weight) {
                     total += weight;
                 }
             }
@@ -81,7 +80,7 @@ impl VoxelOperator {
     fn add_point(
         &mut self,
         mesh: &Mesh,
-        tracker: &mut Tracker,
+        locator: &Locator,
         place: &mut [u32],
         first: usize,
         mut point: [f64; 3],
@@ -94,11 +93,11 @@ impl VoxelOperator {
                 reflection |= axis as u32;
             }
         }
-        let Some((element, r)) = tracker.locate(point) else {
+        let Some(location) = locator.locate(mesh, point) else {
             self.num_dropped_points += 1;
             return false;
         };
-        let nodes = mesh.element(element);
+        let (nodes, r) = (mesh.element(location.element as usize), location.reference_coordinates);
         let (n, g) = (mesh.element_kind.shape_functions(r), mesh.element_kind.shape_gradients(r));
         let mut map = [[0.0; 3]; 3];
         for (a, &node) in nodes.iter().enumerate() {
@@ -109,7 +108,7 @@ impl VoxelOperator {
                 }
             }
         }
-        let Some(inverse) = inverted(&map) else {
+        let Some(inverse) = inverse(&map) else {
             self.num_dropped_points += 1;
             return false;
         };

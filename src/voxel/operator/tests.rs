@@ -6,8 +6,8 @@ use super::*;
 use crate::kinematics::decompose;
 use crate::mesh::{ElementKind, Mirror};
 
-/// A structured mesh of hexahedra of the solid block (or its half z ≥ 0), nodes moved inside by a smooth map so that the
-/// elements are curved while the block's faces stay in place.
+/// A structured mesh of hexahedra of the solid block (or its half z ≥ 0): a section in (x, y), its nodes moved by a smooth
+/// map so that the cells are curved while the block's faces stay in place, extruded along z.
 pub(crate) fn block_mesh(specimen: &Specimen, num: [usize; 3], mirror: Mirror, bend: f64) -> Mesh {
     let b = &specimen.block;
     let high = [0.5 * b.length_mm, 0.5 * b.thickness_mm, 0.5 * b.width_mm];
@@ -18,8 +18,8 @@ pub(crate) fn block_mesh(specimen: &Specimen, num: [usize; 3], mirror: Mirror, b
         for j in 0..count[1] {
             for i in 0..count[0] {
                 let t = [(i, 0), (j, 1), (k, 2)].map(|(n, a)| n as f64 / (count[a] - 1) as f64);
-                let bump = bend * t.map(|t| (std::f64::consts::PI * t).sin()).iter().product::<f64>();
-                nodes.push([0, 1, 2].map(|a| low[a] + (high[a] - low[a]) * t[a] + bump * [1.0, 0.3, -0.7][a]));
+                let bump = bend * (std::f64::consts::PI * t[0]).sin() * (std::f64::consts::PI * t[1]).sin();
+                nodes.push([0, 1, 2].map(|a| low[a] + (high[a] - low[a]) * t[a] + bump * [1.0, 0.3, 0.0][a]));
             }
         }
     }
