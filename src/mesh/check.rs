@@ -65,14 +65,13 @@ impl Mesh {
         self.check_jacobians()?;
         self.check_faces(&domain)?;
         let volume = self.volume();
-        let holes = (4.0 * domain.half[0] * domain.half[1]).max(domain.area()) * domain.depth();
         let curved = if domain.discs.is_empty() && !domain.is_dumbbell {
             0.0
         } else {
             let discs: f64 = domain.discs.iter().map(|d| std::f64::consts::PI * d.radius * d.radius).sum();
             ARC_AREA_TOLERANCE * domain.depth() * (discs + if domain.is_dumbbell { 8.0 } else { 0.0 })
         };
-        let (expected_mm3, tolerance_mm3) = (domain.area() * domain.depth(), curved + 1e-9 * holes);
+        let (expected_mm3, tolerance_mm3) = (domain.area() * domain.depth(), curved + 1e-9 * volume.abs());
         // Written so that NaN fails.
         if !((volume - expected_mm3).abs() <= tolerance_mm3) {
             return Err(MeshError::VolumeMismatch { volume_mm3: volume, expected_mm3, tolerance_mm3 });
@@ -198,14 +197,9 @@ impl Mesh {
             // The extrusion runs along y or z: the other coordinates form the section.
             let along = sub3(at(2 * per_level), at(0));
             let is_y = along[1].abs() > along[2].abs();
-            let mut points: Vec<[f64; 2]> =
+            let points: Vec<[f64; 2]> =
                 (0..per_level).map(|n| at(per_level + n)).map(|p| [p[0], if is_y { p[2] } else { p[1] }]).collect();
-            if is_y {
-                // Levels descend in y, so that (x, z) is seen counter-clockwise already.
-                debug_assert!(along[1] < 0.0);
-            }
             let quality = scaled_jacobian(&points);
-            points.clear();
             worst = worst.min(quality);
             sum += quality;
             let length = |a: [f64; 3], b: [f64; 3]| sub3(a, b).iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -278,12 +272,8 @@ fn is_on_surface(domain: &Domain, positions: &[[f64; 3]]) -> bool {
     if domain.bottom == 0.0 && on_plane(domain.b_axis, 0.0) {
         return true;
     }
-    let on_profile = |sign: f64| {
-        positions.iter().all(|p| {
-            // The quadratic faces' centroid nodes of triangles do not occur here: side faces have nodes on the curve only.
-            (sign * p[domain.b_axis] - domain.half_width(p[0])).abs() < tolerance
-        })
-    };
+    let on_profile =
+        |sign: f64| positions.iter().all(|p| (sign * p[domain.b_axis] - domain.half_width(p[0])).abs() < tolerance);
     if on_profile(1.0) || (domain.bottom < 0.0 && on_profile(-1.0)) {
         return true;
     }

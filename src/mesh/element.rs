@@ -229,7 +229,7 @@ mod tests {
             for face in kind.faces() {
                 // All cross products of the face's edges with its plane vanish: rank of the differences is 2.
                 let [p, q] = [nodes[face[0]], nodes[*face.last().unwrap()]];
-                let r = nodes[face[face.len() / 2 + 1]];
+                let r = nodes[face[if face.len() == 9 { 2 } else { 1 }]];
                 let d = |x: [f64; 3]| [x[0] - p[0], x[1] - p[1], x[2] - p[2]];
                 let (u, v) = (d(q), d(r));
                 let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];

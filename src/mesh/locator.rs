@@ -226,3 +226,67 @@ fn clamp_inside(kind: ElementKind, [xi, eta]: [f64; 2]) -> Option<[f64; 2]> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::test_specimens::{Random, bar, dumbbell, two_holes, width_holes};
+    use crate::mesh::{MeshOptions, mesh_specimen};
+
+    /// Points made from reference coordinates are found again, in the same element or on its boundary.
+    #[test]
+    fn finds_points_again() {
+        let mut random = Random::new(7);
+        for (specimen, force_prisms) in
+            [(two_holes(), false), (two_holes(), true), (bar(), false), (width_holes(), false), (dumbbell(), false)]
+        {
+            let options = MeshOptions { force_prisms, ..MeshOptions::search(&specimen) };
+            let mesh = mesh_specimen(&specimen, &options).unwrap();
+            let locator = Locator::new(&mesh);
+            for element in 0..mesh.num_elements() {
+                for _ in 0..8 {
+                    let mut xi = [0; 3].map(|_| random.between(-1.0, 1.0));
+                    if mesh.element_kind == ElementKind::Prism21 {
+                        (xi[0], xi[1]) = (0.5 * (xi[0] + 1.0), 0.5 * (xi[1] + 1.0));
+                        if xi[0] + xi[1] > 1.0 {
+                            (xi[0], xi[1]) = (1.0 - xi[0], 1.0 - xi[1]);
+                        }
+                    }
+                    let point = position(&mesh, element, xi);
+                    let found = locator.locate(&mesh, point).unwrap();
+                    let back = position(&mesh, found.element as usize, found.reference_coordinates);
+                    for c in 0..3 {
+                        // Newton stops at 1e-12 of elements of a few mm.
+                        assert!((back[c] - point[c]).abs() < 1e-10);
+                    }
+                    let inside = xi.iter().all(|x| x.abs() < 0.999) && mesh.element_kind == ElementKind::Hex27;
+                    assert!(!inside || found.element as usize == element);
+                }
+            }
+            // Nodes lie on boundaries of elements and must be found too; points in the holes and outside must not.
+            assert!(mesh.nodes.iter().all(|&p| locator.locate(&mesh, p).is_some()));
+            for hole in &specimen.holes {
+                let other = if specimen.holes[0].axis == crate::specimen::HoleAxis::Width { 1 } else { 2 };
+                let mut p = [hole.center_mm[0], 0.0, 0.0];
+                p[other] = hole.center_mm[1];
+                assert!(locator.locate(&mesh, p).is_none());
+            }
+            let block = specimen.block;
+            assert!(locator.locate(&mesh, [0.51 * block.length_mm, 0.0, 0.0]).is_none());
+            assert!(locator.locate(&mesh, [0.3 * block.length_mm, 0.51 * block.thickness_mm, 0.1]).is_none());
+            assert!(locator.locate(&mesh, [f64::NAN, 0.0, 0.0]).is_none());
+            assert!(locator.locate(&mesh, [0.0, f64::NAN, 0.0]).is_none());
+        }
+    }
+
+    fn position(mesh: &Mesh, element: usize, xi: [f64; 3]) -> [f64; 3] {
+        let n = mesh.element_kind.shape_functions(xi);
+        let mut p = [0.0; 3];
+        for (&node, weight) in mesh.element(element).iter().zip(n) {
+            for c in 0..3 {
+                p[c] += weight * mesh.nodes[node as usize][c];
+            }
+        }
+        p
+    }
+}

@@ -14,6 +14,11 @@ mod quads;
 mod section;
 mod triangles;
 
+#[cfg(test)]
+mod layout_tests;
+#[cfg(test)]
+mod test_specimens;
+
 pub use build::mesh_specimen;
 pub use check::MeshQuality;
 pub use element::ElementKind;

@@ -195,3 +195,100 @@ fn smooth_minimum(distances: impl Iterator<Item = f64>) -> f64 {
     }
     if sum > 0.0 { sum.powf(-0.25) } else { f64::INFINITY }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::test_specimens::{bar, dumbbell, off_axis, solid, two_holes, width_holes};
+    use crate::mesh::{MeshOptions, mesh_specimen};
+    use std::f64::consts::PI;
+
+    fn volume_rate(specimen: &Specimen, variable: DesignVariable) -> (Mesh, f64) {
+        let mesh = mesh_specimen(specimen, &MeshOptions::standard(specimen)).unwrap();
+        let velocity = shape_velocity(&mesh, specimen, variable);
+        let h = 1e-4;
+        let (plus, minus) = (morphed(&mesh, &velocity, h), morphed(&mesh, &velocity, -h));
+        let rate = (plus.volume() - minus.volume()) / (2.0 * h);
+        (mesh, rate)
+    }
+
+    fn set(specimen: &Specimen, variable: DesignVariable, step: f64) -> Specimen {
+        let mut s = specimen.clone();
+        match variable {
+            DesignVariable::HoleX(i) => s.holes[i].center_mm[0] += step,
+            DesignVariable::HoleOther(i) => s.holes[i].center_mm[1] += step,
+            DesignVariable::HoleDiameter(i) => s.holes[i].diameter_mm += step,
+            DesignVariable::BlockLength => s.block.length_mm += step,
+            DesignVariable::BlockThickness => s.block.thickness_mm += step,
+            DesignVariable::BlockWidth => s.block.width_mm += step,
+        }
+        s
+    }
+
+    /// The morphed mesh passes the whole check of the changed specimen: walls are circles of the new size and place,
+    /// outer faces are planes, node sets are complete, the volume is right.
+    #[test]
+    fn the_morphed_mesh_is_a_mesh_of_the_changed_specimen() {
+        use DesignVariable::*;
+        for specimen in [two_holes(), bar(), width_holes(), off_axis(), solid()] {
+            let mut variables = vec![BlockLength, BlockThickness, BlockWidth];
+            for i in 0..specimen.holes.len() {
+                variables.extend([HoleX(i), HoleOther(i), HoleDiameter(i)]);
+            }
+            for force_prisms in [false, true] {
+                let options = MeshOptions { force_prisms, ..MeshOptions::search(&specimen) };
+                let mesh = mesh_specimen(&specimen, &options).unwrap();
+                for &variable in &variables {
+                    let antisymmetric = matches!(variable, HoleOther(_)) && (mesh.mirror.z || mesh.mirror.y);
+                    if antisymmetric
+                        && !(specimen.test == crate::specimen::TestKind::DoubleLapShear
+                            && mesh.nodes.iter().any(|p| p[1] < 0.0 && p[2] < 0.0))
+                        && specimen.holes[0].axis == HoleAxis::Thickness
+                    {
+                        continue;
+                    }
+                    let step = 0.05;
+                    let velocity = shape_velocity(&mesh, &specimen, variable);
+                    let moved = morphed(&mesh, &velocity, step);
+                    let result = moved.check(&set(&specimen, variable, step));
+                    assert!(result.is_ok(), "{variable:?} of {}: {result:?}", specimen.name);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn volume_derivatives_are_the_closed_forms() {
+        let s = two_holes();
+        let [l, t, w] = [s.block.length_mm, s.block.thickness_mm, s.block.width_mm];
+        let r = 0.5 * s.holes[0].diameter_mm;
+        let section = l * w - 2.0 * PI * r * r;
+        // (variable, derivative of half of the volume)
+        for (variable, expected) in [
+            (DesignVariable::HoleX(0), 0.0),
+            (DesignVariable::HoleDiameter(1), -0.5 * PI * r * t),
+            (DesignVariable::BlockLength, 0.5 * t * w),
+            (DesignVariable::BlockThickness, 0.5 * section),
+            (DesignVariable::BlockWidth, 0.5 * l * t),
+        ] {
+            let (_, rate) = volume_rate(&s, variable);
+            // Quadratic arcs of 30° miss 1e-4 of a hole's area.
+            assert!((rate - expected).abs() < 3e-4 * expected.abs() + 1e-6, "{variable:?}: {rate} {expected}");
+        }
+        let s = width_holes();
+        let (_, rate) = volume_rate(&s, DesignVariable::HoleDiameter(1));
+        let expected = -0.5 * PI * s.holes[1].diameter_mm * 0.5 * s.block.width_mm;
+        assert!((rate - expected).abs() < 3e-4 * expected.abs());
+    }
+
+    #[test]
+    fn a_dumbbell_keeps_its_outline() {
+        let s = dumbbell();
+        let mesh = mesh_specimen(&s, &MeshOptions::standard(&s)).unwrap();
+        let velocity = shape_velocity(&mesh, &s, DesignVariable::BlockLength);
+        let moved = morphed(&mesh, &velocity, 0.5);
+        moved.check(&set(&s, DesignVariable::BlockLength, 0.5)).unwrap();
+        assert!(shape_velocity(&mesh, &s, DesignVariable::BlockWidth).iter().flatten().all(|v| *v == 0.0));
+        assert!(shape_velocity(&mesh, &s, DesignVariable::HoleX(3)).iter().flatten().all(|v| *v == 0.0));
+    }
+}

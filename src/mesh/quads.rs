@@ -275,14 +275,15 @@ impl Layout<'_> {
             }
             let last = points.len() - 1;
             let angles = arc_angles(disc, &points);
-            // How far the radial steps are graded towards the outer boundary: fully on an outer edge, and fading along
-            // an inner edge away from its ends on the outer boundary.
+            // How far the radial steps are graded towards the outer boundary: fully on an outer edge, and fading to
+            // nothing at the middle of an inner edge from its ends on the outer boundary.
             let [ends_u, ends_v] = [points[0], points[last]].map(|p| self.ratio(self.outer_sides(p)));
             let outer = self.ratio(self.outer_sides(points[0]) & self.outer_sides(points[last]));
             let steps: Vec<Vec<f64>> = (0..=last)
                 .map(|i| {
                     let s = i as f64 / last as f64;
-                    let fade = (ends_u.ln() * (1.0 - s) + ends_v.ln() * s).min(outer.ln()).exp();
+                    let from_ends = ends_u.ln() * (1.0 - 2.0 * s).max(0.0) + ends_v.ln() * (2.0 * s - 1.0).max(0.0);
+                    let fade = from_ends.min(outer.ln()).exp();
                     if fade < 1.0 - 1e-12 {
                         let graded = with_middles(&divide(layers, wall, self.ratio(15)));
                         // Between "graded at the wall only" and "graded at both ends".

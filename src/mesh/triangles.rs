@@ -14,6 +14,10 @@ use super::section::{Section, sub};
 const ANGLE_LIMIT_DEG: f64 = 30.0;
 /// Boundary parts are at most this fraction of the distance to the next wall.
 const GAP_FRACTION: f64 = 0.9;
+/// Arcs of triangles span at most this part of a circle.
+const MIN_SEGMENTS: f64 = 12.0;
+/// Factors on the sizes of arcs and of parts beside gaps that are tried in turn.
+const BOUNDARY_FINENESS: [f64; 5] = [1.0, 0.8, 0.65, 0.5, 0.35];
 
 /// A curve of the boundary.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,12 +57,39 @@ impl Curve {
 /// A boundary part between two boundary points, by their indices.
 type BoundaryEdges = HashMap<(usize, usize), (Curve, f64)>;
 
-/// Triangulates the section.
+/// Triangulates the section, with finer and finer boundary parts until no triangle is worse than
+/// `options.min_scaled_jacobian`; a long arc takes half its angle away from the corners of its triangle. If none is good
+/// enough, the best is returned.
 ///
 /// # Errors
 /// [`MeshError::TooManyElements`], [`MeshError::Triangulation`], [`MeshError::RefinementIncomplete`].
 pub(super) fn triangle_section(domain: &Domain, options: &MeshOptions) -> Result<Section, MeshError> {
-    let (points, edges) = divide_boundary(domain, options)?;
+    let mut best: Option<(f64, Section)> = None;
+    let mut failure = None;
+    for fineness in BOUNDARY_FINENESS {
+        match triangulate(domain, options, fineness) {
+            Ok(section) => {
+                let (worst, _) = section.min_scaled_jacobian();
+                if worst >= options.min_scaled_jacobian {
+                    return Ok(section);
+                }
+                if best.as_ref().is_none_or(|(w, _)| worst > *w) {
+                    best = Some((worst, section));
+                }
+            }
+            // The first failure is at the size that was asked for.
+            Err(error) => failure = failure.or(Some(error)),
+        }
+    }
+    match (best, failure) {
+        (Some((_, section)), _) => Ok(section),
+        (None, Some(error)) => Err(error),
+        (None, None) => Err(MeshError::RefinementIncomplete { limit: 0 }),
+    }
+}
+
+fn triangulate(domain: &Domain, options: &MeshOptions, fineness: f64) -> Result<Section, MeshError> {
+    let (points, edges) = divide_boundary(domain, options, fineness)?;
     let limit = options.max_elements / options.levels.div_ceil(2);
     let area = 0.5 * options.section_size_mm.powi(2);
     if domain.area() / area > limit as f64 {
@@ -186,12 +217,16 @@ fn side(domain: &Domain, upper: bool, from: f64, to: f64) -> Curve {
 }
 
 /// Boundary points and the parts between them; each part remembers its curve and the parameter of its middle.
-fn divide_boundary(domain: &Domain, options: &MeshOptions) -> Result<(Vec<[f64; 2]>, BoundaryEdges), MeshError> {
+fn divide_boundary(
+    domain: &Domain,
+    options: &MeshOptions,
+    fineness: f64,
+) -> Result<(Vec<[f64; 2]>, BoundaryEdges), MeshError> {
     let (mut points, mut edges) = (Vec::new(), BoundaryEdges::new());
     for curves in boundary_loops(domain) {
         let first = points.len();
         for &curve in &curves {
-            for pair in parameters(domain, options, curve)?.windows(2) {
+            for pair in parameters(domain, options, fineness, curve)?.windows(2) {
                 edges.insert((points.len(), points.len() + 1), (curve, 0.5 * (pair[0] + pair[1])));
                 points.push(curve.at(domain, pair[0]));
             }
@@ -206,7 +241,7 @@ fn divide_boundary(domain: &Domain, options: &MeshOptions) -> Result<(Vec<[f64; 
 }
 
 /// Parameters that divide a curve into parts of the local size, by equal shares of ∫ ds / size.
-fn parameters(domain: &Domain, options: &MeshOptions, curve: Curve) -> Result<Vec<f64>, MeshError> {
+fn parameters(domain: &Domain, options: &MeshOptions, fineness: f64, curve: Curve) -> Result<Vec<f64>, MeshError> {
     const SAMPLES: usize = 256;
     let point = |i: usize| curve.at(domain, i as f64 / SAMPLES as f64);
     let mut shares = vec![0.0];
@@ -215,7 +250,7 @@ fn parameters(domain: &Domain, options: &MeshOptions, curve: Curve) -> Result<Ve
         let (p, q) = (point(i), point(i + 1));
         let step = sub(q, p);
         let middle = [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])];
-        sum += step[0].hypot(step[1]) / local_size(domain, options, curve, middle);
+        sum += step[0].hypot(step[1]) / local_size(domain, options, fineness, curve, middle);
         shares.push(sum);
     }
     if sum > options.max_elements as f64 {
@@ -238,7 +273,8 @@ fn parameters(domain: &Domain, options: &MeshOptions, curve: Curve) -> Result<Ve
 
 /// Length wanted for a part of `curve` at `p`: the element size (finer on graded sides), the holes' own resolution, and
 /// no more than the gap to the next wall.
-fn local_size(domain: &Domain, options: &MeshOptions, curve: Curve, p: [f64; 2]) -> f64 {
+fn local_size(domain: &Domain, options: &MeshOptions, fineness: f64, curve: Curve, p: [f64; 2]) -> f64 {
+    let arc = |radius: f64| fineness * 2.0 * PI * radius / (options.hole_segments as f64).max(MIN_SEGMENTS);
     let mut size = options.section_size_mm;
     let mut own = None;
     let mut gap = f64::INFINITY;
@@ -246,7 +282,7 @@ fn local_size(domain: &Domain, options: &MeshOptions, curve: Curve, p: [f64; 2])
         Curve::Arc { disc, .. } => {
             own = Some(disc);
             let d = &domain.discs[disc];
-            size = size.min(2.0 * PI * d.radius / options.hole_segments as f64);
+            size = size.min(arc(d.radius));
             gap = domain.outline_distance(p);
             if domain.bottom == 0.0 && !d.is_half {
                 gap = gap.min(p[1]);
@@ -261,11 +297,11 @@ fn local_size(domain: &Domain, options: &MeshOptions, curve: Curve, p: [f64; 2])
             // On the mirror line the wall of a half hole starts: no gap there.
             let touches = d.is_half && domain.bottom == 0.0 && p[1].abs() < 1e-12;
             if touches {
-                size = size.min(2.0 * PI * d.radius / options.hole_segments as f64 + 0.5 * distance.max(0.0));
+                size = size.min(arc(d.radius) + 0.5 * distance.max(0.0));
             } else {
                 gap = gap.min(distance);
             }
         }
     }
-    size.min((GAP_FRACTION * gap).max(1e-4 * domain.scale()))
+    size.min((fineness * GAP_FRACTION * gap).max(1e-4 * domain.scale()))
 }
