@@ -39,8 +39,7 @@ pub fn principal_stretches(deformation_gradient: &Tensor) -> [f64; 3] {
     for _ in 0..20 {
         let mut is_orthogonal = true;
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            let (a, b, c) =
-                (dot(columns[p], columns[p]), dot(columns[q], columns[q]), dot(columns[p], columns[q]));
+            let (a, b, c) = (dot(columns[p], columns[p]), dot(columns[q], columns[q]), dot(columns[p], columns[q]));
             if c.abs() <= f64::EPSILON * (a * b).sqrt() {
                 continue;
             }

@@ -56,10 +56,8 @@ pub struct Covariance {
 impl Covariance {
     pub(super) fn of(information: &FisherInformation) -> Self {
         let n = information.parameters().len();
-        let scales: Vec<f64> =
-            information.values().iter().map(|v| if v.abs() > 0.0 { v.abs() } else { 1.0 }).collect();
-        let relative_information =
-            DMatrix::from_fn(n, n, |i, j| scales[i] * information.matrix()[(i, j)] * scales[j]);
+        let scales: Vec<f64> = information.values().iter().map(|v| if v.abs() > 0.0 { v.abs() } else { 1.0 }).collect();
+        let relative_information = DMatrix::from_fn(n, n, |i, j| scales[i] * information.matrix()[(i, j)] * scales[j]);
         // A parameter without any information has a zero row; it takes no part in the inverse.
         let known: Vec<usize> = (0..n).filter(|&i| relative_information[(i, i)] > 0.0).collect();
         let root: Vec<f64> = known.iter().map(|&i| relative_information[(i, i)].sqrt()).collect();

@@ -3,13 +3,12 @@
 use super::continuum::largest_principal_stretch;
 use super::covariance::{IDENTIFIABILITY_LIMIT, PromisedSd};
 use super::information::{FisherInformation, InformationError, ScanSettings};
-use super::observation::{DriveMaps, EvaluationStep, median, observe};
+use super::observation::{DriveMaps, DrivenState, EvaluationStep, Scanner};
 use crate::fem::{Equilibrium, ForwardModel, SolveError, SolveOptions};
-use crate::kinematics::decompose;
 use crate::material::{Ogden, Parameter};
 use crate::mesh::{MeshError, MeshOptions, mesh_specimen};
 use crate::specimen::{Specimen, TestKind};
-use crate::voxel::{Sampling, VoxelError, VoxelMask, VoxelOperator};
+use crate::voxel::{Sampling, VoxelError, VoxelMask};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -226,9 +225,7 @@ pub fn evaluate_model(
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<(Evaluation, EvaluationMaps), EvaluationError> {
     check_drives(drives)?;
-    let mask = VoxelMask::covering(specimen, scan.voxel_mm)?;
-    let operator = VoxelOperator::new(specimen, model.mesh(), &mask, options.sampling)?;
-    let weights = scan.partial_voxels.weights(&mask);
+    let scanner = Scanner::new(specimen, model.mesh(), scan, options.sampling)?;
     let (equilibria, num_equilibria) = match drives {
         DriveSelection::DriveMm(drives_mm) => {
             let path = model.solve_path(material, drives_mm, &options.solve, is_cancelled)?;
@@ -237,7 +234,7 @@ pub fn evaluate_model(
         }
         DriveSelection::MedianStretch(target) => {
             let (found, count) =
-                solve_for_median(model, specimen, material, &operator, *target, &options.solve, is_cancelled)?;
+                solve_for_median(model, specimen, material, &scanner, *target, &options.solve, is_cancelled)?;
             (vec![found], count)
         }
     };
@@ -249,17 +246,14 @@ pub fn evaluate_model(
     for equilibrium in &equilibria {
         let sensitivities = model.material_sensitivities(material, equilibrium)?;
         let stretch = largest_principal_stretch(&model.quadrature_fields(material, equilibrium));
-        let seen = observe(
-            material,
-            &mask,
-            &operator,
-            &weights,
-            &scan.noise(),
-            equilibrium,
-            &sensitivities,
-            stretch,
-            options.identifiability_limit,
-        )?;
+        let state = DrivenState {
+            drive_mm: equilibrium.drive_mm,
+            force_n: equilibrium.force_n,
+            displacement: &equilibrium.displacement,
+            sensitivities: &sensitivities,
+            largest_principal_stretch: stretch,
+        };
+        let seen = scanner.observe(material, &state, options.identifiability_limit)?;
         information.add(&seen.information)?;
         information_by_drive.push(seen.information);
         steps.push(seen.step);
@@ -273,7 +267,7 @@ pub fn evaluate_model(
         condition_number: covariance.condition_number(&information.shear_indices()),
         largest_principal_stretch: steps.iter().map(|s| s.largest_principal_stretch).fold(f64::NAN, f64::max),
         steps,
-        voxel_material_volume_mm3: mask.material_volume_mm3(),
+        voxel_material_volume_mm3: scanner.mask.material_volume_mm3(),
         scan: *scan,
         notes: EvaluationNotes::default(),
         statistics: EvaluationStatistics {
@@ -281,13 +275,13 @@ pub fn evaluate_model(
             num_nodes: model.mesh().nodes.len(),
             num_unknowns: model.num_unknowns(),
             num_equilibria,
-            num_sample_points: operator.num_points(),
-            num_dropped_points: operator.num_dropped_points(),
+            num_sample_points: scanner.operator.num_points(),
+            num_dropped_points: scanner.operator.num_dropped_points(),
         },
         version: env!("CARGO_PKG_VERSION").into(),
         input_hash: input_hash(specimen, material, scan, drives, options),
     };
-    Ok((evaluation, EvaluationMaps { mask, drives: maps, equilibria, information, information_by_drive }))
+    Ok((evaluation, EvaluationMaps { mask: scanner.mask, drives: maps, equilibria, information, information_by_drive }))
 }
 
 fn check_drives(drives: &DriveSelection) -> Result<(), EvaluationError> {
@@ -329,7 +323,7 @@ fn solve_for_median(
     model: &mut ForwardModel,
     specimen: &Specimen,
     material: &Ogden,
-    operator: &VoxelOperator,
+    scanner: &Scanner,
     target: f64,
     options: &SolveOptions,
     is_cancelled: &dyn Fn() -> bool,
@@ -338,10 +332,10 @@ fn solve_for_median(
     let mut count = 0;
     find_drive(homogeneous_drive_mm(specimen, target), target, |drive_mm| {
         let found = model.solve(material, drive_mm, last.as_ref(), options, is_cancelled)?;
-        let gradients = operator.deformation_gradients(&found.displacement)?;
+        let median = scanner.median_stretch(&found.displacement)?;
         last = Some(found);
         count += 1;
-        Ok(median(gradients.iter().map(|f| decompose(f).stretch_amplitude)).unwrap_or(1.0))
+        Ok(median)
     })?;
     // `find_drive` succeeds only after at least one solve.
     last.map(|equilibrium| (equilibrium, count)).ok_or(EvaluationError::NoDrive)

@@ -234,10 +234,10 @@ impl FisherInformation {
     /// # Errors
     /// [`InformationError::UnknownParameter`].
     pub fn index_of(&self, parameter: Parameter) -> Result<usize, InformationError> {
-        self.parameters.iter().position(|p| *p == parameter).ok_or_else(|| InformationError::UnknownParameter {
-            parameter: parameter.name(),
-            known: self.names(),
-        })
+        self.parameters
+            .iter()
+            .position(|p| *p == parameter)
+            .ok_or_else(|| InformationError::UnknownParameter { parameter: parameter.name(), known: self.names() })
     }
 
     /// Indices of all μᵢ and αᵢ: the usual subset of the criteria, with κ as a nuisance.

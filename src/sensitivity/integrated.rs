@@ -131,8 +131,7 @@ mod tests {
         .unwrap();
         for parameter in shear_parameters(&material()) {
             let sum: f64 = sensitivity_map(&material(), parameter, &states).iter().sum();
-            let bins =
-                histogram.sum_over_bins(|l, k| parameter_sensitivity(&material(), parameter, l, Some(k)).value);
+            let bins = histogram.sum_over_bins(|l, k| parameter_sensitivity(&material(), parameter, l, Some(k)).value);
             // Bin width 0.0025 in λ: at most half of it times the logarithmic slope (below 20), mostly cancelling.
             assert!((bins / sum - 1.0).abs() < 2e-3);
         }

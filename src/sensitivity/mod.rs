@@ -18,5 +18,5 @@ pub use evaluation::{
 };
 pub use information::{FisherInformation, InformationError, MeasurementNoise, PartialVoxels, ScanSettings};
 pub use integrated::{IntegratedSensitivity, integrate_over_voxels, parameter_sensitivity, sensitivity_map};
-pub use observation::{DriveMaps, EvaluationStep, Observation, median, observe};
+pub use observation::{DriveMaps, DrivenState, EvaluationStep, Observation, Scanner, median};
 pub use pointwise::{PointwiseSensitivity, alpha_sensitivity, mu_sensitivity};

@@ -2,12 +2,14 @@
 
 use super::covariance::PromisedSd;
 use super::evaluation::EvaluationError;
-use super::information::{FisherInformation, MeasurementNoise};
+use super::information::{FisherInformation, MeasurementNoise, ScanSettings};
 use super::integrated::{IntegratedSensitivity, integrate_over_voxels, sensitivity_map, shear_parameters};
-use crate::fem::{Equilibrium, ParameterSensitivity};
+use crate::fem::ParameterSensitivity;
 use crate::kinematics::{Decomposition, decompose};
 use crate::material::{Ogden, Parameter};
-use crate::voxel::{Histogram2d, HistogramAxis, VoxelMask, VoxelOperator};
+use crate::mesh::Mesh;
+use crate::specimen::Specimen;
+use crate::voxel::{Histogram2d, HistogramAxis, Sampling, VoxelError, VoxelMask, VoxelOperator};
 use serde::{Deserialize, Serialize};
 
 /// Bins of the (λ, k) histogram.
@@ -78,55 +80,97 @@ pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     Some(if n % 2 == 1 { sorted[n / 2] } else { 0.5 * (sorted[n / 2 - 1] + sorted[n / 2]) })
 }
 
-/// Observes an equilibrium through the scan.
-///
-/// `sensitivities` are those of [`crate::fem::ForwardModel::material_sensitivities`]; `weights` come from
-/// [`super::PartialVoxels::weights`]; `largest_principal_stretch` from [`super::largest_principal_stretch`].
-///
-/// # Errors
-/// Lengths that do not match, noise that is not positive: [`EvaluationError::Voxel`],
-/// [`EvaluationError::Information`].
-#[expect(clippy::too_many_arguments, reason = "the parts of a measurement; a struct would only rename them")]
-pub fn observe(
-    material: &Ogden,
-    mask: &VoxelMask,
-    operator: &VoxelOperator,
-    weights: &[f64],
-    noise: &MeasurementNoise,
-    equilibrium: &Equilibrium,
-    sensitivities: &[ParameterSensitivity],
-    largest_principal_stretch: f64,
-    identifiability_limit: f64,
-) -> Result<Observation, EvaluationError> {
-    let states: Vec<Decomposition> =
-        operator.deformation_gradients(&equilibrium.displacement)?.iter().map(decompose).collect();
-    let displacement = operator.average(&equilibrium.displacement)?;
-    let fields =
-        sensitivities.iter().map(|s| operator.average(&s.displacement)).collect::<Result<Vec<_>, _>>()?;
-    let forces: Vec<f64> = sensitivities.iter().map(|s| s.force_n).collect();
-    let information = FisherInformation::of_drive(material, &fields, weights, &forces, noise)?;
-    let largest = states.iter().map(|s| s.stretch_amplitude).fold(1.0, f64::max);
-    let end = ((largest - 1.0) / STRETCH_AXIS_STEP).ceil().max(1.0) * STRETCH_AXIS_STEP + 1.0;
-    let histogram = Histogram2d::of(
-        states.iter().map(|s| (s.stretch_amplitude, s.deformation_mode)),
-        HistogramAxis { low: 1.0, high: end, num_bins: STRETCH_BINS },
-        HistogramAxis { low: 0.0, high: 1.0, num_bins: MODE_BINS },
-    )?;
-    let step = EvaluationStep {
-        drive_mm: equilibrium.drive_mm,
-        force_n: equilibrium.force_n,
-        num_voxels: states.len(),
-        median_stretch: median(states.iter().map(|s| s.stretch_amplitude)).unwrap_or(1.0),
-        median_mode: median(states.iter().filter_map(|s| s.deformation_mode)),
-        largest_voxel_stretch: largest,
-        largest_principal_stretch,
-        num_voxels_without_mode: states.iter().filter(|s| s.deformation_mode.is_none()).count(),
-        integrated_sensitivity: integrate_over_voxels(material, &states, mask),
-        promised_sd: information.covariance().promised_sd(identifiability_limit),
-    };
-    let sensitivities = shear_parameters(material).map(|p| (p, sensitivity_map(material, p, &states))).collect();
-    let maps = DriveMaps { drive_mm: equilibrium.drive_mm, displacement, states, sensitivities, histogram };
-    Ok(Observation { step, maps, information })
+/// A solved drive, as the scan is to see it.
+#[derive(Clone, Copy, Debug)]
+pub struct DrivenState<'a> {
+    /// Drive, mm.
+    pub drive_mm: f64,
+    /// Force of all samples together, N.
+    pub force_n: f64,
+    /// Nodal displacements, mm.
+    pub displacement: &'a [[f64; 3]],
+    /// From [`crate::fem::ForwardModel::material_sensitivities`].
+    pub sensitivities: &'a [ParameterSensitivity],
+    /// From [`super::largest_principal_stretch`].
+    pub largest_principal_stretch: f64,
+}
+
+/// The scan of one specimen on one mesh: its mask and how it weighs what it sees.
+#[derive(Clone, Debug)]
+pub struct Scanner {
+    /// Grid and mask.
+    pub mask: VoxelMask,
+    /// Voxel averages of fields on the mesh.
+    pub operator: VoxelOperator,
+    noise: MeasurementNoise,
+    weights: Vec<f64>,
+}
+
+impl Scanner {
+    /// Centred grid, mask and operator. `mesh` is a mesh of `specimen`.
+    ///
+    /// # Errors
+    /// See [`VoxelError`].
+    pub fn new(specimen: &Specimen, mesh: &Mesh, scan: &ScanSettings, sampling: Sampling) -> Result<Self, VoxelError> {
+        let mask = VoxelMask::covering(specimen, scan.voxel_mm)?;
+        let operator = VoxelOperator::new(specimen, mesh, &mask, sampling)?;
+        let weights = scan.partial_voxels.weights(&mask);
+        Ok(Scanner { mask, operator, noise: scan.noise(), weights })
+    }
+
+    /// Median of λ over voxels for nodal displacements in mm; 1 where no voxel is admissible.
+    ///
+    /// # Errors
+    /// [`VoxelError::LengthMismatch`].
+    pub fn median_stretch(&self, displacement: &[[f64; 3]]) -> Result<f64, VoxelError> {
+        let gradients = self.operator.deformation_gradients(displacement)?;
+        Ok(median(gradients.iter().map(|f| decompose(f).stretch_amplitude)).unwrap_or(1.0))
+    }
+
+    /// Observes a solved drive.
+    ///
+    /// # Errors
+    /// Lengths that do not match, noise that is not positive: [`EvaluationError::Voxel`],
+    /// [`EvaluationError::Information`].
+    pub fn observe(
+        &self,
+        material: &Ogden,
+        state: &DrivenState,
+        identifiability_limit: f64,
+    ) -> Result<Observation, EvaluationError> {
+        let states: Vec<Decomposition> =
+            self.operator.deformation_gradients(state.displacement)?.iter().map(decompose).collect();
+        let displacement = self.operator.average(state.displacement)?;
+        let fields = state
+            .sensitivities
+            .iter()
+            .map(|s| self.operator.average(&s.displacement))
+            .collect::<Result<Vec<_>, _>>()?;
+        let forces: Vec<f64> = state.sensitivities.iter().map(|s| s.force_n).collect();
+        let information = FisherInformation::of_drive(material, &fields, &self.weights, &forces, &self.noise)?;
+        let largest = states.iter().map(|s| s.stretch_amplitude).fold(1.0, f64::max);
+        let end = ((largest - 1.0) / STRETCH_AXIS_STEP).ceil().max(1.0) * STRETCH_AXIS_STEP + 1.0;
+        let histogram = Histogram2d::of(
+            states.iter().map(|s| (s.stretch_amplitude, s.deformation_mode)),
+            HistogramAxis { low: 1.0, high: end, num_bins: STRETCH_BINS },
+            HistogramAxis { low: 0.0, high: 1.0, num_bins: MODE_BINS },
+        )?;
+        let step = EvaluationStep {
+            drive_mm: state.drive_mm,
+            force_n: state.force_n,
+            num_voxels: states.len(),
+            median_stretch: median(states.iter().map(|s| s.stretch_amplitude)).unwrap_or(1.0),
+            median_mode: median(states.iter().filter_map(|s| s.deformation_mode)),
+            largest_voxel_stretch: largest,
+            largest_principal_stretch: state.largest_principal_stretch,
+            num_voxels_without_mode: states.iter().filter(|s| s.deformation_mode.is_none()).count(),
+            integrated_sensitivity: integrate_over_voxels(material, &states, &self.mask),
+            promised_sd: information.covariance().promised_sd(identifiability_limit),
+        };
+        let sensitivities = shear_parameters(material).map(|p| (p, sensitivity_map(material, p, &states))).collect();
+        let maps = DriveMaps { drive_mm: state.drive_mm, displacement, states, sensitivities, histogram };
+        Ok(Observation { step, maps, information })
+    }
 }
 
 #[cfg(test)]
@@ -143,17 +187,22 @@ mod tests {
     fn homogeneous_shear_is_observed_exactly() {
         let specimen = block("observed");
         let mesh = mesh_specimen(&specimen, &MeshOptions::search(&specimen)).unwrap();
-        let mask = VoxelMask::covering(&specimen, [1.0, 0.25, 0.75]).unwrap();
-        let operator = VoxelOperator::new(&specimen, &mesh, &mask, Sampling::default()).unwrap();
+        let scan = ScanSettings {
+            voxel_mm: [1.0, 0.25, 0.75],
+            noise_sd_mm: [0.05; 3],
+            force_sd_n: 0.02,
+            partial_voxels: PartialVoxels::Uniform,
+        };
+        let scanner = Scanner::new(&specimen, &mesh, &scan, Sampling::default()).unwrap();
         let displacement: Vec<[f64; 3]> = mesh.nodes.iter().map(|x| [0.6 * x[1], 0.0, 0.0]).collect();
-        let stretch = largest_principal_stretch(&quadrature_points(&mesh, &displacement));
-        let equilibrium = Equilibrium { drive_mm: 2.4, displacement, pressure: vec![], force_n: 1.5 };
-        let noise = MeasurementNoise { displacement_sd_mm: [0.05; 3], force_sd_n: 0.02 };
-        let weights = PartialVoxels::Uniform.weights(&mask);
-        let sensitivities = made_up_sensitivities(&mesh);
-        let seen =
-            observe(&one_term(), &mask, &operator, &weights, &noise, &equilibrium, &sensitivities, stretch, 0.5)
-                .unwrap();
+        let state = DrivenState {
+            drive_mm: 2.4,
+            force_n: 1.5,
+            displacement: &displacement,
+            sensitivities: &made_up_sensitivities(&mesh),
+            largest_principal_stretch: largest_principal_stretch(&quadrature_points(&mesh, &displacement)),
+        };
+        let seen = scanner.observe(&one_term(), &state, 0.5).unwrap();
         let lambda = 0.3 + 1.09f64.sqrt();
         assert_eq!(seen.step.num_voxels, 12 * 16 * 12);
         // Affine fields are exact on every mesh; rounding only.

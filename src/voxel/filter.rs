@@ -83,8 +83,7 @@ impl HammingFilter {
                 }
             }
             if is_kept(voxel, filter.sources.len() - first) {
-                let filled: f64 =
-                    filter.sources[first..].iter().map(|&s| acquired.material_fraction[s as usize]).sum();
+                let filled: f64 = filter.sources[first..].iter().map(|&s| acquired.material_fraction[s as usize]).sum();
                 filter.filtered.voxels.push(voxel as u32);
                 filter.filtered.material_fraction.push(filled / 8.0);
                 filter.offsets.push(filter.sources.len() as u32);

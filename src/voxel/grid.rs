@@ -126,9 +126,6 @@ mod tests {
             let error = VoxelGrid::covering(&solid(), [1.0, bad, 1.0]).unwrap_err();
             assert!(matches!(error, VoxelError::InvalidVoxel { axis: 'y', .. }));
         }
-        assert!(matches!(
-            VoxelGrid::covering(&solid(), [1e-9; 3]).unwrap_err(),
-            VoxelError::TooManyVoxels { .. }
-        ));
+        assert!(matches!(VoxelGrid::covering(&solid(), [1e-9; 3]).unwrap_err(), VoxelError::TooManyVoxels { .. }));
     }
 }

@@ -94,8 +94,7 @@ impl Histogram2d {
 
     /// log₁₀ of the density (voxels in the bin / all voxels / bin area), in the order of `counts`; none for empty bins.
     pub fn log10_density(&self) -> Vec<Option<f64>> {
-        let scale =
-            self.num_voxels() as f64 * self.stretch_amplitude.bin_width() * self.deformation_mode.bin_width();
+        let scale = self.num_voxels() as f64 * self.stretch_amplitude.bin_width() * self.deformation_mode.bin_width();
         self.counts.iter().map(|&n| (n > 0).then(|| (n as f64 / scale).log10())).collect()
     }
 

@@ -54,19 +54,14 @@ impl VoxelMask {
         Self::select(specimen, grid, |index, fraction| flags[index] && fraction > 0.0 && fraction >= least_fraction)
     }
 
-    fn select(
-        specimen: &Specimen,
-        grid: VoxelGrid,
-        is_kept: impl Fn(usize, f64) -> bool,
-    ) -> Result<Self, VoxelError> {
+    fn select(specimen: &Specimen, grid: VoxelGrid, is_kept: impl Fn(usize, f64) -> bool) -> Result<Self, VoxelError> {
         let section = Section::new(specimen);
         // Filled part of the section's rectangle per column, and of the voxel's edge per layer.
         let (num_across, num_along) = (grid.shape[section.across], grid.shape[section.along]);
         let mut column_fraction = Vec::with_capacity(grid.shape[0] * num_across);
         for b in 0..num_across {
             for i in 0..grid.shape[0] {
-                let (x, across) =
-                    (clipped(&grid, &section, 0, i), clipped(&grid, &section, section.across, b));
+                let (x, across) = (clipped(&grid, &section, 0, i), clipped(&grid, &section, section.across, b));
                 let area = match section.overlap(x, across) {
                     Overlap::Full => (x[1] - x[0]) * (across[1] - across[0]),
                     Overlap::Cut => section.area(x, across, FRACTION_SLICES),
@@ -84,8 +79,7 @@ impl VoxelMask {
         let (mut voxels, mut material_fraction) = (Vec::new(), Vec::new());
         for index in 0..grid.num_voxels() {
             let n = grid.indices(index);
-            let fraction =
-                column_fraction[n[0] + grid.shape[0] * n[section.across]] * layer_fraction[n[section.along]];
+            let fraction = column_fraction[n[0] + grid.shape[0] * n[section.across]] * layer_fraction[n[section.along]];
             if is_kept(index, fraction) {
                 voxels.push(index as u32);
                 material_fraction.push(fraction.min(1.0));
@@ -183,19 +177,30 @@ pub(crate) mod tests {
     /// own offset) lies within the scatter.
     #[test]
     fn recording_grid_gives_the_recording_mask() {
-        let grid =
-            VoxelGrid::new([-14.90630531, -3.61303687, -10.99919987], PUBLISHED_VOXEL, [30, 39, 30]).unwrap();
+        let grid = VoxelGrid::new([-14.90630531, -3.61303687, -10.99919987], PUBLISHED_VOXEL, [30, 39, 30]).unwrap();
         let mask = VoxelMask::of_specimen(&two_hole(), grid).unwrap();
         // The recordings' masks were sampled with their own rule: a few columns at the hole walls may differ.
         assert!((mask.num_voxels() as f64 - 20_366.0).abs() < 80.0, "{}", mask.num_voxels());
     }
 
+    /// The dumb-bell's filled parts add up to its area × thickness.
+    #[test]
+    fn dumbbell_adds_up() {
+        let specimen = Specimen {
+            test: TestKind::Uniaxial,
+            block: Block { length_mm: 35.0, thickness_mm: 2.0, width_mm: 6.0 },
+            outline: Outline::Iso37Type4,
+            ..solid()
+        };
+        let grid = VoxelGrid::new([-18.1, -1.3, -3.2], [0.7, 0.3, 0.4], [54, 11, 18]).unwrap();
+        let all = VoxelMask::from_flags(&specimen, grid.clone(), &vec![true; grid.num_voxels()], 0.0).unwrap();
+        // As for holes: slices of the columns at the transition arcs.
+        assert!((all.material_volume_mm3() / specimen.volume_mm3() - 1.0).abs() < 1e-4);
+    }
+
     #[test]
     fn too_coarse_a_grid_is_an_error() {
         let grid = VoxelGrid::new([0.0; 3], [100.0; 3], [1; 3]).unwrap();
-        assert_eq!(
-            VoxelMask::of_specimen(&solid(), grid).unwrap_err(),
-            VoxelError::EmptyMask { voxel_mm: [100.0; 3] }
-        );
+        assert_eq!(VoxelMask::of_specimen(&solid(), grid).unwrap_err(), VoxelError::EmptyMask { voxel_mm: [100.0; 3] });
     }
 }

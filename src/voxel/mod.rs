@@ -78,3 +78,8 @@ pub enum VoxelError {
         num_bins: usize,
     },
 }
+
+#[cfg(test)]
+pub(crate) mod tests {
+    pub(crate) use super::mask::tests::two_hole;
+}

@@ -33,13 +33,7 @@ impl Sampling {
     }
 
     /// Points in the material part of a voxel with weights that sum to one.
-    pub(super) fn points(
-        &self,
-        section: &Section,
-        grid: &VoxelGrid,
-        voxel: usize,
-        points: &mut Vec<([f64; 3], f64)>,
-    ) {
+    pub(super) fn points(&self, section: &Section, grid: &VoxelGrid, voxel: usize, points: &mut Vec<([f64; 3], f64)>) {
         points.clear();
         let n = grid.indices(voxel);
         let bounds = [0, 1, 2].map(|axis| clipped(grid, section, axis, n[axis]));

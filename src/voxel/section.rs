@@ -38,7 +38,7 @@ impl<'a> Section<'a> {
 
     /// Half extent of the outline across the section at x, mm.
     fn half_across(&self, x: f64) -> f64 {
-        if self.across == 2 { half_width_mm(self.specimen, x) } else { self.half[1] }
+        if self.across == 2 { self.specimen.half_width_mm(x) } else { self.half[1] }
     }
 
     /// Material along the `across` axis at x, cut to [low, high]: disjoint intervals in increasing order.
@@ -116,11 +116,6 @@ impl<'a> Section<'a> {
         }
         area
     }
-}
-
-/// Stand-in until the specimen room is merged.
-fn half_width_mm(specimen: &Specimen, _x: f64) -> f64 {
-    0.5 * specimen.block.width_mm
 }
 
 #[cfg(test)]

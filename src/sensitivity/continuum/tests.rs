@@ -116,16 +116,10 @@ fn voxel_sums_tend_to_the_continuum() {
         let fields: Vec<_> = sensitivities.iter().map(|s| operator.average(&s.displacement).unwrap()).collect();
         let forces: Vec<f64> = sensitivities.iter().map(|s| s.force_n).collect();
         let volume = mask.grid.voxel_volume_mm3();
-        let by_voxel = FisherInformation::of_drive(
-            &one_term(),
-            &fields,
-            &PartialVoxels::Uniform.weights(&mask),
-            &forces,
-            &noise,
-        )
-        .unwrap();
-        let smooth =
-            information_over_quadrature(&one_term(), &mesh, &points, &sensitivities, &noise, volume).unwrap();
+        let by_voxel =
+            FisherInformation::of_drive(&one_term(), &fields, &PartialVoxels::Uniform.weights(&mask), &forces, &noise)
+                .unwrap();
+        let smooth = information_over_quadrature(&one_term(), &mesh, &points, &sensitivities, &noise, volume).unwrap();
         let (a, b) = (
             integrate_over_voxels(&one_term(), &states, &mask),
             integrate_over_quadrature(&one_term(), &points, mesh.mirror, volume),

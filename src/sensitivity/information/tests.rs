@@ -77,8 +77,7 @@ fn promised_covariance_is_the_spread_of_estimates() {
 #[test]
 fn single_force_closed_form() {
     let zero = vec![vec![[0.0; 3]; 2]; 3];
-    let information =
-        FisherInformation::of_drive(&one_term(), &zero, &[1.0; 2], &[0.0, 0.5, 0.0], &noise()).unwrap();
+    let information = FisherInformation::of_drive(&one_term(), &zero, &[1.0; 2], &[0.0, 0.5, 0.0], &noise()).unwrap();
     let covariance = information.covariance();
     // Closed form; rounding only.
     assert!((covariance.sd(1).unwrap() - 0.04).abs() < 1e-15);
@@ -121,8 +120,5 @@ fn bad_input_is_an_error() {
     assert!(matches!(with(&fields, &[1.0; 3], &forces, &bad), InformationError::InvalidSd { .. }));
     assert!(matches!(with(&fields, &[1.0; 2], &forces, &noise()), InformationError::LengthMismatch { .. }));
     assert!(matches!(with(&fields[..2], &[1.0; 3], &forces, &noise()), InformationError::LengthMismatch { .. }));
-    assert!(matches!(
-        with(&fields, &[1.0; 3], &[0.0, f64::NAN, 0.0], &noise()),
-        InformationError::NotFinite { .. }
-    ));
+    assert!(matches!(with(&fields, &[1.0; 3], &[0.0, f64::NAN, 0.0], &noise()), InformationError::NotFinite { .. }));
 }

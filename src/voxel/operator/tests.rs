@@ -1,7 +1,7 @@
 //! Closed forms on hand-made meshes: affine and polynomial fields, mirrors, the transpose, timing.
 
-use super::super::mask::tests::{PUBLISHED_VOXEL, solid, two_hole};
 use super::super::VoxelGrid;
+use super::super::mask::tests::{PUBLISHED_VOXEL, solid, two_hole};
 use super::*;
 use crate::kinematics::decompose;
 use crate::mesh::{ElementKind, Mirror};
@@ -78,7 +78,8 @@ fn homogeneous_deformation_is_exact() {
             }
             assert!((decompose(&found).stretch_amplitude - expected.stretch_amplitude).abs() < 1e-11);
         }
-        for ((mean, &voxel), fraction) in operator.average(&u).unwrap().iter().zip(&mask.voxels).zip(&mask.material_fraction)
+        for ((mean, &voxel), fraction) in
+            operator.average(&u).unwrap().iter().zip(&mask.voxels).zip(&mask.material_fraction)
         {
             if *fraction > 1.0 - 1e-12 {
                 let x = mask.grid.center_mm(voxel as usize);
