@@ -23,7 +23,7 @@ use crate::mesh::ElementKind;
 /// Most nodes (and quadrature points) of an element.
 pub const MAX_NODES: usize = 27;
 /// Groups of eight lanes that cover them.
-const MAX_GROUPS: usize = 4;
+pub const MAX_GROUPS: usize = 4;
 
 /// Constant tables of an element kind.
 pub struct ElementTables {
