@@ -24,7 +24,7 @@ pub use build::mesh_specimen;
 pub use check::MeshQuality;
 pub use element::ElementKind;
 pub use error::{LigamentEnd, MeshError};
-pub use locator::{Location, Locator};
+pub use locator::{Column, Location, Locator};
 pub use morph::{DesignVariable, morphed, shape_velocity};
 pub use options::MeshOptions;
 
