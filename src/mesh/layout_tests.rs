@@ -236,6 +236,27 @@ fn bad_input_gives_typed_errors() {
     assert!(matches!(mesh_specimen(&s, &nan), Err(MeshError::OutOfRange { name: "grading", .. })));
 }
 
+/// Every grading gives a valid mesh with the same number of elements, finer at the faces the stronger it is.
+#[test]
+fn gradings_keep_the_number_of_elements() {
+    for specimen in [solid(), two_holes(), bar(), width_holes(), dumbbell()] {
+        let mut last: Option<super::MeshQuality> = None;
+        for grading in [1.0, 0.5, 0.25, 0.1] {
+            let options = MeshOptions { grading, ..MeshOptions::standard(&specimen) };
+            let mesh = mesh_specimen(&specimen, &options).unwrap();
+            mesh.check(&specimen).unwrap();
+            let quality = mesh.quality();
+            if let Some(last) = &last {
+                assert!(quality.min_size_mm <= last.min_size_mm, "{}", specimen.name);
+                // The ranking of layouts may change with the grading, but not by much.
+                let ratio = quality.num_elements as f64 / last.num_elements as f64;
+                assert!((0.7..1.4).contains(&ratio), "{}: {ratio}", specimen.name);
+            }
+            last = Some(quality);
+        }
+    }
+}
+
 /// Ligaments down to the limit are meshed.
 #[test]
 fn thin_ligaments_are_meshed() {

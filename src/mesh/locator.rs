@@ -313,8 +313,8 @@ mod tests {
         let n = mesh.element_kind.shape_functions(xi);
         let mut p = [0.0; 3];
         for (&node, weight) in mesh.element(element).iter().zip(n) {
-            for c in 0..3 {
-                p[c] += weight * mesh.nodes[node as usize][c];
+            for (sum, x) in p.iter_mut().zip(mesh.nodes[node as usize]) {
+                *sum += weight * x;
             }
         }
         p
