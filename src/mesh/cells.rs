@@ -99,7 +99,8 @@ impl Layout<'_> {
                 let foot = dot(to_center, along) / length;
                 let distance = (dot(to_center, to_center) - foot * foot).max(0.0).sqrt();
                 let angle = ((length - foot) / distance).atan() + (foot / distance).atan();
-                let around = (angle / TAU * self.options.hole_segments as f64).round() as usize;
+                // Rounded down only a little: with eight around, no arc exceeds 60°.
+                let around = (angle / TAU * self.options.hole_segments as f64 - 0.3).ceil() as usize;
                 let n = count(length, self.options)?.max(around);
                 let fact = facts.entry((u, v)).or_insert((1, 0.0, 1.0, 0));
                 *fact = (fact.0.max(n), fact.1 + foot, fact.2 * distance, fact.3 + 1);
@@ -274,22 +275,21 @@ impl Layout<'_> {
     }
 }
 
-/// Angles of the arc's points that face `points`: between equal angles and straight radial lines, and with the middles
-/// exactly midway so that each element's arc is divided evenly.
+/// Angles of the arc's points that face `points`: between equal angles and straight radial lines, but no step much longer
+/// than the equal ones; the middles are exactly midway so that each element's arc is divided evenly.
 fn arc_angles(disc: &Disc, points: &[[f64; 2]]) -> Vec<f64> {
+    const LONGEST_STEP: f64 = 1.15;
     let angle = |p: [f64; 2]| (p[1] - disc.center[1]).atan2(p[0] - disc.center[0]);
     let last = points.len() - 1;
     let start = angle(points[0]);
     // Counter-clockwise from the start; an edge spans less than half a turn.
-    let span = |p: [f64; 2]| (angle(p) - start).rem_euclid(TAU);
-    let whole = span(points[last]);
-    let corners: Vec<f64> = (0..=last)
-        .step_by(2)
-        .map(|i| {
-            let equal = whole * i as f64 / last as f64;
-            let radial = if i == 0 { 0.0 } else { span(points[i]) };
-            start + 0.5 * (equal + radial)
-        })
-        .collect();
+    let radial: Vec<f64> =
+        (0..=last).step_by(2).map(|i| if i == 0 { 0.0 } else { (angle(points[i]) - start).rem_euclid(TAU) }).collect();
+    let n = radial.len() - 1;
+    let equal = radial[n] / n as f64;
+    let longest = radial.windows(2).map(|w| w[1] - w[0]).fold(equal, f64::max);
+    let weight = 0.5f64.min((LONGEST_STEP - 1.0) * equal / (longest - equal).max(1e-12));
+    let corners: Vec<f64> =
+        radial.iter().enumerate().map(|(i, r)| start + (1.0 - weight) * equal * i as f64 + weight * r).collect();
     with_middles(&corners)
 }

@@ -283,3 +283,52 @@ fn is_on_surface(domain: &Domain, positions: &[[f64; 3]]) -> bool {
             .all(|p| ((p[0] - d.center[0]).hypot(p[domain.b_axis] - d.center[1]) - d.radius).abs() < tolerance)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::mesh_specimen;
+    use crate::mesh::test_specimens::{off_axis, two_holes};
+
+    fn damaged(damage: impl FnOnce(&mut Mesh)) -> Result<(), MeshError> {
+        let specimen = two_holes();
+        let mut mesh = mesh_specimen(&specimen, &MeshOptions::search(&specimen)).unwrap();
+        damage(&mut mesh);
+        mesh.check(&specimen)
+    }
+
+    #[test]
+    fn damage_is_found() {
+        assert_eq!(damaged(|_| {}), Ok(()));
+        assert_eq!(damaged(|m| m.nodes[5][1] = f64::NAN), Err(MeshError::Malformed { count: 1 }));
+        assert_eq!(damaged(|m| m.connectivity[7] = 1 << 30), Err(MeshError::Malformed { count: 1 }));
+        let swapped = damaged(|m| m.connectivity.swap(0, 2));
+        assert!(matches!(swapped, Err(MeshError::InvertedElement { element: 0, .. })), "{swapped:?}");
+        let missing = damaged(|m| m.connectivity.truncate(m.connectivity.len() - 27));
+        assert!(matches!(missing, Err(MeshError::OpenFace { .. })), "{missing:?}");
+        let bulged = damaged(|m| m.nodes.iter_mut().filter(|p| p[0] > 12.6).for_each(|p| p[0] += 1e-3));
+        assert!(matches!(bulged, Err(MeshError::OpenFace { .. })), "{bulged:?}");
+        let twice = damaged(|m| m.connectivity.extend_from_within(..27));
+        assert!(matches!(twice, Err(MeshError::FaceMismatch { .. } | MeshError::OpenFace { .. })), "{twice:?}");
+        let untagged = damaged(|m| m.moved_nodes.truncate(3));
+        assert!(matches!(untagged, Err(MeshError::NodeSetMismatch { set: "moved_nodes", .. })), "{untagged:?}");
+        let unmirrored = damaged(|m| m.mirror_z_nodes.clear());
+        assert!(matches!(unmirrored, Err(MeshError::NodeSetMismatch { set: "mirror_z_nodes", .. })));
+        let specimen = two_holes();
+        let mesh = mesh_specimen(&specimen, &MeshOptions::search(&specimen)).unwrap();
+        assert!(mesh.check(&off_axis()).is_err());
+    }
+
+    #[test]
+    fn quality_counts() {
+        let specimen = two_holes();
+        let mesh = mesh_specimen(&specimen, &MeshOptions::search(&specimen)).unwrap();
+        let quality = mesh.quality();
+        assert_eq!((quality.element_kind, quality.num_nodes), ("hex27", mesh.nodes.len()));
+        assert!(quality.min_scaled_jacobian <= quality.mean_scaled_jacobian && quality.mean_scaled_jacobian <= 1.0);
+        assert!(quality.min_size_mm > 0.0 && quality.max_size_mm < 6.4);
+        assert!(quality.max_aspect_ratio >= 1.0);
+        let json = serde_json::to_value(&quality).unwrap();
+        assert!(json["volume_mm3"].as_f64().unwrap() > 1000.0);
+    }
+}

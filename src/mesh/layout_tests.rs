@@ -236,6 +236,27 @@ fn bad_input_gives_typed_errors() {
     assert!(matches!(mesh_specimen(&s, &nan), Err(MeshError::OutOfRange { name: "grading", .. })));
 }
 
+/// Every grading gives a valid mesh with the same number of elements, finer at the faces the stronger it is.
+#[test]
+fn gradings_keep_the_number_of_elements() {
+    for specimen in [solid(), two_holes(), bar(), width_holes(), dumbbell()] {
+        let mut last: Option<super::MeshQuality> = None;
+        for grading in [1.0, 0.5, 0.25, 0.1] {
+            let options = MeshOptions { grading, ..MeshOptions::standard(&specimen) };
+            let mesh = mesh_specimen(&specimen, &options).unwrap();
+            mesh.check(&specimen).unwrap();
+            let quality = mesh.quality();
+            if let Some(last) = &last {
+                assert!(quality.min_size_mm <= last.min_size_mm, "{}", specimen.name);
+                // The ranking of layouts may change with the grading, but not by much.
+                let ratio = quality.num_elements as f64 / last.num_elements as f64;
+                assert!((0.7..1.4).contains(&ratio), "{}: {ratio}", specimen.name);
+            }
+            last = Some(quality);
+        }
+    }
+}
+
 /// Ligaments down to the limit are meshed.
 #[test]
 fn thin_ligaments_are_meshed() {
@@ -252,4 +273,52 @@ fn thin_ligaments_are_meshed() {
             mesh.check(&s).unwrap();
         }
     }
+}
+
+/// Nonsense of every kind ends in a mesh or a typed error, and soon.
+#[test]
+fn nonsense_never_panics() {
+    let mut random = Random::new(11);
+    let values =
+        [f64::NAN, f64::INFINITY, -1.0, 0.0, -0.0, 1e-320, 1e-9, 1e-3, 0.5, 2.0, 6.0, 12.0, 35.0, 1e3, 1e5, 1e300];
+    let (mut meshed, mut refused) = (0, 0);
+    for _ in 0..3000 {
+        let mut pick = |usual: f64| {
+            if random.below(4) == 0 {
+                values[random.below(values.len() as u64)]
+            } else {
+                usual * random.between(0.3, 1.7)
+            }
+        };
+        let extents = [pick(25.0), pick(6.0), pick(18.0)];
+        let holes: Vec<[f64; 3]> = (0..4).map(|_| [pick(10.0) - 10.0, pick(4.0) - 4.0, pick(2.0)]).collect();
+        let count = random.below(5);
+        let axis = [HoleAxis::Thickness, HoleAxis::Width][random.below(2)];
+        let test = [TestKind::DoubleLapShear, TestKind::Uniaxial][random.below(2)];
+        let mut s = specimen(test, extents, axis, &holes[..count]);
+        if random.below(4) == 0 {
+            s.outline = Outline::Iso37Type4;
+            (s.block.length_mm, s.block.width_mm) = (35.0, 6.0);
+        }
+        let mut options = MeshOptions::search(&s);
+        options.max_elements = 3000;
+        options.force_prisms = random.below(3) == 0;
+        if random.below(10) == 0 {
+            options.section_size_mm = values[random.below(values.len() as u64)];
+            options.grading = values[random.below(values.len() as u64)];
+        }
+        match mesh_specimen(&s, &options) {
+            Ok(mesh) => {
+                let checked = mesh.check(&s);
+                assert!(checked.is_ok(), "{}: {checked:?}", s.name);
+                meshed += 1;
+            }
+            Err(error) => {
+                assert!(!error.to_string().is_empty());
+                refused += 1;
+            }
+        }
+    }
+    println!("{meshed} meshed, {refused} refused");
+    assert!(meshed > 100 && refused > 100);
 }

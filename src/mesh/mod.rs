@@ -1,4 +1,14 @@
 //! Meshes: a section (quadrilaterals or triangles, quadratic, following the hole walls as curves) extruded.
+//!
+//! ```text
+//! specimen ─ domain ─┬─ quads ── cells ── power     structured grids; O-grids in the holes' power-diagram cells
+//!                    └─ triangles                   constrained Delaunay refinement, where quadrilaterals fail
+//!                         └─ section ─ build        extrusion in graded levels, node sets
+//! mesh ─ check, locator, morph                      invariants and quality; inverse map; shape derivatives
+//! ```
+//!
+//! The section is (x, z) extruded along y, or (x, y) extruded along z where holes run along the width. Every mesh is
+//! conforming, its curved walls carry exact nodes at element corners and middles, and equal input gives equal bits.
 
 mod build;
 mod cells;
@@ -24,7 +34,7 @@ pub use build::mesh_specimen;
 pub use check::MeshQuality;
 pub use element::ElementKind;
 pub use error::{LigamentEnd, MeshError};
-pub use locator::{Location, Locator};
+pub use locator::{Column, Location, Locator};
 pub use morph::{DesignVariable, morphed, shape_velocity};
 pub use options::MeshOptions;
 

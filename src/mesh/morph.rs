@@ -199,7 +199,7 @@ fn smooth_minimum(distances: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::test_specimens::{bar, dumbbell, off_axis, solid, two_holes, width_holes};
+    use crate::mesh::test_specimens::{bar, dumbbell, off_axis, solid, specimen, two_holes, width_holes};
     use crate::mesh::{MeshOptions, mesh_specimen};
     use std::f64::consts::PI;
 
@@ -252,6 +252,34 @@ mod tests {
                     assert!(result.is_ok(), "{variable:?} of {}: {result:?}", specimen.name);
                 }
             }
+        }
+    }
+
+    /// In a mirrored mesh a hole and its image move together.
+    #[test]
+    fn mirrored_pairs_move_together() {
+        use crate::specimen::TestKind::{DoubleLapShear, Uniaxial};
+        let holes = [[2.0, 4.5, 3.0], [2.0, -4.5, 3.0], [-5.0, 0.0, 4.0]];
+        for (test, extents, axis, scale) in [
+            (DoubleLapShear, [25.4, 6.4, 19.1], HoleAxis::Thickness, 1.0),
+            (Uniaxial, [25.4, 12.0, 19.1], HoleAxis::Width, 0.6),
+        ] {
+            let holes = holes.map(|h| [h[0], h[1] * scale, h[2] * scale]);
+            let s = specimen(test, extents, axis, &holes);
+            let mesh = mesh_specimen(&s, &MeshOptions::standard(&s)).unwrap();
+            assert!(if axis == HoleAxis::Width { mesh.mirror.y && mesh.mirror.z } else { mesh.mirror.z });
+            for (first, second, sign) in [
+                (DesignVariable::HoleX(0), DesignVariable::HoleX(1), 1.0),
+                (DesignVariable::HoleOther(0), DesignVariable::HoleOther(1), -1.0),
+                (DesignVariable::HoleDiameter(0), DesignVariable::HoleDiameter(1), 1.0),
+            ] {
+                let step = 0.1;
+                let [v, w] = [first, second].map(|variable| shape_velocity(&mesh, &s, variable));
+                let moved = morphed(&morphed(&mesh, &v, step), &w, sign * step);
+                moved.check(&set(&set(&s, first, step), second, sign * step)).unwrap();
+            }
+            let odd = shape_velocity(&mesh, &s, DesignVariable::HoleOther(2));
+            assert!(odd.iter().flatten().all(|v| *v == 0.0));
         }
     }
 

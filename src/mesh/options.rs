@@ -66,7 +66,7 @@ impl MeshOptions {
         let segments = ((12.0 / factor).round() as usize).clamp(8, 64);
         MeshOptions {
             section_size_mm: size,
-            levels: ((layers * depth / size).round() as usize).clamp(2, 400),
+            levels: ((layers * depth / size).round() as usize).clamp(3, 400),
             grading: 0.3,
             hole_segments: segments,
             radial_layers: if factor > 1.3 { 2 } else { ((3.0 / factor).round() as usize).clamp(2, 20) },

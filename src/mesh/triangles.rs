@@ -38,6 +38,18 @@ enum Curve {
 }
 
 impl Curve {
+    fn is_straight(self, domain: &Domain) -> bool {
+        match self {
+            Curve::Line(..) => true,
+            Curve::Arc { .. } => false,
+            Curve::Profile { from, to, .. } => {
+                let [start, _, end] = domain.arc_ends();
+                let middle = 0.5 * (from + to).abs();
+                middle < start || middle > end
+            }
+        }
+    }
+
     fn at(self, domain: &Domain, t: f64) -> [f64; 2] {
         match self {
             Curve::Line(p, q) => [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])],
@@ -256,7 +268,7 @@ fn parameters(domain: &Domain, options: &MeshOptions, fineness: f64, curve: Curv
     if sum > options.max_elements as f64 {
         return Err(MeshError::TooManyElements { elements: sum as usize, limit: options.max_elements });
     }
-    let n = (sum.round() as usize).max(if matches!(curve, Curve::Arc { .. }) { 2 } else { 1 });
+    let n = (sum.round() as usize).max(if curve.is_straight(domain) { 1 } else { 2 });
     let mut parameters = vec![0.0];
     let mut i = 0;
     for k in 1..n {
