@@ -131,7 +131,8 @@ pub struct ElementOutput {
     inverse_map: [Tensor; MAX_GROUPS],
     cofactor: [Tensor; MAX_GROUPS],
     jacobian: [Lanes; MAX_GROUPS],
-    basis: [[Lanes; MAX_GROUPS]; 4],
+    /// φ at the quadrature points, `[m][group]`.
+    pub basis: [[Lanes; MAX_GROUPS]; 4],
     tangent: Vec<[[Lanes; 9]; 9]>,
 }
 

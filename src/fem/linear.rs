@@ -86,11 +86,6 @@ impl LinearSystem {
         })
     }
 
-    /// Entries of the factor.
-    pub fn factor_entries(&self) -> usize {
-        self.symbolic.len_val()
-    }
-
     /// Factorises the present values, in single precision unless that fails.
     ///
     /// # Errors
@@ -195,6 +190,36 @@ impl LinearSystem {
         right_hand_sides: &[Vec<f64>],
         tolerance: f64,
     ) -> Result<Vec<Vec<f64>>, LinearError> {
+        if let Some(x) = self.iterate(topology, right_hand_sides, tolerance, MAX_ITERATIONS)? {
+            return Ok(x);
+        }
+        self.factorise_double(topology)?;
+        match self.iterate(topology, right_hand_sides, tolerance, MAX_ITERATIONS)? {
+            Some(x) => Ok(x),
+            // With an exact factor the iteration refines to rounding; what is left is the matrix's condition.
+            None => {
+                let mut x: Vec<Vec<f64>> = right_hand_sides.to_vec();
+                let mut single = Vec::new();
+                for column in &mut x {
+                    self.precondition(topology.num_unknowns(), 1, column, &mut single);
+                }
+                Ok(x)
+            }
+        }
+    }
+
+    /// Conjugate gradients with the factor at hand, which may be that of a nearby matrix; `None` where `max_iterations`
+    /// do not suffice.
+    ///
+    /// # Errors
+    /// [`LinearError::NotPositiveDefinite`] where a direction of negative curvature is met.
+    pub fn iterate(
+        &mut self,
+        topology: &Topology,
+        right_hand_sides: &[Vec<f64>],
+        tolerance: f64,
+        max_iterations: usize,
+    ) -> Result<Option<Vec<Vec<f64>>>, LinearError> {
         let n = topology.num_unknowns();
         let m = right_hand_sides.len();
         let mut x = vec![0.0; n * m];
@@ -210,15 +235,11 @@ impl LinearSystem {
         let mut is_done: Vec<bool> = rz.iter().map(|&s| s == 0.0).collect();
         let mut iteration = 0;
         while is_done.iter().any(|d| !d) {
+            if iteration == max_iterations {
+                return Ok(None);
+            }
             iteration += 1;
             self.num_iterations += 1;
-            if iteration > MAX_ITERATIONS {
-                if matches!(self.factor, Factor::Double(_)) {
-                    break;
-                }
-                self.factorise_double(topology)?;
-                return self.solve(topology, right_hand_sides, tolerance);
-            }
             for c in 0..m {
                 if is_done[c] {
                     continue;
@@ -235,7 +256,7 @@ impl LinearSystem {
                     r[c * n + i] -= step * ap[i];
                 }
                 let size = dot(&r[range.clone()], &r[range]);
-                is_done[c] = size <= target[c] || !size.is_finite();
+                is_done[c] = size <= target[c];
             }
             if is_done.iter().all(|d| *d) {
                 break;
@@ -254,7 +275,7 @@ impl LinearSystem {
                 }
             }
         }
-        Ok((0..m).map(|c| x[c * n..(c + 1) * n].to_vec()).collect())
+        Ok(Some((0..m).map(|c| x[c * n..(c + 1) * n].to_vec()).collect()))
     }
 }
 

@@ -3,6 +3,7 @@
 use super::error::{SolveError, StepFailure};
 use super::kernel::{Direction, ElementInput, ElementOutput, ElementTables, Kernels, MAX_GROUPS, MAX_NODES};
 use super::linear::LinearSystem;
+use super::nested::Guide;
 use super::topology::{NOT_FREE, Topology};
 use crate::material::{LANES, Lanes, Ogden, Parameter};
 use crate::mesh::Mesh;
@@ -34,6 +35,8 @@ pub struct ForwardModel {
     /// The equilibrium at which the stored tangent stands, if any.
     pub(super) tangent_at: u64,
     pub(super) statistics: Statistics,
+    /// A coarse model for first guesses.
+    pub(super) guide: Option<Box<Guide>>,
 }
 
 /// What the last solve took.
@@ -99,6 +102,7 @@ impl ForwardModel {
             serial: 0,
             tangent_at: 0,
             statistics: Statistics::default(),
+            guide: None,
             mesh,
         };
         model.check_geometry()?;

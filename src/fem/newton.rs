@@ -10,7 +10,7 @@ use crate::material::{MAX_TERMS, Ogden};
 /// Settings of [`ForwardModel::solve`].
 #[derive(Clone, Copy, Debug)]
 pub struct SolveOptions {
-    /// Newton stops when |residual| falls below this fraction of |reactions|. The default, 10⁻⁹, is three digits above
+    /// Newton stops when |residual| falls below this fraction of |reactions|. The default, 10⁻⁸, is four digits above
     /// what rounding leaves at κ/μ = 10⁴.
     pub tolerance: f64,
     /// Newton iterations per load step.
@@ -21,9 +21,15 @@ pub struct SolveOptions {
 
 impl Default for SolveOptions {
     fn default() -> Self {
-        SolveOptions { tolerance: 1e-9, max_iterations: 14, min_step: 1.0 / 512.0 }
+        SolveOptions { tolerance: 1e-8, max_iterations: 14, min_step: 1.0 / 512.0 }
     }
 }
+
+/// Relative residual below which the factor of an earlier iterate is tried first.
+const REUSE_BELOW: f64 = 1e-4;
+
+/// Conjugate-gradient iterations that such a factor is given: they cost as much as a new one.
+const REUSE_ITERATIONS: usize = 10;
 
 /// An equilibrium at one drive.
 #[derive(Clone, Debug)]
@@ -65,6 +71,11 @@ impl ForwardModel {
             return Err(SolveError::InvalidDrive { drive_mm });
         }
         self.statistics = Statistics::default();
+        if start.is_none_or(|s| s.drive_mm != drive_mm)
+            && let Some(found) = self.solve_guided(material, drive_mm, options, is_cancelled)
+        {
+            return Ok(found);
+        }
         let mut current = match start {
             Some(e) => e.clone(),
             None => Equilibrium {
@@ -111,6 +122,29 @@ impl ForwardModel {
                 }
             }
         }
+    }
+
+    /// From the coarse model's equilibrium; `None` where there is no coarse model or the short cut fails.
+    fn solve_guided(
+        &mut self,
+        material: &Ogden,
+        drive_mm: f64,
+        options: &SolveOptions,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Option<Equilibrium> {
+        let mut guide = self.guide.take()?;
+        // A loose coarse solution is enough: its error is the mesh's.
+        let loose = SolveOptions { tolerance: 1e-4, ..*options };
+        let found = guide.coarse.solve(material, drive_mm, None, &loose, is_cancelled).ok().and_then(|coarse| {
+            let first_guess = guide.transfer(self, material, &coarse);
+            self.step(material, &first_guess, None, drive_mm, options, is_cancelled).ok()
+        });
+        self.guide = Some(guide);
+        match &found {
+            Some(_) => self.statistics.load_steps += 1,
+            None => self.statistics.failed_steps += 1,
+        }
+        found
     }
 
     /// Solves at several drives, each from the last.
@@ -205,10 +239,23 @@ impl ForwardModel {
             worst = worst.min(last);
             iteration += 1;
             self.statistics.newton_iterations += 1;
-            self.system.factorise(&self.topology).map_err(StepFailure::Linear)?;
-            // Quadratic convergence leaves last² at best: the linear solve need not be better than a tenth of it.
-            let accuracy = (0.1 * last).clamp(1e-9, 1e-3);
-            let x = self.system.solve(&self.topology, &[right], accuracy).map_err(StepFailure::Linear)?;
+            // Near the solution the factor of an earlier iterate is as good a preconditioner as a new one is, and cheaper.
+            let is_near = iteration > 1 && last < REUSE_BELOW;
+            let mut x = None;
+            if is_near {
+                let accuracy = (0.3 * options.tolerance / last).clamp(1e-7, 1e-2);
+                let right = std::slice::from_ref(&right);
+                x = self.system.iterate(&self.topology, right, accuracy, REUSE_ITERATIONS).ok().flatten();
+            }
+            let x = match x {
+                Some(x) => x,
+                None => {
+                    self.system.factorise(&self.topology).map_err(StepFailure::Linear)?;
+                    // Quadratic convergence leaves last² at best: the linear solve need not be better than a tenth of it.
+                    let accuracy = (0.1 * last).clamp(1e-9, 1e-3);
+                    self.system.solve(&self.topology, &[right], accuracy).map_err(StepFailure::Linear)?
+                }
+            };
             let delta = self.spread(&x[0]);
             let delta_pressure = self.pressure_update(&delta);
             let next = Update { from: trial.clone(), delta, delta_pressure, length: 1.0 };
