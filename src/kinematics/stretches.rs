@@ -48,11 +48,9 @@ pub fn principal_stretches(deformation_gradient: &Tensor) -> [f64; 3] {
             let t = zeta.signum() / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
             let cosine = 1.0 / (1.0 + t * t).sqrt();
             let sine = cosine * t;
-            for i in 0..3 {
-                let (x, y) = (columns[p][i], columns[q][i]);
-                columns[p][i] = cosine * x - sine * y;
-                columns[q][i] = sine * x + cosine * y;
-            }
+            let (x, y) = (columns[p], columns[q]);
+            columns[p] = [0, 1, 2].map(|i| cosine * x[i] - sine * y[i]);
+            columns[q] = [0, 1, 2].map(|i| sine * x[i] + cosine * y[i]);
         }
         if is_orthogonal {
             break;
@@ -157,11 +155,9 @@ pub(crate) mod tests {
     fn inverse_inverts() {
         let f = [[1.2, 0.4, 0.0], [0.1, 0.9, -0.2], [0.0, 0.3, 1.1]];
         let one = product(&f, &inverse(&f).unwrap());
-        for i in 0..3 {
-            for j in 0..3 {
-                // A few operations on numbers of order one.
-                assert!((one[i][j] - if i == j { 1.0 } else { 0.0 }).abs() < 1e-15);
-            }
+        for (found, exact) in one.iter().flatten().zip(crate::kinematics::IDENTITY.iter().flatten()) {
+            // A few operations on numbers of order one.
+            assert!((found - exact).abs() < 1e-15);
         }
         assert_eq!(inverse(&[[1.0; 3]; 3]), None);
     }
