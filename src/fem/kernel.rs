@@ -1,16 +1,19 @@
 //! What one element contributes: residual, tangent, directional derivatives.
 //!
-//! Mixed formulation with displacement u and a discontinuous, element-wise linear pressure p (four numbers, condensed):
-//! stationarity of ∫ Ψ_iso(F) + p ln J − p²/(2κ) dV. With φ the pressure basis, orthonormal over the element
-//! (physical coordinates, so that curved elements keep their order) and G = F⁻ᵀ,
+//! Three-field formulation (Simo, Taylor and Pister 1985): displacement u, and discontinuous, element-wise linear
+//! volume ratio θ and pressure p, four numbers each, condensed. Stationarity of ∫ Ψ_iso(F) + U(θ) + p (J − θ) dV with
+//! U = κ/2 (ln θ)². With φ the basis of p and θ, orthonormal over the element (in physical coordinates, so that curved
+//! elements keep their order), θ = Π J is explicit and so is the condensed pressure p = Π U′(Π J). Then
 //!
-//! * R_u = ∫ (P_iso + p G) : ∇N,  R_p = ∫ φ ln J − p/κ,
-//! * B = ∫ φ G : ∇N,  K = ∫ ∇N : ∂P/∂F|_p : ∇N + κ Bᵀ B  (condensed, symmetric),
-//! * condensed residual r = R_u + κ Bᵀ R_p,  δp = κ (B δu + R_p).
+//! * R_u = ∫ (P_iso + p cof F) : ∇N,  gap = Π U′(Π J) − p,
+//! * B = ∫ φ cof F : ∇N,  D = ∫ φ φ U″(θ),
+//! * condensed residual r = R_u + Bᵀ gap, tangent K = ∫ ∇N : ∂P/∂F|_p : ∇N + Bᵀ D B (symmetric),
+//! * δp = D B δu + gap.
 //!
 //! Keeping p an independent iterate ("mixed Newton") is what makes large steps converge when κ ≫ μ: the geometric
-//! stiffness never sees the spurious pressure κ ln J of a trial state. Where p is not given it is the condensed one,
-//! p = κ ∫ φ ln J.
+//! stiffness never sees the spurious pressure of a trial state. Where p is not given it is the condensed one.
+//! The constraint is on J, not on ln J: p ln J has the curvature −p/J² in volume changes that θ does not resolve, which
+//! destabilises elements under tension next to the singular bonded edges (seen as indefinite tangents on fine meshes).
 //!
 //! Quadrature points are worked on eight at a time, nodes of the stiffness likewise.
 
@@ -20,7 +23,7 @@ use crate::mesh::ElementKind;
 /// Most nodes (and quadrature points) of an element.
 pub const MAX_NODES: usize = 27;
 /// Groups of eight lanes that cover them.
-const MAX_GROUPS: usize = 4;
+pub const MAX_GROUPS: usize = 4;
 
 /// Constant tables of an element kind.
 pub struct ElementTables {
@@ -102,8 +105,10 @@ pub struct Direction {
 pub struct ElementOutput {
     /// Condensed residual r, or its directional derivative, per node, kPa·mm².
     pub residual: [[f64; 3]; MAX_NODES],
-    /// κ R_p: what the pressure iterate misses.
+    /// What the pressure iterate misses.
     pub pressure_gap: [f64; 4],
+    /// D.
+    pub bulk: [[f64; 4]; 4],
     /// Pressure coefficients used (condensed ones where none were given), or their directional derivative.
     pub pressure: [f64; 4],
     /// B: `[m][i][group of nodes]`.
@@ -122,8 +127,10 @@ pub struct ElementOutput {
     pub volume: [Lanes; MAX_GROUPS],
     /// Reference positions of the quadrature points, `[i][group]`.
     pub points: [[Lanes; MAX_GROUPS]; 3],
-    /// P:weights brought back to reference coordinates, scratch.
+    /// ∂ξ_c/∂X_J, `[c][J]`.
     inverse_map: [Tensor; MAX_GROUPS],
+    cofactor: [Tensor; MAX_GROUPS],
+    jacobian: [Lanes; MAX_GROUPS],
     basis: [[Lanes; MAX_GROUPS]; 4],
     tangent: Vec<[[Lanes; 9]; 9]>,
 }
@@ -134,6 +141,7 @@ impl Default for ElementOutput {
         ElementOutput {
             residual: [[0.0; 3]; MAX_NODES],
             pressure_gap: [0.0; 4],
+            bulk: [[0.0; 4]; 4],
             pressure: [0.0; 4],
             divergence: [[[Lanes::ZERO; MAX_GROUPS]; 3]; 4],
             stiffness: vec![[[Lanes::ZERO; MAX_GROUPS]; 3]; 3 * MAX_NODES],
@@ -144,15 +152,17 @@ impl Default for ElementOutput {
             volume: [Lanes::ZERO; MAX_GROUPS],
             points: [[Lanes::ZERO; MAX_GROUPS]; 3],
             inverse_map: [tensor; MAX_GROUPS],
+            cofactor: [tensor; MAX_GROUPS],
+            jacobian: [Lanes::ZERO; MAX_GROUPS],
             basis: [[Lanes::ZERO; MAX_GROUPS]; 4],
             tangent: vec![[[Lanes::ZERO; 9]; 9]; MAX_GROUPS],
         }
     }
 }
 
-/// Determinant and transposed inverse of a tensor.
+/// Determinant and cofactor (determinant × inverse transpose) of a tensor.
 #[inline(always)]
-fn inverse_transpose(f: &Tensor) -> (Lanes, Tensor) {
+fn cofactor(f: &Tensor) -> (Lanes, Tensor) {
     let mut g = [[Lanes::ZERO; 3]; 3];
     for i in 0..3 {
         for j in 0..3 {
@@ -160,14 +170,7 @@ fn inverse_transpose(f: &Tensor) -> (Lanes, Tensor) {
             g[i][j] = f[i1][j1] * f[i2][j2] - f[i1][j2] * f[i2][j1];
         }
     }
-    let det = f[0][0] * g[0][0] + f[0][1] * g[0][1] + f[0][2] * g[0][2];
-    let scale = Lanes::splat(1.0) / det;
-    for row in &mut g {
-        for x in row.iter_mut() {
-            *x = *x * scale;
-        }
-    }
-    (det, g)
+    (f[0][0] * g[0][0] + f[0][1] * g[0][1] + f[0][2] * g[0][2], g)
 }
 
 /// Σ_a x_a ⊗ ∂N_a/∂ξ at the points of a group.
@@ -221,14 +224,14 @@ fn kinematics<const FMA: bool>(tables: &ElementTables, input: &ElementInput, out
     let mut volume = 0.0;
     for g in 0..tables.groups {
         let map = gradient_of::<FMA>(tables, &input.positions, g);
-        let (det, inverse_t) = inverse_transpose(&map);
+        let (det, cofactor) = cofactor(&map);
         out.min_geometry_jacobian = out.min_geometry_jacobian.min(det.min());
         out.volume[g] = det * tables.weight[g];
         volume += out.volume[g].sum();
         // Stored so that ∂N/∂X_J = Σ_c inverse_map[c][J] ∂N/∂ξ_c.
         for c in 0..3 {
             for j in 0..3 {
-                out.inverse_map[g][c][j] = inverse_t[j][c];
+                out.inverse_map[g][c][j] = cofactor[j][c] / det;
             }
         }
         let h = gradient_of::<FMA>(tables, &input.displacements, g);
@@ -326,29 +329,50 @@ fn element<const FMA: bool, const TANGENT: bool>(
     }
     let kappa = input.material.bulk_kpa;
     let tensor = [[Lanes::ZERO; 3]; 3];
-    let mut inverse_f = [tensor; MAX_GROUPS];
     let mut projected = [0.0; 4];
     for g in 0..tables.groups {
-        let (j, inverse) = inverse_transpose(&out.deformation_gradient[g]);
-        inverse_f[g] = inverse;
+        let (j, cofactor) = cofactor(&out.deformation_gradient[g]);
+        out.cofactor[g] = cofactor;
+        out.jacobian[g] = j;
         let smallest = j.min();
         if !(smallest >= out.min_jacobian) {
             out.min_jacobian = smallest;
         }
-        if smallest > 0.0 {
-            let dilation = j.ln() * out.volume[g];
-            for m in 0..4 {
-                projected[m] += (dilation * out.basis[m][g]).sum();
-            }
+        for m in 0..4 {
+            projected[m] += (j * out.volume[g] * out.basis[m][g]).sum();
         }
     }
     if !(out.min_jacobian > 0.0) {
         return false;
     }
+    let mut condensed = [0.0; 4];
+    out.bulk = [[0.0; 4]; 4];
+    for g in 0..tables.groups {
+        let mut ratio = Lanes::ZERO;
+        for m in 0..4 {
+            ratio += out.basis[m][g] * projected[m];
+        }
+        let smallest = ratio.min();
+        if !(smallest > 0.0) {
+            out.min_jacobian = smallest;
+            return false;
+        }
+        let log = ratio.ln();
+        let first = log * kappa / ratio * out.volume[g];
+        let second = (Lanes::splat(1.0) - log) * kappa / (ratio * ratio) * out.volume[g];
+        for m in 0..4 {
+            condensed[m] += (first * out.basis[m][g]).sum();
+            for n in 0..=m {
+                out.bulk[m][n] += (second * out.basis[m][g] * out.basis[n][g]).sum();
+            }
+        }
+    }
     for m in 0..4 {
-        let condensed = kappa * projected[m];
-        out.pressure[m] = input.pressure.map_or(condensed, |p| p[m]);
-        out.pressure_gap[m] = condensed - out.pressure[m];
+        for n in 0..m {
+            out.bulk[n][m] = out.bulk[m][n];
+        }
+        out.pressure[m] = input.pressure.map_or(condensed[m], |p| p[m]);
+        out.pressure_gap[m] = condensed[m] - out.pressure[m];
     }
     let mut weighted = [tensor; MAX_GROUPS];
     for g in 0..tables.groups {
@@ -357,15 +381,16 @@ fn element<const FMA: bool, const TANGENT: bool>(
             p += out.basis[m][g] * out.pressure[m];
             gap += out.basis[m][g] * out.pressure_gap[m];
         }
+        let kirchhoff = p * out.jacobian[g];
         let state = SpectralState::new(input.material, &out.deformation_gradient[g]);
-        out.stress[g] = state.first_piola_kirchhoff_stress(p);
+        out.stress[g] = state.first_piola_kirchhoff_stress(kirchhoff);
         for i in 0..3 {
             for j in 0..3 {
-                weighted[g][i][j] = (out.stress[g][i][j] + gap * inverse_f[g][i][j]) * out.volume[g];
+                weighted[g][i][j] = (out.stress[g][i][j] + gap * out.cofactor[g][i][j]) * out.volume[g];
             }
         }
         if TANGENT {
-            state.material_tangent::<FMA>(input.material, p, &mut out.tangent[g]);
+            state.material_tangent::<FMA>(input.material, kirchhoff, kirchhoff, &mut out.tangent[g]);
             for row in &mut out.tangent[g] {
                 for x in row.iter_mut() {
                     *x = *x * out.volume[g];
@@ -376,19 +401,14 @@ fn element<const FMA: bool, const TANGENT: bool>(
     out.residual = [[0.0; 3]; MAX_NODES];
     add_internal_force::<FMA>(tables, &out.inverse_map, &weighted, &mut out.residual);
     if TANGENT {
-        stiffness::<FMA>(tables, kappa, &inverse_f, out);
+        stiffness::<FMA>(tables, out);
     }
     true
 }
 
 /// K and B from the weighted tangents.
 #[inline(always)]
-fn stiffness<const FMA: bool>(
-    tables: &ElementTables,
-    kappa: f64,
-    inverse_f: &[Tensor; MAX_GROUPS],
-    out: &mut ElementOutput,
-) {
+fn stiffness<const FMA: bool>(tables: &ElementTables, out: &mut ElementOutput) {
     // Physical gradients with the nodes in lanes: [q][J][group].
     let mut physical = [[[Lanes::ZERO; MAX_GROUPS]; 3]; MAX_NODES];
     let mut divergence = [[[Lanes::ZERO; MAX_GROUPS]; 3]; 4];
@@ -406,7 +426,7 @@ fn stiffness<const FMA: bool>(
             for n in 0..tables.groups {
                 let mut d = Lanes::ZERO;
                 for j in 0..3 {
-                    d = Lanes::splat(inverse_f[g][i][j].0[l]).mul_add::<FMA>(physical[q][j][n], d);
+                    d = Lanes::splat(out.cofactor[g][i][j].0[l]).mul_add::<FMA>(physical[q][j][n], d);
                 }
                 for m in 0..4 {
                     let w = Lanes::splat(out.basis[m][g].0[l] * out.volume[g].0[l]);
@@ -416,6 +436,17 @@ fn stiffness<const FMA: bool>(
         }
     }
     out.divergence = divergence;
+    // D B.
+    let mut stiffened = [[[Lanes::ZERO; MAX_GROUPS]; 3]; 4];
+    for m in 0..4 {
+        for n in 0..4 {
+            for i in 0..3 {
+                for g in 0..tables.groups {
+                    stiffened[m][i][g] = (divergence[n][i][g] * out.bulk[m][n]) + stiffened[m][i][g];
+                }
+            }
+        }
+    }
     // For eight columns b and one component k: traction[q][J][i] = Σ_L A_iJkL ∂N_b/∂X_L, then K_ab = Σ_qJ ∂N_a/∂X_J · it.
     let mut traction = [[[Lanes::ZERO; 3]; 3]; MAX_NODES];
     for block in 0..tables.groups {
@@ -443,7 +474,7 @@ fn stiffness<const FMA: bool>(
                     _ => column_of::<FMA, 1>(tables.num, block, lane, &physical, &traction, &mut column),
                 }
                 for m in 0..4 {
-                    let s = Lanes::splat(kappa * divergence[m][k][block].0[lane]);
+                    let s = Lanes::splat(stiffened[m][k][block].0[lane]);
                     for i in 0..3 {
                         for n in block..tables.groups {
                             column[i][n] = s.mul_add::<FMA>(divergence[m][i][n], column[i][n]);
@@ -498,23 +529,25 @@ fn directional<const FMA: bool>(
     if !element::<FMA, false>(tables, input, out) {
         return false;
     }
-    let kappa = input.material.bulk_kpa;
     let tensor = [[Lanes::ZERO; 3]; 3];
     let mut delta_f = [tensor; MAX_GROUPS];
-    let mut inverse_f = [tensor; MAX_GROUPS];
-    let mut delta_pressure = [0.0; 4];
+    let mut dilation = [0.0; 4];
     for g in 0..tables.groups {
         let h = gradient_of::<FMA>(tables, &direction.displacements, g);
         delta_f[g] = multiply(&h, &out.inverse_map[g]);
-        inverse_f[g] = inverse_transpose(&out.deformation_gradient[g]).1;
-        let dilation = contract(&inverse_f[g], &delta_f[g]) * out.volume[g];
+        let d = contract(&out.cofactor[g], &delta_f[g]) * out.volume[g];
         for m in 0..4 {
-            delta_pressure[m] += kappa * (dilation * out.basis[m][g]).sum();
+            dilation[m] += (d * out.basis[m][g]).sum();
         }
     }
-    if direction.parameter == Some(Parameter::Kappa) {
-        for m in 0..4 {
-            delta_pressure[m] += (out.pressure[m] + out.pressure_gap[m]) / kappa;
+    let mut delta_pressure = [0.0; 4];
+    for m in 0..4 {
+        for n in 0..4 {
+            delta_pressure[m] += out.bulk[m][n] * dilation[n];
+        }
+        if direction.parameter == Some(Parameter::Kappa) {
+            // The condensed pressure is proportional to κ.
+            delta_pressure[m] += (out.pressure[m] + out.pressure_gap[m]) / input.material.bulk_kpa;
         }
     }
     let mut weighted = [tensor; MAX_GROUPS];
@@ -524,8 +557,9 @@ fn directional<const FMA: bool>(
             p += out.basis[m][g] * out.pressure[m];
             dp += out.basis[m][g] * delta_pressure[m];
         }
+        let kirchhoff = p * out.jacobian[g];
         let state = SpectralState::new(input.material, &out.deformation_gradient[g]);
-        state.material_tangent::<FMA>(input.material, p, &mut out.tangent[g]);
+        state.material_tangent::<FMA>(input.material, kirchhoff, kirchhoff, &mut out.tangent[g]);
         let mut s = match direction.parameter {
             Some(parameter) => state.stress_parameter_derivative(input.material, parameter),
             None => tensor,
@@ -537,7 +571,7 @@ fn directional<const FMA: bool>(
                         s[i][j] = out.tangent[g][3 * i + j][3 * k + l].mul_add::<FMA>(delta_f[g][k][l], s[i][j]);
                     }
                 }
-                weighted[g][i][j] = (s[i][j] + dp * inverse_f[g][i][j]) * out.volume[g];
+                weighted[g][i][j] = (s[i][j] + dp * out.cofactor[g][i][j]) * out.volume[g];
             }
         }
     }

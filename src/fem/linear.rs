@@ -41,8 +41,8 @@ enum Factor {
 /// Pattern, values and factor of a symmetric positive definite matrix (lower triangle, elimination order).
 pub struct LinearSystem {
     symbolic: SymbolicCholesky<usize>,
-    /// Values of the lower triangle, in the pattern of [`Topology`].
-    pub values: Vec<f64>,
+    /// 3×3 blocks of the lower triangle (columns of a block one after the other), in the block pattern of [`Topology`].
+    pub blocks: Vec<[f64; 9]>,
     factor: Factor,
     single_values: Vec<f32>,
     memory: MemBuffer,
@@ -77,7 +77,7 @@ impl LinearSystem {
         let memory = MemBuffer::try_new(scratch).map_err(|_| LinearError::OutOfMemory { num_unknowns: n })?;
         Ok(LinearSystem {
             symbolic,
-            values: vec![0.0; topology.row_indices.len()],
+            blocks: vec![[0.0; 9]; topology.block_rows.len()],
             factor: Factor::None,
             single_values: Vec::new(),
             memory,
@@ -101,8 +101,7 @@ impl LinearSystem {
             Factor::Single(l) => l,
             _ => vec![0.0; self.symbolic.len_val()],
         };
-        self.single_values.clear();
-        self.single_values.extend(self.values.iter().map(|&x| x as f32));
+        topology.to_scalar(&self.blocks, |x| x as f32, &mut self.single_values);
         let n = topology.num_unknowns();
         let pattern =
             SymbolicSparseColMatRef::new_checked(n, n, &topology.column_pointers, None, &topology.row_indices);
@@ -129,11 +128,13 @@ impl LinearSystem {
     pub fn factorise_double(&mut self, topology: &Topology) -> Result<(), LinearError> {
         let n = topology.num_unknowns();
         let mut l = vec![0.0f64; self.symbolic.len_val()];
+        let mut values = Vec::new();
+        topology.to_scalar(&self.blocks, |x| x, &mut values);
         let pattern =
             SymbolicSparseColMatRef::new_checked(n, n, &topology.column_pointers, None, &topology.row_indices);
         let result = self.symbolic.factorize_numeric_llt(
             &mut l,
-            SparseColMatRef::new(pattern, &self.values[..]),
+            SparseColMatRef::new(pattern, &values[..]),
             Side::Lower,
             Default::default(),
             Par::Seq,
@@ -146,12 +147,9 @@ impl LinearSystem {
                 self.factor = Factor::Double(l);
                 Ok(())
             }
-            Err(error) => Err(match error {
-                faer::linalg::solvers::LltError::NonPositivePivot { index } => {
-                    LinearError::NotPositiveDefinite { index }
-                }
-                _ => LinearError::OutOfMemory { num_unknowns: n },
-            }),
+            Err(faer::linalg::solvers::LltError::NonPositivePivot { index }) => {
+                Err(LinearError::NotPositiveDefinite { index })
+            }
         }
     }
 
@@ -187,7 +185,7 @@ impl LinearSystem {
     }
 
     /// Solves K X = B for up to four columns at once by preconditioned conjugate gradients, each to
-    /// ‖residual‖ ≤ `tolerance` ‖b‖ in the norm of the preconditioner. Falls back on a fresh double-precision factor.
+    /// ‖residual‖ ≤ `tolerance` ‖b‖. Falls back on a fresh double-precision factor.
     ///
     /// # Errors
     /// [`LinearError::NotPositiveDefinite`].
@@ -206,7 +204,8 @@ impl LinearSystem {
         self.precondition(n, m, &mut z, &mut single);
         let mut p = z.clone();
         let mut rz: Vec<f64> = (0..m).map(|c| dot(&r[c * n..][..n], &z[c * n..][..n])).collect();
-        let target: Vec<f64> = rz.iter().map(|s| s.abs() * tolerance * tolerance).collect();
+        let target: Vec<f64> =
+            (0..m).map(|c| dot(&r[c * n..][..n], &r[c * n..][..n]) * tolerance * tolerance).collect();
         let mut ap = vec![0.0; n];
         let mut is_done: Vec<bool> = rz.iter().map(|&s| s == 0.0).collect();
         let mut iteration = 0;
@@ -225,7 +224,7 @@ impl LinearSystem {
                     continue;
                 }
                 let range = c * n..(c + 1) * n;
-                multiply(topology, &self.values, &p[range.clone()], &mut ap);
+                multiply(topology, &self.blocks, &p[range.clone()], &mut ap);
                 let curvature = dot(&p[range.clone()], &ap);
                 if !(curvature > 0.0) {
                     return Err(LinearError::NotPositiveDefinite { index: 0 });
@@ -235,6 +234,11 @@ impl LinearSystem {
                     x[c * n + i] += step * p[c * n + i];
                     r[c * n + i] -= step * ap[i];
                 }
+                let size = dot(&r[range.clone()], &r[range]);
+                is_done[c] = size <= target[c] || !size.is_finite();
+            }
+            if is_done.iter().all(|d| *d) {
+                break;
             }
             z.copy_from_slice(&r);
             self.precondition(n, m, &mut z, &mut single);
@@ -243,10 +247,6 @@ impl LinearSystem {
                     continue;
                 }
                 let next = dot(&r[c * n..][..n], &z[c * n..][..n]);
-                if next.abs() <= target[c] || !next.is_finite() {
-                    is_done[c] = true;
-                    continue;
-                }
                 let beta = next / rz[c];
                 rz[c] = next;
                 for i in c * n..(c + 1) * n {
@@ -259,17 +259,31 @@ impl LinearSystem {
 }
 
 /// y = K x with the lower triangle.
-fn multiply(topology: &Topology, values: &[f64], x: &[f64], y: &mut [f64]) {
+fn multiply(topology: &Topology, blocks: &[[f64; 9]], x: &[f64], y: &mut [f64]) {
     y.fill(0.0);
-    for j in 0..x.len() {
-        let (start, end) = (topology.column_pointers[j], topology.column_pointers[j + 1]);
-        let xj = x[j];
-        let mut sum = values[start] * xj;
-        for (&i, &v) in topology.row_indices[start + 1..end].iter().zip(&values[start + 1..end]) {
-            y[i] += v * xj;
-            sum += v * x[i];
+    for (j, pair) in topology.block_pointers.windows(2).enumerate() {
+        let (start, end) = (pair[0] as usize, pair[1] as usize);
+        let xj = [x[3 * j], x[3 * j + 1], x[3 * j + 2]];
+        // The diagonal block: its lower triangle.
+        let d = &blocks[start];
+        let mut sum = [
+            d[0] * xj[0] + d[1] * xj[1] + d[2] * xj[2],
+            d[1] * xj[0] + d[4] * xj[1] + d[5] * xj[2],
+            d[2] * xj[0] + d[5] * xj[1] + d[8] * xj[2],
+        ];
+        for (&row, b) in topology.block_rows[start + 1..end].iter().zip(&blocks[start + 1..end]) {
+            let i = 3 * row as usize;
+            let xi = [x[i], x[i + 1], x[i + 2]];
+            for (c, yi) in y[i..i + 3].iter_mut().enumerate() {
+                *yi += b[c] * xj[0] + b[3 + c] * xj[1] + b[6 + c] * xj[2];
+            }
+            for (k, s) in sum.iter_mut().enumerate() {
+                *s += b[3 * k] * xi[0] + b[3 * k + 1] * xi[1] + b[3 * k + 2] * xi[2];
+            }
         }
-        y[j] += sum;
+        for (c, s) in sum.iter().enumerate() {
+            y[3 * j + c] += s;
+        }
     }
 }
 

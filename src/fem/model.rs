@@ -1,10 +1,10 @@
 //! The forward model: a mesh made ready for solving, and the loops over its elements.
 
 use super::error::{SolveError, StepFailure};
-use super::kernel::{Direction, ElementInput, ElementOutput, ElementTables, Kernels, MAX_NODES};
+use super::kernel::{Direction, ElementInput, ElementOutput, ElementTables, Kernels, MAX_GROUPS, MAX_NODES};
 use super::linear::LinearSystem;
 use super::topology::{NOT_FREE, Topology};
-use crate::material::{LANES, Ogden, Parameter};
+use crate::material::{LANES, Lanes, Ogden, Parameter};
 use crate::mesh::Mesh;
 use crate::specimen::{Specimen, TestKind};
 
@@ -18,7 +18,7 @@ pub struct ForwardModel {
     pub(super) topology: Topology,
     pub(super) system: LinearSystem,
     pub(super) output: Box<ElementOutput>,
-    /// Per element: B and κ R_p of the last assembly, from which the pressure follows after a solve.
+    /// Per element: B, D and the pressure gap of the last assembly, from which the pressure follows after a solve.
     pub(super) condensation: Vec<Condensation>,
     /// Affine displacement along x per unit of drive at each node: the first guess of a load step.
     pub(super) lift: Vec<f64>,
@@ -50,8 +50,9 @@ pub struct Statistics {
 
 /// What is kept of an element between assembly and the update of its pressure.
 pub(super) struct Condensation {
-    divergence: [[[f64; MAX_NODES]; 3]; 4],
+    divergence: [[[Lanes; MAX_GROUPS]; 3]; 4],
     pressure_gap: [f64; 4],
+    bulk: [[f64; 4]; 4],
 }
 
 impl ForwardModel {
@@ -83,7 +84,11 @@ impl ForwardModel {
             system,
             output: Box::default(),
             condensation: (0..num_elements)
-                .map(|_| Condensation { divergence: [[[0.0; MAX_NODES]; 3]; 4], pressure_gap: [0.0; 4] })
+                .map(|_| Condensation {
+                    divergence: [[[Lanes::ZERO; MAX_GROUPS]; 3]; 4],
+                    pressure_gap: [0.0; 4],
+                    bulk: [[0.0; 4]; 4],
+                })
                 .collect(),
             lift,
             driven_elements,
@@ -205,10 +210,11 @@ impl ForwardModel {
     ) -> Result<(), StepFailure> {
         residual.fill([0.0; 3]);
         self.tangent_at = 0;
-        self.system.values.fill(0.0);
+        self.system.blocks.fill([0.0; 9]);
         let mut out = std::mem::take(&mut self.output);
         let mut failure = None;
-        for e in 0..self.mesh.num_elements() {
+        for index in 0..self.mesh.num_elements() {
+            let e = self.topology.element_order[index] as usize;
             let input = self.input(e, &self.mesh.nodes, displacement, pressure, material);
             if !self.kernels.tangent(&self.tables, &input, &mut out) {
                 failure = Some(StepFailure::InvertedElement { element: e, jacobian: out.min_jacobian });
@@ -217,12 +223,9 @@ impl ForwardModel {
             scatter(self.mesh.element(e), &out.residual, residual);
             let kept = &mut self.condensation[e];
             kept.pressure_gap = out.pressure_gap;
+            kept.bulk = out.bulk;
             for m in 0..4 {
-                for i in 0..3 {
-                    for a in 0..self.tables.num_nodes() {
-                        kept.divergence[m][i][a] = out.divergence[m][i][a / LANES].0[a % LANES];
-                    }
-                }
+                kept.divergence[m] = out.divergence[m];
             }
             self.scatter_stiffness(e, &out);
         }
@@ -237,41 +240,34 @@ impl ForwardModel {
     fn scatter_stiffness(&mut self, e: usize, out: &ElementOutput) {
         let nodes = self.mesh.element(e);
         let n = nodes.len();
-        let blocks = self.topology.pair_blocks(e);
-        let mut pair = 0;
+        let mut places = [NOT_FREE; MAX_NODES];
+        for (place, &v) in places.iter_mut().zip(nodes) {
+            *place = self.topology.place[v as usize];
+        }
+        let mut pairs = self.topology.pair_blocks(e);
         for b in 0..n {
-            let place_b = self.topology.place[nodes[b] as usize];
-            if place_b == NOT_FREE {
-                pair += n - b;
+            let (now, rest) = pairs.split_at(n - b);
+            pairs = rest;
+            if places[b] == NOT_FREE {
                 continue;
             }
-            for a in b..n {
-                let place_a = self.topology.place[nodes[a] as usize];
-                let block = blocks[pair] as usize;
-                pair += 1;
-                if place_a == NOT_FREE {
+            let columns = &out.stiffness[3 * b..3 * b + 3];
+            for (a, &block) in (b..n).zip(now) {
+                if places[a] == NOT_FREE {
                     continue;
                 }
                 let (group, lane) = (a / LANES, a % LANES);
-                if place_a == place_b {
+                let target = &mut self.system.blocks[block as usize];
+                if places[a] >= places[b] {
                     for k in 0..3 {
-                        for i in k..3 {
-                            let slot = self.topology.entry(place_b as usize, 0, i, k);
-                            self.system.values[slot] += out.stiffness[3 * b + k][i][group].0[lane];
-                        }
-                    }
-                } else if place_a > place_b {
-                    for k in 0..3 {
-                        let slot = self.topology.entry(place_b as usize, block, 0, k);
                         for i in 0..3 {
-                            self.system.values[slot + i] += out.stiffness[3 * b + k][i][group].0[lane];
+                            target[3 * k + i] += columns[k][i][group].0[lane];
                         }
                     }
                 } else {
                     for k in 0..3 {
-                        let slot = self.topology.entry(place_a as usize, block, 0, k);
                         for i in 0..3 {
-                            self.system.values[slot + i] += out.stiffness[3 * b + i][k][group].0[lane];
+                            target[3 * k + i] += columns[i][k][group].0[lane];
                         }
                     }
                 }
@@ -279,38 +275,42 @@ impl ForwardModel {
         }
     }
 
-    /// Replaces rows and columns of pinned unknowns by the identity (scaled by their own diagonal).
+    /// Replaces rows and columns of pinned unknowns by their diagonal.
     fn pin(&mut self) {
         let t = &self.topology;
-        for j in 0..t.num_unknowns() {
-            let (start, end) = (t.column_pointers[j], t.column_pointers[j + 1]);
-            if t.is_pinned[j] {
-                self.system.values[start + 1..end].fill(0.0);
-            } else {
-                for s in start + 1..end {
-                    if t.is_pinned[t.row_indices[s]] {
-                        self.system.values[s] = 0.0;
+        for (j, pair) in t.block_pointers.windows(2).enumerate() {
+            for s in pair[0] as usize..pair[1] as usize {
+                let row = t.block_rows[s] as usize;
+                let block = &mut self.system.blocks[s];
+                for k in 0..3 {
+                    for i in 0..3 {
+                        let is_diagonal = row == j && i == k;
+                        if !is_diagonal && (t.is_pinned[3 * j + k] || t.is_pinned[3 * row + i]) {
+                            block[3 * k + i] = 0.0;
+                        }
                     }
                 }
             }
         }
     }
 
-    /// δp of every element from δu: κ (B δu + R_p), with the B of the last tangent.
-    pub(super) fn pressure_update(&self, kappa: f64, delta: &[[f64; 3]]) -> Vec<[f64; 4]> {
+    /// δp of every element from δu: D B δu + gap, with the B and D of the last tangent.
+    pub(super) fn pressure_update(&self, delta: &[[f64; 3]]) -> Vec<[f64; 4]> {
         let mut update = Vec::with_capacity(self.condensation.len());
         for (e, kept) in self.condensation.iter().enumerate() {
             let nodes = self.mesh.element(e);
             let mut p = kept.pressure_gap;
-            for (m, p) in p.iter_mut().enumerate() {
-                let mut s = 0.0;
+            for m in 0..4 {
+                let mut dilation = 0.0;
                 for (a, &v) in nodes.iter().enumerate() {
                     let d = &delta[v as usize];
                     for i in 0..3 {
-                        s += kept.divergence[m][i][a] * d[i];
+                        dilation += kept.divergence[m][i][a / LANES].0[a % LANES] * d[i];
                     }
                 }
-                *p += kappa * s;
+                for (n, p) in p.iter_mut().enumerate() {
+                    *p += kept.bulk[n][m] * dilation;
+                }
             }
             update.push(p);
         }

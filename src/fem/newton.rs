@@ -210,7 +210,7 @@ impl ForwardModel {
             let accuracy = (0.1 * last).clamp(1e-9, 1e-3);
             let x = self.system.solve(&self.topology, &[right], accuracy).map_err(StepFailure::Linear)?;
             let delta = self.spread(&x[0]);
-            let delta_pressure = self.pressure_update(material.bulk_kpa, &delta);
+            let delta_pressure = self.pressure_update(&delta);
             let next = Update { from: trial.clone(), delta, delta_pressure, length: 1.0 };
             next.apply(&mut trial);
             update = Some(next);

@@ -21,10 +21,14 @@ pub struct Topology {
     pub column_pointers: Vec<usize>,
     /// Row indices, increasing in each column, the diagonal first.
     pub row_indices: Vec<usize>,
-    /// Per node place: number of 3×3 blocks in its column.
-    blocks_in_column: Vec<u32>,
-    /// Per element, for local pairs (a ≥ b) in the order b-major: which block of the column of the earlier node.
+    /// First 3×3 block of each node's column; the diagonal block comes first.
+    pub block_pointers: Vec<u32>,
+    /// Row (node place) of each block.
+    pub block_rows: Vec<u32>,
+    /// Per element, for local pairs (a ≥ b) in the order b-major: the block of the column of the earlier node.
     pair_block: Vec<u32>,
+    /// Elements in the order in which the elimination first meets them: neighbours in memory are assembled together.
+    pub element_order: Vec<u32>,
     pairs_per_element: usize,
 }
 
@@ -76,12 +80,18 @@ impl Topology {
             is_pinned,
             column_pointers: vec![0],
             row_indices: Vec::new(),
-            blocks_in_column: Vec::new(),
+            block_pointers: vec![0],
+            block_rows: Vec::new(),
+            element_order: Vec::new(),
             pair_block: Vec::new(),
             pairs_per_element: 0,
         };
-        let columns = topology.build_pattern(&graph, &order, &place_of_compact);
-        topology.build_pairs(mesh, &columns);
+        topology.build_pattern(&graph, &order, &place_of_compact);
+        topology.build_pairs(mesh);
+        let first = |e: u32| mesh.element(e as usize).iter().map(|&v| topology.place[v as usize]).min();
+        let mut element_order: Vec<u32> = (0..mesh.num_elements() as u32).collect();
+        element_order.sort_by_key(|&e| first(e));
+        topology.element_order = element_order;
         topology
     }
 
@@ -96,8 +106,7 @@ impl Topology {
     }
 
     /// The 3×3 block pattern: rows ≥ column, sorted, per column; fills the scalar pattern.
-    fn build_pattern(&mut self, graph: &Graph, order: &[u32], place_of_compact: &[u32]) -> Vec<Vec<u32>> {
-        let mut columns = Vec::with_capacity(order.len());
+    fn build_pattern(&mut self, graph: &Graph, order: &[u32], place_of_compact: &[u32]) {
         for (k, &v) in order.iter().enumerate() {
             let mut rows: Vec<u32> = vec![k as u32];
             for e in graph.offsets[v as usize]..graph.offsets[v as usize + 1] {
@@ -115,13 +124,12 @@ impl Topology {
                 }
                 self.column_pointers.push(self.row_indices.len());
             }
-            self.blocks_in_column.push(rows.len() as u32);
-            columns.push(rows);
+            self.block_rows.extend_from_slice(&rows);
+            self.block_pointers.push(self.block_rows.len() as u32);
         }
-        columns
     }
 
-    fn build_pairs(&mut self, mesh: &Mesh, columns: &[Vec<u32>]) {
+    fn build_pairs(&mut self, mesh: &Mesh) {
         let n = mesh.element_kind.num_nodes();
         self.pairs_per_element = n * (n + 1) / 2;
         self.pair_block.reserve(self.pairs_per_element * mesh.num_elements());
@@ -134,7 +142,10 @@ impl Topology {
                         0
                     } else {
                         // Every pair of an element's nodes is an edge of the graph, so the search succeeds.
-                        columns[pa.min(pb) as usize].binary_search(&pa.max(pb)).unwrap_or_default() as u32
+                        let start = self.block_pointers[pa.min(pb) as usize];
+                        let end = self.block_pointers[pa.min(pb) as usize + 1];
+                        let rows = &self.block_rows[start as usize..end as usize];
+                        start + rows.binary_search(&pa.max(pb)).unwrap_or_default() as u32
                     };
                     self.pair_block.push(block);
                 }
@@ -147,11 +158,20 @@ impl Topology {
         &self.pair_block[element * self.pairs_per_element..(element + 1) * self.pairs_per_element]
     }
 
-    /// Where the entry (component i of block `block`, component k of the column's node `place`) is stored.
-    #[inline(always)]
-    pub fn entry(&self, place: usize, block: usize, i: usize, k: usize) -> usize {
-        // Column k starts after k columns that hold 3·blocks − 0, −1, … entries.
-        self.column_pointers[3 * place + k] + 3 * block + i - k
+    /// Writes the lower triangle of `blocks` (3×3, column by column) in the scalar pattern.
+    pub fn to_scalar<T>(&self, blocks: &[[f64; 9]], convert: impl Fn(f64) -> T, out: &mut Vec<T>) {
+        out.clear();
+        out.reserve(self.row_indices.len());
+        for pair in self.block_pointers.windows(2) {
+            let column = &blocks[pair[0] as usize..pair[1] as usize];
+            for k in 0..3 {
+                for (r, block) in column.iter().enumerate() {
+                    for i in if r == 0 { k } else { 0 }..3 {
+                        out.push(convert(block[3 * k + i]));
+                    }
+                }
+            }
+        }
     }
 }
 

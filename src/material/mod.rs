@@ -3,10 +3,12 @@
 mod lanes;
 mod ogden_lanes;
 mod point;
+mod read;
 
 pub use lanes::{LANES, Lanes};
 pub use ogden_lanes::{MAX_TERMS, SpectralState, Tensor};
 pub use point::{energy_density, first_piola_kirchhoff_stress, material_tangent, stress_parameter_derivative};
+pub use read::MaterialError;
 
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,8 @@
 //! Ogden stress and tangent at eight points at once.
 //!
 //! With x_a = ln λ_a² (eigenvalues of C), e_ap = μ_p exp(α_p/2 (x_a − x̄)), m_p = mean_a e_ap:
-//! τ_a = Σ_p (e_ap − m_p) + p, P = Σ_a τ_a/λ_a n̂_a ⊗ n_a, with p the pressure-like stress (κ ln J, or its projection).
+//! τ_a = Σ_p (e_ap − m_p) + p, P = Σ_a τ_a/λ_a n̂_a ⊗ n_a, with p the pressure-like (Kirchhoff) stress: κ ln J
+//! at a point, J times the element's pressure in the mixed formulation.
 //! The tangent in the principal frame has the blocks
 //!
 //! * normal: ∂P_a/∂λ_b = (∂τ_a/∂ln λ_b − τ_a δ_ab)/(λ_a λ_b),
@@ -127,9 +128,16 @@ impl SpectralState {
         out
     }
 
-    /// ∂P/∂F (kPa) at fixed pressure: `out[3 i + J][3 k + L]`, both triangles filled.
+    /// ∂P/∂F (kPa) with the pressure-like stress `pressure` and its derivative with respect to ln J, `pressure_rate`:
+    /// `out[3 i + J][3 k + L]`, both triangles filled.
     #[inline(always)]
-    pub fn material_tangent<const FMA: bool>(&self, material: &Ogden, pressure: Lanes, out: &mut [[Lanes; 9]; 9]) {
+    pub fn material_tangent<const FMA: bool>(
+        &self,
+        material: &Ogden,
+        pressure: Lanes,
+        pressure_rate: Lanes,
+        out: &mut [[Lanes; 9]; 9],
+    ) {
         let inverse = [1.0, 1.0, 1.0].map(Lanes::splat);
         let inverse = [inverse[0] / self.stretch[0], inverse[1] / self.stretch[1], inverse[2] / self.stretch[2]];
         let squared =
@@ -153,7 +161,7 @@ impl SpectralState {
         for a in 0..3 {
             normal[a][a] -= self.tau[a] + pressure;
             for b in a..3 {
-                normal[a][b] = normal[a][b] * inverse[a] * inverse[b];
+                normal[a][b] = (normal[a][b] + pressure_rate) * inverse[a] * inverse[b];
                 normal[b][a] = normal[a][b];
             }
         }

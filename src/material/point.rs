@@ -41,25 +41,11 @@ pub fn first_piola_kirchhoff_stress(material: &Ogden, deformation_gradient: &[[f
 /// ∂P/∂F (kPa), `[3 i + J][3 k + L]`.
 pub fn material_tangent(material: &Ogden, deformation_gradient: &[[f64; 3]; 3]) -> [[f64; 9]; 9] {
     let f = deformation_gradient;
-    let j = determinant(f);
-    let pressure = material.bulk_kpa * j.ln();
+    let pressure = Lanes::splat(material.bulk_kpa * determinant(f).ln());
+    let rate = Lanes::splat(material.bulk_kpa);
     let mut lanes = [[Lanes::ZERO; 9]; 9];
-    SpectralState::new(material, &splat(f)).material_tangent::<false>(material, Lanes::splat(pressure), &mut lanes);
-    let mut out = lanes.map(|row| row.map(|x| x.0[0]));
-    // κ F⁻ᵀ ⊗ F⁻ᵀ: the derivative of the pressure itself.
-    let mut inverse_transpose = [0.0; 9];
-    for i in 0..3 {
-        for c in 0..3 {
-            let (i1, i2, c1, c2) = ((i + 1) % 3, (i + 2) % 3, (c + 1) % 3, (c + 2) % 3);
-            inverse_transpose[3 * i + c] = (f[i1][c1] * f[i2][c2] - f[i1][c2] * f[i2][c1]) / j;
-        }
-    }
-    for m in 0..9 {
-        for n in 0..9 {
-            out[m][n] += material.bulk_kpa * inverse_transpose[m] * inverse_transpose[n];
-        }
-    }
-    out
+    SpectralState::new(material, &splat(f)).material_tangent::<false>(material, pressure, rate, &mut lanes);
+    lanes.map(|row| row.map(|x| x.0[0]))
 }
 
 /// ∂P/∂ξ at fixed F (kPa per unit of ξ).

@@ -72,8 +72,8 @@ impl Mesh {
             ARC_AREA_TOLERANCE * domain.depth() * (discs + if domain.is_dumbbell { 8.0 } else { 0.0 })
         };
         let (expected_mm3, tolerance_mm3) = (domain.area() * domain.depth(), curved + 1e-9 * volume.abs());
-        // Written so that NaN fails.
-        if !((volume - expected_mm3).abs() <= tolerance_mm3) {
+        let difference = (volume - expected_mm3).abs();
+        if difference.is_nan() || difference > tolerance_mm3 {
             return Err(MeshError::VolumeMismatch { volume_mm3: volume, expected_mm3, tolerance_mm3 });
         }
         self.check_sets(&domain)
@@ -96,7 +96,7 @@ impl Mesh {
         for element in 0..self.num_elements() {
             for gradient in &gradients {
                 let jacobian = determinant(self.geometry_gradient(element, gradient));
-                if !(jacobian > 0.0) {
+                if jacobian.is_nan() || jacobian <= 0.0 {
                     return Err(MeshError::InvertedElement { element, jacobian });
                 }
             }

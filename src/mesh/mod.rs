@@ -1,6 +1,7 @@
 //! Meshes: a section (quadrilaterals or triangles, quadratic, following the hole walls as curves) extruded.
 
 mod build;
+mod cells;
 mod check;
 mod domain;
 mod element;

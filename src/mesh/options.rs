@@ -19,7 +19,7 @@ pub struct MeshOptions {
     /// Smallest element size next to a graded boundary (bonded faces and their edges, hole walls) relative to the size
     /// in the interior; 1 = uniform. The number of elements does not depend on it.
     pub grading: f64,
-    /// Least number of elements around a whole hole.
+    /// Least number of elements around a whole hole, at least 8.
     pub hole_segments: usize,
     /// Least number of element layers between a hole and the edge of its cell.
     pub radial_layers: usize,
@@ -85,7 +85,7 @@ impl MeshOptions {
         in_range("section_size_mm", self.section_size_mm, 1e-6, 1e6)?;
         in_range("levels", self.levels as f64, 1.0, 1e4)?;
         in_range("grading", self.grading, 0.01, 1.0)?;
-        in_range("hole_segments", self.hole_segments as f64, 4.0, 1e4)?;
+        in_range("hole_segments", self.hole_segments as f64, 8.0, 1e4)?;
         in_range("radial_layers", self.radial_layers as f64, 1.0, 1e3)?;
         in_range("min_scaled_jacobian", self.min_scaled_jacobian, 0.0, 0.9)?;
         in_range("max_elements", self.max_elements as f64, 1.0, 2e7)

@@ -26,8 +26,7 @@ impl Section {
         for cell in 0..self.num_cells() {
             let points: Vec<[f64; 2]> = self.cell(cell).iter().map(|&n| self.points[n as usize]).collect();
             let quality = scaled_jacobian(&points);
-            // Written so that NaN counts as worst.
-            if !(quality >= worst.0) {
+            if quality.is_nan() || quality < worst.0 {
                 worst = (quality, cell);
             }
         }

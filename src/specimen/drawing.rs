@@ -100,7 +100,7 @@ const BELOW_OTHER: f64 = 6.0;
 /// More distinct ordinates than this are left to the table.
 const MAX_ORDINATES: usize = 24;
 /// Usual scales, largest first.
-const SCALES: [f64; 12] = [50.0, 20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01];
+const SCALES: [f64; 14] = [50.0, 20.0, 10.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01];
 
 /// A length with up to three decimals, without trailing zeros.
 pub(super) fn format_mm(value: f64) -> String {
@@ -229,14 +229,10 @@ impl Drawing {
             self.line(Layer::Centre, [x - mark, y], [x + mark, y]);
             self.line(Layer::Centre, [x, y - mark], [x, y + mark]);
         }
-        let labels: Vec<String> = specimen
-            .holes
-            .iter()
-            .enumerate()
-            .map(|(i, hole)| format!("{} ⌀{}", i + 1, format_mm(hole.diameter_mm)))
-            .collect();
+        let details: Vec<String> =
+            specimen.holes.iter().map(|hole| format!("⌀{}", format_mm(hole.diameter_mm))).collect();
         let bounds = [[center[0] - hx, center[1] - hb], [center[0] + hx, center[1] + hb]];
-        for label in place_labels(&circles, &labels, bounds, center) {
+        for label in place_labels(&circles, &details, bounds, center) {
             if let Some((from, to)) = label.leader {
                 self.line(Layer::Dimensions, from, to);
             }
@@ -377,7 +373,8 @@ impl Drawing {
         self.line(Layer::Sheet, [left - 2.0, 5.0], [left - 2.0, 5.0 + TITLE_HEIGHT]);
         self.line(Layer::Sheet, [left - 2.0, 5.0 + TITLE_HEIGHT], [width - 5.0, 5.0 + TITLE_HEIGHT]);
         let mut y = 5.0 + TITLE_HEIGHT - 6.5;
-        let per_line = ((TABLE_WIDTH + 3.0) / (3.5 * CHARACTER_WIDTH)) as usize;
+        // Names have wide letters: a little more room than for numbers.
+        let per_line = (TABLE_WIDTH / (3.6 * CHARACTER_WIDTH)) as usize;
         for line in wrap(&specimen.name, per_line, 2) {
             self.text(Layer::Sheet, [left + 1.0, y], 3.5, Anchor::Start, false, line);
             y -= 5.0;
@@ -400,7 +397,7 @@ impl Drawing {
             format!("Block {length} × {thickness} × {breadth} (x, y, z)"),
             faces,
             format!("Samples of this kind in one test: {}", specimen.samples_in_parallel),
-            format!("Dimensions in mm    Scale {ratio} on {sheet}"),
+            format!("Dimensions in mm. Scale {ratio} on {sheet}."),
         ] {
             self.text(Layer::Sheet, [left + 1.0, y], TEXT_HEIGHT, Anchor::Start, false, line);
             y -= 4.6;
@@ -422,7 +419,7 @@ fn wrap(text: &str, per_line: usize, max_lines: usize) -> Vec<String> {
             lines.push(rest[..per_line - 1].iter().chain(['…'].iter()).collect());
             break;
         }
-        let space = rest[..per_line].iter().rposition(|c| *c == ' ').filter(|at| *at > 0);
+        let space = rest[..=per_line].iter().rposition(|c| *c == ' ').filter(|at| *at > 0);
         let cut = space.unwrap_or(per_line);
         lines.push(rest[..cut].iter().collect());
         rest = &rest[if space.is_some() { cut + 1 } else { cut }..];

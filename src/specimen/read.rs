@@ -58,7 +58,8 @@ impl Specimen {
         Ok(specimen)
     }
 
-    /// The specimen as `specimen/1`, indented, with a line break at the end. Reading it back gives the same bits.
+    /// The specimen as `specimen/1`, indented, with a line break at the end. Reading it back gives each number to within one unit in its
+    /// last place (serde_json's default parser rounds so).
     pub fn to_json(&self) -> String {
         // Serialising fails only for maps with keys that are not strings and for failing writers: neither is here.
         let mut text = serde_json::to_string_pretty(self).expect("a struct of strings and numbers serialises");
