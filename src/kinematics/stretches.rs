@@ -156,12 +156,12 @@ pub(crate) mod tests {
                     assert!((s[i] - d[i]).abs() < 8.0 * f64::EPSILON * d[0], "{d:?}: {s:?}");
                 }
                 let frame = principal_frame(&f).unwrap();
-                for i in 0..3 {
-                    for j in 0..3 {
+                for (i, row) in f.iter().enumerate() {
+                    for (j, entry) in row.iter().enumerate() {
                         let sum: f64 =
                             (0..3).map(|m| frame.stretched_directions[m][i] * frame.reference_directions[m][j]).sum();
                         // As above.
-                        assert!((sum - f[i][j]).abs() < 8.0 * f64::EPSILON * d[0]);
+                        assert!((sum - entry).abs() < 8.0 * f64::EPSILON * d[0]);
                     }
                 }
                 let volume = d[0] * d[1] * d[2];
