@@ -4,13 +4,17 @@
 //! Tensors are `[[f64; 3]; 3]`, row first. For F the row is the current and the column the reference direction.
 
 mod decomposition;
+mod gradient;
 mod stretches;
 
 pub use decomposition::{
     Decomposition, MODE_TOLERANCE, compose, decompose, mode_exponent_derivatives, mode_exponents,
     stretch_amplitude_and_mode,
 };
-pub use stretches::{determinant, inverse, isochoric_principal_stretches, principal_stretches};
+pub use gradient::{StateGradient, state_gradient};
+pub use stretches::{
+    PrincipalFrame, determinant, inverse, isochoric_principal_stretches, principal_frame, principal_stretches,
+};
 
 /// A second-order tensor, `[row][column]`.
 pub type Tensor = [[f64; 3]; 3];

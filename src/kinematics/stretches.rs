@@ -24,17 +24,34 @@ pub fn inverse(tensor: &Tensor) -> Option<Tensor> {
     Some(inverse)
 }
 
-/// Principal stretches λ₁ ≥ λ₂ ≥ λ₃ ≥ 0: the singular values of F.
+/// F = Σⱼ λⱼ nⱼ ⊗ Nⱼ: principal stretches with their directions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PrincipalFrame {
+    /// λ₁ ≥ λ₂ ≥ λ₃ ≥ 0.
+    pub stretches: [f64; 3],
+    /// λⱼ nⱼ, current directions times stretches: `[j][component]`.
+    pub stretched_directions: [[f64; 3]; 3],
+    /// Unit vectors Nⱼ in the reference: `[j][component]`.
+    pub reference_directions: [[f64; 3]; 3],
+}
+
+/// Principal stretches λ₁ ≥ λ₂ ≥ λ₃ ≥ 0: the singular values of F. Entries that are not finite give NaN.
+pub fn principal_stretches(deformation_gradient: &Tensor) -> [f64; 3] {
+    principal_frame(deformation_gradient).map_or([f64::NAN; 3], |frame| frame.stretches)
+}
+
+/// Principal stretches and directions; none where F is not finite. Directions of repeated stretches are any that fit.
 ///
 /// One-sided Jacobi: columns of F are rotated in pairs until they are orthogonal; their lengths are then the singular
 /// values. C = FᵀF is never squared into existence, so small stretches keep full relative accuracy, and repeated
-/// stretches need no special case. Entries that are not finite give NaN.
-pub fn principal_stretches(deformation_gradient: &Tensor) -> [f64; 3] {
+/// stretches need no special case.
+pub fn principal_frame(deformation_gradient: &Tensor) -> Option<PrincipalFrame> {
     if deformation_gradient.iter().flatten().any(|x| !x.is_finite()) {
-        return [f64::NAN; 3];
+        return None;
     }
     let f = deformation_gradient;
     let mut columns = [0, 1, 2].map(|j| [f[0][j], f[1][j], f[2][j]]);
+    let mut rotation = super::IDENTITY;
     // Convergence is quadratic: 3x3 matrices need three to five sweeps; the limit only guards against rounding cycles.
     for _ in 0..20 {
         let mut is_orthogonal = true;
@@ -48,19 +65,24 @@ pub fn principal_stretches(deformation_gradient: &Tensor) -> [f64; 3] {
             let t = zeta.signum() / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
             let cosine = 1.0 / (1.0 + t * t).sqrt();
             let sine = cosine * t;
-            for i in 0..3 {
-                let (x, y) = (columns[p][i], columns[q][i]);
-                columns[p][i] = cosine * x - sine * y;
-                columns[q][i] = sine * x + cosine * y;
+            for vectors in [&mut columns, &mut rotation] {
+                let (x, y) = (vectors[p], vectors[q]);
+                vectors[p] = [0, 1, 2].map(|i| cosine * x[i] - sine * y[i]);
+                vectors[q] = [0, 1, 2].map(|i| sine * x[i] + cosine * y[i]);
             }
         }
         if is_orthogonal {
             break;
         }
     }
-    let mut stretches = columns.map(|c| dot(c, c).sqrt());
-    stretches.sort_by(|x, y| y.total_cmp(x));
-    stretches
+    let lengths = columns.map(|c| dot(c, c).sqrt());
+    let mut order = [0, 1, 2];
+    order.sort_by(|&x, &y| lengths[y].total_cmp(&lengths[x]));
+    Some(PrincipalFrame {
+        stretches: order.map(|j| lengths[j]),
+        stretched_directions: order.map(|j| columns[j]),
+        reference_directions: order.map(|j| rotation[j]),
+    })
 }
 
 /// Isochoric principal stretches λ̄ᵢ = J^(−1/3) λᵢ, largest first. NaN where J ≤ 0 or F is not finite.
@@ -133,6 +155,15 @@ pub(crate) mod tests {
                     // Forming F rounds at 4 ulp of its largest entry; the Jacobi sweeps add a few ulp of each value.
                     assert!((s[i] - d[i]).abs() < 8.0 * f64::EPSILON * d[0], "{d:?}: {s:?}");
                 }
+                let frame = principal_frame(&f).unwrap();
+                for (i, row) in f.iter().enumerate() {
+                    for (j, entry) in row.iter().enumerate() {
+                        let sum: f64 =
+                            (0..3).map(|m| frame.stretched_directions[m][i] * frame.reference_directions[m][j]).sum();
+                        // As above.
+                        assert!((sum - entry).abs() < 8.0 * f64::EPSILON * d[0]);
+                    }
+                }
                 let volume = d[0] * d[1] * d[2];
                 // Cancellation in the determinant of entries as large as d₁: relative to d₁ d₂ max(d₂, d₃).
                 assert!((determinant(&f) - volume).abs() < 1e-14 * d[0] * d[0] * d[0]);
@@ -157,11 +188,9 @@ pub(crate) mod tests {
     fn inverse_inverts() {
         let f = [[1.2, 0.4, 0.0], [0.1, 0.9, -0.2], [0.0, 0.3, 1.1]];
         let one = product(&f, &inverse(&f).unwrap());
-        for i in 0..3 {
-            for j in 0..3 {
-                // A few operations on numbers of order one.
-                assert!((one[i][j] - if i == j { 1.0 } else { 0.0 }).abs() < 1e-15);
-            }
+        for (found, exact) in one.iter().flatten().zip(crate::kinematics::IDENTITY.iter().flatten()) {
+            // A few operations on numbers of order one.
+            assert!((found - exact).abs() < 1e-15);
         }
         assert_eq!(inverse(&[[1.0; 3]; 3]), None);
     }

@@ -2,6 +2,7 @@
 
 mod continuum;
 mod covariance;
+mod drives;
 mod evaluation;
 mod information;
 mod integrated;
@@ -12,9 +13,10 @@ pub use continuum::{
     information_over_quadrature, integrate_over_quadrature, largest_principal_stretch, median_stretch_over_quadrature,
 };
 pub use covariance::{Covariance, Criterion, IDENTIFIABILITY_LIMIT, PromisedSd};
+pub use drives::DriveSelection;
 pub use evaluation::{
-    DriveSelection, Evaluation, EvaluationError, EvaluationMaps, EvaluationNotes, EvaluationOptions,
-    EvaluationStatistics, evaluate, evaluate_model,
+    Evaluation, EvaluationError, EvaluationMaps, EvaluationNotes, EvaluationOptions, EvaluationStatistics, evaluate,
+    evaluate_model,
 };
 pub use information::{FisherInformation, InformationError, MeasurementNoise, PartialVoxels, ScanSettings};
 pub use integrated::{IntegratedSensitivity, integrate_over_voxels, parameter_sensitivity, sensitivity_map};

@@ -20,6 +20,7 @@ const STRETCH_AXIS_STEP: f64 = 0.1;
 
 /// One drive of an `evaluation/1`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct EvaluationStep {
     /// Drive, mm.
     pub drive_mm: f64,

@@ -35,9 +35,9 @@ fn promised_covariance_is_the_spread_of_estimates() {
     let covariance = information.covariance();
     // Rows of the standardised design matrix: entry / noise sd of that datum.
     let mut rows: Vec<[f64; 3]> = Vec::new();
-    for v in 0..num_voxels {
-        for c in 0..3 {
-            let sd = noise().displacement_sd_mm[c] / weights[v].sqrt();
+    for (v, weight) in weights.iter().enumerate() {
+        for (c, noise_sd) in noise().displacement_sd_mm.into_iter().enumerate() {
+            let sd = noise_sd / weight.sqrt();
             rows.push([0, 1, 2].map(|i| fields[i][v][c] / sd));
         }
     }

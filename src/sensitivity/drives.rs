@@ -1,0 +1,127 @@
+//! At which drives a specimen is evaluated, and the search for the drive that reaches a median stretch.
+
+use super::evaluation::EvaluationError;
+use super::observation::Scanner;
+use crate::fem::{Equilibrium, ForwardModel, SolveOptions};
+use crate::material::Ogden;
+use crate::specimen::{Specimen, TestKind};
+use serde::{Deserialize, Serialize};
+
+/// Largest median stretch that may be asked for.
+const MAX_MEDIAN_STRETCH: f64 = 5.0;
+/// Accuracy of the median stretch reached.
+const MEDIAN_TOLERANCE: f64 = 1e-5;
+/// Equilibria in the search for a drive. Safeguarded secant steps need about six.
+const MAX_DRIVE_SOLVES: usize = 30;
+
+/// At which drives to evaluate.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DriveSelection {
+    /// These, mm, increasing.
+    DriveMm(Vec<f64>),
+    /// The one at which the median of λ over voxels has this value.
+    MedianStretch(f64),
+}
+
+/// Refuses empty, unordered and unreachable selections.
+pub(super) fn check_drives(drives: &DriveSelection) -> Result<(), EvaluationError> {
+    match drives {
+        DriveSelection::DriveMm(drives_mm) => {
+            if drives_mm.is_empty() {
+                return Err(EvaluationError::NoDrive);
+            }
+            let mut previous_mm = 0.0;
+            for &drive_mm in drives_mm {
+                if !drive_mm.is_finite() || drive_mm <= previous_mm {
+                    return Err(EvaluationError::InvalidDrive { drive_mm, previous_mm });
+                }
+                previous_mm = drive_mm;
+            }
+            Ok(())
+        }
+        &DriveSelection::MedianStretch(value) => {
+            if value > 1.0 + MEDIAN_TOLERANCE && value <= MAX_MEDIAN_STRETCH {
+                Ok(())
+            } else {
+                Err(EvaluationError::InvalidMedianStretch { value, limit: MAX_MEDIAN_STRETCH })
+            }
+        }
+    }
+}
+
+/// The drive at which a homogeneous specimen has stretch amplitude λ: shear γ = λ − 1/λ over the thickness, or λ − 1 over
+/// the length.
+fn homogeneous_drive_mm(specimen: &Specimen, stretch: f64) -> f64 {
+    match specimen.test {
+        TestKind::DoubleLapShear => (stretch - 1.0 / stretch) * specimen.block.thickness_mm,
+        TestKind::Uniaxial => (stretch - 1.0) * specimen.block.length_mm,
+    }
+}
+
+/// Solves for the drive at which the median of λ over voxels is `target`, each equilibrium from the last.
+pub(super) fn solve_for_median(
+    model: &mut ForwardModel,
+    specimen: &Specimen,
+    material: &Ogden,
+    scanner: &Scanner,
+    target: f64,
+    options: &SolveOptions,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<(Equilibrium, usize), EvaluationError> {
+    let mut last: Option<Equilibrium> = None;
+    let mut count = 0;
+    find_drive(homogeneous_drive_mm(specimen, target), target, |drive_mm| {
+        let found = model.solve(material, drive_mm, last.as_ref(), options, is_cancelled)?;
+        let median = scanner.median_stretch(&found.displacement)?;
+        last = Some(found);
+        count += 1;
+        Ok(median)
+    })?;
+    // `find_drive` succeeds only after at least one solve.
+    last.map(|equilibrium| (equilibrium, count)).ok_or(EvaluationError::NoDrive)
+}
+
+/// Finds the drive at which an increasing function `median_at(drive)` with value 1 at rest has the value `target`:
+/// secant steps inside a bracket, else bisection. The last call is at the drive returned.
+fn find_drive(
+    guess_mm: f64,
+    target: f64,
+    mut median_at: impl FnMut(f64) -> Result<f64, EvaluationError>,
+) -> Result<f64, EvaluationError> {
+    // Ends of the bracket: drive and median less target.
+    let (mut low, mut high): ((f64, f64), Option<(f64, f64)>) = ((0.0, 1.0 - target), None);
+    let mut was_below = None;
+    let (mut drive_mm, mut found) = (guess_mm, 1.0);
+    for _ in 0..MAX_DRIVE_SOLVES {
+        found = median_at(drive_mm)?;
+        let excess = found - target;
+        if excess.abs() <= MEDIAN_TOLERANCE {
+            return Ok(drive_mm);
+        }
+        let is_below = excess < 0.0;
+        // Regula falsi stalls on curved functions; the value at an end that is kept twice is halved (Illinois).
+        let is_repeated = was_below == Some(is_below);
+        was_below = Some(is_below);
+        if is_below {
+            low = (drive_mm, excess);
+            if let Some(end) = high.as_mut().filter(|_| is_repeated) {
+                end.1 *= 0.5;
+            }
+        } else {
+            high = Some((drive_mm, excess));
+            if is_repeated {
+                low.1 *= 0.5;
+            }
+        }
+        drive_mm = match high {
+            // Still below: along the chord from rest, at most doubling.
+            None => drive_mm * ((target - 1.0) / (found - 1.0).max(1e-9)).clamp(1.02, 2.0),
+            Some((end, value)) => low.0 + (end - low.0) * (low.1 / (low.1 - value)).clamp(0.02, 0.98),
+        };
+    }
+    Err(EvaluationError::MedianStretchNotReached { target, found, drive_mm, num_solves: MAX_DRIVE_SOLVES })
+}
+
+#[cfg(test)]
+mod tests;
