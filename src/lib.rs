@@ -14,6 +14,7 @@ pub mod fem;
 pub mod kinematics;
 pub mod material;
 pub mod mesh;
+pub mod provenance;
 pub mod report;
 pub mod sensitivity;
 pub mod specimen;

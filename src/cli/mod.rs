@@ -1,1 +1,107 @@
-//! cli
+//! The command. Nothing is computed here: arguments become one validated request, the library works, results are printed.
+//!
+//! Results on stdout (`--json` for machines), progress on stderr, files in a folder. Exit codes: 0 done, 2 bad input,
+//! 3 no solution found, 4 a file cannot be written, 130 stopped by Ctrl-C.
+
+mod error;
+mod evaluate;
+mod input;
+mod interrupt;
+mod output;
+mod solve;
+
+use clap::{Args, Parser, Subcommand};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+pub use error::CliError;
+
+/// Designs, verifies and diagnoses full-field experiments on soft materials.
+#[derive(Parser)]
+#[command(
+    name = "lambdak",
+    version,
+    after_help = "Exit codes: 0 done, 2 bad input, 3 no solution found, 4 a file cannot be written, 130 stopped by Ctrl-C."
+)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Forces and fields of a specimen at its drives, by finite elements.
+    Solve(solve::SolveArguments),
+    /// What a scan of a specimen would see, and what it would tell about the material.
+    Evaluate(evaluate::EvaluateArguments),
+}
+
+/// What every command takes.
+#[derive(Args)]
+struct Common {
+    /// Print the result as JSON on stdout (and write files only where --out says).
+    #[arg(long)]
+    json: bool,
+    /// Folder for result files [default: results/NAME].
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+    /// Threads [default: one per core].
+    #[arg(long)]
+    threads: Option<usize>,
+}
+
+/// A specimen, its material and its mesh.
+#[derive(Args)]
+struct Subject {
+    /// Specimen file (specimen/1).
+    specimen: PathBuf,
+    /// Material file (ogden/1) [default: Ecoflex 00-20].
+    #[arg(long)]
+    material: Option<PathBuf>,
+    /// Drives in mm, comma-separated [default: the specimen's].
+    #[arg(long, value_delimiter = ',')]
+    drive: Vec<f64>,
+    /// Element size: search, standard, fine, or a factor on standard (0.2 to 5).
+    #[arg(long, default_value = "standard")]
+    mesh: String,
+    /// Mesh the whole specimen even where it has mirror planes.
+    #[arg(long)]
+    full: bool,
+}
+
+/// Runs the command line.
+pub fn run() -> ExitCode {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            // Help and version are not errors; a closed pipe while printing them is none either.
+            let code = u8::try_from(error.exit_code()).unwrap_or(2);
+            let _ = error.print();
+            return ExitCode::from(code);
+        }
+    };
+    interrupt::listen();
+    let result = match &arguments.command {
+        Command::Solve(a) => solve::run(a),
+        Command::Evaluate(a) => evaluate::run(a),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("lambdak: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+/// Starts the thread pool.
+fn start_threads(common: &Common) -> Result<(), CliError> {
+    let Some(n) = common.threads else { return Ok(()) };
+    if !(1..=1024).contains(&n) {
+        return Err(CliError::Option { option: "threads", message: format!("{n} is not from 1 to 1024") });
+    }
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(n)
+        .build_global()
+        .map_err(|e| CliError::Option { option: "threads", message: e.to_string() })
+}

@@ -13,6 +13,7 @@ mod model;
 mod nested;
 mod newton;
 mod ordering;
+mod result;
 mod topology;
 
 pub use derivatives::{ParameterSensitivity, PathSensitivity};
@@ -22,3 +23,4 @@ pub use linear::LinearError;
 pub use model::{ForwardModel, Statistics};
 pub use nested::PrepareError;
 pub use newton::{Equilibrium, SolveOptions};
+pub use result::{SolveResult, SolveStep};

@@ -13,7 +13,6 @@ use crate::specimen::Specimen;
 
 /// A specimen could not be meshed, or its mesh not be solved on.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum PrepareError {
     /// No mesh.
     #[error(transparent)]

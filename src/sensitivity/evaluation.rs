@@ -5,13 +5,13 @@ use super::covariance::{IDENTIFIABILITY_LIMIT, PromisedSd};
 use super::drives::{DriveSelection, check_drives, solve_for_median};
 use super::information::{FisherInformation, InformationError, ScanSettings};
 use super::observation::{DriveMaps, DrivenState, EvaluationStep, Scanner};
-use crate::fem::{Equilibrium, ForwardModel, SolveError, SolveOptions};
+use crate::fem::{Equilibrium, ForwardModel, PrepareError, SolveError, SolveOptions};
 use crate::material::{Ogden, Parameter};
-use crate::mesh::{MeshError, MeshOptions, mesh_specimen};
+use crate::mesh::{MeshError, MeshOptions};
+use crate::provenance::input_hash;
 use crate::specimen::Specimen;
 use crate::voxel::{Sampling, VoxelError, VoxelMask};
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 /// Why a specimen was not evaluated.
 #[derive(Debug, thiserror::Error)]
@@ -193,8 +193,10 @@ pub fn evaluate(
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<(Evaluation, EvaluationMaps), EvaluationError> {
     check_drives(drives)?;
-    let mesh = mesh_specimen(specimen, &options.mesh)?;
-    let mut model = ForwardModel::new(mesh, specimen)?;
+    let mut model = ForwardModel::of_specimen(specimen, &options.mesh).map_err(|error| match error {
+        PrepareError::Mesh(error) => EvaluationError::from(error),
+        PrepareError::Solve(error) => EvaluationError::from(error),
+    })?;
     evaluate_model(&mut model, specimen, material, scan, drives, options, is_cancelled)
 }
 
@@ -266,13 +268,13 @@ pub fn evaluate_model(
             num_dropped_points: scanner.operator.num_dropped_points(),
         },
         version: env!("CARGO_PKG_VERSION").into(),
-        input_hash: input_hash(specimen, material, scan, drives, options),
+        input_hash: hash_of_inputs(specimen, material, scan, drives, options),
     };
     Ok((evaluation, EvaluationMaps { mask: scanner.mask, drives: maps, equilibria, information, information_by_drive }))
 }
 
 /// SHA-256 over the JSON of all inputs. Field order is fixed by the types, so equal inputs have equal hashes.
-fn input_hash(
+fn hash_of_inputs(
     specimen: &Specimen,
     material: &Ogden,
     scan: &ScanSettings,
@@ -291,7 +293,7 @@ fn input_hash(
         "identifiability_limit": options.identifiability_limit,
         "bulk_log_prior_sd": options.bulk_log_prior_sd,
     });
-    Sha256::digest(inputs.to_string().as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect()
+    input_hash(&inputs)
 }
 
 #[cfg(test)]

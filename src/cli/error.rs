@@ -1,0 +1,59 @@
+//! What a command can fail with, and the exit code that says so.
+
+use std::path::PathBuf;
+
+/// A failed command.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CliError {
+    /// A file could not be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A file or folder could not be written.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The input is not usable.
+    #[error("{}: {message}", path.display())]
+    Input {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// An option's value is not usable.
+    #[error("--{option}: {message}")]
+    Option {
+        /// The option.
+        option: &'static str,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// The computation did not succeed.
+    #[error("{0}")]
+    Numerics(String),
+    /// Ctrl-C.
+    #[error("stopped; {0}")]
+    Interrupted(String),
+}
+
+impl CliError {
+    /// 2 for bad input, 3 for a computation that did not succeed, 4 for a file that cannot be written, 130 after Ctrl-C.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            CliError::Read { .. } | CliError::Input { .. } | CliError::Option { .. } => 2,
+            CliError::Numerics(_) => 3,
+            CliError::Write { .. } => 4,
+            CliError::Interrupted(_) => 130,
+        }
+    }
+}
