@@ -8,7 +8,7 @@ use super::kernel::ElementOutput;
 use super::model::ForwardModel;
 use super::newton::Equilibrium;
 use crate::material::{LANES, Ogden};
-use crate::mesh::{Locator, MeshError, MeshOptions, mesh_specimen};
+use crate::mesh::{Location, MeshError, MeshOptions, mesh_specimen, refined};
 use crate::specimen::Specimen;
 
 /// A specimen could not be meshed, or its mesh not be solved on.
@@ -22,12 +22,8 @@ pub enum PrepareError {
     Solve(#[from] SolveError),
 }
 
-/// Element size of the coarse mesh relative to the fine one. In three dimensions this is a tenth of the unknowns and
-/// a hundredth of the factorisation.
-const COARSENING: f64 = 2.4;
-
-/// Fine meshes smaller than this many unknowns are solved from rest.
-const WORTHWHILE: usize = 16_000;
+/// Meshes of fewer elements are solved from rest.
+const WORTHWHILE: usize = 1_000;
 
 impl ForwardModel {
     /// Meshes `specimen` and prepares it, with a coarse model for first guesses where the mesh is large.
@@ -35,54 +31,37 @@ impl ForwardModel {
     /// # Errors
     /// [`PrepareError`].
     pub fn of_specimen(specimen: &Specimen, options: &MeshOptions) -> Result<ForwardModel, PrepareError> {
-        let mut fine = ForwardModel::new(mesh_specimen(specimen, options)?, specimen)?;
-        if fine.num_unknowns() >= WORTHWHILE {
-            let coarser = MeshOptions {
-                section_size_mm: options.section_size_mm * COARSENING,
-                levels: ((options.levels as f64 / COARSENING).round() as usize).max(2),
-                ..options.clone()
-            };
-            // A coarse mesh that fails (a thin ligament, say) costs the short cut, not the solution.
-            if let Ok(mesh) = mesh_specimen(specimen, &coarser)
-                && let Ok(coarse) = ForwardModel::new(mesh, specimen)
-            {
-                fine.guide(coarse);
-            }
+        let mesh = mesh_specimen(specimen, options)?;
+        if mesh.num_elements() < WORTHWHILE {
+            return Ok(ForwardModel::new(mesh, specimen)?);
         }
+        // Twice the element size, then split: about the same mesh, with a coarse one inside it.
+        let coarser = MeshOptions {
+            section_size_mm: 2.0 * options.section_size_mm,
+            levels: (options.levels / 2).max(2),
+            hole_segments: (options.hole_segments / 2).max(8),
+            radial_layers: (options.radial_layers / 2).max(1),
+            ..*options
+        };
+        let nested = mesh_specimen(specimen, &coarser).ok().and_then(|coarse| Some((refined(&coarse)?, coarse)));
+        let Some((refinement, coarse)) = nested else {
+            return Ok(ForwardModel::new(mesh, specimen)?);
+        };
+        let mut fine = ForwardModel::new(refinement.mesh, specimen)?;
+        fine.guide = Some(Box::new(Guide {
+            coarse: ForwardModel::new(coarse, specimen)?,
+            nodes: refinement.nodes,
+            parents: refinement.parents,
+        }));
         Ok(fine)
     }
-
-    /// Takes first guesses from `coarse`, another mesh of the same specimen with the same mirror planes.
-    pub fn guide(&mut self, coarse: ForwardModel) {
-        let locator = Locator::new(coarse.mesh());
-        let located: Option<Vec<_>> = self.mesh.nodes.iter().map(|&x| locate_near(&locator, &coarse, x)).collect();
-        self.guide = located.map(|nodes| Box::new(Guide { coarse, locator, nodes }));
-    }
 }
 
-/// A coarse model and where the fine nodes lie in it.
+/// A coarse model and how the fine mesh lies in it.
 pub(super) struct Guide {
     pub(super) coarse: ForwardModel,
-    locator: Locator,
-    nodes: Vec<crate::mesh::Location>,
-}
-
-/// Curved walls of two meshes differ by the chord error: a point just outside is pulled towards the inside.
-fn locate_near(locator: &Locator, coarse: &ForwardModel, x: [f64; 3]) -> Option<crate::mesh::Location> {
-    if let Some(found) = locator.locate(coarse.mesh(), x) {
-        return Some(found);
-    }
-    // Try a few directions at growing distances; only a first guess depends on it.
-    for distance in [1e-3, 1e-2, 3e-2, 1e-1, 0.3] {
-        for direction in 0..26 {
-            let code = if direction < 13 { direction } else { direction + 1 };
-            let offset = [code % 3, (code / 3) % 3, code / 9].map(|c| (c as f64 - 1.0) * distance);
-            if let Some(found) = locator.locate(coarse.mesh(), [x[0] + offset[0], x[1] + offset[1], x[2] + offset[2]]) {
-                return Some(found);
-            }
-        }
-    }
-    None
+    nodes: Vec<Location>,
+    parents: Vec<u32>,
 }
 
 impl Guide {
@@ -125,11 +104,9 @@ impl Guide {
             let mut p = [0.0; 4];
             for q in 0..fine.tables.num_nodes() {
                 let (g, l) = (q / LANES, q % LANES);
-                let x = [0, 1, 2].map(|i| out.points[i][g].0[l]);
-                let value = self.locator.locate(&self.coarse.mesh, x).map_or(0.0, |found| {
-                    let a = &affine[found.element as usize];
-                    a[0] + a[1] * x[0] + a[2] * x[1] + a[3] * x[2]
-                });
+                let a = &affine[self.parents[e] as usize];
+                let value =
+                    a[0] + a[1] * out.points[0][g].0[l] + a[2] * out.points[1][g].0[l] + a[3] * out.points[2][g].0[l];
                 for (m, p) in p.iter_mut().enumerate() {
                     *p += value * out.basis[m][g].0[l] * out.volume[g].0[l];
                 }

@@ -22,6 +22,7 @@ mod morph;
 mod options;
 mod power;
 mod quads;
+mod refine;
 mod section;
 mod triangles;
 
@@ -37,6 +38,7 @@ pub use error::{LigamentEnd, MeshError};
 pub use locator::{Column, Location, Locator};
 pub use morph::{DesignVariable, morphed, shape_velocity};
 pub use options::MeshOptions;
+pub use refine::{Refinement, refined};
 
 /// Which mirror planes through the origin the mesh uses. A mirrored mesh covers the half with the positive
 /// coordinate only; normal displacement is zero on the plane.
