@@ -37,8 +37,8 @@ pub struct PathSensitivity {
     pub parameters: Vec<ParameterSensitivity>,
 }
 
-/// Relative accuracy of the linear solves.
-const ACCURACY: f64 = 1e-10;
+/// Relative accuracy of the linear solves (two iterations with the single-precision factor).
+const ACCURACY: f64 = 1e-8;
 
 impl ForwardModel {
     /// Makes the stored tangent that of `equilibrium`, and a factor near it.
@@ -66,7 +66,6 @@ impl ForwardModel {
         self.ensure_tangent(material, equilibrium)?;
         let num_nodes = self.mesh.nodes.len();
         let parameters = material.parameters();
-        let zero = vec![[0.0; 3]; num_nodes];
         let positions = self.mesh.nodes.clone();
         let mut derivative = vec![[0.0; 3]; num_nodes];
         let mut right = Vec::with_capacity(parameters.len());
@@ -75,7 +74,7 @@ impl ForwardModel {
                 material,
                 &positions,
                 &equilibrium.displacement,
-                &zero,
+                None,
                 Some(parameter),
                 None,
                 &mut derivative,
@@ -92,7 +91,7 @@ impl ForwardModel {
                 material,
                 &positions,
                 &equilibrium.displacement,
-                &displacement,
+                Some(&displacement),
                 Some(parameter),
                 Some(&driven),
                 &mut derivative,
@@ -157,7 +156,7 @@ impl ForwardModel {
                 material,
                 &positions,
                 &equilibrium.displacement,
-                &change,
+                Some(&change),
                 None,
                 Some(&driven),
                 &mut buffer,
@@ -213,7 +212,7 @@ impl ForwardModel {
         rate: &[[f64; 3]],
         t: f64,
     ) -> Result<Vec<[f64; 3]>, SolveError> {
-        let direction = &sensitivity.displacement;
+        let direction = Some(&sensitivity.displacement[..]);
         self.difference(equilibrium, velocity, rate, t, |model, x, u, out| {
             model.assemble_directional(material, x, u, direction, Some(sensitivity.parameter), None, out)
         })

@@ -95,8 +95,8 @@ pub struct ElementInput<'a> {
 
 /// A direction in which the condensed residual is differentiated.
 pub struct Direction {
-    /// δu at the nodes.
-    pub displacements: [[f64; 3]; MAX_NODES],
+    /// δu at the nodes; `None` where only the parameter moves.
+    pub displacements: Option<[[f64; 3]; MAX_NODES]>,
     /// The parameter that moves by 1, if any.
     pub parameter: Option<Parameter>,
 }
@@ -534,7 +534,8 @@ fn directional<const FMA: bool>(
     let mut delta_f = [tensor; MAX_GROUPS];
     let mut dilation = [0.0; 4];
     for g in 0..tables.groups {
-        let h = gradient_of::<FMA>(tables, &direction.displacements, g);
+        let Some(displacements) = &direction.displacements else { break };
+        let h = gradient_of::<FMA>(tables, displacements, g);
         delta_f[g] = multiply(&h, &out.inverse_map[g]);
         let d = contract(&out.cofactor[g], &delta_f[g]) * out.volume[g];
         for m in 0..4 {
@@ -560,18 +561,24 @@ fn directional<const FMA: bool>(
         }
         let kirchhoff = p * out.jacobian[g];
         let state = SpectralState::new(input.material, &out.deformation_gradient[g]);
-        state.material_tangent::<FMA>(input.material, kirchhoff, kirchhoff, &mut out.tangent[g]);
         let mut s = match direction.parameter {
             Some(parameter) => state.stress_parameter_derivative(input.material, parameter),
             None => tensor,
         };
-        for i in 0..3 {
-            for j in 0..3 {
-                for k in 0..3 {
-                    for l in 0..3 {
-                        s[i][j] = out.tangent[g][3 * i + j][3 * k + l].mul_add::<FMA>(delta_f[g][k][l], s[i][j]);
+        if direction.displacements.is_some() {
+            state.material_tangent::<FMA>(input.material, kirchhoff, kirchhoff, &mut out.tangent[g]);
+            for i in 0..3 {
+                for j in 0..3 {
+                    for k in 0..3 {
+                        for l in 0..3 {
+                            s[i][j] = out.tangent[g][3 * i + j][3 * k + l].mul_add::<FMA>(delta_f[g][k][l], s[i][j]);
+                        }
                     }
                 }
+            }
+        }
+        for i in 0..3 {
+            for j in 0..3 {
                 weighted[g][i][j] = (s[i][j] + dp * out.cofactor[g][i][j]) * out.volume[g];
             }
         }

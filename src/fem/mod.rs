@@ -14,6 +14,7 @@ mod nested;
 mod newton;
 mod ordering;
 mod result;
+mod stages;
 mod topology;
 
 pub use derivatives::{ParameterSensitivity, PathSensitivity};

@@ -327,7 +327,7 @@ impl ForwardModel {
         material: &Ogden,
         positions: &[[f64; 3]],
         displacement: &[[f64; 3]],
-        direction: &[[f64; 3]],
+        direction: Option<&[[f64; 3]]>,
         parameter: Option<Parameter>,
         elements: Option<&[u32]>,
         derivative: &mut [[f64; 3]],
@@ -336,10 +336,14 @@ impl ForwardModel {
         let mut out = std::mem::take(&mut self.output);
         let result = self.each_element(elements, |e| {
             let input = self.input(e, positions, displacement, None, material);
-            let mut d = Direction { displacements: [[0.0; 3]; MAX_NODES], parameter };
-            for (a, &v) in self.mesh.element(e).iter().enumerate() {
-                d.displacements[a] = direction[v as usize];
-            }
+            let displacements = direction.map(|nodal| {
+                let mut local = [[0.0; 3]; MAX_NODES];
+                for (a, &v) in self.mesh.element(e).iter().enumerate() {
+                    local[a] = nodal[v as usize];
+                }
+                local
+            });
+            let d = Direction { displacements, parameter };
             if !self.kernels.directional(&self.tables, &input, &d, &mut out) {
                 return Err(StepFailure::InvertedElement { element: e, jacobian: out.min_jacobian });
             }

@@ -1,0 +1,118 @@
+//! Times each stage of solve and evaluate on the two-hole double-lap shear specimen (full model, 5 mm), at about 20, 70
+//! and 200 thousand unknowns, and of one design evaluation. `cargo bench --bench stages [-- 20k]`.
+//!
+//! Medians of repeated runs, wall seconds of one thread, and the ratio of each stage to the whole forward solution.
+
+use lambdak::fem::{ForwardModel, SolveOptions};
+use lambdak::material::Ogden;
+use lambdak::mesh::{DesignVariable, MeshOptions, mesh_specimen, shape_velocity};
+use lambdak::sensitivity::{DriveSelection, EvaluationOptions, PartialVoxels, ScanSettings, Scanner, evaluate};
+use lambdak::specimen::Specimen;
+use lambdak::voxel::Sampling;
+use std::hint::black_box;
+use std::time::Instant;
+
+fn median(runs: usize, mut work: impl FnMut()) -> f64 {
+    let mut seconds: Vec<f64> = (0..runs)
+        .map(|_| {
+            let start = Instant::now();
+            work();
+            start.elapsed().as_secs_f64()
+        })
+        .collect();
+    seconds.sort_by(f64::total_cmp);
+    seconds[runs / 2]
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let specimen = Specimen::from_json(include_str!("../geometries/two-hole-shear.json"))?;
+    let material = Ogden::from_json(include_str!("../geometries/materials/ecoflex-0020.json"))?;
+    let scan = ScanSettings {
+        voxel_mm: [1.0, 0.1875, 0.75],
+        noise_sd_mm: [0.05; 3],
+        force_sd_n: 0.02,
+        partial_voxels: PartialVoxels::default(),
+    };
+    let chosen: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
+    for (label, factor, runs) in [("search", 1.8, 9), ("20k", 1.15, 5), ("70k", 0.73, 3), ("200k", 0.5, 1)] {
+        if !chosen.is_empty() && !chosen.iter().any(|c| c == label) {
+            continue;
+        }
+        let options = if label == "search" {
+            MeshOptions::search(&specimen)
+        } else {
+            MeshOptions { use_mirror: false, ..MeshOptions::scaled(&specimen, factor) }
+        };
+        let mesh_seconds = median(runs, || {
+            black_box(mesh_specimen(&specimen, &options).is_ok());
+        });
+        let setup = median(runs, || {
+            black_box(ForwardModel::of_specimen(&specimen, &options).is_ok());
+        });
+        let mut model = ForwardModel::of_specimen(&specimen, &options)?;
+        let solve = SolveOptions::default();
+        let mut state = model.solve(&material, 5.0, None, &solve, &|| false)?;
+        let forward = median(runs, || {
+            if let Ok(found) = model.solve(&material, 5.0, None, &solve, &|| false) {
+                state = found;
+            }
+        });
+        let sensitivities = model.material_sensitivities(&material, &state)?;
+        let sensitivity_seconds = median(runs, || {
+            if let Ok(found) = model.solve(&material, 5.0, Some(&state), &solve, &|| false) {
+                state = found;
+            }
+            black_box(model.material_sensitivities(&material, &state).is_ok());
+        });
+        let warm = median(runs, || {
+            if let Ok(found) = model.solve(&material, 5.0, Some(&state), &solve, &|| false) {
+                state = found;
+            }
+        });
+        let velocity = shape_velocity(model.mesh(), &specimen, DesignVariable::HoleDiameter(0));
+        let gradient = median(runs, || {
+            let g = model.path_sensitivity(&material, &state, &sensitivities, Some(&velocity), 0.0);
+            black_box(g.is_ok());
+        });
+        let assembly = median(runs, || {
+            black_box(model.assemble_stage(&material, &state).is_ok());
+        });
+        let factor_seconds = median(runs, || {
+            black_box(model.factorise_stage().is_ok());
+        });
+        let back_solve = median(runs, || {
+            black_box(model.back_solve_stage().is_ok());
+        });
+        let voxel_setup = median(runs, || {
+            black_box(Scanner::new(&specimen, model.mesh(), &scan, Sampling::default()).is_ok());
+        });
+        let whole = median(runs.min(3), || {
+            let options = EvaluationOptions { mesh: options, ..EvaluationOptions::standard(&specimen) };
+            let drives = DriveSelection::DriveMm(vec![5.0]);
+            black_box(evaluate(&specimen, &material, &scan, &drives, &options, &|| false).is_ok());
+        });
+        println!(
+            "{label}: {} unknowns, {} elements, instructions {}, force {:.4} N, {} Newton iterations",
+            model.num_unknowns(),
+            model.mesh().num_elements(),
+            model.instruction_set(),
+            state.force_n,
+            model.statistics().newton_iterations
+        );
+        for (stage, seconds) in [
+            ("mesh", mesh_seconds),
+            ("order and symbolic factorisation", setup),
+            ("assembly, once", assembly),
+            ("factorisation, once", factor_seconds),
+            ("back-solve, once", back_solve),
+            ("forward solution from rest to 5 mm", forward),
+            ("material sensitivities, all", sensitivity_seconds - warm),
+            ("shape gradient, one variable, with those of the sensitivities", gradient),
+            ("voxel operator", voxel_setup),
+            ("whole evaluation at one drive", whole),
+        ] {
+            println!("  {stage:<62} {seconds:>9.4} s  {:>7.3} of the forward solution", seconds / forward);
+        }
+    }
+    Ok(())
+}
