@@ -1,1 +1,27 @@
-//! design
+//! The search for a better specimen.
+
+mod checkpoint;
+mod confirm;
+mod explore;
+mod local;
+mod objective;
+mod response;
+mod search;
+mod space;
+mod study;
+
+pub use checkpoint::{Checkpoint, CheckpointError};
+pub use confirm::{Confirmed, CriterionValues, Gain, MaterialEvaluation, confirm};
+pub use explore::{geometry_margins, is_makeable, sample};
+pub use local::{Improved, LocalModel, LocalProblem, LocalSettings, improve};
+pub use objective::{Judged, Reference};
+pub use response::{
+    Evaluated, EvaluationFailure, Evaluator, MaterialSample, Response, TEARING_FRACTION, sample_materials,
+    tearing_stretch,
+};
+pub use search::{Candidate, Found, Progress, ProgressSink, SearchError, base_at_drive, search, study_hash};
+pub use space::{Orbit, Structure, Subspace, Variable, subspaces};
+pub use study::{
+    Budget, Combine, CountRange, MaterialPrior, Objective, ObjectiveKind, Range, Study, StudyError, Vary,
+    VerificationSettings,
+};
