@@ -1,0 +1,89 @@
+//! Writes one of every picture and a page with all of them, to look at: `lambdak-gallery` in the temporary folder.
+
+use super::test_xml::assert_well_formed;
+use super::*;
+
+fn page(pictures: &[(&str, String)]) -> Report {
+    let header = ReportHeader {
+        subtitle: "Two-hole double-lap shear specimen, one scan at 7 mm, two material priors".into(),
+        program_version: "0.1.0".into(),
+        input_hash: "9f2c5e0c7d".into(),
+        seed: Some(42),
+        facts: vec![("study".into(), "geometries/studies/two-hole-shear.json".into())],
+    };
+    let mut report = Report::new("A better specimen", header);
+    report.section("Summary").paragraph(
+        "The chosen specimen has three holes along the thickness. At the same drive it tells 1.87 times as much about \
+         α₁ as the base specimen and stays within every limit.",
+    );
+    report.callout(
+        CalloutKind::Finding,
+        "Holes help here",
+        "They raise the stretch between them, where a scan with this noise still resolves it.",
+    );
+    report.callout(CalloutKind::Caution, "The two measures disagree", "By Fisher information the solid block is the better specimen for one-term materials: a removed voxel is a lost measurement.");
+    report.table(&Table {
+        caption: "Chosen designs".into(),
+        columns: vec![
+            Column::words("design"),
+            Column::numbers("objective", ""),
+            Column::numbers("sd of μ₁", "kPa"),
+            Column::numbers("force", "N"),
+            Column::words("closest limit"),
+        ],
+        rows: vec![
+            vec!["1".into(), "1.87".into(), "0.110".into(), "9.20".into(), "largest drive".into()],
+            vec!["2".into(), "1.74".into(), "0.132".into(), "10.4".into(), "ligament hole 1 – hole 2".into()],
+            vec!["base".into(), "1.00".into(), "0.220".into(), "10.5".into(), "largest drive".into()],
+        ],
+        emphasised_rows: vec![0],
+        note: "Standard deviations are what the Fisher information promises for one scan.".into(),
+    });
+    report.section("Pictures");
+    for (name, svg) in pictures {
+        report.figure(svg, &format!("Example of {name}."));
+    }
+    report.section("Method").callout(
+        CalloutKind::Note,
+        "How it was done",
+        "Coarse meshes to explore, fine ones to confirm.",
+    );
+    report.verbatim("{ \"schema\": \"specimen/1\" }");
+    report
+}
+
+#[test]
+fn the_gallery_is_written_and_well_formed() {
+    let pictures = [
+        ("density", density::tests::sample(3).to_svg()),
+        ("density-rows", density::tests::sample(6).to_svg()),
+        ("maps", maps::tests::sample().to_svg()),
+        ("bars", bars::tests::sample(false).to_svg()),
+        ("bars-log", bars::tests::sample(true).to_svg()),
+        ("pareto", pareto::tests::sample().to_svg()),
+        ("history", history::tests::sample().to_svg()),
+        ("spread", spread::tests::sample().to_svg()),
+        ("correlation", correlation::tests::sample().to_svg()),
+        ("shape", shape::tests::sample().to_svg()),
+        ("limits", limits::tests::sample(false).to_svg()),
+        ("limits-broken", limits::tests::sample(true).to_svg()),
+        ("ranking", ranking::tests::sample().to_svg()),
+        ("placeholder", ParetoPlot { title: "Information against force".into(), ..ParetoPlot::default() }.to_svg()),
+    ];
+    let folder = std::env::temp_dir().join("lambdak-gallery");
+    std::fs::create_dir_all(&folder).expect("temporary folder");
+    for (name, svg) in &pictures {
+        std::fs::write(folder.join(format!("{name}.svg")), svg).expect("written");
+    }
+    let report = page(&pictures);
+    assert_well_formed(&report.to_html());
+    report.write(&folder.join("report.html")).expect("written");
+    for (name, kind) in [("hex", crate::mesh::ElementKind::Hex27), ("prism", crate::mesh::ElementKind::Prism21)] {
+        let mesh = vtu::tests::row_of_cells(kind, 3);
+        let mut vtu = Vtu::new(&mesh).expect("valid mesh");
+        vtu.point_vectors("displacement_mm", &mesh.nodes).expect("fits");
+        vtu.cell_scalars("jacobian", &[1.0, 2.0, 3.0]).expect("fits");
+        vtu.cell_tensors("cauchy_stress_kpa", &[[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 9.0]]; 3]).expect("fits");
+        vtu.write(&folder.join(format!("{name}.vtu"))).expect("written");
+    }
+}
