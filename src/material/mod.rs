@@ -1,5 +1,15 @@
 //! Strain energies, their stress, tangent and parameter derivatives.
 
+mod lanes;
+mod ogden_lanes;
+mod point;
+mod read;
+
+pub use lanes::{LANES, Lanes};
+pub use ogden_lanes::{MAX_TERMS, SpectralState, Tensor};
+pub use point::{energy_density, first_piola_kirchhoff_stress, material_tangent, stress_parameter_derivative};
+pub use read::MaterialError;
+
 use serde::{Deserialize, Serialize};
 
 /// One Ogden term.

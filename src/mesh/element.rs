@@ -79,6 +79,30 @@ impl ElementKind {
         g
     }
 
+    /// Reference coordinates of the nodes.
+    pub fn node_coordinates(self) -> Vec<[f64; 3]> {
+        let section: Vec<[f64; 2]> = match self {
+            ElementKind::Hex27 => (0..9).map(|n| [f64::from(n % 3) - 1.0, f64::from(n / 3) - 1.0]).collect(),
+            ElementKind::Prism21 => {
+                let third = 1.0 / 3.0;
+                vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5], [third, third]]
+            }
+        };
+        (0..3).flat_map(|k| section.iter().map(move |p| [p[0], p[1], f64::from(k) - 1.0])).collect()
+    }
+
+    /// Local nodes of each face: first the two ends of the extrusion (ζ = −1, ζ = 1), then the sides.
+    pub fn faces(self) -> Vec<Vec<usize>> {
+        let per_level = self.num_nodes() / 3;
+        let sides: Vec<[usize; 3]> = match self {
+            ElementKind::Hex27 => vec![[0, 1, 2], [2, 5, 8], [8, 7, 6], [6, 3, 0]],
+            ElementKind::Prism21 => vec![[0, 3, 1], [1, 4, 2], [2, 5, 0]],
+        };
+        let ends = [0, 2].map(|k| (k * per_level..(k + 1) * per_level).collect());
+        let walls = sides.iter().map(|s| (0..3).flat_map(|k| s.map(|n| n + k * per_level)).collect());
+        ends.into_iter().chain(walls).collect()
+    }
+
     /// Quadrature points and weights in reference coordinates: 3×3×3 Gauss points for the hexahedron (degree 5 in each
     /// coordinate), Radon's 7-point rule (degree 5) × 3 Gauss points for the prism.
     pub fn quadrature(self) -> Vec<([f64; 3], f64)> {
@@ -110,6 +134,28 @@ impl ElementKind {
         }
         points
     }
+}
+
+/// Section shape functions and gradients at (ξ, η): the first 9 or 7 entries.
+pub(super) fn section_shape(kind: ElementKind, [xi, eta]: [f64; 2]) -> ([f64; 9], [[f64; 2]; 9]) {
+    let (mut n, mut g) = ([0.0; 9], [[0.0; 2]; 9]);
+    match kind {
+        ElementKind::Hex27 => {
+            let ((a, da), (b, db)) = (lagrange(xi), lagrange(eta));
+            for j in 0..3 {
+                for i in 0..3 {
+                    n[i + 3 * j] = a[i] * b[j];
+                    g[i + 3 * j] = [da[i] * b[j], a[i] * db[j]];
+                }
+            }
+        }
+        ElementKind::Prism21 => {
+            let (t, dt) = triangle(xi, eta);
+            n[..7].copy_from_slice(&t);
+            g[..7].copy_from_slice(&dt);
+        }
+    }
+    (n, g)
 }
 
 /// Quadratic Lagrange polynomials at −1, 0, 1 and their derivatives.
@@ -166,6 +212,31 @@ mod tests {
                         // Third derivatives are below 60, so central differences err by 60 h²/6 = 1e-9.
                         assert!(((np[a] - nm[a]) / (2.0 * h) - g[a][c]).abs() < 2e-9);
                     }
+                }
+            }
+        }
+    }
+    /// Each shape function is 1 at its own node and 0 at the others; a face's nodes lie on one side of the cell.
+    #[test]
+    fn nodes_and_faces_are_consistent() {
+        for kind in [ElementKind::Hex27, ElementKind::Prism21] {
+            let nodes = kind.node_coordinates();
+            for (a, &x) in nodes.iter().enumerate() {
+                for (b, n) in kind.shape_functions(x).iter().enumerate() {
+                    assert!((n - if a == b { 1.0 } else { 0.0 }).abs() < 1e-14);
+                }
+            }
+            for face in kind.faces() {
+                // All cross products of the face's edges with its plane vanish: rank of the differences is 2.
+                let [p, q] = [nodes[face[0]], nodes[*face.last().unwrap()]];
+                let r = nodes[face[if face.len() == 9 { 2 } else { 1 }]];
+                let d = |x: [f64; 3]| [x[0] - p[0], x[1] - p[1], x[2] - p[2]];
+                let (u, v) = (d(q), d(r));
+                let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+                assert!(normal.iter().any(|n| n.abs() > 0.1));
+                for &n in &face {
+                    let w = d(nodes[n]);
+                    assert!((w[0] * normal[0] + w[1] * normal[1] + w[2] * normal[2]).abs() < 1e-14);
                 }
             }
         }

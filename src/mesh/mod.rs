@@ -1,8 +1,32 @@
 //! Meshes: a section (quadrilaterals or triangles, quadratic, following the hole walls as curves) extruded.
 
+mod build;
+mod cells;
+mod check;
+mod domain;
 mod element;
+mod error;
+mod grading;
+mod locator;
+mod morph;
+mod options;
+mod power;
+mod quads;
+mod section;
+mod triangles;
 
+#[cfg(test)]
+mod layout_tests;
+#[cfg(test)]
+mod test_specimens;
+
+pub use build::mesh_specimen;
+pub use check::MeshQuality;
 pub use element::ElementKind;
+pub use error::{LigamentEnd, MeshError};
+pub use locator::{Location, Locator};
+pub use morph::{DesignVariable, morphed, shape_velocity};
+pub use options::MeshOptions;
 
 /// Which mirror planes through the origin the mesh uses. A mirrored mesh covers the half with the positive
 /// coordinate only; normal displacement is zero on the plane.

@@ -1,1 +1,22 @@
-//! sensitivity
+//! How much a deformation tells about a material: pointwise and integrated sensitivities, Fisher information.
+
+mod continuum;
+mod covariance;
+mod evaluation;
+mod information;
+mod integrated;
+mod observation;
+mod pointwise;
+
+pub use continuum::{
+    information_over_quadrature, integrate_over_quadrature, largest_principal_stretch, median_stretch_over_quadrature,
+};
+pub use covariance::{Covariance, Criterion, IDENTIFIABILITY_LIMIT, PromisedSd};
+pub use evaluation::{
+    DriveSelection, Evaluation, EvaluationError, EvaluationMaps, EvaluationNotes, EvaluationOptions,
+    EvaluationStatistics, evaluate, evaluate_model,
+};
+pub use information::{FisherInformation, InformationError, MeasurementNoise, PartialVoxels, ScanSettings};
+pub use integrated::{IntegratedSensitivity, integrate_over_voxels, parameter_sensitivity, sensitivity_map};
+pub use observation::{DriveMaps, DrivenState, EvaluationStep, Observation, Scanner, median};
+pub use pointwise::{PointwiseSensitivity, alpha_sensitivity, mu_sensitivity};

@@ -3,6 +3,43 @@
 //! Frame (reference): origin at the centre of the undeformed block; x along its length (the pull direction),
 //! y along its thickness, z along its width. Lengths in mm.
 
+//!
+//! What is supported: a plain block or one standard dumb-bell, with circular holes that all share one axis.
+//! The mesh is a section extruded along that axis, so holes of two directions in one specimen are refused.
+//! Parsing and validation: [`Specimen::from_json`]. Limits of what can be made: [`ManufacturingLimits`].
+//! Drawings for the mould maker: [`to_svg`], [`to_dxf`], [`to_stl`].
+
+mod clearance;
+mod drawing;
+mod drawing_dxf;
+mod drawing_labels;
+mod drawing_stl;
+mod drawing_svg;
+pub mod dumbbell;
+mod geometry;
+pub(crate) mod json;
+mod limits;
+mod limits_error;
+mod read;
+mod read_error;
+#[cfg(test)]
+mod sampling;
+#[cfg(test)]
+mod tests;
+
+pub use drawing_dxf::to_dxf;
+pub use drawing_stl::{DrawingError, to_stl};
+pub use drawing_svg::to_svg;
+pub use geometry::{Ligament, LigamentKind, MIRROR_TOLERANCE_MM, SectionEdge};
+pub use json::JsonProblem;
+pub use limits::{DiameterRange, LimitMargin, ManufacturingLimits, Symmetry};
+pub use limits_error::LimitsError;
+pub use read::{
+    MAX_DIAMETER_MM, MAX_DRIVES, MAX_HOLES, MAX_NAME_LENGTH, MAX_NOMINAL_STRETCH, MAX_SAMPLES_IN_PARALLEL,
+    MAX_SHEAR_STRAIN, MAX_SIZE_MM, MIN_DIAMETER_MM, MIN_SIZE_MM, SCHEMA, min_meshable_ligament_mm,
+};
+pub use read_error::SpecimenError;
+
 use serde::{Deserialize, Serialize};
 
 /// How the specimen is held and moved.

@@ -1,0 +1,80 @@
+//! Why a forward problem was not solved.
+
+use super::linear::LinearError;
+
+/// Why a forward problem was not solved.
+#[derive(Clone, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SolveError {
+    /// The load step shrank below its limit.
+    #[error(
+        "no equilibrium found beyond a drive of {reached_mm} mm (asked: {asked_mm} mm): {cause}; reduce the drive, \
+         refine the mesh or check the material's stability"
+    )]
+    Diverged {
+        /// Last drive with an equilibrium, mm.
+        reached_mm: f64,
+        /// Drive asked for, mm.
+        asked_mm: f64,
+        /// What stopped the last attempt.
+        cause: StepFailure,
+    },
+    /// The caller's cancellation check said stop.
+    #[error("cancelled at a drive of {reached_mm} mm")]
+    Cancelled {
+        /// Last drive with an equilibrium, mm.
+        reached_mm: f64,
+    },
+    /// The mesh cannot be used.
+    #[error(
+        "element {element} of the mesh has a geometry Jacobian of {jacobian:e} (limit: > 0); use another mesh size"
+    )]
+    InvalidMesh {
+        /// Element index.
+        element: usize,
+        /// Smallest geometry Jacobian.
+        jacobian: f64,
+    },
+    /// More terms than supported.
+    #[error("the material has {num_terms} Ogden terms (limit: {limit})")]
+    TooManyTerms {
+        /// Terms given.
+        num_terms: usize,
+        /// Most terms supported.
+        limit: usize,
+    },
+    /// The drive is not a finite number.
+    #[error("the drive is {drive_mm} mm; it must be finite")]
+    InvalidDrive {
+        /// Drive given, mm.
+        drive_mm: f64,
+    },
+    /// The linear system could not be solved at an equilibrium.
+    #[error(transparent)]
+    Linear(#[from] LinearError),
+}
+
+/// Why one load step failed.
+#[derive(Clone, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum StepFailure {
+    /// An element would invert.
+    #[error("element {element} would invert (smallest det F = {jacobian:.3e})")]
+    InvertedElement {
+        /// Element index.
+        element: usize,
+        /// Smallest det F there.
+        jacobian: f64,
+    },
+    /// Newton's method did not reach the tolerance.
+    #[error("Newton's method stopped after {iterations} iterations at a relative residual of {residual:.3e}")]
+    NotConverged {
+        /// Iterations made.
+        iterations: usize,
+        /// Residual relative to the reactions.
+        residual: f64,
+    },
+    /// The tangent lost positive definiteness (instability of the specimen or of the material).
+    #[error("{0}")]
+    Linear(LinearError),
+}

@@ -1,0 +1,682 @@
+//! What one element contributes: residual, tangent, directional derivatives.
+//!
+//! Three-field formulation (Simo, Taylor and Pister 1985): displacement u, and discontinuous, element-wise linear
+//! volume ratio θ and pressure p, four numbers each, condensed. Stationarity of ∫ Ψ_iso(F) + U(θ) + p (J − θ) dV with
+//! U = κ/2 (ln θ)². With φ the basis of p and θ, orthonormal over the element (in physical coordinates, so that curved
+//! elements keep their order), θ = Π J is explicit and so is the condensed pressure p = Π U′(Π J). Then
+//!
+//! * R_u = ∫ (P_iso + p cof F) : ∇N,  gap = Π U′(Π J) − p,
+//! * B = ∫ φ cof F : ∇N,  D = ∫ φ φ U″(θ),
+//! * condensed residual r = R_u + Bᵀ gap, tangent K = ∫ ∇N : ∂P/∂F|_p : ∇N + Bᵀ D B (symmetric),
+//! * δp = D B δu + gap.
+//!
+//! Keeping p an independent iterate ("mixed Newton") is what makes large steps converge when κ ≫ μ: the geometric
+//! stiffness never sees the spurious pressure of a trial state. Where p is not given it is the condensed one.
+//! The constraint is on J, not on ln J: p ln J has the curvature −p/J² in volume changes that θ does not resolve, which
+//! destabilises elements under tension next to the singular bonded edges (seen as indefinite tangents on fine meshes).
+//!
+//! Quadrature points are worked on eight at a time, nodes of the stiffness likewise.
+
+use crate::material::{LANES, Lanes, Ogden, Parameter, SpectralState, Tensor};
+use crate::mesh::ElementKind;
+
+/// Most nodes (and quadrature points) of an element.
+pub const MAX_NODES: usize = 27;
+/// Groups of eight lanes that cover them.
+pub const MAX_GROUPS: usize = 4;
+
+/// Constant tables of an element kind.
+pub struct ElementTables {
+    /// Nodes, and equally quadrature points (27 or 21).
+    num: usize,
+    groups: usize,
+    /// `[node][group]`: N_a at the quadrature points.
+    shape: Vec<[Lanes; MAX_GROUPS]>,
+    /// `[node][c][group]`: ∂N_a/∂ξ_c at the quadrature points.
+    gradient_by_point: Vec<[[Lanes; MAX_GROUPS]; 3]>,
+    /// `[point][c][group of nodes]`: the same, nodes in lanes (zero past the last node).
+    gradient_by_node: Vec<[[Lanes; MAX_GROUPS]; 3]>,
+    /// Quadrature weights; zero in padding lanes.
+    weight: [Lanes; MAX_GROUPS],
+}
+
+impl ElementTables {
+    /// Tables of `kind`.
+    pub fn new(kind: ElementKind) -> ElementTables {
+        let points = kind.quadrature();
+        let num = kind.num_nodes();
+        let groups = num.div_ceil(LANES);
+        let zero = [Lanes::ZERO; MAX_GROUPS];
+        let mut tables = ElementTables {
+            num,
+            groups,
+            shape: vec![zero; num],
+            gradient_by_point: vec![[zero; 3]; num],
+            gradient_by_node: vec![[zero; 3]; num],
+            weight: zero,
+        };
+        for slot in 0..groups * LANES {
+            // Padding lanes repeat the first point with weight zero, so that nothing divides by zero there.
+            let q = if slot < num { slot } else { 0 };
+            let (x, w) = points[q];
+            let (n, g) = (kind.shape_functions(x), kind.shape_gradients(x));
+            let (group, lane) = (slot / LANES, slot % LANES);
+            tables.weight[group].0[lane] = if slot < num { w } else { 0.0 };
+            for a in 0..num {
+                tables.shape[a][group].0[lane] = n[a];
+                for c in 0..3 {
+                    tables.gradient_by_point[a][c][group].0[lane] = g[a][c];
+                    if slot < num {
+                        tables.gradient_by_node[q][c][a / LANES].0[a % LANES] = g[a][c];
+                    }
+                }
+            }
+        }
+        tables
+    }
+
+    /// Number of nodes and of quadrature points.
+    pub fn num_nodes(&self) -> usize {
+        self.num
+    }
+}
+
+/// The state of one element.
+pub struct ElementInput<'a> {
+    /// Reference positions of the nodes, mm.
+    pub positions: [[f64; 3]; MAX_NODES],
+    /// Displacements of the nodes, mm.
+    pub displacements: [[f64; 3]; MAX_NODES],
+    /// Pressure coefficients; `None` for the condensed ones.
+    pub pressure: Option<[f64; 4]>,
+    /// The material.
+    pub material: &'a Ogden,
+}
+
+/// A direction in which the condensed residual is differentiated.
+pub struct Direction {
+    /// δu at the nodes.
+    pub displacements: [[f64; 3]; MAX_NODES],
+    /// The parameter that moves by 1, if any.
+    pub parameter: Option<Parameter>,
+}
+
+/// What one element yields. Reused between elements.
+pub struct ElementOutput {
+    /// Condensed residual r, or its directional derivative, per node, kPa·mm².
+    pub residual: [[f64; 3]; MAX_NODES],
+    /// What the pressure iterate misses.
+    pub pressure_gap: [f64; 4],
+    /// D.
+    pub bulk: [[f64; 4]; 4],
+    /// Pressure coefficients used (condensed ones where none were given), or their directional derivative.
+    pub pressure: [f64; 4],
+    /// B: `[m][i][group of nodes]`.
+    pub divergence: [[[Lanes; MAX_GROUPS]; 3]; 4],
+    /// K: `[3 b + k][i][group of nodes a]`, valid for a ≥ 8⌊b/8⌋.
+    pub stiffness: Vec<[[Lanes; MAX_GROUPS]; 3]>,
+    /// Smallest det F over the quadrature points (the element is unusable where it is not positive).
+    pub min_jacobian: f64,
+    /// Smallest determinant of the geometry map.
+    pub min_geometry_jacobian: f64,
+    /// Deformation gradients at the quadrature points, `[group]`.
+    pub deformation_gradient: [Tensor; MAX_GROUPS],
+    /// First Piola–Kirchhoff stress at the quadrature points.
+    pub stress: [Tensor; MAX_GROUPS],
+    /// Quadrature weight × geometry determinant, mm³.
+    pub volume: [Lanes; MAX_GROUPS],
+    /// Reference positions of the quadrature points, `[i][group]`.
+    pub points: [[Lanes; MAX_GROUPS]; 3],
+    /// ∂ξ_c/∂X_J, `[c][J]`.
+    inverse_map: [Tensor; MAX_GROUPS],
+    cofactor: [Tensor; MAX_GROUPS],
+    jacobian: [Lanes; MAX_GROUPS],
+    basis: [[Lanes; MAX_GROUPS]; 4],
+    tangent: Vec<[[Lanes; 9]; 9]>,
+}
+
+impl Default for ElementOutput {
+    fn default() -> Self {
+        let tensor = [[Lanes::ZERO; 3]; 3];
+        ElementOutput {
+            residual: [[0.0; 3]; MAX_NODES],
+            pressure_gap: [0.0; 4],
+            bulk: [[0.0; 4]; 4],
+            pressure: [0.0; 4],
+            divergence: [[[Lanes::ZERO; MAX_GROUPS]; 3]; 4],
+            stiffness: vec![[[Lanes::ZERO; MAX_GROUPS]; 3]; 3 * MAX_NODES],
+            min_jacobian: 0.0,
+            min_geometry_jacobian: 0.0,
+            deformation_gradient: [tensor; MAX_GROUPS],
+            stress: [tensor; MAX_GROUPS],
+            volume: [Lanes::ZERO; MAX_GROUPS],
+            points: [[Lanes::ZERO; MAX_GROUPS]; 3],
+            inverse_map: [tensor; MAX_GROUPS],
+            cofactor: [tensor; MAX_GROUPS],
+            jacobian: [Lanes::ZERO; MAX_GROUPS],
+            basis: [[Lanes::ZERO; MAX_GROUPS]; 4],
+            tangent: vec![[[Lanes::ZERO; 9]; 9]; MAX_GROUPS],
+        }
+    }
+}
+
+/// Determinant and cofactor (determinant × inverse transpose) of a tensor.
+#[inline(always)]
+fn cofactor(f: &Tensor) -> (Lanes, Tensor) {
+    let mut g = [[Lanes::ZERO; 3]; 3];
+    for i in 0..3 {
+        for j in 0..3 {
+            let (i1, i2, j1, j2) = ((i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3);
+            g[i][j] = f[i1][j1] * f[i2][j2] - f[i1][j2] * f[i2][j1];
+        }
+    }
+    (f[0][0] * g[0][0] + f[0][1] * g[0][1] + f[0][2] * g[0][2], g)
+}
+
+/// Σ_a x_a ⊗ ∂N_a/∂ξ at the points of a group.
+#[inline(always)]
+fn gradient_of<const FMA: bool>(tables: &ElementTables, nodal: &[[f64; 3]; MAX_NODES], group: usize) -> Tensor {
+    let mut out = [[Lanes::ZERO; 3]; 3];
+    for a in 0..tables.num {
+        for i in 0..3 {
+            let x = Lanes::splat(nodal[a][i]);
+            for c in 0..3 {
+                out[i][c] = x.mul_add::<FMA>(tables.gradient_by_point[a][c][group], out[i][c]);
+            }
+        }
+    }
+    out
+}
+
+#[inline(always)]
+fn multiply(a: &Tensor, b: &Tensor) -> Tensor {
+    let mut out = [[Lanes::ZERO; 3]; 3];
+    for i in 0..3 {
+        for j in 0..3 {
+            out[i][j] = a[i][0] * b[0][j] + a[i][1] * b[1][j] + a[i][2] * b[2][j];
+        }
+    }
+    out
+}
+
+#[inline(always)]
+fn contract(a: &Tensor, b: &Tensor) -> Lanes {
+    let mut s = Lanes::ZERO;
+    for i in 0..3 {
+        for j in 0..3 {
+            s += a[i][j] * b[i][j];
+        }
+    }
+    s
+}
+
+/// Geometry, F and the pressure basis. Returns false where an element is inverted.
+#[inline(always)]
+fn kinematics<const FMA: bool>(tables: &ElementTables, input: &ElementInput, out: &mut ElementOutput) -> bool {
+    let mut centre = [0.0; 3];
+    for a in 0..tables.num {
+        for i in 0..3 {
+            centre[i] += input.positions[a][i] / tables.num as f64;
+        }
+    }
+    out.min_jacobian = f64::INFINITY;
+    out.min_geometry_jacobian = f64::INFINITY;
+    let mut volume = 0.0;
+    for g in 0..tables.groups {
+        let map = gradient_of::<FMA>(tables, &input.positions, g);
+        let (det, cofactor) = cofactor(&map);
+        out.min_geometry_jacobian = out.min_geometry_jacobian.min(det.min());
+        out.volume[g] = det * tables.weight[g];
+        volume += out.volume[g].sum();
+        // Stored so that ∂N/∂X_J = Σ_c inverse_map[c][J] ∂N/∂ξ_c.
+        for c in 0..3 {
+            for j in 0..3 {
+                out.inverse_map[g][c][j] = cofactor[j][c] / det;
+            }
+        }
+        let h = gradient_of::<FMA>(tables, &input.displacements, g);
+        let mut f = multiply(&h, &out.inverse_map[g]);
+        for (i, row) in f.iter_mut().enumerate() {
+            row[i] = row[i] + 1.0;
+        }
+        out.deformation_gradient[g] = f;
+        for i in 0..3 {
+            let mut x = Lanes::ZERO;
+            for a in 0..tables.num {
+                x = Lanes::splat(input.positions[a][i] - centre[i]).mul_add::<FMA>(tables.shape[a][g], x);
+            }
+            out.points[i][g] = x;
+        }
+    }
+    if !(out.min_geometry_jacobian > 0.0) {
+        return false;
+    }
+    // Gram–Schmidt on 1, x, y, z (scaled by the element's size) in the element's volume.
+    let size = volume.cbrt();
+    for m in 0..4 {
+        for g in 0..tables.groups {
+            out.basis[m][g] = if m == 0 { Lanes::splat(1.0) } else { out.points[m - 1][g] * (1.0 / size) };
+        }
+        // Twice is enough (Kahan): the second pass removes what rounding left.
+        for _ in 0..2 {
+            for l in 0..m {
+                let mut dot = 0.0;
+                for g in 0..tables.groups {
+                    dot += (out.basis[l][g] * out.basis[m][g] * out.volume[g]).sum();
+                }
+                for g in 0..tables.groups {
+                    let b = out.basis[l][g];
+                    out.basis[m][g] -= b * dot;
+                }
+            }
+        }
+        let mut norm = 0.0;
+        for g in 0..tables.groups {
+            norm += (out.basis[m][g] * out.basis[m][g] * out.volume[g]).sum();
+        }
+        let scale = 1.0 / norm.sqrt();
+        for g in 0..tables.groups {
+            out.basis[m][g] = out.basis[m][g] * scale;
+        }
+    }
+    for g in 0..tables.groups {
+        for i in 0..3 {
+            out.points[i][g] = out.points[i][g] + centre[i];
+        }
+    }
+    true
+}
+
+/// Adds ∫ stress : ∇N to the residual; `stress` is weighted by the volume already.
+#[inline(always)]
+fn add_internal_force<const FMA: bool>(
+    tables: &ElementTables,
+    inverse_map: &[Tensor; MAX_GROUPS],
+    stress: &[Tensor; MAX_GROUPS],
+    residual: &mut [[f64; 3]; MAX_NODES],
+) {
+    let mut pulled = [[[Lanes::ZERO; 3]; 3]; MAX_GROUPS];
+    for g in 0..tables.groups {
+        for i in 0..3 {
+            for c in 0..3 {
+                let (s, m) = (&stress[g][i], &inverse_map[g][c]);
+                pulled[g][i][c] = s[0] * m[0] + s[1] * m[1] + s[2] * m[2];
+            }
+        }
+    }
+    for a in 0..tables.num {
+        for i in 0..3 {
+            let mut s = Lanes::ZERO;
+            for g in 0..tables.groups {
+                for c in 0..3 {
+                    s = pulled[g][i][c].mul_add::<FMA>(tables.gradient_by_point[a][c][g], s);
+                }
+            }
+            residual[a][i] += s.sum();
+        }
+    }
+}
+
+/// Residual and, where `TANGENT`, stiffness. Returns false where det F ≤ 0 somewhere (then only the minima are set).
+#[inline(always)]
+fn element<const FMA: bool, const TANGENT: bool>(
+    tables: &ElementTables,
+    input: &ElementInput,
+    out: &mut ElementOutput,
+) -> bool {
+    if !kinematics::<FMA>(tables, input, out) {
+        return false;
+    }
+    let kappa = input.material.bulk_kpa;
+    let tensor = [[Lanes::ZERO; 3]; 3];
+    let mut projected = [0.0; 4];
+    for g in 0..tables.groups {
+        let (j, cofactor) = cofactor(&out.deformation_gradient[g]);
+        out.cofactor[g] = cofactor;
+        out.jacobian[g] = j;
+        let smallest = j.min();
+        if !(smallest >= out.min_jacobian) {
+            out.min_jacobian = smallest;
+        }
+        for m in 0..4 {
+            projected[m] += (j * out.volume[g] * out.basis[m][g]).sum();
+        }
+    }
+    if !(out.min_jacobian > 0.0) {
+        return false;
+    }
+    let mut condensed = [0.0; 4];
+    out.bulk = [[0.0; 4]; 4];
+    for g in 0..tables.groups {
+        let mut ratio = Lanes::ZERO;
+        for m in 0..4 {
+            ratio += out.basis[m][g] * projected[m];
+        }
+        let smallest = ratio.min();
+        if !(smallest > 0.0) {
+            out.min_jacobian = smallest;
+            return false;
+        }
+        let log = ratio.ln();
+        let first = log * kappa / ratio * out.volume[g];
+        let second = (Lanes::splat(1.0) - log) * kappa / (ratio * ratio) * out.volume[g];
+        for m in 0..4 {
+            condensed[m] += (first * out.basis[m][g]).sum();
+            for n in 0..=m {
+                out.bulk[m][n] += (second * out.basis[m][g] * out.basis[n][g]).sum();
+            }
+        }
+    }
+    for m in 0..4 {
+        for n in 0..m {
+            out.bulk[n][m] = out.bulk[m][n];
+        }
+        out.pressure[m] = input.pressure.map_or(condensed[m], |p| p[m]);
+        out.pressure_gap[m] = condensed[m] - out.pressure[m];
+    }
+    let mut weighted = [tensor; MAX_GROUPS];
+    for g in 0..tables.groups {
+        let (mut p, mut gap) = (Lanes::ZERO, Lanes::ZERO);
+        for m in 0..4 {
+            p += out.basis[m][g] * out.pressure[m];
+            gap += out.basis[m][g] * out.pressure_gap[m];
+        }
+        let kirchhoff = p * out.jacobian[g];
+        let state = SpectralState::new(input.material, &out.deformation_gradient[g]);
+        out.stress[g] = state.first_piola_kirchhoff_stress(kirchhoff);
+        for i in 0..3 {
+            for j in 0..3 {
+                weighted[g][i][j] = (out.stress[g][i][j] + gap * out.cofactor[g][i][j]) * out.volume[g];
+            }
+        }
+        if TANGENT {
+            state.material_tangent::<FMA>(input.material, kirchhoff, kirchhoff, &mut out.tangent[g]);
+            for row in &mut out.tangent[g] {
+                for x in row.iter_mut() {
+                    *x = *x * out.volume[g];
+                }
+            }
+        }
+    }
+    out.residual = [[0.0; 3]; MAX_NODES];
+    add_internal_force::<FMA>(tables, &out.inverse_map, &weighted, &mut out.residual);
+    if TANGENT {
+        stiffness::<FMA>(tables, out);
+    }
+    true
+}
+
+/// K and B from the weighted tangents.
+#[inline(always)]
+fn stiffness<const FMA: bool>(tables: &ElementTables, out: &mut ElementOutput) {
+    // Physical gradients with the nodes in lanes: [q][J][group].
+    let mut physical = [[[Lanes::ZERO; MAX_GROUPS]; 3]; MAX_NODES];
+    let mut divergence = [[[Lanes::ZERO; MAX_GROUPS]; 3]; 4];
+    for q in 0..tables.num {
+        let (g, l) = (q / LANES, q % LANES);
+        for j in 0..3 {
+            for c in 0..3 {
+                let m = Lanes::splat(out.inverse_map[g][c][j].0[l]);
+                for n in 0..tables.groups {
+                    physical[q][j][n] = m.mul_add::<FMA>(tables.gradient_by_node[q][c][n], physical[q][j][n]);
+                }
+            }
+        }
+        for i in 0..3 {
+            for n in 0..tables.groups {
+                let mut d = Lanes::ZERO;
+                for j in 0..3 {
+                    d = Lanes::splat(out.cofactor[g][i][j].0[l]).mul_add::<FMA>(physical[q][j][n], d);
+                }
+                for m in 0..4 {
+                    let w = Lanes::splat(out.basis[m][g].0[l] * out.volume[g].0[l]);
+                    divergence[m][i][n] = w.mul_add::<FMA>(d, divergence[m][i][n]);
+                }
+            }
+        }
+    }
+    out.divergence = divergence;
+    // D B.
+    let mut stiffened = [[[Lanes::ZERO; MAX_GROUPS]; 3]; 4];
+    for m in 0..4 {
+        for n in 0..4 {
+            for i in 0..3 {
+                for g in 0..tables.groups {
+                    stiffened[m][i][g] = (divergence[n][i][g] * out.bulk[m][n]) + stiffened[m][i][g];
+                }
+            }
+        }
+    }
+    // For eight columns b and one component k: traction[q][J][i] = Σ_L A_iJkL ∂N_b/∂X_L, then K_ab = Σ_qJ ∂N_a/∂X_J · it.
+    let mut traction = [[[Lanes::ZERO; 3]; 3]; MAX_NODES];
+    for block in 0..tables.groups {
+        for k in 0..3 {
+            for q in 0..tables.num {
+                let (g, l) = (q / LANES, q % LANES);
+                let a = &out.tangent[g];
+                for j in 0..3 {
+                    for i in 0..3 {
+                        let row = &a[3 * i + j];
+                        let mut t = Lanes::splat(row[3 * k].0[l]) * physical[q][0][block];
+                        t = Lanes::splat(row[3 * k + 1].0[l]).mul_add::<FMA>(physical[q][1][block], t);
+                        t = Lanes::splat(row[3 * k + 2].0[l]).mul_add::<FMA>(physical[q][2][block], t);
+                        traction[q][j][i] = t;
+                    }
+                }
+            }
+            for lane in 0..LANES.min(tables.num - block * LANES) {
+                let b = block * LANES + lane;
+                let mut column = [[Lanes::ZERO; MAX_GROUPS]; 3];
+                match tables.groups - block {
+                    4 => column_of::<FMA, 4>(tables.num, block, lane, &physical, &traction, &mut column),
+                    3 => column_of::<FMA, 3>(tables.num, block, lane, &physical, &traction, &mut column),
+                    2 => column_of::<FMA, 2>(tables.num, block, lane, &physical, &traction, &mut column),
+                    _ => column_of::<FMA, 1>(tables.num, block, lane, &physical, &traction, &mut column),
+                }
+                for m in 0..4 {
+                    let s = Lanes::splat(stiffened[m][k][block].0[lane]);
+                    for i in 0..3 {
+                        for n in block..tables.groups {
+                            column[i][n] = s.mul_add::<FMA>(divergence[m][i][n], column[i][n]);
+                        }
+                    }
+                }
+                out.stiffness[3 * b + k] = column;
+            }
+        }
+    }
+}
+
+/// One column of the stiffness; `N` groups of rows from `block` on, all accumulators in registers.
+#[inline(always)]
+fn column_of<const FMA: bool, const N: usize>(
+    num: usize,
+    block: usize,
+    lane: usize,
+    physical: &[[[Lanes; MAX_GROUPS]; 3]; MAX_NODES],
+    traction: &[[[Lanes; 3]; 3]; MAX_NODES],
+    column: &mut [[Lanes; MAX_GROUPS]; 3],
+) {
+    let mut sum = [[Lanes::ZERO; N]; 3];
+    for q in 0..num {
+        for j in 0..3 {
+            let t = &traction[q][j];
+            let s = [Lanes::splat(t[0].0[lane]), Lanes::splat(t[1].0[lane]), Lanes::splat(t[2].0[lane])];
+            for n in 0..N {
+                let x = physical[q][j][block + n];
+                for i in 0..3 {
+                    sum[i][n] = s[i].mul_add::<FMA>(x, sum[i][n]);
+                }
+            }
+        }
+    }
+    for i in 0..3 {
+        for n in 0..N {
+            column[i][block + n] = sum[i][n];
+        }
+    }
+}
+
+/// Directional derivative of the condensed residual at fixed geometry: in δu and, where given, a parameter. The state's
+/// pressure must be the condensed one (`input.pressure` = `None`) or a converged iterate.
+#[inline(always)]
+fn directional<const FMA: bool>(
+    tables: &ElementTables,
+    input: &ElementInput,
+    direction: &Direction,
+    out: &mut ElementOutput,
+) -> bool {
+    if !element::<FMA, false>(tables, input, out) {
+        return false;
+    }
+    let tensor = [[Lanes::ZERO; 3]; 3];
+    let mut delta_f = [tensor; MAX_GROUPS];
+    let mut dilation = [0.0; 4];
+    for g in 0..tables.groups {
+        let h = gradient_of::<FMA>(tables, &direction.displacements, g);
+        delta_f[g] = multiply(&h, &out.inverse_map[g]);
+        let d = contract(&out.cofactor[g], &delta_f[g]) * out.volume[g];
+        for m in 0..4 {
+            dilation[m] += (d * out.basis[m][g]).sum();
+        }
+    }
+    let mut delta_pressure = [0.0; 4];
+    for m in 0..4 {
+        for n in 0..4 {
+            delta_pressure[m] += out.bulk[m][n] * dilation[n];
+        }
+        if direction.parameter == Some(Parameter::Kappa) {
+            // The condensed pressure is proportional to κ.
+            delta_pressure[m] += (out.pressure[m] + out.pressure_gap[m]) / input.material.bulk_kpa;
+        }
+    }
+    let mut weighted = [tensor; MAX_GROUPS];
+    for g in 0..tables.groups {
+        let (mut p, mut dp) = (Lanes::ZERO, Lanes::ZERO);
+        for m in 0..4 {
+            p += out.basis[m][g] * out.pressure[m];
+            dp += out.basis[m][g] * delta_pressure[m];
+        }
+        let kirchhoff = p * out.jacobian[g];
+        let state = SpectralState::new(input.material, &out.deformation_gradient[g]);
+        state.material_tangent::<FMA>(input.material, kirchhoff, kirchhoff, &mut out.tangent[g]);
+        let mut s = match direction.parameter {
+            Some(parameter) => state.stress_parameter_derivative(input.material, parameter),
+            None => tensor,
+        };
+        for i in 0..3 {
+            for j in 0..3 {
+                for k in 0..3 {
+                    for l in 0..3 {
+                        s[i][j] = out.tangent[g][3 * i + j][3 * k + l].mul_add::<FMA>(delta_f[g][k][l], s[i][j]);
+                    }
+                }
+                weighted[g][i][j] = (s[i][j] + dp * out.cofactor[g][i][j]) * out.volume[g];
+            }
+        }
+    }
+    out.pressure = delta_pressure;
+    out.residual = [[0.0; 3]; MAX_NODES];
+    add_internal_force::<FMA>(tables, &out.inverse_map, &weighted, &mut out.residual);
+    true
+}
+
+/// The kernels, compiled for one instruction set.
+#[derive(Clone, Copy)]
+pub struct Kernels {
+    residual: unsafe fn(&ElementTables, &ElementInput, &mut ElementOutput) -> bool,
+    tangent: unsafe fn(&ElementTables, &ElementInput, &mut ElementOutput) -> bool,
+    directional: unsafe fn(&ElementTables, &ElementInput, &Direction, &mut ElementOutput) -> bool,
+    /// Name of the instruction set.
+    pub name: &'static str,
+}
+
+macro_rules! compile_for {
+    ($module:ident, $fma:literal, $feature:meta) => {
+        mod $module {
+            use super::*;
+            #[$feature]
+            pub fn residual(t: &ElementTables, i: &ElementInput, o: &mut ElementOutput) -> bool {
+                element::<$fma, false>(t, i, o)
+            }
+            #[$feature]
+            pub fn tangent(t: &ElementTables, i: &ElementInput, o: &mut ElementOutput) -> bool {
+                element::<$fma, true>(t, i, o)
+            }
+            #[$feature]
+            pub fn directional(t: &ElementTables, i: &ElementInput, d: &Direction, o: &mut ElementOutput) -> bool {
+                super::directional::<$fma>(t, i, d, o)
+            }
+        }
+    };
+}
+
+compile_for!(portable, false, inline(never));
+#[cfg(target_arch = "x86_64")]
+compile_for!(avx2, true, target_feature(enable = "avx2,fma"));
+#[cfg(target_arch = "x86_64")]
+compile_for!(avx512, true, target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma"));
+
+impl Kernels {
+    /// The best that this processor runs.
+    pub fn detect() -> Kernels {
+        #[cfg(target_arch = "x86_64")]
+        {
+            let has_512 = is_x86_feature_detected!("avx512f")
+                && is_x86_feature_detected!("avx512dq")
+                && is_x86_feature_detected!("avx512vl")
+                && is_x86_feature_detected!("avx512bw");
+            if has_512 && is_x86_feature_detected!("fma") {
+                return Kernels {
+                    residual: avx512::residual,
+                    tangent: avx512::tangent,
+                    directional: avx512::directional,
+                    name: "avx512",
+                };
+            }
+            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+                return Kernels {
+                    residual: avx2::residual,
+                    tangent: avx2::tangent,
+                    directional: avx2::directional,
+                    name: "avx2",
+                };
+            }
+        }
+        Kernels::portable()
+    }
+
+    /// Kernels without special instructions.
+    pub fn portable() -> Kernels {
+        Kernels {
+            residual: portable::residual,
+            tangent: portable::tangent,
+            directional: portable::directional,
+            name: "portable",
+        }
+    }
+
+    /// Condensed residual. False where an element is inverted.
+    pub fn residual(&self, tables: &ElementTables, input: &ElementInput, out: &mut ElementOutput) -> bool {
+        // SAFETY: `detect` only hands out functions whose instructions this processor has.
+        unsafe { (self.residual)(tables, input, out) }
+    }
+
+    /// Residual, B and K. False where an element is inverted.
+    pub fn tangent(&self, tables: &ElementTables, input: &ElementInput, out: &mut ElementOutput) -> bool {
+        // SAFETY: as above.
+        unsafe { (self.tangent)(tables, input, out) }
+    }
+
+    /// Directional derivative of the condensed residual. False where an element is inverted.
+    pub fn directional(
+        &self,
+        tables: &ElementTables,
+        input: &ElementInput,
+        direction: &Direction,
+        out: &mut ElementOutput,
+    ) -> bool {
+        // SAFETY: as above.
+        unsafe { (self.directional)(tables, input, direction, out) }
+    }
+}

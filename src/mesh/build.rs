@@ -1,0 +1,107 @@
+//! From a specimen to its mesh: section, extrusion, node sets.
+
+use super::check::orient_and_limit;
+use super::domain::Domain;
+use super::error::MeshError;
+use super::grading::{divide, with_middles};
+use super::options::MeshOptions;
+use super::quads::quad_section;
+use super::section::Section;
+use super::triangles::triangle_section;
+use super::{ElementKind, Mesh};
+use crate::specimen::{Specimen, TestKind};
+
+/// Meshes `specimen` (the half or quarter with positive coordinates where it is mirrored).
+///
+/// The section is a structured grid (no holes), or O-grids in the holes' power-diagram cells, or triangles where neither
+/// suits; it is extruded in levels. Curved walls carry exact nodes at element corners and middles. Equal input gives
+/// equal bits.
+///
+/// # Errors
+/// Any [`MeshError`]; in particular [`MeshError::LigamentTooThin`] for holes that touch, and [`MeshError::PoorElement`]
+/// if even the triangles are worse than `options.min_scaled_jacobian`.
+pub fn mesh_specimen(specimen: &Specimen, options: &MeshOptions) -> Result<Mesh, MeshError> {
+    let domain = Domain::new(specimen, options)?;
+    let section = if options.force_prisms { None } else { quad_section(&domain, options)? };
+    let section = match section {
+        Some(section) => section,
+        None => triangle_section(&domain, options)?,
+    };
+    orient_and_limit(&section, options)?;
+    extrude(&domain, options, &section)
+}
+
+fn extrude(domain: &Domain, options: &MeshOptions, section: &Section) -> Result<Mesh, MeshError> {
+    let half = domain.extrusion_half;
+    let ratio = domain.grading.extrusion;
+    let mut levels: Vec<f64> = if domain.extrusion_mirrored {
+        divide(options.levels.div_ceil(2), 1.0, ratio).iter().map(|u| half * u).collect()
+    } else {
+        divide(options.levels, ratio, ratio).iter().map(|u| half * (2.0 * u - 1.0)).collect()
+    };
+    levels = with_middles(&levels);
+    if domain.extrusion_axis == 1 {
+        // (x, z, −y) is right-handed: go down in y so that Jacobians are positive.
+        levels.reverse();
+    }
+    let layers = levels.len() / 2;
+    let elements = layers * section.num_cells();
+    if elements > options.max_elements {
+        return Err(MeshError::TooManyElements { elements, limit: options.max_elements });
+    }
+    let in_section = section.points.len();
+    let mut nodes = Vec::with_capacity(levels.len() * in_section);
+    for &level in &levels {
+        for p in &section.points {
+            let mut node = [0.0; 3];
+            (node[0], node[domain.b_axis], node[domain.extrusion_axis]) = (p[0], p[1], level);
+            nodes.push(node);
+        }
+    }
+    let mut connectivity = Vec::with_capacity(3 * layers * section.cells.len());
+    for layer in 0..layers {
+        for cell in 0..section.num_cells() {
+            for k in 0..3 {
+                let offset = ((2 * layer + k) * in_section) as u32;
+                connectivity.extend(section.cell(cell).iter().map(|n| n + offset));
+            }
+        }
+    }
+    let element_kind = if section.nodes_per_cell == 9 { ElementKind::Hex27 } else { ElementKind::Prism21 };
+    let mut mesh = Mesh {
+        element_kind,
+        nodes,
+        connectivity,
+        mirror: domain.mirror,
+        fixed_nodes: Vec::new(),
+        moved_nodes: Vec::new(),
+        mirror_y_nodes: Vec::new(),
+        mirror_z_nodes: Vec::new(),
+    };
+    let mut half_extents = [domain.half[0]; 3];
+    (half_extents[domain.b_axis], half_extents[domain.extrusion_axis]) = (domain.half[1], half);
+    let axis = pull_axis(domain.test);
+    let tolerance = 1e-9 * domain.scale().max(2.0 * half);
+    mesh.fixed_nodes = nodes_on_plane(&mesh, axis, -half_extents[axis], tolerance);
+    mesh.moved_nodes = nodes_on_plane(&mesh, axis, half_extents[axis], tolerance);
+    if domain.mirror.y {
+        mesh.mirror_y_nodes = nodes_on_plane(&mesh, 1, 0.0, tolerance);
+    }
+    if domain.mirror.z {
+        mesh.mirror_z_nodes = nodes_on_plane(&mesh, 2, 0.0, tolerance);
+    }
+    Ok(mesh)
+}
+
+/// The coordinate whose extreme faces are held: y (plates) or x (grips).
+pub(super) fn pull_axis(test: TestKind) -> usize {
+    match test {
+        TestKind::DoubleLapShear => 1,
+        TestKind::Uniaxial => 0,
+    }
+}
+
+/// Nodes whose coordinate `axis` is `position`.
+pub(super) fn nodes_on_plane(mesh: &Mesh, axis: usize, position: f64, tolerance: f64) -> Vec<u32> {
+    (0..mesh.nodes.len() as u32).filter(|&n| (mesh.nodes[n as usize][axis] - position).abs() < tolerance).collect()
+}

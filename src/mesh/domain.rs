@@ -1,0 +1,287 @@
+//! The specimen reduced to what a mesher needs: a checked section, its holes, mirror planes and gradings.
+
+use super::Mirror;
+use super::error::{LigamentEnd, MeshError};
+use super::options::{MeshOptions, in_range};
+use crate::specimen::{HoleAxis, Outline, Specimen, TestKind};
+
+/// Lengths outside this range, mm, are refused: they are certainly errors of unit.
+const LENGTH_RANGE_MM: [f64; 2] = [1e-3, 1e5];
+/// Ligaments below this fraction of the smaller hole's diameter are not meshed.
+const MIN_LIGAMENT_RATIO: f64 = 0.02;
+/// Two positions closer than this fraction of the block's size are the same.
+pub(super) const COINCIDENT: f64 = 1e-9;
+
+/// ISO 37 type 4 (S3): half of the narrow part's length, mm.
+const NARROW_HALF_LENGTH_MM: f64 = 6.0;
+/// Half of the narrow part's width, mm.
+const NARROW_HALF_WIDTH_MM: f64 = 1.0;
+/// Half of the ends' width, mm.
+const END_HALF_WIDTH_MM: f64 = 3.0;
+/// Both transition radii, mm.
+const TRANSITION_RADIUS_MM: f64 = 3.0;
+
+/// A hole in section coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Disc {
+    pub center: [f64; 2],
+    pub radius: f64,
+    /// Index in the specimen.
+    pub index: usize,
+    /// Centred on the section's mirror line, which cuts it in half.
+    pub is_half: bool,
+}
+
+/// The section [−half₀, half₀] × [bottom, half₁] (coordinates a = x and b = z or y) with its holes, and its extrusion.
+#[derive(Clone, Debug)]
+pub(super) struct Domain {
+    pub half: [f64; 2],
+    /// −half₁, or 0 if the section is mirrored at b = 0.
+    pub bottom: f64,
+    pub is_dumbbell: bool,
+    pub discs: Vec<Disc>,
+    /// Coordinate index of b: 2 (z) or 1 (y).
+    pub b_axis: usize,
+    /// Coordinate index of the extrusion: 1 (y) or 2 (z).
+    pub extrusion_axis: usize,
+    pub extrusion_half: f64,
+    pub extrusion_mirrored: bool,
+    pub mirror: Mirror,
+    pub test: TestKind,
+    /// Size ratio at a = ±half₀, at b = ±half₁, at the hole walls and at the ends of the extrusion; 1 = not graded.
+    pub grading: Grading,
+}
+
+/// See [`Domain::grading`].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Grading {
+    pub ends: f64,
+    pub sides: f64,
+    pub holes: f64,
+    pub extrusion: f64,
+}
+
+impl Domain {
+    /// Checks `specimen` and `options` and finds the mirror planes.
+    pub fn new(specimen: &Specimen, options: &MeshOptions) -> Result<Self, MeshError> {
+        let block = &specimen.block;
+        let [low, high] = LENGTH_RANGE_MM;
+        in_range("length_mm", block.length_mm, low, high)?;
+        in_range("thickness_mm", block.thickness_mm, low, high)?;
+        in_range("width_mm", block.width_mm, low, high)?;
+        options.validate()?;
+        for (hole, h) in specimen.holes.iter().enumerate() {
+            let finite = h.center_mm.iter().all(|c| c.is_finite() && c.abs() < high);
+            if !(finite && h.diameter_mm > 0.0 && h.diameter_mm < high) {
+                return Err(MeshError::InvalidHole { hole, center_mm: h.center_mm, diameter_mm: h.diameter_mm });
+            }
+            if h.axis != specimen.holes[0].axis {
+                return Err(MeshError::MixedHoleAxes { hole });
+            }
+        }
+        let is_dumbbell = specimen.outline == Outline::Iso37Type4;
+        let along_width = specimen.holes.first().is_some_and(|h| h.axis == HoleAxis::Width);
+        if is_dumbbell {
+            check_dumbbell(block.length_mm, block.width_mm)?;
+            if along_width {
+                return Err(MeshError::UnsupportedHoleAxis { hole: 0 });
+            }
+        }
+        let (b_axis, extrusion_axis) = if along_width { (1, 2) } else { (2, 1) };
+        let extents = [block.length_mm, block.thickness_mm, block.width_mm];
+        let scale = extents.iter().fold(0.0f64, |a, &b| a.max(b));
+        let mut discs: Vec<Disc> = specimen
+            .holes
+            .iter()
+            .enumerate()
+            .map(|(index, h)| Disc { center: h.center_mm, radius: 0.5 * h.diameter_mm, index, is_half: false })
+            .collect();
+
+        let uniaxial = specimen.test == TestKind::Uniaxial;
+        let holes_symmetric = discs.iter().all(|d| {
+            discs.iter().any(|e| {
+                let tolerance = COINCIDENT * scale;
+                (d.center[0] - e.center[0]).abs() < tolerance
+                    && (d.center[1] + e.center[1]).abs() < tolerance
+                    && (d.radius - e.radius).abs() < tolerance
+            })
+        });
+        // Plates move along x, the section is mirrored in b and the extrusion in its own axis. y = 0 is no mirror
+        // plane in shear: one plate moves, the other does not.
+        let may = |axis: usize| options.use_mirror && (axis == 2 || uniaxial);
+        let section_mirrored = may(b_axis) && holes_symmetric;
+        let extrusion_mirrored = may(extrusion_axis);
+        let is_mirrored = |axis| if axis == b_axis { section_mirrored } else { extrusion_mirrored };
+
+        let domain_half = [0.5 * extents[0], 0.5 * extents[b_axis]];
+        let shear = !uniaxial;
+        let ratio = options.grading;
+        let domain = Domain {
+            half: domain_half,
+            bottom: if section_mirrored { 0.0 } else { -domain_half[1] },
+            is_dumbbell,
+            discs: Vec::new(),
+            b_axis,
+            extrusion_axis,
+            extrusion_half: 0.5 * extents[extrusion_axis],
+            extrusion_mirrored,
+            mirror: Mirror { y: is_mirrored(1), z: is_mirrored(2) },
+            test: specimen.test,
+            // In shear every edge of the block and of a hole through the plates is singular. In tension the grips'
+            // edges are; the free faces and the hole walls carry smooth fields.
+            grading: Grading {
+                ends: ratio,
+                sides: if shear { ratio } else { 1.0 },
+                holes: if shear && !along_width { ratio } else { ratio.sqrt() },
+                extrusion: if shear { ratio } else { 1.0 },
+            },
+        };
+        domain.check_ligaments(&discs)?;
+        let mut domain = domain;
+        if section_mirrored {
+            discs.retain(|d| d.center[1] > -COINCIDENT * scale);
+            for d in &mut discs {
+                if d.center[1] < COINCIDENT * scale {
+                    d.center[1] = 0.0;
+                    d.is_half = true;
+                }
+            }
+        }
+        domain.discs = discs;
+        Ok(domain)
+    }
+
+    /// Half-width of the section's outline at `a`.
+    pub fn half_width(&self, a: f64) -> f64 {
+        if self.is_dumbbell { dumbbell_half_width(a) } else { self.half[1] }
+    }
+
+    /// Positions a > 0 at which the dumb-bell's outline changes its curve.
+    pub fn arc_ends(&self) -> [f64; 3] {
+        let arc = transition_arc_length_mm();
+        [NARROW_HALF_LENGTH_MM, NARROW_HALF_LENGTH_MM + arc, NARROW_HALF_LENGTH_MM + 2.0 * arc]
+    }
+
+    /// Largest extent of the section.
+    pub fn scale(&self) -> f64 {
+        self.half[0].max(self.half[1]) * 2.0
+    }
+
+    /// Signed distance from a point inside the section to its outline (mirror line not counted); exact for the block,
+    /// and the distance to the nearest sampled outline point for the dumb-bell.
+    pub fn outline_distance(&self, p: [f64; 2]) -> f64 {
+        let ends = self.half[0] - p[0].abs();
+        if !self.is_dumbbell {
+            return ends.min(self.half[1] - p[1].abs());
+        }
+        let inside = self.half_width(p[0]) - p[1].abs();
+        // The outline is at most as far as straight up; search that reach for a nearer point.
+        let reach = inside.abs();
+        let mut nearest = reach;
+        for i in -20..=20 {
+            let a = (p[0] + reach * f64::from(i) / 20.0).clamp(-self.half[0], self.half[0]);
+            nearest = nearest.min((a - p[0]).hypot(self.half_width(a) - p[1].abs()));
+        }
+        ends.min(if inside < 0.0 { -nearest } else { nearest })
+    }
+
+    fn check_ligaments(&self, discs: &[Disc]) -> Result<(), MeshError> {
+        for (i, d) in discs.iter().enumerate() {
+            let to_outline = self.outline_distance(d.center) - d.radius;
+            let check = |to, length_mm: f64, limit_mm: f64| {
+                if length_mm >= limit_mm {
+                    return Ok(());
+                }
+                Err(MeshError::LigamentTooThin { from: LigamentEnd::Hole(d.index), to, length_mm, limit_mm })
+            };
+            check(LigamentEnd::Outline, to_outline, MIN_LIGAMENT_RATIO * 2.0 * d.radius)?;
+            for e in &discs[i + 1..] {
+                let distance = (d.center[0] - e.center[0]).hypot(d.center[1] - e.center[1]);
+                let limit = MIN_LIGAMENT_RATIO * 2.0 * d.radius.min(e.radius);
+                check(LigamentEnd::Hole(e.index), distance - d.radius - e.radius, limit)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Area of the meshed part of the section, mm², in closed form.
+    pub fn area(&self) -> f64 {
+        let [a, b] = self.half;
+        let mut whole = 4.0 * a * b;
+        if self.is_dumbbell {
+            whole -= 4.0 * dumbbell_missing_area();
+        }
+        let mirrored = self.bottom > -self.half[1];
+        let holes: f64 = self
+            .discs
+            .iter()
+            .map(|d| std::f64::consts::PI * d.radius * d.radius * if d.is_half { 0.5 } else { 1.0 })
+            .sum();
+        whole * if mirrored { 0.5 } else { 1.0 } - holes
+    }
+
+    /// Extent of the meshed part along the extrusion, mm.
+    pub fn depth(&self) -> f64 {
+        self.extrusion_half * if self.extrusion_mirrored { 1.0 } else { 2.0 }
+    }
+}
+
+fn check_dumbbell(length_mm: f64, width_mm: f64) -> Result<(), MeshError> {
+    let width = 2.0 * END_HALF_WIDTH_MM;
+    if (width_mm - width).abs() > 1e-6 * width {
+        return Err(MeshError::OutlineMismatch {
+            name: "width_mm",
+            value_mm: width_mm,
+            relation: "equal to",
+            limit_mm: width,
+        });
+    }
+    let shortest = 2.0 * transition_end_mm();
+    if length_mm < 1.01 * shortest {
+        return Err(MeshError::OutlineMismatch {
+            name: "length_mm",
+            value_mm: length_mm,
+            relation: "at least",
+            limit_mm: 1.01 * shortest,
+        });
+    }
+    Ok(())
+}
+
+/// cos θ of the slope where the two transition arcs meet: together they rise 2 r (1 − cos θ).
+fn transition_cosine() -> f64 {
+    1.0 - (END_HALF_WIDTH_MM - NARROW_HALF_WIDTH_MM) / (2.0 * TRANSITION_RADIUS_MM)
+}
+
+/// Length of each transition arc along x, mm.
+fn transition_arc_length_mm() -> f64 {
+    TRANSITION_RADIUS_MM * (1.0 - transition_cosine().powi(2)).sqrt()
+}
+
+/// Half-width of the ISO 37 type 4 outline at x, mm.
+pub(super) fn dumbbell_half_width(x: f64) -> f64 {
+    let (r, arc) = (TRANSITION_RADIUS_MM, transition_arc_length_mm());
+    let s = x.abs() - NARROW_HALF_LENGTH_MM;
+    if s <= 0.0 {
+        NARROW_HALF_WIDTH_MM
+    } else if s <= arc {
+        NARROW_HALF_WIDTH_MM + r - (r * r - s * s).sqrt()
+    } else if s < 2.0 * arc {
+        let t = 2.0 * arc - s;
+        END_HALF_WIDTH_MM - r + (r * r - t * t).sqrt()
+    } else {
+        END_HALF_WIDTH_MM
+    }
+}
+
+/// |x| at which the transition to the ends is complete, mm.
+pub(super) fn transition_end_mm() -> f64 {
+    NARROW_HALF_LENGTH_MM + 2.0 * transition_arc_length_mm()
+}
+
+/// Area between the outline and the block in one quarter: over the transition the outline is point-symmetric about its
+/// middle, so its mean is the mean of the two half-widths.
+fn dumbbell_missing_area() -> f64 {
+    let rise = END_HALF_WIDTH_MM - NARROW_HALF_WIDTH_MM;
+    NARROW_HALF_LENGTH_MM * rise + 2.0 * transition_arc_length_mm() * 0.5 * rise
+}

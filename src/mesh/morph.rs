@@ -1,0 +1,292 @@
+//! Derivatives of the node positions with respect to the design, on a fixed topology.
+
+use serde::{Deserialize, Serialize};
+
+use super::Mesh;
+use super::domain::{dumbbell_half_width, transition_end_mm};
+use super::locator::extrusion_axis;
+use crate::specimen::{HoleAxis, Outline, Specimen};
+
+/// One geometric quantity of a specimen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DesignVariable {
+    /// x of the centre of a hole (index in the specimen), mm.
+    HoleX(usize),
+    /// The other coordinate of a hole's centre (z or y), mm.
+    HoleOther(usize),
+    /// Diameter of a hole, mm.
+    HoleDiameter(usize),
+    /// Extent of the block along x, mm.
+    BlockLength,
+    /// Extent of the block along y, mm.
+    BlockThickness,
+    /// Extent of the block along z, mm.
+    BlockWidth,
+}
+
+/// d(node position)/d(variable), dimensionless, per node of `mesh` (of `specimen`).
+///
+/// A hole's wall moves rigidly or dilates, so it stays a circle; the motion fades as d/(d + d_h) towards the other walls
+/// and the outline, with d_h the distance to the hole and d a smooth minimum of the distances to the others. A block
+/// dimension scales the outline affinely about the origin and leaves the holes' centres and shapes alone; along the
+/// extrusion everything is scaled.
+///
+/// In a mirrored mesh the velocity is that of the meshed half. A hole and its image are moved together by summing their
+/// two variables (with opposite signs for [`DesignVariable::HoleOther`]); the one outside the meshed half contributes
+/// zero. [`DesignVariable::HoleOther`] of a hole centred on the mirror plane gives zero: by symmetry it changes symmetric
+/// results (forces, integrals) in second order only.
+///
+/// A dumb-bell keeps its standard outline: length moves its ends, width gives zero. An index of a hole that does not
+/// exist gives zero.
+pub fn shape_velocity(mesh: &Mesh, specimen: &Specimen, variable: DesignVariable) -> Vec<[f64; 3]> {
+    let field = Field::new(mesh, specimen);
+    mesh.nodes.iter().map(|&p| field.velocity(p, variable)).collect()
+}
+
+/// `mesh` with its nodes moved by `step` times `velocity` (as from [`shape_velocity`]). Topology and node sets stay.
+/// Check the result before use when the step is not small: elements may have become poor.
+pub fn morphed(mesh: &Mesh, velocity: &[[f64; 3]], step: f64) -> Mesh {
+    let mut moved = mesh.clone();
+    for (p, v) in moved.nodes.iter_mut().zip(velocity) {
+        for c in 0..3 {
+            p[c] += step * v[c];
+        }
+    }
+    moved
+}
+
+struct Field<'a> {
+    specimen: &'a Specimen,
+    half: [f64; 3],
+    /// Coordinate index of the section's second direction and of the extrusion.
+    b_axis: usize,
+    extrusion_axis: usize,
+    section_mirrored: bool,
+    tolerance: f64,
+}
+
+impl<'a> Field<'a> {
+    fn new(mesh: &Mesh, specimen: &'a Specimen) -> Self {
+        let b = &specimen.block;
+        // A mesh says itself how it is extruded, which settles the case without holes.
+        let extrusion_axis = match specimen.holes.first().map(|h| h.axis) {
+            Some(HoleAxis::Thickness) => 1,
+            Some(HoleAxis::Width) => 2,
+            None => extrusion_axis(mesh),
+        };
+        let b_axis = 3 - extrusion_axis;
+        let half = [0.5 * b.length_mm, 0.5 * b.thickness_mm, 0.5 * b.width_mm];
+        Field {
+            specimen,
+            half,
+            b_axis,
+            extrusion_axis,
+            section_mirrored: if b_axis == 2 { mesh.mirror.z } else { mesh.mirror.y },
+            tolerance: 1e-7 * (half[0] + half[1] + half[2]),
+        }
+    }
+
+    /// Distance from the wall of a hole; at least 0.
+    fn hole_distance(&self, hole: usize, p: [f64; 2]) -> f64 {
+        let h = &self.specimen.holes[hole];
+        let distance = (p[0] - h.center_mm[0]).hypot(p[1] - h.center_mm[1]) - 0.5 * h.diameter_mm;
+        if distance < self.tolerance { 0.0 } else { distance }
+    }
+
+    /// Smooth minimum of the distances to the outline's sides: 0 on it.
+    fn outline_distance(&self, p: [f64; 2]) -> f64 {
+        let sides = if self.specimen.outline == Outline::Iso37Type4 {
+            // Distances along the coordinates are enough: the weight only has to vanish on the outline.
+            let width = dumbbell_half_width(p[0]);
+            [self.half[0] - p[0], self.half[0] + p[0], width - p[1], width + p[1]]
+        } else {
+            let b = self.half[self.b_axis];
+            [self.half[0] - p[0], self.half[0] + p[0], b - p[1], b + p[1]]
+        };
+        smooth_minimum(sides.into_iter().map(|d| if d < self.tolerance { 0.0 } else { d }))
+    }
+
+    fn velocity(&self, node: [f64; 3], variable: DesignVariable) -> [f64; 3] {
+        let p = [node[0], node[self.b_axis]];
+        let mut v = [0.0; 3];
+        match variable {
+            DesignVariable::HoleX(hole) => v[0] = self.hole_weight(hole, p),
+            DesignVariable::HoleOther(hole) => {
+                if !self.is_on_mirror(hole) {
+                    v[self.b_axis] = self.hole_weight(hole, p);
+                }
+            }
+            DesignVariable::HoleDiameter(hole) => {
+                let weight = self.hole_weight(hole, p);
+                if weight > 0.0 {
+                    let center = self.specimen.holes[hole].center_mm;
+                    let radial = [p[0] - center[0], p[1] - center[1]];
+                    let distance = radial[0].hypot(radial[1]);
+                    v[0] = 0.5 * weight * radial[0] / distance;
+                    v[self.b_axis] = 0.5 * weight * radial[1] / distance;
+                }
+            }
+            DesignVariable::BlockLength => v[0] = self.outline_weight(p) * self.length_rate(p[0]),
+            DesignVariable::BlockThickness => v[1] = self.block_rate(node, p, 1),
+            DesignVariable::BlockWidth => v[2] = self.block_rate(node, p, 2),
+        }
+        v
+    }
+
+    /// 1 at the hole's wall, 0 at the outline, the other walls and (for holes off it) the mirror line.
+    fn hole_weight(&self, hole: usize, p: [f64; 2]) -> f64 {
+        let Some(h) = self.specimen.holes.get(hole) else { return 0.0 };
+        if self.section_mirrored && h.center_mm[1] < -self.tolerance {
+            return 0.0;
+        }
+        let own = self.hole_distance(hole, p);
+        let mirror = (self.section_mirrored && !self.is_on_mirror(hole)).then_some(if p[1] < self.tolerance {
+            0.0
+        } else {
+            p[1]
+        });
+        let others = (0..self.specimen.holes.len()).filter(|&i| i != hole).map(|i| self.hole_distance(i, p));
+        let nearest = smooth_minimum(others.chain(mirror).chain([self.outline_distance(p)]));
+        if nearest <= 0.0 { 0.0 } else { nearest / (nearest + own) }
+    }
+
+    fn is_on_mirror(&self, hole: usize) -> bool {
+        let on_plane = |h: &crate::specimen::Hole| h.center_mm[1].abs() <= self.tolerance;
+        self.section_mirrored && self.specimen.holes.get(hole).is_some_and(on_plane)
+    }
+
+    /// 1 on the outline, 0 on the holes' walls.
+    fn outline_weight(&self, p: [f64; 2]) -> f64 {
+        let holes = smooth_minimum((0..self.specimen.holes.len()).map(|i| self.hole_distance(i, p)));
+        if holes.is_infinite() { 1.0 } else { holes / (holes + self.outline_distance(p)) }
+    }
+
+    fn length_rate(&self, x: f64) -> f64 {
+        if self.specimen.outline == Outline::Iso37Type4 {
+            // The narrow part and the arcs stay; the ends stretch.
+            let start = transition_end_mm();
+            0.5 * x.signum() * ((x.abs() - start) / (self.half[0] - start)).max(0.0)
+        } else {
+            0.5 * x / self.half[0]
+        }
+    }
+
+    fn block_rate(&self, node: [f64; 3], p: [f64; 2], axis: usize) -> f64 {
+        let affine = 0.5 * node[axis] / self.half[axis];
+        if axis == self.extrusion_axis {
+            affine
+        } else if self.specimen.outline == Outline::Iso37Type4 {
+            0.0
+        } else {
+            affine * self.outline_weight(p)
+        }
+    }
+}
+
+/// (Σ d⁻⁴)^(−1/4): 0 if any distance is 0, infinite for none.
+fn smooth_minimum(distances: impl Iterator<Item = f64>) -> f64 {
+    let mut sum = 0.0;
+    for d in distances {
+        if d <= 0.0 {
+            return 0.0;
+        }
+        sum += d.powi(-4);
+    }
+    if sum > 0.0 { sum.powf(-0.25) } else { f64::INFINITY }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::test_specimens::{bar, dumbbell, off_axis, solid, two_holes, width_holes};
+    use crate::mesh::{MeshOptions, mesh_specimen};
+    use std::f64::consts::PI;
+
+    fn volume_rate(specimen: &Specimen, variable: DesignVariable) -> (Mesh, f64) {
+        let mesh = mesh_specimen(specimen, &MeshOptions::standard(specimen)).unwrap();
+        let velocity = shape_velocity(&mesh, specimen, variable);
+        let h = 1e-4;
+        let (plus, minus) = (morphed(&mesh, &velocity, h), morphed(&mesh, &velocity, -h));
+        let rate = (plus.volume() - minus.volume()) / (2.0 * h);
+        (mesh, rate)
+    }
+
+    fn set(specimen: &Specimen, variable: DesignVariable, step: f64) -> Specimen {
+        let mut s = specimen.clone();
+        match variable {
+            DesignVariable::HoleX(i) => s.holes[i].center_mm[0] += step,
+            DesignVariable::HoleOther(i) => s.holes[i].center_mm[1] += step,
+            DesignVariable::HoleDiameter(i) => s.holes[i].diameter_mm += step,
+            DesignVariable::BlockLength => s.block.length_mm += step,
+            DesignVariable::BlockThickness => s.block.thickness_mm += step,
+            DesignVariable::BlockWidth => s.block.width_mm += step,
+        }
+        s
+    }
+
+    /// The morphed mesh passes the whole check of the changed specimen: walls are circles of the new size and place,
+    /// outer faces are planes, node sets are complete, the volume is right.
+    #[test]
+    fn the_morphed_mesh_is_a_mesh_of_the_changed_specimen() {
+        use DesignVariable::*;
+        for specimen in [two_holes(), bar(), width_holes(), off_axis(), solid()] {
+            let mut variables = vec![BlockLength, BlockThickness, BlockWidth];
+            for i in 0..specimen.holes.len() {
+                variables.extend([HoleX(i), HoleOther(i), HoleDiameter(i)]);
+            }
+            for force_prisms in [false, true] {
+                let options = MeshOptions { force_prisms, ..MeshOptions::search(&specimen) };
+                let mesh = mesh_specimen(&specimen, &options).unwrap();
+                for &variable in &variables {
+                    // Moving a hole off the mirror plane leaves no half to compare with.
+                    let along_width = specimen.holes.first().is_some_and(|h| h.axis == HoleAxis::Width);
+                    let section_mirrored = if along_width { mesh.mirror.y } else { mesh.mirror.z };
+                    if section_mirrored && matches!(variable, HoleOther(_)) {
+                        continue;
+                    }
+                    let step = 0.05;
+                    let velocity = shape_velocity(&mesh, &specimen, variable);
+                    let moved = morphed(&mesh, &velocity, step);
+                    let result = moved.check(&set(&specimen, variable, step));
+                    assert!(result.is_ok(), "{variable:?} of {}: {result:?}", specimen.name);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn volume_derivatives_are_the_closed_forms() {
+        let s = two_holes();
+        let [l, t, w] = [s.block.length_mm, s.block.thickness_mm, s.block.width_mm];
+        let r = 0.5 * s.holes[0].diameter_mm;
+        let section = l * w - 2.0 * PI * r * r;
+        // (variable, derivative of half of the volume)
+        for (variable, expected) in [
+            (DesignVariable::HoleX(0), 0.0),
+            (DesignVariable::HoleDiameter(1), -0.5 * PI * r * t),
+            (DesignVariable::BlockLength, 0.5 * t * w),
+            (DesignVariable::BlockThickness, 0.5 * section),
+            (DesignVariable::BlockWidth, 0.5 * l * t),
+        ] {
+            let (_, rate) = volume_rate(&s, variable);
+            // Quadratic arcs of 30° miss 1e-4 of a hole's area.
+            assert!((rate - expected).abs() < 3e-4 * expected.abs() + 1e-6, "{variable:?}: {rate} {expected}");
+        }
+        let s = width_holes();
+        let (_, rate) = volume_rate(&s, DesignVariable::HoleDiameter(1));
+        let expected = -0.5 * PI * s.holes[1].diameter_mm * 0.5 * s.block.width_mm;
+        assert!((rate - expected).abs() < 3e-4 * expected.abs());
+    }
+
+    #[test]
+    fn a_dumbbell_keeps_its_outline() {
+        let s = dumbbell();
+        let mesh = mesh_specimen(&s, &MeshOptions::standard(&s)).unwrap();
+        let velocity = shape_velocity(&mesh, &s, DesignVariable::BlockLength);
+        let moved = morphed(&mesh, &velocity, 0.5);
+        moved.check(&set(&s, DesignVariable::BlockLength, 0.5)).unwrap();
+        assert!(shape_velocity(&mesh, &s, DesignVariable::BlockWidth).iter().flatten().all(|v| *v == 0.0));
+        assert!(shape_velocity(&mesh, &s, DesignVariable::HoleX(3)).iter().flatten().all(|v| *v == 0.0));
+    }
+}

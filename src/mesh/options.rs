@@ -1,0 +1,102 @@
+//! How fine a mesh is, and which mesher may be used.
+
+use serde::{Deserialize, Serialize};
+
+use super::error::MeshError;
+use crate::specimen::Specimen;
+
+/// Settings of [`super::mesh_specimen`].
+///
+/// The constructors [`search`](Self::search), [`standard`](Self::standard) and [`fine`](Self::fine) derive the sizes from
+/// the specimen's block, so that the number of unknowns is about the same for every specimen of the same shape.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeshOptions {
+    /// Mean element size in the section, mm.
+    pub section_size_mm: f64,
+    /// Element layers through the whole extrusion; a mirrored mesh has half of them (rounded up).
+    pub levels: usize,
+    /// Smallest element size next to a graded boundary (bonded faces and their edges, hole walls) relative to the size
+    /// in the interior; 1 = uniform. The number of elements does not depend on it.
+    pub grading: f64,
+    /// Least number of elements around a whole hole, at least 8.
+    pub hole_segments: usize,
+    /// Least number of element layers between a hole and the edge of its cell.
+    pub radial_layers: usize,
+    /// Mesh one half or quarter where the specimen has mirror planes.
+    pub use_mirror: bool,
+    /// Use triangles extruded to prisms even where quadrilaterals would do.
+    pub force_prisms: bool,
+    /// A section of quadrilaterals with a smaller scaled Jacobian is replaced by triangles; a section of triangles with
+    /// a smaller one is refused.
+    pub min_scaled_jacobian: f64,
+    /// Most elements allowed.
+    pub max_elements: usize,
+}
+
+/// Elements in the unmirrored block at standard size.
+const STANDARD_ELEMENTS: f64 = 720.0;
+
+impl MeshOptions {
+    /// Coarse meshes for a search: about 2–4 thousand free unknowns in half of a two-hole block.
+    pub fn search(specimen: &Specimen) -> Self {
+        MeshOptions { hole_segments: 8, ..Self::scaled(specimen, 1.8) }
+    }
+
+    /// The default: about 10–15 thousand free unknowns in half of a two-hole block.
+    pub fn standard(specimen: &Specimen) -> Self {
+        Self::scaled(specimen, 1.0)
+    }
+
+    /// Meshes to confirm results: about 40–70 thousand free unknowns in half of a two-hole block.
+    pub fn fine(specimen: &Specimen) -> Self {
+        Self::scaled(specimen, 0.6)
+    }
+
+    /// Element size `factor` times that of [`Self::standard`]; unknowns go with its inverse third power.
+    pub fn scaled(specimen: &Specimen, factor: f64) -> Self {
+        let block = &specimen.block;
+        let volume = block.length_mm * block.thickness_mm * block.width_mm;
+        let size = (volume / STANDARD_ELEMENTS).cbrt() * factor;
+        let along_width = specimen.holes.first().is_some_and(|h| h.axis == crate::specimen::HoleAxis::Width);
+        let depth = if along_width { block.width_mm } else { block.thickness_mm };
+        // Through the plates' gap shear is not uniform. Along holes fields change slowly but for the free faces.
+        let layers = if along_width { 0.6 } else { 1.25 };
+        // `as` saturates and maps NaN to 0: bad numbers are reported by `validate`, not here.
+        let segments = ((12.0 / factor).round() as usize).clamp(8, 64);
+        MeshOptions {
+            section_size_mm: size,
+            levels: ((layers * depth / size).round() as usize).clamp(2, 400),
+            grading: 0.3,
+            hole_segments: segments,
+            radial_layers: if factor > 1.3 { 2 } else { ((3.0 / factor).round() as usize).clamp(2, 20) },
+            use_mirror: true,
+            force_prisms: false,
+            min_scaled_jacobian: 0.2,
+            max_elements: 100_000,
+        }
+    }
+
+    /// Checks the ranges.
+    ///
+    /// # Errors
+    /// [`MeshError::OutOfRange`].
+    pub fn validate(&self) -> Result<(), MeshError> {
+        in_range("section_size_mm", self.section_size_mm, 1e-6, 1e6)?;
+        in_range("levels", self.levels as f64, 1.0, 1e4)?;
+        in_range("grading", self.grading, 0.01, 1.0)?;
+        in_range("hole_segments", self.hole_segments as f64, 8.0, 1e4)?;
+        in_range("radial_layers", self.radial_layers as f64, 1.0, 1e3)?;
+        in_range("min_scaled_jacobian", self.min_scaled_jacobian, 0.0, 0.9)?;
+        in_range("max_elements", self.max_elements as f64, 1.0, 2e7)
+    }
+}
+
+/// `Ok` if `value` is a number in [`minimum`, `maximum`].
+pub(super) fn in_range(name: &'static str, value: f64, minimum: f64, maximum: f64) -> Result<(), MeshError> {
+    if value >= minimum && value <= maximum {
+        Ok(())
+    } else {
+        Err(MeshError::OutOfRange { name, value, minimum, maximum })
+    }
+}

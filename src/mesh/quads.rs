@@ -1,0 +1,190 @@
+//! Sections of quadrilaterals: structured grids, and an O-grid in the power-diagram cell of each hole.
+
+use super::cells::{Style, holed_section};
+use super::domain::Domain;
+use super::error::MeshError;
+use super::grading::{divide, with_middles};
+use super::options::MeshOptions;
+use super::power::Rectangle;
+use super::section::{PointMerger, Section};
+
+/// The best section of quadrilaterals for `domain`, or `None` where quadrilaterals are no use.
+///
+/// With holes, several inner rectangles around them (what is outside becomes structured strips) and several ways to make
+/// cells in them are ranked on a coarse section by shape and number of cells; the first that is good enough at the size
+/// asked for is taken. So the layout of cells hardly depends on the size.
+///
+/// # Errors
+/// [`MeshError::TooManyElements`].
+pub(super) fn quad_section(domain: &Domain, options: &MeshOptions) -> Result<Option<Section>, MeshError> {
+    if domain.discs.is_empty() {
+        return structured_section(domain, options).map(Some);
+    }
+    if domain.is_dumbbell {
+        return Ok(None);
+    }
+    let area = domain.area();
+    limit_cells((area / options.section_size_mm.powi(2)) as usize, options)?;
+    let size = (area / RANKING_CELLS).sqrt().max(options.section_size_mm);
+    let coarse = MeshOptions {
+        section_size_mm: size,
+        hole_segments: options.hole_segments.min(8),
+        radial_layers: options.radial_layers.min(2),
+        ..*options
+    };
+    let mut ranking: Vec<(f64, Rectangle, Style)> = Vec::new();
+    for rectangle in inner_rectangles(domain, size) {
+        for (shortest, bend) in STYLES {
+            let style = Style { shortest_mm: shortest * size, bend };
+            let Some(section) = holed_section(domain, &coarse, rectangle, style)? else { continue };
+            let (worst, _) = section.min_scaled_jacobian();
+            let excess = (section.num_cells() as f64 * size * size / area).max(1.0).ln();
+            ranking.push((worst.min(0.5) + section.mean_shape() - 0.2 * excess, rectangle, style));
+            if worst < options.min_scaled_jacobian {
+                // Only if nothing else is left: its size may still make it better.
+                ranking.last_mut().into_iter().for_each(|r| r.0 -= 10.0);
+            }
+        }
+    }
+    // Stable: of equals the first stays first. Scores are rounded so that mirror images rank alike.
+    ranking.sort_by_key(|r| -((r.0 * 1e6).round() as i64));
+    for &(_, rectangle, style) in ranking.iter().take(MAX_ATTEMPTS) {
+        if let Some(section) = holed_section(domain, options, rectangle, style)?
+            && section.min_scaled_jacobian().0 >= options.min_scaled_jacobian
+        {
+            return Ok(Some(section));
+        }
+    }
+    Ok(None)
+}
+
+/// About so many cells have the sections that layouts are ranked by.
+const RANKING_CELLS: f64 = 60.0;
+/// So many layouts are tried at the size asked for.
+const MAX_ATTEMPTS: usize = 8;
+/// Ways to make cells: edges shorter than this many element sizes are collapsed, and the lines to the cells' corners bend
+/// by this fraction.
+const STYLES: [(f64, f64); 4] = [(0.45, 0.0), (0.15, 0.0), (0.45, 0.7), (0.15, 0.7)];
+
+/// Number of parts for a length, refused if absurd.
+pub(super) fn count(length: f64, options: &MeshOptions) -> Result<usize, MeshError> {
+    let n = (length / options.section_size_mm).round();
+    if n > options.max_elements as f64 {
+        return Err(MeshError::TooManyElements { elements: n as usize, limit: options.max_elements });
+    }
+    Ok((n as usize).max(1))
+}
+
+pub(super) fn limit_cells(cells: usize, options: &MeshOptions) -> Result<(), MeshError> {
+    if cells.saturating_mul(options.levels.div_ceil(2)) > options.max_elements {
+        return Err(MeshError::TooManyElements { elements: cells, limit: options.max_elements });
+    }
+    Ok(())
+}
+
+/// `low` to `high` in `n` graded parts, with middles.
+pub(super) fn line(low: f64, high: f64, n: usize, start: f64, end: f64) -> Vec<f64> {
+    with_middles(&divide(n, start, end)).iter().map(|u| low + (high - low) * u).collect()
+}
+
+/// Block or dumb-bell without holes.
+fn structured_section(domain: &Domain, options: &MeshOptions) -> Result<Section, MeshError> {
+    let [a, b] = domain.half;
+    let grading = domain.grading;
+    let along = if domain.is_dumbbell {
+        let [x0, x1, x2] = domain.arc_ends();
+        // The narrow part is a third as wide as the ends: its elements are made shorter.
+        let n = |length: f64, factor: f64| count(length * factor, options);
+        let end = line(x2, a, n(a - x2, 1.0)?, 1.0, grading.ends);
+        let outer = line(x1, x2, n(x2 - x1, 1.2)?.max(2), 1.0, 1.0);
+        let inner = line(x0, x1, n(x1 - x0, 1.4)?.max(2), 1.0, 1.0);
+        let narrow = line(-x0, x0, 2 * n(x0, 1.4)?, 1.0, 1.0);
+        let mut all: Vec<f64> = end.iter().rev().chain(outer.iter().rev().skip(1)).map(|x| -x).collect();
+        all.extend(inner.iter().rev().skip(1).map(|x| -x));
+        all.extend(&narrow[1..]);
+        for part in [inner, outer, end] {
+            all.extend(&part[1..]);
+        }
+        all
+    } else {
+        line(-a, a, count(2.0 * a, options)?.max(2), grading.ends, grading.ends)
+    };
+    let lower = if domain.bottom < 0.0 { grading.sides } else { 1.0 };
+    let width = b - domain.bottom;
+    let across_count = if domain.is_dumbbell { count(width, options)?.max(2) } else { count(width, options)? };
+    let across = line(domain.bottom / b, 1.0, across_count, lower, grading.sides);
+    limit_cells((along.len() / 2) * (across.len() / 2), options)?;
+    let mut builder = Builder::new(domain);
+    builder.grid(along.len(), across.len(), |i, j| [along[i], across[j] * domain.half_width(along[i])]);
+    Ok(builder.finish())
+}
+
+/// Rectangles around all holes, the whole section first. The distance kept from a hole is a multiple of its radius.
+fn inner_rectangles(domain: &Domain, size: f64) -> Vec<Rectangle> {
+    const RADII: [f64; 4] = [f64::INFINITY, 3.4, 2.5, 1.8];
+    let outer = Rectangle { low: [-domain.half[0], domain.bottom], high: domain.half };
+    let reach = |c: usize, sign: f64, k: f64| {
+        domain.discs.iter().map(|d| sign * d.center[c] + k * d.radius).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let has_half = domain.discs.iter().any(|d| d.is_half);
+    let side = |c: usize, upper: bool, k: f64| {
+        let sign = if upper { 1.0 } else { -1.0 };
+        let limit = if upper { outer.high[c] } else { -outer.low[c] };
+        let position = reach(c, sign, k);
+        // A strip thinner than half an element is not worth its own layer.
+        let no_strip = limit - position < 0.5 * size || (c == 1 && !upper && has_half);
+        sign * if no_strip { limit } else { position }
+    };
+    let mut rectangles: Vec<Rectangle> = Vec::new();
+    for k1 in RADII {
+        for k0 in RADII {
+            let r = Rectangle {
+                low: [side(0, false, k0), side(1, false, k1)],
+                high: [side(0, true, k0), side(1, true, k1)],
+            };
+            let same = |q: &Rectangle| {
+                (0..2).all(|c| (q.low[c] - r.low[c]).abs() + (q.high[c] - r.high[c]).abs() < 1e-9 * domain.scale())
+            };
+            if !rectangles.iter().any(same) {
+                rectangles.push(r);
+            }
+        }
+    }
+    rectangles
+}
+
+/// Collects grids into a section.
+pub(super) struct Builder {
+    merger: PointMerger,
+    cells: Vec<u32>,
+}
+
+impl Builder {
+    pub fn new(domain: &Domain) -> Self {
+        Builder { merger: PointMerger::new(domain), cells: Vec::new() }
+    }
+
+    /// A grid of `ni` × `nj` points (odd numbers; every other one is a middle). The first direction turned
+    /// counter-clockwise gives the second.
+    pub fn grid(&mut self, ni: usize, nj: usize, point: impl Fn(usize, usize) -> [f64; 2]) {
+        let mut indices = Vec::with_capacity(ni * nj);
+        for j in 0..nj {
+            for i in 0..ni {
+                indices.push(self.merger.insert(point(i, j)));
+            }
+        }
+        for j in (0..nj - 1).step_by(2) {
+            for i in (0..ni - 1).step_by(2) {
+                for b in 0..3 {
+                    for a in 0..3 {
+                        self.cells.push(indices[i + a + ni * (j + b)]);
+                    }
+                }
+            }
+        }
+    }
+
+    pub fn finish(self) -> Section {
+        Section { nodes_per_cell: 9, points: self.merger.points, cells: self.cells }
+    }
+}

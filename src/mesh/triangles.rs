@@ -1,0 +1,307 @@
+//! Sections of triangles by constrained Delaunay refinement: for every shape that quadrilaterals do not suit.
+
+use std::collections::{HashMap, HashSet};
+use std::f64::consts::PI;
+
+use spade::{AngleLimit, ConstrainedDelaunayTriangulation, Point2, RefinementParameters, Triangulation};
+
+use super::domain::Domain;
+use super::error::MeshError;
+use super::options::MeshOptions;
+use super::section::{Section, sub};
+
+/// Smallest angle asked of the refinement, degrees.
+const ANGLE_LIMIT_DEG: f64 = 30.0;
+/// Boundary parts are at most this fraction of the distance to the next wall.
+const GAP_FRACTION: f64 = 0.9;
+/// Arcs of triangles span at most this part of a circle.
+const MIN_SEGMENTS: f64 = 12.0;
+/// Factors on the sizes of arcs and of parts beside gaps that are tried in turn.
+const BOUNDARY_FINENESS: [f64; 5] = [1.0, 0.8, 0.65, 0.5, 0.35];
+
+/// A curve of the boundary.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Curve {
+    Line([f64; 2], [f64; 2]),
+    /// Circle of a disc from one angle to another.
+    Arc {
+        disc: usize,
+        from: f64,
+        to: f64,
+    },
+    /// The dumb-bell's outline b = ±half-width between two positions a.
+    Profile {
+        upper: bool,
+        from: f64,
+        to: f64,
+    },
+}
+
+impl Curve {
+    fn at(self, domain: &Domain, t: f64) -> [f64; 2] {
+        match self {
+            Curve::Line(p, q) => [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])],
+            Curve::Arc { disc, from, to } => {
+                let d = &domain.discs[disc];
+                let angle = from + t * (to - from);
+                [d.center[0] + d.radius * angle.cos(), d.center[1] + d.radius * angle.sin()]
+            }
+            Curve::Profile { upper, from, to } => {
+                let a = from + t * (to - from);
+                [a, if upper { domain.half_width(a) } else { -domain.half_width(a) }]
+            }
+        }
+    }
+}
+
+/// A boundary part between two boundary points, by their indices.
+type BoundaryEdges = HashMap<(usize, usize), (Curve, f64)>;
+
+/// Triangulates the section, with finer and finer boundary parts until no triangle is worse than
+/// `options.min_scaled_jacobian`; a long arc takes half its angle away from the corners of its triangle. If none is good
+/// enough, the best is returned.
+///
+/// # Errors
+/// [`MeshError::TooManyElements`], [`MeshError::Triangulation`], [`MeshError::RefinementIncomplete`].
+pub(super) fn triangle_section(domain: &Domain, options: &MeshOptions) -> Result<Section, MeshError> {
+    let mut best: Option<(f64, Section)> = None;
+    let mut failure = None;
+    for fineness in BOUNDARY_FINENESS {
+        match triangulate(domain, options, fineness) {
+            Ok(section) => {
+                let (worst, _) = section.min_scaled_jacobian();
+                if worst >= options.min_scaled_jacobian {
+                    return Ok(section);
+                }
+                if best.as_ref().is_none_or(|(w, _)| worst > *w) {
+                    best = Some((worst, section));
+                }
+            }
+            // The first failure is at the size that was asked for.
+            Err(error) => failure = failure.or(Some(error)),
+        }
+    }
+    match (best, failure) {
+        (Some((_, section)), _) => Ok(section),
+        (None, Some(error)) => Err(error),
+        (None, None) => Err(MeshError::RefinementIncomplete { limit: 0 }),
+    }
+}
+
+fn triangulate(domain: &Domain, options: &MeshOptions, fineness: f64) -> Result<Section, MeshError> {
+    let (points, edges) = divide_boundary(domain, options, fineness)?;
+    let limit = options.max_elements / options.levels.div_ceil(2);
+    let area = 0.5 * options.section_size_mm.powi(2);
+    if domain.area() / area > limit as f64 {
+        let elements = (domain.area() / area) as usize;
+        return Err(MeshError::TooManyElements { elements, limit });
+    }
+    let mut triangulation = ConstrainedDelaunayTriangulation::<Point2<f64>>::new();
+    let mut handles = Vec::with_capacity(points.len());
+    for p in &points {
+        let handle = triangulation.insert(Point2::new(p[0], p[1]));
+        handles.push(handle.map_err(|_| MeshError::Triangulation { x_mm: p[0], y_mm: p[1] })?);
+    }
+    // Fixed order: a hash map's would differ between runs.
+    let mut ordered: Vec<(usize, usize)> = edges.keys().copied().collect();
+    ordered.sort_unstable();
+    for &(u, v) in &ordered {
+        if handles[u] == handles[v] || !triangulation.can_add_constraint(handles[u], handles[v]) {
+            return Err(MeshError::Triangulation { x_mm: points[u][0], y_mm: points[u][1] });
+        }
+        triangulation.add_constraint(handles[u], handles[v]);
+    }
+    let vertices = 20 * points.len() + 4 * limit.min((domain.area() / area) as usize + 100);
+    let parameters = RefinementParameters::<f64>::new()
+        .exclude_outer_faces(true)
+        .keep_constraint_edges()
+        .with_angle_limit(AngleLimit::from_deg(ANGLE_LIMIT_DEG))
+        .with_max_allowed_area(area)
+        .with_max_additional_vertices(vertices);
+    let result = triangulation.refine(parameters);
+    if !result.refinement_complete {
+        return Err(MeshError::RefinementIncomplete { limit: vertices });
+    }
+    let excluded: HashSet<_> = result.excluded_faces.iter().copied().collect();
+    let boundary: BoundaryEdges =
+        edges.into_iter().map(|((u, v), curve)| (sorted(handles[u].index(), handles[v].index()), curve)).collect();
+
+    let mut section = Section { nodes_per_cell: 7, points: Vec::new(), cells: Vec::new() };
+    let mut corner_of: HashMap<usize, u32> = HashMap::new();
+    let mut middle_of: HashMap<(usize, usize), u32> = HashMap::new();
+    for face in triangulation.inner_faces() {
+        if excluded.contains(&face.fix()) {
+            continue;
+        }
+        let corners = face.vertices().map(|v| (v.fix().index(), [v.position().x, v.position().y]));
+        let mut cell = [0u32; 7];
+        for (k, &(vertex, p)) in corners.iter().enumerate() {
+            cell[k] = *corner_of.entry(vertex).or_insert_with(|| push(&mut section.points, p));
+        }
+        for k in 0..3 {
+            let ((u, p), (v, q)) = (corners[k], corners[(k + 1) % 3]);
+            cell[3 + k] = *middle_of.entry(sorted(u, v)).or_insert_with(|| {
+                let straight = [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])];
+                let middle = boundary.get(&sorted(u, v)).map_or(straight, |&(curve, t)| curve.at(domain, t));
+                push(&mut section.points, middle)
+            });
+        }
+        // Where the quadratic map of the six outer nodes takes the centroid.
+        let center = [0, 1].map(|c| {
+            (4.0 * (3..6).map(|k| section.points[cell[k] as usize][c]).sum::<f64>()
+                - (0..3).map(|k| section.points[cell[k] as usize][c]).sum::<f64>())
+                / 9.0
+        });
+        cell[6] = push(&mut section.points, center);
+        section.cells.extend(cell);
+    }
+    if section.num_cells() > limit {
+        return Err(MeshError::TooManyElements { elements: section.num_cells(), limit });
+    }
+    Ok(section)
+}
+
+fn sorted(u: usize, v: usize) -> (usize, usize) {
+    (u.min(v), u.max(v))
+}
+
+fn push(points: &mut Vec<[f64; 2]>, p: [f64; 2]) -> u32 {
+    points.push(p);
+    points.len() as u32 - 1
+}
+
+/// Closed loops of curves: the outline first, then the whole holes.
+fn boundary_loops(domain: &Domain) -> Vec<Vec<Curve>> {
+    let ([a, b], bottom) = (domain.half, domain.bottom);
+    let mut outline = Vec::new();
+    let mut halves: Vec<usize> = (0..domain.discs.len()).filter(|&i| domain.discs[i].is_half).collect();
+    halves.sort_by(|&i, &j| domain.discs[i].center[0].total_cmp(&domain.discs[j].center[0]));
+    let knots = if domain.is_dumbbell {
+        let [x0, x1, x2] = domain.arc_ends();
+        vec![-a, -x2, -x1, -x0, x0, x1, x2, a]
+    } else {
+        vec![-a, a]
+    };
+    if bottom < 0.0 {
+        outline.extend(knots.windows(2).map(|w| side(domain, false, w[0], w[1])));
+    } else {
+        let mut from = -a;
+        for disc in halves {
+            let (center, radius) = (domain.discs[disc].center[0], domain.discs[disc].radius);
+            outline.push(Curve::Line([from, 0.0], [center - radius, 0.0]));
+            outline.push(Curve::Arc { disc, from: PI, to: 0.0 });
+            from = center + radius;
+        }
+        outline.push(Curve::Line([from, 0.0], [a, 0.0]));
+    }
+    outline.push(Curve::Line([a, bottom], [a, b]));
+    outline.extend(knots.windows(2).rev().map(|w| side(domain, true, w[1], w[0])));
+    outline.push(Curve::Line([-a, b], [-a, bottom]));
+    let mut loops = vec![outline];
+    for (disc, d) in domain.discs.iter().enumerate() {
+        if !d.is_half {
+            // Two halves: no part may span the whole circle.
+            loops.push(vec![Curve::Arc { disc, from: 2.0 * PI, to: PI }, Curve::Arc { disc, from: PI, to: 0.0 }]);
+        }
+    }
+    loops
+}
+
+fn side(domain: &Domain, upper: bool, from: f64, to: f64) -> Curve {
+    if domain.is_dumbbell {
+        Curve::Profile { upper, from, to }
+    } else {
+        let b = if upper { domain.half[1] } else { -domain.half[1] };
+        Curve::Line([from, b], [to, b])
+    }
+}
+
+/// Boundary points and the parts between them; each part remembers its curve and the parameter of its middle.
+fn divide_boundary(
+    domain: &Domain,
+    options: &MeshOptions,
+    fineness: f64,
+) -> Result<(Vec<[f64; 2]>, BoundaryEdges), MeshError> {
+    let (mut points, mut edges) = (Vec::new(), BoundaryEdges::new());
+    for curves in boundary_loops(domain) {
+        let first = points.len();
+        for &curve in &curves {
+            for pair in parameters(domain, options, fineness, curve)?.windows(2) {
+                edges.insert((points.len(), points.len() + 1), (curve, 0.5 * (pair[0] + pair[1])));
+                points.push(curve.at(domain, pair[0]));
+            }
+        }
+        // The last part returns to the loop's first point.
+        let last = points.len() - 1;
+        if let Some(closing) = edges.remove(&(last, last + 1)) {
+            edges.insert((first, last), closing);
+        }
+    }
+    Ok((points, edges))
+}
+
+/// Parameters that divide a curve into parts of the local size, by equal shares of ∫ ds / size.
+fn parameters(domain: &Domain, options: &MeshOptions, fineness: f64, curve: Curve) -> Result<Vec<f64>, MeshError> {
+    const SAMPLES: usize = 256;
+    let point = |i: usize| curve.at(domain, i as f64 / SAMPLES as f64);
+    let mut shares = vec![0.0];
+    let mut sum = 0.0;
+    for i in 0..SAMPLES {
+        let (p, q) = (point(i), point(i + 1));
+        let step = sub(q, p);
+        let middle = [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])];
+        sum += step[0].hypot(step[1]) / local_size(domain, options, fineness, curve, middle);
+        shares.push(sum);
+    }
+    if sum > options.max_elements as f64 {
+        return Err(MeshError::TooManyElements { elements: sum as usize, limit: options.max_elements });
+    }
+    let n = (sum.round() as usize).max(if matches!(curve, Curve::Arc { .. }) { 2 } else { 1 });
+    let mut parameters = vec![0.0];
+    let mut i = 0;
+    for k in 1..n {
+        let target = sum * k as f64 / n as f64;
+        while i + 1 < SAMPLES && shares[i + 1] < target {
+            i += 1;
+        }
+        let within = (target - shares[i]) / (shares[i + 1] - shares[i]);
+        parameters.push((i as f64 + within) / SAMPLES as f64);
+    }
+    parameters.push(1.0);
+    Ok(parameters)
+}
+
+/// Length wanted for a part of `curve` at `p`: the element size (finer on graded sides), the holes' own resolution, and
+/// no more than the gap to the next wall.
+fn local_size(domain: &Domain, options: &MeshOptions, fineness: f64, curve: Curve, p: [f64; 2]) -> f64 {
+    let arc = |radius: f64| fineness * 2.0 * PI * radius / (options.hole_segments as f64).max(MIN_SEGMENTS);
+    let mut size = options.section_size_mm;
+    let mut own = None;
+    let mut gap = f64::INFINITY;
+    match curve {
+        Curve::Arc { disc, .. } => {
+            own = Some(disc);
+            let d = &domain.discs[disc];
+            size = size.min(arc(d.radius));
+            gap = domain.outline_distance(p);
+            if domain.bottom == 0.0 && !d.is_half {
+                gap = gap.min(p[1]);
+            }
+        }
+        Curve::Profile { .. } => size = size.min(domain.half_width(p[0])),
+        Curve::Line(..) => {}
+    }
+    for (i, d) in domain.discs.iter().enumerate() {
+        if own != Some(i) {
+            let distance = (p[0] - d.center[0]).hypot(p[1] - d.center[1]) - d.radius;
+            // On the mirror line the wall of a half hole starts: no gap there.
+            let touches = d.is_half && domain.bottom == 0.0 && p[1].abs() < 1e-12;
+            if touches {
+                size = size.min(arc(d.radius) + 0.5 * distance.max(0.0));
+            } else {
+                gap = gap.min(distance);
+            }
+        }
+    }
+    size.min((fineness * GAP_FRACTION * gap).max(1e-4 * domain.scale()))
+}

@@ -1,0 +1,135 @@
+//! Smooth counterparts of the voxel sums, over the quadrature points of the mesh.
+//!
+//! A sum over voxels jumps when a wall crosses a voxel's middle; a search needs values that vary smoothly with the design.
+//! With ∫ dV / V_voxel in place of Σ_voxels the sums become integrals over the specimen: the limit of small voxels at a fixed
+//! number of voxels per volume. Mirrored parts count as often as they are reflected.
+
+use super::information::{FisherInformation, InformationError, MeasurementNoise};
+use super::integrated::{IntegratedSensitivity, parameter_sensitivity, shear_parameters};
+use crate::fem::{ParameterSensitivity, QuadraturePoint};
+use crate::kinematics::{decompose, principal_stretches};
+use crate::material::Ogden;
+use crate::mesh::{Mesh, Mirror};
+
+/// How many reflected copies make the whole specimen.
+pub(super) fn num_copies(mirror: Mirror) -> f64 {
+    [mirror.y, mirror.z].map(|is_used| if is_used { 2.0 } else { 1.0 }).iter().product()
+}
+
+/// 𝒮 of every μᵢ and αᵢ over the whole specimen: `volume_integral` = ∫ S dV, `sum` = ∫ S dV / V_voxel,
+/// `mean_per_voxel` = ∫ S dV / V.
+pub fn integrate_over_quadrature(
+    material: &Ogden,
+    points: &[QuadraturePoint],
+    mirror: Mirror,
+    voxel_volume_mm3: f64,
+) -> Vec<IntegratedSensitivity> {
+    let states: Vec<_> = points.iter().map(|p| (decompose(&p.deformation_gradient), p.volume_mm3)).collect();
+    let copies = num_copies(mirror);
+    let volume = copies * points.iter().map(|p| p.volume_mm3).sum::<f64>();
+    shear_parameters(material)
+        .map(|parameter| {
+            let half: f64 = states
+                .iter()
+                .map(|(s, dv)| {
+                    dv * parameter_sensitivity(material, parameter, s.stretch_amplitude, s.deformation_mode).value
+                })
+                .sum();
+            let integral = copies * half;
+            IntegratedSensitivity {
+                parameter: parameter.name(),
+                sum: integral / voxel_volume_mm3,
+                mean_per_voxel: integral / volume,
+                volume_integral: integral,
+            }
+        })
+        .collect()
+}
+
+/// Fisher information of one drive with ∫ dV / V_voxel in place of the sum over voxels.
+///
+/// `points` come from [`crate::fem::ForwardModel::quadrature_fields`] (element after element, in the order of
+/// [`crate::mesh::ElementKind::quadrature`]); `sensitivities` stand in the order of [`Ogden::parameters`]. Products of two sensitivities are
+/// even under the mirrors, so each reflected copy adds the same.
+///
+/// # Errors
+/// [`InformationError::InvalidSd`], [`InformationError::LengthMismatch`], [`InformationError::NotFinite`].
+pub fn information_over_quadrature(
+    material: &Ogden,
+    mesh: &Mesh,
+    points: &[QuadraturePoint],
+    sensitivities: &[ParameterSensitivity],
+    noise: &MeasurementNoise,
+    voxel_volume_mm3: f64,
+) -> Result<FisherInformation, InformationError> {
+    noise.check()?;
+    let mut information = FisherInformation::none(material);
+    let num = information.parameters().len();
+    let rule = mesh.element_kind.quadrature();
+    let shape: Vec<[f64; 27]> = rule.iter().map(|(r, _)| mesh.element_kind.shape_functions(*r)).collect();
+    check_length("sensitivities", sensitivities.len(), num)?;
+    check_length("quadrature points", points.len(), mesh.num_elements() * rule.len())?;
+    for s in sensitivities {
+        check_length("a parameter's nodal sensitivities", s.displacement.len(), mesh.nodes.len())?;
+    }
+    let root = noise.displacement_sd_mm.map(|sd| 1.0 / sd);
+    let mut sums = vec![0.0; num * num];
+    let mut local = vec![[0.0; 3]; num];
+    for (n, point) in points.iter().enumerate() {
+        let nodes = mesh.element(point.element);
+        let weights = &shape[n % rule.len()];
+        for (value, s) in local.iter_mut().zip(sensitivities) {
+            *value = [0.0; 3];
+            for (&node, weight) in nodes.iter().zip(weights) {
+                for c in 0..3 {
+                    value[c] += weight * root[c] * s.displacement[node as usize][c];
+                }
+            }
+        }
+        for i in 0..num {
+            for j in 0..=i {
+                let (a, b) = (local[i], local[j]);
+                sums[i * num + j] += point.volume_mm3 * (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
+            }
+        }
+    }
+    let scale = num_copies(mesh.mirror) / voxel_volume_mm3;
+    for i in 0..num {
+        for j in 0..=i {
+            information.set(i, j, scale * sums[i * num + j]);
+        }
+    }
+    let forces: Vec<f64> = sensitivities.iter().map(|s| s.force_n).collect();
+    information.add_force(&forces, noise.force_sd_n);
+    information.check_finite()?;
+    Ok(information)
+}
+
+/// Volume-weighted median of the stretch amplitude λ; none without admissible points.
+pub fn median_stretch_over_quadrature(points: &[QuadraturePoint]) -> Option<f64> {
+    let mut states: Vec<(f64, f64)> = points
+        .iter()
+        .map(|p| (decompose(&p.deformation_gradient).stretch_amplitude, p.volume_mm3))
+        .filter(|(s, _)| s.is_finite())
+        .collect();
+    states.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * states.iter().map(|s| s.1).sum::<f64>();
+    let mut sum = 0.0;
+    states.into_iter().find_map(|(stretch, volume)| {
+        sum += volume;
+        (sum >= half).then_some(stretch)
+    })
+}
+
+/// The largest principal stretch at any quadrature point (with volume change), or NaN without points. Bonded edges are
+/// singular: there it grows as the mesh is refined.
+pub fn largest_principal_stretch(points: &[QuadraturePoint]) -> f64 {
+    points.iter().map(|p| principal_stretches(&p.deformation_gradient)[0]).fold(f64::NAN, f64::max)
+}
+
+fn check_length(what: &'static str, found: usize, expected: usize) -> Result<(), InformationError> {
+    if found == expected { Ok(()) } else { Err(InformationError::LengthMismatch { what, found, expected }) }
+}
+
+#[cfg(test)]
+pub(crate) mod tests;

@@ -1,0 +1,409 @@
+//! Evaluates a specimen: what a scan of it would see and what it would tell about the material.
+
+use super::continuum::largest_principal_stretch;
+use super::covariance::{IDENTIFIABILITY_LIMIT, PromisedSd};
+use super::information::{FisherInformation, InformationError, ScanSettings};
+use super::observation::{DriveMaps, DrivenState, EvaluationStep, Scanner};
+use crate::fem::{Equilibrium, ForwardModel, SolveError, SolveOptions};
+use crate::material::{Ogden, Parameter};
+use crate::mesh::{MeshError, MeshOptions, mesh_specimen};
+use crate::specimen::{Specimen, TestKind};
+use crate::voxel::{Sampling, VoxelError, VoxelMask};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+/// Why a specimen was not evaluated.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum EvaluationError {
+    /// The specimen was not meshed.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// An equilibrium was not found.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+    /// The scan's grid does not suit the specimen.
+    #[error(transparent)]
+    Voxel(#[from] VoxelError),
+    /// The noise or a sensitivity is unusable.
+    #[error(transparent)]
+    Information(#[from] InformationError),
+    /// No drive was given.
+    #[error("no drive to evaluate; give at least one, in mm")]
+    NoDrive,
+    /// Drives must be positive and increase.
+    #[error("drive {drive_mm} mm after {previous_mm} mm; drives must be finite, positive and increasing")]
+    InvalidDrive {
+        /// The drive, mm.
+        drive_mm: f64,
+        /// The one before, mm (0 for the first).
+        previous_mm: f64,
+    },
+    /// The median stretch asked for is not above 1 or not a number.
+    #[error("median stretch {value} asked for; it must lie between 1 and {limit}")]
+    InvalidMedianStretch {
+        /// Value asked for.
+        value: f64,
+        /// Largest value.
+        limit: f64,
+    },
+    /// The search for the drive did not end.
+    #[error(
+        "median stretch {target} not reached in {num_solves} solves: {found} at a drive of {drive_mm} mm; ask for a smaller one"
+    )]
+    MedianStretchNotReached {
+        /// Asked for.
+        target: f64,
+        /// Found last.
+        found: f64,
+        /// At this drive, mm.
+        drive_mm: f64,
+        /// Equilibria solved.
+        num_solves: usize,
+    },
+}
+
+/// Largest median stretch that may be asked for.
+const MAX_MEDIAN_STRETCH: f64 = 5.0;
+/// Accuracy of the median stretch reached.
+const MEDIAN_TOLERANCE: f64 = 1e-5;
+/// Equilibria in the search for a drive. Safeguarded secant steps need about six.
+const MAX_DRIVE_SOLVES: usize = 30;
+
+/// At which drives to evaluate.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DriveSelection {
+    /// These, mm, increasing.
+    DriveMm(Vec<f64>),
+    /// The one at which the median of λ over voxels has this value.
+    MedianStretch(f64),
+}
+
+/// Settings of an evaluation.
+#[derive(Clone, Copy, Debug)]
+pub struct EvaluationOptions {
+    /// The mesh.
+    pub mesh: MeshOptions,
+    /// Sample points per voxel.
+    pub sampling: Sampling,
+    /// The solver.
+    pub solve: SolveOptions,
+    /// Largest relative standard deviation of an identifiable parameter.
+    pub identifiability_limit: f64,
+    /// Standard deviation of ln κ known beforehand, added to the joint information; none by default.
+    pub bulk_log_prior_sd: Option<f64>,
+}
+
+impl EvaluationOptions {
+    /// Standard mesh, default sampling and tolerances, no prior.
+    pub fn standard(specimen: &Specimen) -> Self {
+        EvaluationOptions {
+            mesh: MeshOptions::standard(specimen),
+            sampling: Sampling::default(),
+            solve: SolveOptions::default(),
+            identifiability_limit: IDENTIFIABILITY_LIMIT,
+            bulk_log_prior_sd: None,
+        }
+    }
+}
+
+/// Result of an evaluation (`evaluation/1`).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Evaluation {
+    /// Always `evaluation/1`.
+    pub schema: String,
+    /// Drives, increasing.
+    pub steps: Vec<EvaluationStep>,
+    /// Standard deviations that all drives together promise.
+    pub promised_sd: Vec<PromisedSd>,
+    /// Correlation of the estimates, rows and columns as `promised_sd`; null where undetermined.
+    pub correlation: Vec<Vec<Option<f64>>>,
+    /// Largest over smallest eigenvalue of the relative covariance of all μᵢ, αᵢ; null where undetermined.
+    pub condition_number: Option<f64>,
+    /// Largest principal stretch at any drive.
+    pub largest_principal_stretch: f64,
+    /// Material volume of the mask, mm³.
+    pub voxel_material_volume_mm3: f64,
+    /// The scan.
+    pub scan: ScanSettings,
+    /// What the numbers mean.
+    pub notes: EvaluationNotes,
+    /// Sizes of the computation.
+    pub statistics: EvaluationStatistics,
+    /// Version of the program.
+    pub version: String,
+    /// SHA-256 of specimen, material, scan, drives and settings, hexadecimal.
+    pub input_hash: String,
+}
+
+/// Meaning of the numbers, for readers of the JSON alone.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct EvaluationNotes {
+    /// `integrated_sensitivity`.
+    pub integrated_sensitivity: String,
+    /// `promised_sd`.
+    pub promised_sd: String,
+}
+
+impl Default for EvaluationNotes {
+    fn default() -> Self {
+        EvaluationNotes {
+            integrated_sensitivity: "sum: over voxels of d2Psi/dxi dlambda at the voxel's (lambda, k), 1 for mu and kPa for alpha; \
+                                     mean_per_voxel: sum / num_voxels; volume_integral: sum weighted by the voxel's material \
+                                     volume (mm3), comparable across voxel sizes; kappa's is zero"
+                .into(),
+            promised_sd: "Cramer-Rao bound of a joint fit of all parameters to the voxel displacements and forces; at the top level from \
+                          all drives together, in a step from that drive alone; value in the parameter's unit, null where the \
+                          data do not determine it"
+                .into(),
+        }
+    }
+}
+
+/// Sizes of the computation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct EvaluationStatistics {
+    /// Elements of the mesh.
+    pub num_elements: usize,
+    /// Nodes of the mesh.
+    pub num_nodes: usize,
+    /// Free displacement unknowns.
+    pub num_unknowns: usize,
+    /// Equilibria solved for (more than steps when a drive was searched).
+    pub num_equilibria: usize,
+    /// Sample points of the voxels.
+    pub num_sample_points: usize,
+    /// Sample points dropped between wall and mesh.
+    pub num_dropped_points: usize,
+}
+
+/// What an evaluation holds besides its numbers: for plots and further work.
+#[derive(Clone, Debug)]
+pub struct EvaluationMaps {
+    /// Grid and mask.
+    pub mask: VoxelMask,
+    /// Voxel fields per drive.
+    pub drives: Vec<DriveMaps>,
+    /// Equilibria per drive, on the model's mesh.
+    pub equilibria: Vec<Equilibrium>,
+    /// Information of all drives together, with the prior if any.
+    pub information: FisherInformation,
+    /// Information of each drive.
+    pub information_by_drive: Vec<FisherInformation>,
+}
+
+/// Meshes, solves and evaluates a specimen.
+///
+/// # Errors
+/// See [`EvaluationError`].
+pub fn evaluate(
+    specimen: &Specimen,
+    material: &Ogden,
+    scan: &ScanSettings,
+    drives: &DriveSelection,
+    options: &EvaluationOptions,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<(Evaluation, EvaluationMaps), EvaluationError> {
+    check_drives(drives)?;
+    let mesh = mesh_specimen(specimen, &options.mesh)?;
+    let mut model = ForwardModel::new(mesh, specimen)?;
+    evaluate_model(&mut model, specimen, material, scan, drives, options, is_cancelled)
+}
+
+/// As [`evaluate`] on a prepared model of `specimen`; `options.mesh` only enters the input hash.
+///
+/// # Errors
+/// See [`EvaluationError`].
+pub fn evaluate_model(
+    model: &mut ForwardModel,
+    specimen: &Specimen,
+    material: &Ogden,
+    scan: &ScanSettings,
+    drives: &DriveSelection,
+    options: &EvaluationOptions,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<(Evaluation, EvaluationMaps), EvaluationError> {
+    check_drives(drives)?;
+    let scanner = Scanner::new(specimen, model.mesh(), scan, options.sampling)?;
+    let (equilibria, num_equilibria) = match drives {
+        DriveSelection::DriveMm(drives_mm) => {
+            let path = model.solve_path(material, drives_mm, &options.solve, is_cancelled)?;
+            let count = path.len();
+            (path, count)
+        }
+        DriveSelection::MedianStretch(target) => {
+            let (found, count) =
+                solve_for_median(model, specimen, material, &scanner, *target, &options.solve, is_cancelled)?;
+            (vec![found], count)
+        }
+    };
+    let mut information = FisherInformation::none(material);
+    if let Some(sd) = options.bulk_log_prior_sd {
+        information.add_log_prior(Parameter::Kappa, sd)?;
+    }
+    let (mut steps, mut maps, mut information_by_drive) = (Vec::new(), Vec::new(), Vec::new());
+    for equilibrium in &equilibria {
+        let sensitivities = model.material_sensitivities(material, equilibrium)?;
+        let stretch = largest_principal_stretch(&model.quadrature_fields(material, equilibrium));
+        let state = DrivenState {
+            drive_mm: equilibrium.drive_mm,
+            force_n: equilibrium.force_n,
+            displacement: &equilibrium.displacement,
+            sensitivities: &sensitivities,
+            largest_principal_stretch: stretch,
+        };
+        let seen = scanner.observe(material, &state, options.identifiability_limit)?;
+        information.add(&seen.information)?;
+        information_by_drive.push(seen.information);
+        steps.push(seen.step);
+        maps.push(seen.maps);
+    }
+    let covariance = information.covariance();
+    let evaluation = Evaluation {
+        schema: "evaluation/1".into(),
+        promised_sd: covariance.promised_sd(options.identifiability_limit),
+        correlation: covariance.correlation_matrix(),
+        condition_number: covariance.condition_number(&information.shear_indices()),
+        largest_principal_stretch: steps.iter().map(|s| s.largest_principal_stretch).fold(f64::NAN, f64::max),
+        steps,
+        voxel_material_volume_mm3: scanner.mask.material_volume_mm3(),
+        scan: *scan,
+        notes: EvaluationNotes::default(),
+        statistics: EvaluationStatistics {
+            num_elements: model.mesh().num_elements(),
+            num_nodes: model.mesh().nodes.len(),
+            num_unknowns: model.num_unknowns(),
+            num_equilibria,
+            num_sample_points: scanner.operator.num_points(),
+            num_dropped_points: scanner.operator.num_dropped_points(),
+        },
+        version: env!("CARGO_PKG_VERSION").into(),
+        input_hash: input_hash(specimen, material, scan, drives, options),
+    };
+    Ok((evaluation, EvaluationMaps { mask: scanner.mask, drives: maps, equilibria, information, information_by_drive }))
+}
+
+fn check_drives(drives: &DriveSelection) -> Result<(), EvaluationError> {
+    match drives {
+        DriveSelection::DriveMm(drives_mm) => {
+            if drives_mm.is_empty() {
+                return Err(EvaluationError::NoDrive);
+            }
+            let mut previous_mm = 0.0;
+            for &drive_mm in drives_mm {
+                if !drive_mm.is_finite() || drive_mm <= previous_mm {
+                    return Err(EvaluationError::InvalidDrive { drive_mm, previous_mm });
+                }
+                previous_mm = drive_mm;
+            }
+            Ok(())
+        }
+        &DriveSelection::MedianStretch(value) => {
+            if value > 1.0 + MEDIAN_TOLERANCE && value <= MAX_MEDIAN_STRETCH {
+                Ok(())
+            } else {
+                Err(EvaluationError::InvalidMedianStretch { value, limit: MAX_MEDIAN_STRETCH })
+            }
+        }
+    }
+}
+
+/// The drive at which a homogeneous specimen has stretch amplitude λ: shear γ = λ − 1/λ over the thickness, or λ − 1 over
+/// the length.
+fn homogeneous_drive_mm(specimen: &Specimen, stretch: f64) -> f64 {
+    match specimen.test {
+        TestKind::DoubleLapShear => (stretch - 1.0 / stretch) * specimen.block.thickness_mm,
+        TestKind::Uniaxial => (stretch - 1.0) * specimen.block.length_mm,
+    }
+}
+
+/// Solves for the drive at which the median of λ over voxels is `target`, each equilibrium from the last.
+fn solve_for_median(
+    model: &mut ForwardModel,
+    specimen: &Specimen,
+    material: &Ogden,
+    scanner: &Scanner,
+    target: f64,
+    options: &SolveOptions,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<(Equilibrium, usize), EvaluationError> {
+    let mut last: Option<Equilibrium> = None;
+    let mut count = 0;
+    find_drive(homogeneous_drive_mm(specimen, target), target, |drive_mm| {
+        let found = model.solve(material, drive_mm, last.as_ref(), options, is_cancelled)?;
+        let median = scanner.median_stretch(&found.displacement)?;
+        last = Some(found);
+        count += 1;
+        Ok(median)
+    })?;
+    // `find_drive` succeeds only after at least one solve.
+    last.map(|equilibrium| (equilibrium, count)).ok_or(EvaluationError::NoDrive)
+}
+
+/// Finds the drive at which an increasing function `median_at(drive)` with value 1 at rest has the value `target`:
+/// secant steps inside a bracket, else bisection. The last call is at the drive returned.
+fn find_drive(
+    guess_mm: f64,
+    target: f64,
+    mut median_at: impl FnMut(f64) -> Result<f64, EvaluationError>,
+) -> Result<f64, EvaluationError> {
+    // Ends of the bracket: drive and median less target.
+    let (mut low, mut high): ((f64, f64), Option<(f64, f64)>) = ((0.0, 1.0 - target), None);
+    let mut was_below = None;
+    let (mut drive_mm, mut found) = (guess_mm, 1.0);
+    for _ in 0..MAX_DRIVE_SOLVES {
+        found = median_at(drive_mm)?;
+        let excess = found - target;
+        if excess.abs() <= MEDIAN_TOLERANCE {
+            return Ok(drive_mm);
+        }
+        let is_below = excess < 0.0;
+        // Regula falsi stalls on curved functions; the value at an end that is kept twice is halved (Illinois).
+        let is_repeated = was_below == Some(is_below);
+        was_below = Some(is_below);
+        if is_below {
+            low = (drive_mm, excess);
+            if let Some(end) = high.as_mut().filter(|_| is_repeated) {
+                end.1 *= 0.5;
+            }
+        } else {
+            high = Some((drive_mm, excess));
+            if is_repeated {
+                low.1 *= 0.5;
+            }
+        }
+        drive_mm = match high {
+            // Still below: along the chord from rest, at most doubling.
+            None => drive_mm * ((target - 1.0) / (found - 1.0).max(1e-9)).clamp(1.02, 2.0),
+            Some((end, value)) => low.0 + (end - low.0) * (low.1 / (low.1 - value)).clamp(0.02, 0.98),
+        };
+    }
+    Err(EvaluationError::MedianStretchNotReached { target, found, drive_mm, num_solves: MAX_DRIVE_SOLVES })
+}
+
+/// SHA-256 over the JSON of all inputs. Field order is fixed by the types, so equal inputs have equal hashes.
+fn input_hash(
+    specimen: &Specimen,
+    material: &Ogden,
+    scan: &ScanSettings,
+    drives: &DriveSelection,
+    options: &EvaluationOptions,
+) -> String {
+    let Sampling { gauss_points, cut_slices } = options.sampling;
+    let inputs = serde_json::json!({
+        "specimen": specimen,
+        "material": material,
+        "scan": scan,
+        "drives": drives,
+        "mesh": options.mesh,
+        "sampling": { "gauss_points": gauss_points, "cut_slices": cut_slices },
+        "solver_tolerance": options.solve.tolerance,
+        "identifiability_limit": options.identifiability_limit,
+        "bulk_log_prior_sd": options.bulk_log_prior_sd,
+    });
+    Sha256::digest(inputs.to_string().as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests;

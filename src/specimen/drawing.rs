@@ -1,0 +1,487 @@
+//! The dimensioned drawing as lines, arcs and texts on a sheet; `drawing_svg` and `drawing_dxf` write it.
+//!
+//! Front view (x, z) above, side view (x, y) below, x to the right in both. Holes appear as circles in the view
+//! along their axis and as hidden lines in the other. Positions are ordinates from the block's centre lines; the
+//! table repeats them and adds distances from the end at −x and from the negative side.
+
+use super::drawing_labels::{place_labels, spread};
+use super::{HoleAxis, Outline, Specimen, TestKind, dumbbell};
+
+/// What an entity belongs to; the layer names of the DXF.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Layer {
+    Outline,
+    Holes,
+    Centre,
+    Dimensions,
+    /// Frame, table and title: on the sheet only, not in the DXF.
+    Sheet,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Anchor {
+    Start,
+    Middle,
+    End,
+}
+
+/// A shape, paper mm, origin at the sheet's lower left corner, second coordinate up.
+#[derive(Clone, Debug)]
+pub(super) enum Shape {
+    Line([f64; 2], [f64; 2]),
+    Circle([f64; 2], f64),
+    /// Centre, radius, start and end in degrees, counter-clockwise.
+    Arc([f64; 2], f64, f64, f64),
+    Text(Text),
+}
+
+/// A line of text on its baseline. Vertical text reads upwards.
+#[derive(Clone, Debug)]
+pub(super) struct Text {
+    pub at: [f64; 2],
+    pub height: f64,
+    pub anchor: Anchor,
+    pub is_vertical: bool,
+    pub content: String,
+}
+
+/// Mean width of a character over the height given for the text, sans-serif, on the generous side.
+pub(super) const CHARACTER_WIDTH: f64 = 0.64;
+
+impl Text {
+    /// Bounding box (min, max), paper mm.
+    pub(super) fn bounds(&self) -> [[f64; 2]; 2] {
+        let width = CHARACTER_WIDTH * self.height * self.content.chars().count() as f64;
+        let start = match self.anchor {
+            Anchor::Start => 0.0,
+            Anchor::Middle => -0.5 * width,
+            Anchor::End => -width,
+        };
+        let [x, y] = self.at;
+        if self.is_vertical {
+            [[x - self.height, y + start], [x, y + start + width]]
+        } else {
+            [[x + start, y], [x + start + width, y + self.height]]
+        }
+    }
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Entity {
+    pub layer: Layer,
+    pub is_hidden: bool,
+    pub shape: Shape,
+}
+
+/// A drawing on a sheet.
+#[derive(Clone, Debug)]
+pub(super) struct Drawing {
+    pub entities: Vec<Entity>,
+    /// Sheet, paper mm.
+    pub size: [f64; 2],
+    /// Paper mm per specimen mm.
+    pub scale: f64,
+    /// Centre of the front view, paper mm.
+    pub front_center: [f64; 2],
+}
+
+pub(super) const TEXT_HEIGHT: f64 = 2.5;
+const MARGIN: f64 = 10.0;
+const COLUMN_WIDTHS: [f64; 6] = [9.0, 15.0, 15.0, 15.0, 15.0, 15.0];
+const TABLE_WIDTH: f64 = 84.0;
+const ROW_HEIGHT: f64 = 4.0;
+const TITLE_HEIGHT: f64 = 40.0;
+const LEFT_OF_VIEW: f64 = 17.0;
+const RIGHT_OF_VIEW: f64 = 26.0;
+const ABOVE_FRONT: f64 = 26.0;
+const ABOVE_SIDE: f64 = 9.0;
+const BELOW_SECTION: f64 = 27.0;
+const BELOW_OTHER: f64 = 6.0;
+/// More distinct ordinates than this are left to the table.
+const MAX_ORDINATES: usize = 24;
+/// Usual scales, largest first.
+const SCALES: [f64; 14] = [50.0, 20.0, 10.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01];
+
+/// A length with up to three decimals, without trailing zeros.
+pub(super) fn format_mm(value: f64) -> String {
+    let text = format!("{value:.3}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".into() } else { text.into() }
+}
+
+impl Drawing {
+    /// Lays out the drawing of a specimen.
+    pub(super) fn new(specimen: &Specimen) -> Drawing {
+        let num_holes = specimen.holes.len();
+        let rows_of = |height: f64| ((height - 2.0 * MARGIN - TITLE_HEIGHT - 16.0) / ROW_HEIGHT) as usize;
+        let size = if num_holes <= rows_of(210.0) { [297.0, 210.0] } else { [420.0, 297.0] };
+        let rows = rows_of(size[1]);
+        let num_tables = num_holes.div_ceil(rows).max(1);
+        let panel = num_tables as f64 * TABLE_WIDTH;
+
+        let block = specimen.block;
+        let is_front_section = specimen.extrusion_axis() == HoleAxis::Thickness;
+        let below = |is_section: bool| if is_section { BELOW_SECTION } else { BELOW_OTHER };
+        let (below_front, below_side) = (below(is_front_section), below(!is_front_section));
+        let area = [size[0] - 2.0 * MARGIN - panel - 4.0, size[1] - 2.0 * MARGIN];
+        let free =
+            [area[0] - LEFT_OF_VIEW - RIGHT_OF_VIEW, area[1] - ABOVE_FRONT - below_front - ABOVE_SIDE - below_side];
+        let fits = |s: f64| s * block.length_mm <= free[0] && s * (block.width_mm + block.thickness_mm) <= free[1];
+        // A specimen larger than any usual scale allows is drawn to whatever scale fits.
+        let largest = (free[0] / block.length_mm).min(free[1] / (block.width_mm + block.thickness_mm));
+        let scale = SCALES.into_iter().find(|s| fits(*s)).unwrap_or(largest);
+
+        let spare = free[1] - scale * (block.width_mm + block.thickness_mm);
+        let x = MARGIN + LEFT_OF_VIEW + 0.5 * free[0];
+        let front_top = size[1] - MARGIN - ABOVE_FRONT - 0.25 * spare;
+        let front_center = [x, front_top - 0.5 * scale * block.width_mm];
+        let side_top = front_top - scale * block.width_mm - below_front - 0.35 * spare - ABOVE_SIDE;
+        let side_center = [x, side_top - 0.5 * scale * block.thickness_mm];
+
+        let mut drawing = Drawing { entities: Vec::new(), size, scale, front_center };
+        drawing.outline(specimen, front_center, side_center);
+        let (section, other) = if is_front_section { (front_center, side_center) } else { (side_center, front_center) };
+        drawing.section_view(specimen, section);
+        drawing.hidden_holes(specimen, other);
+        drawing.overall_dimensions(specimen, front_center, side_center);
+        drawing.table(specimen, rows, [size[0] - MARGIN - panel, size[1] - MARGIN]);
+        drawing.title(specimen);
+        drawing
+    }
+
+    pub(super) fn push(&mut self, layer: Layer, shape: Shape) {
+        self.entities.push(Entity { layer, is_hidden: false, shape });
+    }
+
+    fn line(&mut self, layer: Layer, from: [f64; 2], to: [f64; 2]) {
+        self.push(layer, Shape::Line(from, to));
+    }
+
+    fn text(&mut self, layer: Layer, at: [f64; 2], height: f64, anchor: Anchor, is_vertical: bool, content: String) {
+        self.push(layer, Shape::Text(Text { at, height, anchor, is_vertical, content }));
+    }
+
+    fn rectangle(&mut self, layer: Layer, [x0, y0]: [f64; 2], [x1, y1]: [f64; 2]) {
+        let corners = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
+        for (i, corner) in corners.into_iter().enumerate() {
+            self.line(layer, corner, corners[(i + 1) % 4]);
+        }
+    }
+
+    fn outline(&mut self, specimen: &Specimen, front: [f64; 2], side: [f64; 2]) {
+        let s = self.scale;
+        let [hx, hy, hz] =
+            [specimen.block.length_mm, specimen.block.thickness_mm, specimen.block.width_mm].map(|c| 0.5 * s * c);
+        self.rectangle(Layer::Outline, [side[0] - hx, side[1] - hy], [side[0] + hx, side[1] + hy]);
+        if specimen.outline == Outline::Block {
+            self.rectangle(Layer::Outline, [front[0] - hx, front[1] - hz], [front[0] + hx, front[1] + hz]);
+            return;
+        }
+        let arcs = dumbbell::arcs();
+        let [narrow, settled] = [arcs[0].start_mm, arcs[1].end_mm];
+        let at = |x: f64, z: f64| [front[0] + s * x, front[1] + s * z];
+        for side in [-1.0, 1.0] {
+            self.line(Layer::Outline, at(-narrow[0], side * narrow[1]), at(narrow[0], side * narrow[1]));
+            self.line(Layer::Outline, [front[0] + side * hx, front[1] - hz], [front[0] + side * hx, front[1] + hz]);
+            for end in [-1.0, 1.0] {
+                let end_corner = [front[0] + end * hx, front[1] + side * hz];
+                self.line(Layer::Outline, at(end * settled[0], side * settled[1]), end_corner);
+                for arc in arcs {
+                    let angle_of = |p: [f64; 2]| {
+                        let [dx, dz] = [end * (p[0] - arc.center_mm[0]), side * (p[1] - arc.center_mm[1])];
+                        dz.atan2(dx).to_degrees().rem_euclid(360.0)
+                    };
+                    let (a, b) = (angle_of(arc.start_mm), angle_of(arc.end_mm));
+                    // Each mirror reverses the sense: take the way round that is the shorter one.
+                    let (from, to) = if (b - a).rem_euclid(360.0) < 180.0 { (a, b) } else { (b, a) };
+                    let center = at(end * arc.center_mm[0], side * arc.center_mm[1]);
+                    self.push(Layer::Outline, Shape::Arc(center, s * dumbbell::TRANSITION_RADIUS_MM, from, to));
+                }
+            }
+        }
+        // The narrow portion's length, between the view and the overall dimension.
+        let above = front[1] + hz + 5.0;
+        let ends = [at(-narrow[0], narrow[1]), at(narrow[0], narrow[1])];
+        self.dimension_x([ends[0], ends[1]], above, format_mm(dumbbell::NARROW_LENGTH_MM));
+    }
+
+    /// Circles, centre marks, labels and ordinates of the holes.
+    fn section_view(&mut self, specimen: &Specimen, center: [f64; 2]) {
+        let s = self.scale;
+        let [length, lateral] = specimen.section_size();
+        let (hx, hb) = (0.5 * s * length, 0.5 * s * lateral);
+        self.line(Layer::Centre, [center[0] - hx - 3.0, center[1]], [center[0] + hx + 3.0, center[1]]);
+        self.line(Layer::Centre, [center[0], center[1] - hb - 3.0], [center[0], center[1] + hb + 3.0]);
+        if specimen.holes.is_empty() {
+            return;
+        }
+        let circles: Vec<([f64; 2], f64)> = specimen
+            .holes
+            .iter()
+            .map(|hole| {
+                let [x, b] = hole.center_mm;
+                ([center[0] + s * x, center[1] + s * b], 0.5 * s * hole.diameter_mm)
+            })
+            .collect();
+        for ([x, y], radius) in circles.iter().copied() {
+            self.push(Layer::Holes, Shape::Circle([x, y], radius));
+            let mark = radius + radius.min(1.2);
+            self.line(Layer::Centre, [x - mark, y], [x + mark, y]);
+            self.line(Layer::Centre, [x, y - mark], [x, y + mark]);
+        }
+        let details: Vec<String> =
+            specimen.holes.iter().map(|hole| format!("⌀{}", format_mm(hole.diameter_mm))).collect();
+        let bounds = [[center[0] - hx, center[1] - hb], [center[0] + hx, center[1] + hb]];
+        for label in place_labels(&circles, &details, bounds, center) {
+            if let Some((from, to)) = label.leader {
+                self.line(Layer::Dimensions, from, to);
+            }
+            self.push(Layer::Dimensions, Shape::Text(label.text));
+        }
+        self.ordinates(specimen, center, [hx, hb]);
+    }
+
+    /// Ordinates from the centre lines: x below the view, the lateral coordinate at its right.
+    fn ordinates(&mut self, specimen: &Specimen, center: [f64; 2], half: [f64; 2]) {
+        let spacing = TEXT_HEIGHT + 1.0;
+        for k in 0..2 {
+            let mut values: Vec<f64> = specimen.holes.iter().map(|hole| hole.center_mm[k]).chain([0.0]).collect();
+            values.sort_by(f64::total_cmp);
+            values.dedup_by(|a, b| (*a - *b).abs() < 5e-4);
+            // Beyond the view's own extent only as far as its margins are free on both sides.
+            let room = 2.0 * half[k] + if k == 0 { 30.0 } else { 12.0 };
+            if values.len() > MAX_ORDINATES || values.len() as f64 * spacing > room {
+                continue;
+            }
+            let wanted: Vec<f64> = values.iter().map(|value| center[k] + self.scale * value).collect();
+            let placed = spread(&wanted, spacing);
+            let sign = if k == 0 { -1.0 } else { 1.0 };
+            let across = 1 - k;
+            let start = center[across] + sign * half[across];
+            for ((value, from), to) in values.iter().zip(wanted).zip(placed) {
+                let point = |along: f64, offset: f64| {
+                    let away = start + sign * offset;
+                    if k == 0 { [along, away] } else { [away, along] }
+                };
+                self.line(Layer::Dimensions, point(from, 3.5), point(from, 5.0));
+                self.line(Layer::Dimensions, point(from, 5.0), point(to, 9.0));
+                self.line(Layer::Dimensions, point(to, 9.0), point(to, 11.0));
+                let anchor = if k == 0 { Anchor::End } else { Anchor::Start };
+                let baseline = to + if k == 0 { 0.4 } else { -0.4 } * TEXT_HEIGHT;
+                let at = point(baseline, 11.8);
+                self.text(Layer::Dimensions, at, TEXT_HEIGHT, anchor, k == 0, format_mm(*value));
+            }
+        }
+    }
+
+    /// The holes as hidden lines in the view across their axis.
+    fn hidden_holes(&mut self, specimen: &Specimen, center: [f64; 2]) {
+        let half = 0.5 * self.scale * specimen.extrusion_mm();
+        for hole in &specimen.holes {
+            let x = center[0] + self.scale * hole.center_mm[0];
+            let radius = 0.5 * self.scale * hole.diameter_mm;
+            for wall in [x - radius, x + radius] {
+                let shape = Shape::Line([wall, center[1] - half], [wall, center[1] + half]);
+                self.entities.push(Entity { layer: Layer::Holes, is_hidden: true, shape });
+            }
+            self.line(Layer::Centre, [x, center[1] - half - 1.5], [x, center[1] + half + 1.5]);
+        }
+    }
+
+    fn overall_dimensions(&mut self, specimen: &Specimen, front: [f64; 2], side: [f64; 2]) {
+        let [hx, hy, hz] = [specimen.block.length_mm, specimen.block.thickness_mm, specimen.block.width_mm]
+            .map(|c| 0.5 * self.scale * c);
+        let top = front[1] + hz;
+        let ends = [[front[0] - hx, top], [front[0] + hx, top]];
+        self.dimension_x(ends, top + 12.0, format_mm(specimen.block.length_mm));
+        self.dimension_y(front, [hx, hz], format_mm(specimen.block.width_mm));
+        self.dimension_y(side, [hx, hy], format_mm(specimen.block.thickness_mm));
+        let title_x = front[0] - hx;
+        let outline = match specimen.outline {
+            Outline::Block => String::new(),
+            Outline::Iso37Type4 => format!(
+                ", ISO 37 type 4: narrow portion {} wide, radii R{}",
+                format_mm(dumbbell::NARROW_WIDTH_MM),
+                format_mm(dumbbell::TRANSITION_RADIUS_MM)
+            ),
+        };
+        let front_title = format!("Front view (x, z){outline}");
+        self.text(Layer::Dimensions, [title_x, top + 20.0], TEXT_HEIGHT, Anchor::Start, false, front_title);
+        let side_title = "Side view (x, y)".to_string();
+        let at = [title_x, side[1] + hy + 4.5];
+        self.text(Layer::Dimensions, at, TEXT_HEIGHT, Anchor::Start, false, side_title);
+    }
+
+    /// A horizontal dimension between two points, its line at height `y`.
+    fn dimension_x(&mut self, ends: [[f64; 2]; 2], y: f64, content: String) {
+        for [x, from] in ends {
+            self.line(Layer::Dimensions, [x, from + 1.0], [x, y + 1.5]);
+            self.line(Layer::Dimensions, [x - 1.0, y - 1.0], [x + 1.0, y + 1.0]);
+        }
+        self.line(Layer::Dimensions, [ends[0][0], y], [ends[1][0], y]);
+        let middle = 0.5 * (ends[0][0] + ends[1][0]);
+        self.text(Layer::Dimensions, [middle, y + 1.0], TEXT_HEIGHT, Anchor::Middle, false, content);
+    }
+
+    /// The vertical overall dimension at the left of a view with half extents `half`.
+    fn dimension_y(&mut self, center: [f64; 2], half: [f64; 2], content: String) {
+        let edge = center[0] - half[0];
+        let x = edge - 9.0;
+        for y in [center[1] - half[1], center[1] + half[1]] {
+            self.line(Layer::Dimensions, [edge - 1.0, y], [x - 1.5, y]);
+            self.line(Layer::Dimensions, [x - 1.0, y - 1.0], [x + 1.0, y + 1.0]);
+        }
+        self.line(Layer::Dimensions, [x, center[1] - half[1]], [x, center[1] + half[1]]);
+        self.text(Layer::Dimensions, [x - 1.5, center[1]], TEXT_HEIGHT, Anchor::Middle, true, content);
+    }
+
+    /// The table of holes; `rows` per table, tables side by side from `top_left`.
+    fn table(&mut self, specimen: &Specimen, rows: usize, top_left: [f64; 2]) {
+        if specimen.holes.is_empty() {
+            return;
+        }
+        let b = if specimen.extrusion_axis() == HoleAxis::Thickness { "z" } else { "y" };
+        let header = ["hole", "x", b, "from -x", &format!("from -{b}"), "⌀"].map(String::from);
+        let [length, lateral] = specimen.section_size();
+        for (table, holes) in specimen.holes.chunks(rows).enumerate() {
+            let left = top_left[0] + table as f64 * TABLE_WIDTH;
+            let mut y = top_left[1] - 6.0;
+            self.table_row(left, y, &header);
+            self.line(Layer::Sheet, [left, y - 1.2], [left + TABLE_WIDTH - 2.0, y - 1.2]);
+            for (i, hole) in holes.iter().enumerate() {
+                y -= ROW_HEIGHT + if i == 0 { 1.0 } else { 0.0 };
+                let [x, b] = hole.center_mm;
+                let mut row = vec![(table * rows + i + 1).to_string()];
+                row.extend([x, b, 0.5 * length + x, 0.5 * lateral + b, hole.diameter_mm].map(format_mm));
+                self.table_row(left, y, &row);
+            }
+        }
+    }
+
+    fn table_row(&mut self, left: f64, y: f64, cells: &[String]) {
+        let mut right = left;
+        for (cell, width) in cells.iter().zip(COLUMN_WIDTHS) {
+            right += width;
+            self.text(Layer::Sheet, [right - 2.0, y], TEXT_HEIGHT, Anchor::End, false, cell.clone());
+        }
+    }
+
+    fn title(&mut self, specimen: &Specimen) {
+        let [width, _] = self.size;
+        let left = width - MARGIN - TABLE_WIDTH;
+        self.rectangle(Layer::Sheet, [5.0, 5.0], [width - 5.0, self.size[1] - 5.0]);
+        self.line(Layer::Sheet, [left - 2.0, 5.0], [left - 2.0, 5.0 + TITLE_HEIGHT]);
+        self.line(Layer::Sheet, [left - 2.0, 5.0 + TITLE_HEIGHT], [width - 5.0, 5.0 + TITLE_HEIGHT]);
+        let mut y = 5.0 + TITLE_HEIGHT - 6.5;
+        // Names have wide letters: a little more room than for numbers.
+        let per_line = (TABLE_WIDTH / (3.6 * CHARACTER_WIDTH)) as usize;
+        for line in wrap(&specimen.name, per_line, 2) {
+            self.text(Layer::Sheet, [left + 1.0, y], 3.5, Anchor::Start, false, line);
+            y -= 5.0;
+        }
+        let block = specimen.block;
+        let [length, thickness, breadth] = [block.length_mm, block.thickness_mm, block.width_mm].map(format_mm);
+        let faces = match specimen.test {
+            TestKind::DoubleLapShear => {
+                format!("Double-lap shear, faces y = ±{} bonded", format_mm(0.5 * block.thickness_mm))
+            }
+            TestKind::Uniaxial => format!("Uniaxial, faces x = ±{} bonded", format_mm(0.5 * block.length_mm)),
+        };
+        let ratio = if self.scale >= 1.0 {
+            format!("{}:1", format_mm(self.scale))
+        } else {
+            format!("1:{}", format_mm(1.0 / self.scale))
+        };
+        let sheet = if self.size[0] > 300.0 { "A3" } else { "A4" };
+        for line in [
+            format!("Block {length} × {thickness} × {breadth} (x, y, z)"),
+            faces,
+            format!("Samples of this kind in one test: {}", specimen.samples_in_parallel),
+            format!("Dimensions in mm. Scale {ratio} on {sheet}."),
+        ] {
+            self.text(Layer::Sheet, [left + 1.0, y], TEXT_HEIGHT, Anchor::Start, false, line);
+            y -= 4.6;
+        }
+    }
+}
+
+/// Breaks a text into at most `max_lines` lines of `per_line` characters; what is left over becomes an ellipsis.
+fn wrap(text: &str, per_line: usize, max_lines: usize) -> Vec<String> {
+    let characters: Vec<char> = text.chars().collect();
+    let mut lines = Vec::new();
+    let mut rest = &characters[..];
+    while !rest.is_empty() && lines.len() < max_lines {
+        if rest.len() <= per_line {
+            lines.push(rest.iter().collect());
+            break;
+        }
+        if lines.len() + 1 == max_lines {
+            lines.push(rest[..per_line - 1].iter().chain(['…'].iter()).collect());
+            break;
+        }
+        let space = rest[..=per_line].iter().rposition(|c| *c == ' ').filter(|at| *at > 0);
+        let cut = space.unwrap_or(per_line);
+        lines.push(rest[..cut].iter().collect());
+        rest = &rest[if space.is_some() { cut + 1 } else { cut }..];
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::specimen::sampling::{dumbbell_with_hole, valid_specimen};
+    use proptest::prelude::*;
+
+    fn check_texts(drawing: &Drawing) -> Result<(), String> {
+        let texts: Vec<&Text> = drawing
+            .entities
+            .iter()
+            .filter_map(|entity| if let Shape::Text(text) = &entity.shape { Some(text) } else { None })
+            .collect();
+        for (i, a) in texts.iter().enumerate() {
+            let [a0, a1] = a.bounds();
+            if a0[0] < 4.0 || a0[1] < 4.0 || a1[0] > drawing.size[0] - 4.0 || a1[1] > drawing.size[1] - 4.0 {
+                return Err(format!("{:?} leaves the sheet", a.content));
+            }
+            for b in &texts[i + 1..] {
+                let [b0, b1] = b.bounds();
+                let is_apart = a1[0] <= b0[0] || b1[0] <= a0[0] || a1[1] <= b0[1] || b1[1] <= a0[1];
+                if !is_apart {
+                    return Err(format!("{:?} and {:?} overlap", a.content, b.content));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn numbers_are_short() {
+        assert_eq!(format_mm(4.2333), "4.233");
+        assert_eq!(format_mm(-0.0001), "0");
+        assert_eq!(format_mm(100.0), "100");
+        assert_eq!(format_mm(-25.4), "-25.4");
+    }
+
+    #[test]
+    fn long_names_are_wrapped_and_cut() {
+        assert_eq!(wrap("one two three", 7, 2), ["one two", "three"].map(String::from).to_vec());
+        assert_eq!(wrap(&"x".repeat(30), 10, 2), ["x".repeat(10), format!("{}…", "x".repeat(9))]);
+        assert!(wrap("", 10, 2).is_empty());
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 128, failure_persistence: None, ..ProptestConfig::default() })]
+
+        #[test]
+        fn texts_do_not_overlap(specimen in valid_specimen()) {
+            prop_assert_eq!(check_texts(&Drawing::new(&specimen)), Ok(()));
+        }
+
+        #[test]
+        fn texts_do_not_overlap_in_dumbbells(specimen in dumbbell_with_hole()) {
+            prop_assume!(specimen.validate().is_ok());
+            prop_assert_eq!(check_texts(&Drawing::new(&specimen)), Ok(()));
+        }
+    }
+}

@@ -1,0 +1,226 @@
+//! Closed forms of a specimen's geometry: section, outline, containment, ligaments, mirrors, volume.
+
+use super::{HoleAxis, Outline, Specimen, TestKind, dumbbell};
+use std::f64::consts::PI;
+
+/// How far a hole may lie from its partner's mirror image, in place and in diameter, for the specimen to count
+/// as symmetric, mm. Far below any mould's accuracy, far above rounding.
+pub const MIRROR_TOLERANCE_MM: f64 = 1e-6;
+
+/// A side of the section's outline. The lateral direction is z for holes along the thickness (and without
+/// holes), y for holes along the width.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum SectionEdge {
+    /// The end x = −length/2.
+    MinusX,
+    /// The end x = +length/2.
+    PlusX,
+    /// The side at the negative lateral coordinate; with a dumb-bell outline, arcs included.
+    MinusLateral,
+    /// The side at the positive lateral coordinate; with a dumb-bell outline, arcs included.
+    PlusLateral,
+}
+
+impl SectionEdge {
+    /// All four.
+    pub const ALL: [SectionEdge; 4] =
+        [SectionEdge::MinusX, SectionEdge::PlusX, SectionEdge::MinusLateral, SectionEdge::PlusLateral];
+}
+
+/// What a ligament lies between. Indices into `Specimen::holes`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum LigamentKind {
+    /// Between two holes, the smaller index first.
+    HoleHole(usize, usize),
+    /// Between a hole and a side of the section.
+    HoleEdge(usize, SectionEdge),
+}
+
+impl std::fmt::Display for LigamentKind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            LigamentKind::HoleHole(i, j) => write!(f, "holes[{i}] and holes[{j}]"),
+            LigamentKind::HoleEdge(i, edge) => {
+                let side = match edge {
+                    SectionEdge::MinusX => "the end at -x",
+                    SectionEdge::PlusX => "the end at +x",
+                    SectionEdge::MinusLateral => "the side at the negative lateral coordinate",
+                    SectionEdge::PlusLateral => "the side at the positive lateral coordinate",
+                };
+                write!(f, "holes[{i}] and {side}")
+            }
+        }
+    }
+}
+
+/// The material between a hole and another hole or a side, at its thinnest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ligament {
+    /// Between what.
+    pub kind: LigamentKind,
+    /// Thickness, mm; negative where the hole reaches into the other hole or beyond the side.
+    pub length_mm: f64,
+    /// Unit vector in the section (x, lateral) along which the thickness is measured, away from the first hole.
+    pub direction: [f64; 2],
+}
+
+impl Specimen {
+    /// Half the extent along z at `x_mm`, mm: width/2 of a block, the standard's profile of a dumb-bell.
+    pub fn half_width_mm(&self, x_mm: f64) -> f64 {
+        match self.outline {
+            Outline::Block => 0.5 * self.block.width_mm,
+            Outline::Iso37Type4 => dumbbell::half_width_mm(x_mm),
+        }
+    }
+
+    /// Whether a reference position (x, y, z), mm, lies in the material, boundary included.
+    pub fn contains(&self, position: [f64; 3]) -> bool {
+        let [x, y, z] = position;
+        let is_in_outline = x.abs() <= 0.5 * self.block.length_mm
+            && y.abs() <= 0.5 * self.block.thickness_mm
+            && z.abs() <= self.half_width_mm(x);
+        is_in_outline
+            && self.holes.iter().all(|hole| {
+                let lateral = match hole.axis {
+                    HoleAxis::Thickness => z,
+                    HoleAxis::Width => y,
+                };
+                (x - hole.center_mm[0]).hypot(lateral - hole.center_mm[1]) >= 0.5 * hole.diameter_mm
+            })
+    }
+
+    /// The holes' common axis; `None` without holes.
+    pub fn hole_axis(&self) -> Option<HoleAxis> {
+        self.holes.first().map(|hole| hole.axis)
+    }
+
+    /// Direction of extrusion: the holes' axis, the thickness without holes.
+    pub fn extrusion_axis(&self) -> HoleAxis {
+        self.hole_axis().unwrap_or(HoleAxis::Thickness)
+    }
+
+    /// Extents of the section along x and along the lateral direction, mm: (length, width) for holes along the
+    /// thickness and without holes, (length, thickness) for holes along the width.
+    pub fn section_size(&self) -> [f64; 2] {
+        match self.extrusion_axis() {
+            HoleAxis::Thickness => [self.block.length_mm, self.block.width_mm],
+            HoleAxis::Width => [self.block.length_mm, self.block.thickness_mm],
+        }
+    }
+
+    /// Extent across the section, mm.
+    pub fn extrusion_mm(&self) -> f64 {
+        match self.extrusion_axis() {
+            HoleAxis::Thickness => self.block.thickness_mm,
+            HoleAxis::Width => self.block.width_mm,
+        }
+    }
+
+    /// Whether loads and geometry are symmetric under y → −y. Only a uniaxial test is.
+    pub fn is_mirror_y(&self) -> bool {
+        self.test == TestKind::Uniaxial && self.mirror_defect_mm([1.0, -1.0, 1.0]) <= MIRROR_TOLERANCE_MM
+    }
+
+    /// Whether loads and geometry are symmetric under z → −z.
+    pub fn is_mirror_z(&self) -> bool {
+        self.mirror_defect_mm([1.0, 1.0, -1.0]) <= MIRROR_TOLERANCE_MM
+    }
+
+    /// Whether the geometry alone is symmetric under x → −x. The loads never are.
+    pub fn is_geometry_mirror_x(&self) -> bool {
+        self.mirror_defect_mm([-1.0, 1.0, 1.0]) <= MIRROR_TOLERANCE_MM
+    }
+
+    /// How far the holes are from being symmetric under (x, y, z) → (s₀x, s₁y, s₂z) with signs s, mm: the
+    /// largest of the least differences (distance of centres plus difference of diameters) between the mirror
+    /// image of a hole and a hole. Zero without holes.
+    pub fn mirror_defect_mm(&self, signs: [f64; 3]) -> f64 {
+        let defect_of = |hole: &super::Hole| {
+            let lateral_sign = if hole.axis == HoleAxis::Thickness { signs[2] } else { signs[1] };
+            let image = [signs[0] * hole.center_mm[0], lateral_sign * hole.center_mm[1]];
+            self.holes
+                .iter()
+                .filter(|other| other.axis == hole.axis)
+                .map(|other| {
+                    (other.center_mm[0] - image[0]).hypot(other.center_mm[1] - image[1])
+                        + (other.diameter_mm - hole.diameter_mm).abs()
+                })
+                .fold(f64::INFINITY, f64::min)
+        };
+        self.holes.iter().map(defect_of).fold(0.0, f64::max)
+    }
+
+    /// Volume of the material, mm³: area of the outline less the holes' circles, times the extrusion.
+    pub fn volume_mm3(&self) -> f64 {
+        let outline_area = match self.outline {
+            Outline::Block => {
+                let [length, lateral] = self.section_size();
+                length * lateral
+            }
+            Outline::Iso37Type4 => dumbbell::area_mm2(),
+        };
+        let hole_area: f64 = self.holes.iter().map(|hole| 0.25 * PI * hole.diameter_mm * hole.diameter_mm).sum();
+        (outline_area - hole_area) * self.extrusion_mm()
+    }
+
+    /// Every ligament: each hole to each of the four sides, and each pair of holes. In the order of the holes.
+    pub fn ligaments(&self) -> Vec<Ligament> {
+        let mut ligaments = Vec::with_capacity(self.holes.len() * (self.holes.len() + 7) / 2);
+        for (i, hole) in self.holes.iter().enumerate() {
+            for edge in SectionEdge::ALL {
+                let (distance, direction) = self.distance_to_edge(hole.center_mm, edge);
+                let length_mm = distance - 0.5 * hole.diameter_mm;
+                ligaments.push(Ligament { kind: LigamentKind::HoleEdge(i, edge), length_mm, direction });
+            }
+            for (j, other) in self.holes.iter().enumerate().skip(i + 1) {
+                let offset = [other.center_mm[0] - hole.center_mm[0], other.center_mm[1] - hole.center_mm[1]];
+                let distance = offset[0].hypot(offset[1]);
+                let direction = if distance > 0.0 { offset.map(|c| c / distance) } else { [1.0, 0.0] };
+                let length_mm = distance - 0.5 * (hole.diameter_mm + other.diameter_mm);
+                ligaments.push(Ligament { kind: LigamentKind::HoleHole(i, j), length_mm, direction });
+            }
+        }
+        ligaments
+    }
+
+    /// Elongation or slip at which the test reaches a nominal deformation, as a fraction of `drive_mm`: shear
+    /// strain drive/thickness, or stretch 1 + drive/length. For a dumb-bell the length is the one over which the
+    /// narrow portion's strain would give the whole elongation ([`dumbbell::effective_length_mm`]).
+    pub fn nominal_deformation(&self, drive_mm: f64) -> f64 {
+        match self.test {
+            TestKind::DoubleLapShear => drive_mm / self.block.thickness_mm,
+            TestKind::Uniaxial => 1.0 + drive_mm / self.nominal_length_mm(),
+        }
+    }
+
+    /// The drive at the limit of what is supported, mm (shear strain 1.5 or nominal stretch 3).
+    pub fn max_supported_drive_mm(&self) -> f64 {
+        match self.test {
+            TestKind::DoubleLapShear => super::MAX_SHEAR_STRAIN * self.block.thickness_mm,
+            TestKind::Uniaxial => (super::MAX_NOMINAL_STRETCH - 1.0) * self.nominal_length_mm(),
+        }
+    }
+
+    fn nominal_length_mm(&self) -> f64 {
+        match self.outline {
+            Outline::Block => self.block.length_mm,
+            Outline::Iso37Type4 => dumbbell::effective_length_mm(),
+        }
+    }
+
+    /// Signed distance (positive inside) from a point of the section to a side, mm, and the unit vector to it.
+    fn distance_to_edge(&self, point: [f64; 2], edge: SectionEdge) -> (f64, [f64; 2]) {
+        let [length, lateral] = self.section_size();
+        match (edge, self.outline) {
+            (SectionEdge::MinusX, _) => (0.5 * length + point[0], [-1.0, 0.0]),
+            (SectionEdge::PlusX, _) => (0.5 * length - point[0], [1.0, 0.0]),
+            (SectionEdge::MinusLateral, Outline::Block) => (0.5 * lateral + point[1], [0.0, -1.0]),
+            (SectionEdge::PlusLateral, Outline::Block) => (0.5 * lateral - point[1], [0.0, 1.0]),
+            (SectionEdge::PlusLateral, Outline::Iso37Type4) => dumbbell::distance_to_upper_side(point),
+            (SectionEdge::MinusLateral, Outline::Iso37Type4) => {
+                let (distance, direction) = dumbbell::distance_to_upper_side([point[0], -point[1]]);
+                (distance, [direction[0], -direction[1]])
+            }
+        }
+    }
+}

@@ -1,0 +1,295 @@
+//! Manufacturability: what the mould maker, the scanner and the actuator allow.
+
+use super::json::JsonProblem;
+use super::{LigamentKind, LimitsError, MAX_HOLES, MIRROR_TOLERANCE_MM, Specimen};
+use serde::{Deserialize, Serialize};
+
+/// How far a diameter may be off a punch, mm.
+const PUNCH_TOLERANCE_MM: f64 = 1e-6;
+/// Rounding by which a value may miss its limit and still satisfy it, relative to the limit.
+const ROUNDING: f64 = 1e-9;
+
+/// Diameters that can be made, mm.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DiameterRange {
+    /// Smallest, mm.
+    pub min: f64,
+    /// Largest, mm.
+    pub max: f64,
+}
+
+/// Mirror planes through the origin that the geometry must have.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Symmetry {
+    /// Free.
+    #[default]
+    None,
+    /// x → −x.
+    MirrorX,
+    /// y → −y.
+    MirrorY,
+    /// z → −z.
+    MirrorZ,
+    /// x → −x and z → −z.
+    MirrorXAndZ,
+    /// x → −x and y → −y.
+    MirrorXAndY,
+}
+
+impl Symmetry {
+    /// The mirrors, as the signs of (x, y, z).
+    pub fn mirrors(self) -> &'static [[f64; 3]] {
+        const X: [f64; 3] = [-1.0, 1.0, 1.0];
+        const Y: [f64; 3] = [1.0, -1.0, 1.0];
+        const Z: [f64; 3] = [1.0, 1.0, -1.0];
+        match self {
+            Symmetry::None => &[],
+            Symmetry::MirrorX => &[X],
+            Symmetry::MirrorY => &[Y],
+            Symmetry::MirrorZ => &[Z],
+            Symmetry::MirrorXAndZ => &[X, Z],
+            Symmetry::MirrorXAndY => &[X, Y],
+        }
+    }
+}
+
+/// Limits that a proposed design must keep.
+///
+/// ```
+/// use lambdak::specimen::ManufacturingLimits;
+/// let limits = ManufacturingLimits::from_json(
+///     r#"{ "min_ligament_hole_hole_mm": 2.0, "min_ligament_hole_edge_mm": 2.0, "punches_mm": [3.0, 4.0, 5.0] }"#,
+/// )?;
+/// assert_eq!(limits.max_holes, None);
+/// # Ok::<(), lambdak::specimen::LimitsError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ManufacturingLimits {
+    /// Thinnest ligament between two holes, mm.
+    pub min_ligament_hole_hole_mm: f64,
+    /// Thinnest ligament between a hole and a side of the section, mm.
+    pub min_ligament_hole_edge_mm: f64,
+    /// Continuous range of diameters, mm. Exactly one of this and `punches_mm` is given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub diameter_mm: Option<DiameterRange>,
+    /// Diameters of the punches or pins at hand, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub punches_mm: Option<Vec<f64>>,
+    /// Fewest voxels across any ligament, counted as [`ManufacturingLimits::voxels_across`] does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub min_voxels_across_ligament: Option<f64>,
+    /// Largest force of the actuator or load cell, all samples together, N.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_force_n: Option<f64>,
+    /// Largest travel of the actuator, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_drive_mm: Option<f64>,
+    /// Largest principal stretch anywhere, against tearing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_local_stretch: Option<f64>,
+    /// Most holes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_holes: Option<usize>,
+    /// Mirror planes that the geometry must have.
+    #[serde(default)]
+    pub symmetry: Symmetry,
+}
+
+/// How far a value is from its limit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LimitMargin {
+    /// Name of the limit, with its unit, as in [`ManufacturingLimits`].
+    pub name: String,
+    /// The value, in the limit's unit.
+    pub value: f64,
+    /// The limit.
+    pub limit: f64,
+    /// Distance from the limit relative to the limit (to 1 where the limit is below 1 in a count); negative where
+    /// violated. A limit that is met or not, without a distance (punches, symmetry), has 1 where met.
+    pub margin_relative: f64,
+    /// Whether the limit is kept, to rounding.
+    pub is_satisfied: bool,
+}
+
+impl LimitMargin {
+    /// `value` must be at least `limit`. A NaN violates.
+    pub fn at_least(name: &str, value: f64, limit: f64) -> Self {
+        Self::from_difference(name, value, limit, value - limit)
+    }
+
+    /// `value` must be at most `limit`. A NaN violates.
+    pub fn at_most(name: &str, value: f64, limit: f64) -> Self {
+        Self::from_difference(name, value, limit, limit - value)
+    }
+
+    fn from_difference(name: &str, value: f64, limit: f64, difference: f64) -> Self {
+        // Counts may be limited to zero; every other limit is positive.
+        let scale = if limit.abs() > f64::MIN_POSITIVE { limit.abs() } else { 1.0 };
+        let margin_relative = difference / scale;
+        LimitMargin { name: name.into(), value, limit, margin_relative, is_satisfied: margin_relative >= -ROUNDING }
+    }
+
+    /// A limit without a distance: met within `tolerance` of `limit`, or violated by `difference / scale`.
+    fn discrete(name: &str, value: f64, limit: f64, difference: f64, tolerance: f64, scale: f64) -> Self {
+        let is_satisfied = difference <= tolerance;
+        let margin_relative = if is_satisfied { 1.0 } else { -difference / scale };
+        LimitMargin { name: name.into(), value, limit, margin_relative, is_satisfied }
+    }
+}
+
+impl ManufacturingLimits {
+    /// Reads and validates limits.
+    ///
+    /// # Errors
+    /// [`LimitsError`].
+    pub fn from_json(text: &str) -> Result<Self, LimitsError> {
+        let limits: Self =
+            serde_json::from_str(text).map_err(|error| LimitsError::Json(JsonProblem::new(text, &error)))?;
+        limits.validate()?;
+        Ok(limits)
+    }
+
+    /// Checks the limits themselves. Call it when the limits are part of a larger file.
+    ///
+    /// # Errors
+    /// [`LimitsError`].
+    pub fn validate(&self) -> Result<(), LimitsError> {
+        let above = |field: &str, value: f64, above: f64| {
+            let is_fine = value.is_finite() && value > above;
+            if is_fine { Ok(()) } else { Err(LimitsError::OutOfRange { field: field.into(), value, above }) }
+        };
+        above("min_ligament_hole_hole_mm", self.min_ligament_hole_hole_mm, 0.0)?;
+        above("min_ligament_hole_edge_mm", self.min_ligament_hole_edge_mm, 0.0)?;
+        match (&self.diameter_mm, &self.punches_mm) {
+            (Some(range), None) => {
+                above("diameter_mm.min", range.min, 0.0)?;
+                above("diameter_mm.max", range.max, 0.0)?;
+                if range.min > range.max {
+                    return Err(LimitsError::EmptyRange { min_mm: range.min, max_mm: range.max });
+                }
+            }
+            (None, Some(punches)) => {
+                if punches.is_empty() {
+                    return Err(LimitsError::NoPunches);
+                }
+                for (i, punch) in punches.iter().enumerate() {
+                    above(&format!("punches_mm[{i}]"), *punch, 0.0)?;
+                }
+            }
+            (range, punches) => {
+                let (has_range, has_punches) = (range.is_some(), punches.is_some());
+                return Err(LimitsError::DiametersAmbiguous { has_range, has_punches });
+            }
+        }
+        for (field, value, least) in [
+            ("min_voxels_across_ligament", self.min_voxels_across_ligament, 0.0),
+            ("max_force_n", self.max_force_n, 0.0),
+            ("max_drive_mm", self.max_drive_mm, 0.0),
+            ("max_local_stretch", self.max_local_stretch, 1.0),
+        ] {
+            if let Some(value) = value {
+                above(field, value, least)?;
+            }
+        }
+        match self.max_holes {
+            Some(value) if value > MAX_HOLES => Err(LimitsError::TooManyHoles { value, limit: MAX_HOLES }),
+            _ => Ok(()),
+        }
+    }
+
+    /// The thinnest allowed ligament of a kind, mm.
+    pub fn min_ligament_mm(&self, kind: LigamentKind) -> f64 {
+        match kind {
+            LigamentKind::HoleHole(..) => self.min_ligament_hole_hole_mm,
+            LigamentKind::HoleEdge(..) => self.min_ligament_hole_edge_mm,
+        }
+    }
+
+    /// Voxels across a ligament of the section: voxel layers passed along the axis on which the ligament passes
+    /// most, max over axes of (thickness × |direction| / voxel). Never more than the voxels really crossed.
+    pub fn voxels_across(specimen: &Specimen, length_mm: f64, direction: [f64; 2], voxel_mm: [f64; 3]) -> f64 {
+        let lateral_voxel = match specimen.extrusion_axis() {
+            super::HoleAxis::Thickness => voxel_mm[2],
+            super::HoleAxis::Width => voxel_mm[1],
+        };
+        length_mm * (direction[0].abs() / voxel_mm[0]).max(direction[1].abs() / lateral_voxel)
+    }
+
+    /// Margins of every limit on the geometry, by closed forms: thinnest ligament of each kind, diameters, voxels
+    /// across the ligament that has fewest, number of holes, symmetry. Without holes only what applies.
+    /// `voxel_mm`: the scan's voxel along (x, y, z).
+    pub fn check_geometry(&self, specimen: &Specimen, voxel_mm: [f64; 3]) -> Vec<LimitMargin> {
+        let mut margins = Vec::new();
+        let ligaments = specimen.ligaments();
+        let is_between_holes = |kind: LigamentKind| matches!(kind, LigamentKind::HoleHole(..));
+        for (name, between_holes, limit) in [
+            ("min_ligament_hole_hole_mm", true, self.min_ligament_hole_hole_mm),
+            ("min_ligament_hole_edge_mm", false, self.min_ligament_hole_edge_mm),
+        ] {
+            let thinnest =
+                least(ligaments.iter().filter(|l| is_between_holes(l.kind) == between_holes).map(|l| l.length_mm));
+            margins.extend(thinnest.map(|value| LimitMargin::at_least(name, value, limit)));
+        }
+        if let Some(range) = &self.diameter_mm {
+            let smallest = least(specimen.holes.iter().map(|hole| hole.diameter_mm));
+            let largest = least(specimen.holes.iter().map(|hole| -hole.diameter_mm)).map(|value| -value);
+            margins.extend(smallest.map(|value| LimitMargin::at_least("diameter_mm.min", value, range.min)));
+            margins.extend(largest.map(|value| LimitMargin::at_most("diameter_mm.max", value, range.max)));
+        }
+        if let Some(punches) = &self.punches_mm {
+            margins.extend(worst_punch(specimen, punches));
+        }
+        if let Some(limit) = self.min_voxels_across_ligament {
+            let fewest =
+                least(ligaments.iter().map(|l| Self::voxels_across(specimen, l.length_mm, l.direction, voxel_mm)));
+            margins.extend(fewest.map(|value| LimitMargin::at_least("min_voxels_across_ligament", value, limit)));
+        }
+        if let Some(limit) = self.max_holes {
+            margins.push(LimitMargin::at_most("max_holes", specimen.holes.len() as f64, limit as f64));
+        }
+        if self.symmetry != Symmetry::None {
+            let defects = self.symmetry.mirrors().iter().map(|signs| specimen.mirror_defect_mm(*signs));
+            let defect = defects.fold(0.0, f64::max);
+            let scale = specimen.section_size()[0];
+            let tolerance = MIRROR_TOLERANCE_MM;
+            margins.push(LimitMargin::discrete("symmetry", defect, tolerance, defect, tolerance, scale));
+        }
+        margins
+    }
+
+    /// Margins of the limits on what the test does: largest drive, mm; force of all samples at it, N; largest
+    /// principal stretch anywhere. A quantity that is not limited gives no margin.
+    pub fn check_response(&self, drive_mm: f64, force_n: f64, local_stretch: f64) -> Vec<LimitMargin> {
+        [
+            ("max_drive_mm", drive_mm, self.max_drive_mm),
+            ("max_force_n", force_n.abs(), self.max_force_n),
+            ("max_local_stretch", local_stretch, self.max_local_stretch),
+        ]
+        .into_iter()
+        .filter_map(|(name, value, limit)| limit.map(|limit| LimitMargin::at_most(name, value, limit)))
+        .collect()
+    }
+}
+
+/// The diameter that is furthest from its nearest punch.
+fn worst_punch(specimen: &Specimen, punches: &[f64]) -> Option<LimitMargin> {
+    let nearest_of =
+        |diameter: f64| punches.iter().copied().min_by(|a, b| (a - diameter).abs().total_cmp(&(b - diameter).abs()));
+    specimen
+        .holes
+        .iter()
+        .filter_map(|hole| nearest_of(hole.diameter_mm).map(|punch| (hole.diameter_mm, punch)))
+        .max_by(|a, b| (a.0 - a.1).abs().total_cmp(&(b.0 - b.1).abs()))
+        .map(|(value, punch)| {
+            LimitMargin::discrete("punches_mm", value, punch, (value - punch).abs(), PUNCH_TOLERANCE_MM, punch)
+        })
+}
+
+/// The least of some values; `None` of none. A NaN wins, so that it is seen.
+fn least(values: impl Iterator<Item = f64>) -> Option<f64> {
+    values.reduce(|a, b| if a.is_nan() || a < b { a } else { b })
+}

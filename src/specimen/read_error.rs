@@ -1,0 +1,191 @@
+//! What can be wrong with a specimen.
+
+use super::{HoleAxis, JsonProblem, LigamentKind};
+
+/// Why a specimen is refused. Every variant carries the value, the limit and what to change.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SpecimenError {
+    /// The text is not JSON, or a field is missing, unknown, doubled or of the wrong type.
+    #[error("specimen JSON, {0}")]
+    Json(JsonProblem),
+    /// The schema is another one.
+    #[error("schema is {found:?}; set it to {expected:?}")]
+    WrongSchema {
+        /// What the text says.
+        found: String,
+        /// What this version reads.
+        expected: &'static str,
+    },
+    /// The name is too long or holds control characters.
+    #[error("name has {length} characters, control characters: {has_control}; use 0 to {limit} printable characters")]
+    BadName {
+        /// Number of characters.
+        length: usize,
+        /// Whether a control character (line break, tab, …) is in it.
+        has_control: bool,
+        /// Most characters.
+        limit: usize,
+    },
+    /// A number is NaN or infinite.
+    #[error("{field} is {value}; give a finite number")]
+    NotFinite {
+        /// Path of the field.
+        field: String,
+        /// Its value.
+        value: f64,
+    },
+    /// A length is outside the supported range (zero and negative lengths included).
+    #[error("{field} is {value_mm} mm; choose a value from {min_mm} to {max_mm} mm")]
+    SizeOutOfRange {
+        /// Path of the field.
+        field: String,
+        /// Its value, mm.
+        value_mm: f64,
+        /// Smallest, mm.
+        min_mm: f64,
+        /// Largest, mm.
+        max_mm: f64,
+    },
+    /// More holes than supported.
+    #[error("there are {count} holes; use at most {limit}")]
+    TooManyHoles {
+        /// How many.
+        count: usize,
+        /// Most.
+        limit: usize,
+    },
+    /// Holes along different axes. The mesh is a section extruded along the holes.
+    #[error(
+        "holes[{hole}] runs along {axis:?} and holes[0] along {expected:?}; all holes of one specimen must share their axis, because the mesh is extruded along it"
+    )]
+    MixedHoleAxes {
+        /// The first hole that differs.
+        hole: usize,
+        /// Its axis.
+        axis: HoleAxis,
+        /// The axis of the holes before it.
+        expected: HoleAxis,
+    },
+    /// A hole reaches the outside of the outline.
+    #[error(
+        "no material between {between}: the hole reaches {excess_mm:.4} mm too far; move it inwards or make it smaller, at least {limit_mm:.4} mm of material must remain"
+    )]
+    HoleOutside {
+        /// The hole and the side.
+        between: LigamentKind,
+        /// How far it reaches beyond the side, mm.
+        excess_mm: f64,
+        /// Thinnest ligament that can be meshed, mm.
+        limit_mm: f64,
+    },
+    /// Two holes overlap or touch.
+    #[error(
+        "{between} overlap by {overlap_mm:.4} mm; move them apart or make them smaller, at least {limit_mm:.4} mm of material must remain"
+    )]
+    HolesOverlap {
+        /// The two holes.
+        between: LigamentKind,
+        /// Depth of the overlap, mm; 0 where they touch.
+        overlap_mm: f64,
+        /// Thinnest ligament that can be meshed, mm.
+        limit_mm: f64,
+    },
+    /// A ligament is too thin to mesh.
+    #[error(
+        "the ligament between {between} is {length_mm:.4} mm; it must be at least {limit_mm:.4} mm to be meshed (0.05 mm and 2 % of the hole's diameter): move the hole or make it smaller"
+    )]
+    LigamentTooThin {
+        /// Between what.
+        between: LigamentKind,
+        /// Its thickness, mm.
+        length_mm: f64,
+        /// Thinnest that can be meshed, mm.
+        limit_mm: f64,
+    },
+    /// No drive is given.
+    #[error("drive_mm is empty; give 1 to {limit} drives, mm")]
+    NoDrives {
+        /// Most drives.
+        limit: usize,
+    },
+    /// More drives than supported.
+    #[error("drive_mm has {count} entries; give at most {limit}")]
+    TooManyDrives {
+        /// How many.
+        count: usize,
+        /// Most.
+        limit: usize,
+    },
+    /// A drive is zero or negative.
+    #[error("drive_mm[{index}] is {value_mm} mm; drives must be positive")]
+    DriveNotPositive {
+        /// Which.
+        index: usize,
+        /// Its value, mm.
+        value_mm: f64,
+    },
+    /// A drive is not larger than the one before.
+    #[error(
+        "drive_mm[{index}] is {value_mm} mm, not above {previous_mm} mm before it; list the drives in increasing order, each once"
+    )]
+    DrivesNotIncreasing {
+        /// Which.
+        index: usize,
+        /// Its value, mm.
+        value_mm: f64,
+        /// The one before, mm.
+        previous_mm: f64,
+    },
+    /// A drive goes beyond the deformation that is supported.
+    #[error(
+        "drive_mm[{index}] is {value_mm} mm, a nominal {measure} of {deformation:.3}; the limit is {limit} at {limit_mm:.4} mm: drive less, or make the specimen {dimension}"
+    )]
+    DriveTooLarge {
+        /// Which.
+        index: usize,
+        /// Its value, mm.
+        value_mm: f64,
+        /// `shear strain` or `stretch`.
+        measure: &'static str,
+        /// Nominal deformation that it means.
+        deformation: f64,
+        /// Largest supported nominal deformation.
+        limit: f64,
+        /// Largest supported drive of this specimen, mm.
+        limit_mm: f64,
+        /// `thicker` or `longer`.
+        dimension: &'static str,
+    },
+    /// No or too many samples share the load cell.
+    #[error("samples_in_parallel is {value}; choose 1 to {limit}")]
+    SamplesOutOfRange {
+        /// Its value.
+        value: u32,
+        /// Most.
+        limit: u32,
+    },
+    /// The block is not the bounding box of the standard's dumb-bell.
+    #[error(
+        "{field} is {value_mm} mm; outline iso37_type4 has {standard_mm} mm there: set it, or leave out the outline"
+    )]
+    NotTheStandardsBlock {
+        /// Path of the field.
+        field: &'static str,
+        /// Its value, mm.
+        value_mm: f64,
+        /// The standard's, mm.
+        standard_mm: f64,
+    },
+    /// A dumb-bell cannot be bonded between plates.
+    #[error("outline iso37_type4 is tested in uniaxial tension only; set test to uniaxial, or leave out the outline")]
+    DumbbellInShear,
+    /// A dumb-bell's section is (x, z), so its holes run along the thickness.
+    #[error(
+        "holes[{hole}] runs along the width; in outline iso37_type4 holes must run along the thickness, because the mesh is extruded along it"
+    )]
+    DumbbellHoleAlongWidth {
+        /// Which hole.
+        hole: usize,
+    },
+}
