@@ -1,6 +1,6 @@
 //! One axis: how values become positions, and where its ticks are.
 
-use super::number::{fixed, significant, superscript};
+use super::number::{fixed, significant, superscript, trimmed};
 
 /// A range of values, linear or logarithmic.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,14 +101,6 @@ fn log_label(value: f64) -> String {
     let mantissa = (value / 10f64.powi(exponent)).round();
     let power = format!("10{}", superscript(exponent));
     if mantissa > 1.5 { format!("{mantissa:.0} × {power}") } else { power }
-}
-
-fn trimmed(text: String) -> String {
-    if text.contains('.') && !text.contains('×') {
-        text.trim_end_matches('0').trim_end_matches('.').to_string()
-    } else {
-        text
-    }
 }
 
 fn linear_ticks(low: f64, high: f64, count: usize) -> Vec<Tick> {

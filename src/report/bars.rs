@@ -111,7 +111,12 @@ impl GroupedBars {
             return;
         }
         for (s, name) in self.series.iter().enumerate() {
-            svg.rect([x, y - 9.0, 10.0, 10.0], SERIES[s % SERIES.len()]);
+            let color = SERIES[s % SERIES.len()];
+            if self.is_log {
+                svg.circle([x + 5.0, y - 4.0], 4.5, color, "#ffffff", 1.0);
+            } else {
+                svg.rect([x, y - 9.0, 10.0, 10.0], color);
+            }
             svg.text([x + 15.0, y], name, &TextStyle::new(SMALL));
             x += 15.0 + text_width(name, SMALL) + 20.0;
         }

@@ -13,8 +13,8 @@ pub struct DensityPanel {
     pub title: String,
     /// Counts or densities, not negative, λ fastest: `bin_λ + num_stretch_bins × bin_k`. Zero bins stay empty.
     pub density: Vec<f64>,
-    /// A stretch to mark by a line, such as the median; None for no line.
-    pub marked_stretch: Option<f64>,
+    /// The median stretch, marked by a line and written above; None for no line.
+    pub median_stretch: Option<f64>,
 }
 
 /// Panels side by side (at most four in a row) with shared axes and one colour scale.
@@ -88,7 +88,7 @@ impl DensityPlot {
             horizontal: Axis::linear(self.stretch_range[0], self.stretch_range[1]),
             vertical: Axis::linear(self.mode_range[0], self.mode_range[1]),
         };
-        svg.text([x, y - MARGINAL - 10.0], &shortened(&panel.title, TITLE, w), &TextStyle::title());
+        svg.text([x, y - MARGINAL - 10.0], &shortened(&panel.title, TITLE, w - 78.0), &TextStyle::title());
         svg.rect([x, y, w, h], EMPTY);
         svg.cells([x, y, w, h], [nx, nk], |i, j| {
             let v = panel.density[i + nx * (nk - 1 - j)];
@@ -103,14 +103,12 @@ impl DensityPlot {
             frame.draw_left(svg, "deformation mode k", 5, 40.0);
         }
         if let Some(marked) =
-            panel.marked_stretch.filter(|m| (self.stretch_range[0]..=self.stretch_range[1]).contains(m))
+            panel.median_stretch.filter(|m| (self.stretch_range[0]..=self.stretch_range[1]).contains(m))
         {
             let at = frame.at([marked, self.mode_range[0]])[0];
             svg.line([at, y - MARGINAL + 2.0], [at, y + h], MUTED, 1.0, "2 3");
             let text = format!("median {}", significant(marked, 3));
-            let style = if at > x + 0.6 * w { TextStyle::note().end() } else { TextStyle::note() };
-            let dx = if at > x + 0.6 * w { -4.0 } else { 4.0 };
-            svg.text([at + dx, y - MARGINAL + 9.0], &text, &style);
+            svg.text([x + w, y - MARGINAL - 10.0], &text, &TextStyle::note().end());
         }
     }
 
@@ -168,7 +166,7 @@ pub(super) mod tests {
                 DensityPanel {
                     title: format!("two holes, {} mm", 2.5 * (p + 1) as f64),
                     density,
-                    marked_stretch: Some(1.4 + 0.1 * p as f64),
+                    median_stretch: Some(1.4 + 0.1 * p as f64),
                 }
             })
             .collect();
@@ -198,7 +196,7 @@ pub(super) mod tests {
         let mut plot = sample(1);
         plot.panels[0].density[3] = f64::NAN;
         plot.panels[0].density[4] = f64::INFINITY;
-        plot.panels[0].marked_stretch = Some(f64::NAN);
+        plot.panels[0].median_stretch = Some(f64::NAN);
         assert_well_formed(&plot.to_svg());
         plot.panels[0].density.fill(0.0);
         assert!(plot.to_svg().contains("no voxel"));

@@ -1,6 +1,6 @@
 //! How far a design is from each of its limits.
 
-use super::color::{ACCENT, AXIS, BAD, GRID};
+use super::color::{ACCENT, AXIS, BAD};
 use super::number::{signed_percent, significant};
 use super::svg::{NORMAL, SMALL, Svg, TITLE, TextStyle, shortened, text_width};
 
@@ -21,7 +21,7 @@ pub struct LimitBar {
     pub is_satisfied: bool,
 }
 
-/// Bars of relative margins, the closest limit first.
+/// Bars of relative margins: broken limits first, then the closest.
 #[derive(Clone, Debug, Default)]
 pub struct LimitsPlot {
     /// Title above.
@@ -42,7 +42,8 @@ impl LimitsPlot {
             return Svg::placeholder(&self.title, "no limits were set");
         }
         let mut limits: Vec<&LimitBar> = self.limits.iter().collect();
-        limits.sort_by(|a, b| a.margin_relative.total_cmp(&b.margin_relative));
+        limits
+            .sort_by(|a, b| a.is_satisfied.cmp(&b.is_satisfied).then(a.margin_relative.total_cmp(&b.margin_relative)));
         let names = limits.iter().map(|l| text_width(&l.name, NORMAL)).fold(0.0, f64::max);
         let left = (names + 20.0).clamp(80.0, 300.0);
         let (top, height) = (48.0, ROW * limits.len() as f64);
@@ -50,7 +51,8 @@ impl LimitsPlot {
         let low = if least < 0.0 { least.max(-LARGEST) } else { 0.0 };
         let at = |margin: f64| left + PLOT * (margin.clamp(low, LARGEST) - low) / (LARGEST - low);
         let value_at = left + PLOT + 74.0;
-        let mut svg = Svg::new(value_at + 190.0, top + height + 14.0);
+        let values = limits.iter().map(|l| text_width(&value_text(l), SMALL)).fold(80.0, f64::max);
+        let mut svg = Svg::new(value_at + values + 12.0, top + height + 14.0);
         svg.text([left, 18.0], &shortened(&self.title, TITLE, PLOT + 240.0), &TextStyle::title());
         svg.text([left, top - 8.0], "margin relative to the limit", &TextStyle::note());
         svg.text([value_at, top - 8.0], "value (limit)", &TextStyle::note());
@@ -61,7 +63,6 @@ impl LimitsPlot {
             let name = shortened(&limit.name, NORMAL, left - 14.0);
             let style = TextStyle::new(NORMAL).end();
             svg.text([left - 12.0, text_y], &name, &if limit.is_satisfied { style } else { style.color(BAD) });
-            svg.line([left, y + 0.5 * ROW], [left + PLOT, y + 0.5 * ROW], GRID, 1.0, "");
             let mut end = at(0.0);
             if limit.margin_relative.is_finite() {
                 let margin = at(limit.margin_relative);
@@ -71,12 +72,16 @@ impl LimitsPlot {
             let is_cut = limit.margin_relative > LARGEST;
             let percent = if is_cut { "> 100 %".into() } else { signed_percent(limit.margin_relative) };
             svg.text([end + 6.0, text_y], &percent, &TextStyle::new(SMALL).color(color));
-            let text = format!("{} ({}) {}", significant(limit.value, 3), significant(limit.limit, 3), limit.unit);
-            svg.text([value_at, text_y], text.trim_end(), &TextStyle::new(SMALL));
+            svg.text([value_at, text_y], &value_text(limit), &TextStyle::new(SMALL));
         }
         svg.line([at(0.0), top - 2.0], [at(0.0), top + height + 2.0], AXIS, 1.0, "");
         svg.finish(&self.title)
     }
+}
+
+fn value_text(limit: &LimitBar) -> String {
+    let text = format!("{} ({}) {}", significant(limit.value, 3), significant(limit.limit, 3), limit.unit);
+    text.trim_end().to_string()
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::axis::Axis;
 use super::color::{AXIS, ColorMap, EMPTY};
 use super::frame::{Frame, draw_color_bar};
-use super::number::fixed;
+use super::number::{fixed, trimmed};
 use super::svg::{SMALL, Svg, TITLE, TextStyle, shortened};
 
 /// One scalar field on the voxel grid.
@@ -96,7 +96,7 @@ impl VoxelMaps {
                 let caption = if is_mean {
                     format!("mean over {third_name}")
                 } else {
-                    format!("slice {third_name} = {} mm", fixed(middle, 2))
+                    format!("slice {third_name} = {} mm", trimmed(fixed(middle, 2)))
                 };
                 svg.text([left, top - 5.0], &caption, &TextStyle::note());
                 if vertical == 1 {
@@ -104,7 +104,7 @@ impl VoxelMaps {
                     svg.text([left + w, top + height + 30.0], "x / mm", &TextStyle::note().end());
                 }
                 if column == 0 {
-                    let num_ticks = ((height / 26.0) as usize).clamp(2, 6);
+                    let num_ticks = if height < 44.0 { 2 } else { ((height / 26.0) as usize).clamp(4, 6) };
                     frame.draw_left(svg, "", num_ticks, 0.0);
                     let label = ["x / mm", "y / mm", "z / mm"][vertical];
                     let style = TextStyle::new(SMALL).color(super::color::MUTED).middle().vertical();

@@ -34,6 +34,15 @@ pub(super) fn fixed(value: f64, decimals: usize) -> String {
     if text.bytes().all(|b| matches!(b, b'-' | b'0' | b'.')) { text.replace('-', "") } else { minus(&text) }
 }
 
+/// `text` without zeros at the end of its decimals.
+pub(super) fn trimmed(text: String) -> String {
+    if text.contains('.') && !text.contains('×') {
+        text.trim_end_matches('0').trim_end_matches('.').to_string()
+    } else {
+        text
+    }
+}
+
 /// A relative value as signed per cent.
 pub(super) fn signed_percent(fraction: f64) -> String {
     if !fraction.is_finite() {

@@ -75,7 +75,7 @@ impl ParetoPlot {
         let mut svg = Svg::new(x + w + 24.0, y + h + 50.0);
         svg.text([x, 18.0], &shortened(&self.title, TITLE, w), &TextStyle::title());
         frame.draw_grid(&mut svg, 6, 6);
-        self.draw_front(&mut svg, &frame, &points);
+        let front = self.draw_front(&mut svg, &frame, &points);
         frame.draw_bottom(&mut svg, &self.x_label, 6);
         frame.draw_left(&mut svg, &self.y_label, 6, 50.0);
 
@@ -86,6 +86,15 @@ impl ParetoPlot {
             let radius = draw_mark(&mut svg, frame.at([p.x, p.y]), p.kind);
             if p.kind != PointKind::Infeasible {
                 placer.occupy(frame.at([p.x, p.y]), radius);
+            }
+        }
+        // The staircase is taken as well, in steps shorter than a label is high.
+        for pair in front.windows(2) {
+            let length = (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
+            let steps = (length / 6.0).ceil();
+            for i in 0..steps as usize {
+                let t = i as f64 / steps;
+                placer.occupy([0, 1].map(|c| pair[0][c] + t * (pair[1][c] - pair[0][c])), 1.0);
             }
         }
         for p in points.iter().rev().filter(|p| !p.label.is_empty()) {
@@ -105,7 +114,7 @@ impl ParetoPlot {
     }
 
     /// The front as a staircase: between two front designs nothing better than their corner is known.
-    fn draw_front(&self, svg: &mut Svg, frame: &Frame, points: &[&ParetoPoint]) {
+    fn draw_front(&self, svg: &mut Svg, frame: &Frame, points: &[&ParetoPoint]) -> Vec<[f64; 2]> {
         let is_on_front = |p: &&&ParetoPoint| matches!(p.kind, PointKind::Front | PointKind::Best);
         let sign = if self.larger_x_is_better { -1.0 } else { 1.0 };
         let mut front: Vec<[f64; 2]> = points.iter().filter(is_on_front).map(|p| [p.x, p.y]).collect();
@@ -126,6 +135,7 @@ impl ParetoPlot {
         }
         let line: Vec<[f64; 2]> = line.into_iter().map(|p| frame.at(p)).collect();
         svg.polyline(&line, "#9dbbd4", 1.5);
+        line
     }
 }
 

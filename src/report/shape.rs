@@ -35,7 +35,7 @@ pub struct DeformedShape {
 const AZIMUTH: f64 = 0.50;
 const ELEVATION: f64 = 0.52;
 const PICTURE: [f64; 2] = [470.0, 300.0];
-/// Reference edges with a sharper angle than this (its cosine) are drawn as the ghost's outline.
+/// Reference edges with a sharper angle than this (its cosine) are drawn, on the shape and as its ghost.
 const SHARP_COSINE: f64 = 0.8;
 
 impl DeformedShape {
@@ -51,9 +51,9 @@ impl DeformedShape {
         let mut svg = Svg::new(PICTURE[0] + 110.0, PICTURE[1] + 44.0);
         svg.text([10.0, 18.0], &shortened(&self.title, TITLE, PICTURE[0]), &TextStyle::title());
 
-        let ghost = outline(&quads);
+        let sharp = sharp_edges(&quads);
         let draw_ghost = |svg: &mut Svg, color: &str, dash: &str| {
-            for [a, b] in &ghost {
+            for [a, b] in sharp.values() {
                 svg.line(camera.project(*a), camera.project(*b), color, 0.9, dash);
             }
         };
@@ -67,6 +67,12 @@ impl DeformedShape {
             let points = quad.current.map(|p| camera.project(p));
             // The stroke in the fill's colour closes the hairline gaps that anti-aliasing leaves.
             svg.polygon(&points, &color, &color, 0.6);
+            for c in 0..4 {
+                let (a, b) = (c, (c + 1) % 4);
+                if sharp.contains_key(&edge_key(quad.reference[a], quad.reference[b])) {
+                    svg.line(points[a], points[b], "#3c3c3c", 0.8, "");
+                }
+            }
         }
         svg.open_translucent(0.45);
         draw_ghost(&mut svg, MUTED, "3 3");
@@ -163,18 +169,24 @@ fn normal(p: &[[f64; 3]; 4]) -> [f64; 3] {
     if length > 0.0 { n.map(|c| c / length) } else { [0.0; 3] }
 }
 
-/// Sharp edges of the reference surface, each once.
-fn outline(quads: &[&ShapeQuad]) -> Vec<[[f64; 3]; 2]> {
-    // Corners are matched on a grid of 10⁻⁵ mm, far below any edge and far above rounding.
-    let key = |p: [f64; 3]| p.map(|c| (c * 1e5).round() as i64);
+/// An edge, whatever its direction: its ends on a grid of 10⁻⁵ mm, far below any edge and far above rounding.
+type EdgeKey = [[i64; 3]; 2];
+
+fn edge_key(a: [f64; 3], b: [f64; 3]) -> EdgeKey {
+    let [a, b] = [a, b].map(|p| p.map(|c| (c * 1e5).round() as i64));
+    [a.min(b), a.max(b)]
+}
+
+/// Sharp edges of the reference surface with their ends, each once.
+fn sharp_edges(quads: &[&ShapeQuad]) -> BTreeMap<EdgeKey, [[f64; 3]; 2]> {
     let mut edges = BTreeMap::new();
     for quad in quads {
         let n = normal(&quad.reference);
         for c in 0..4 {
             let (a, b) = (quad.reference[c], quad.reference[(c + 1) % 4]);
-            let (ka, kb) = (key(a), key(b));
-            if ka != kb {
-                edges.entry((ka.min(kb), ka.max(kb))).or_insert_with(|| ([a, b], Vec::new())).1.push(n);
+            let key = edge_key(a, b);
+            if key[0] != key[1] {
+                edges.entry(key).or_insert_with(|| ([a, b], Vec::new())).1.push(n);
             }
         }
     }
@@ -182,7 +194,7 @@ fn outline(quads: &[&ShapeQuad]) -> Vec<[[f64; 3]; 2]> {
         [a, b] => (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]).abs() < SHARP_COSINE,
         _ => true,
     };
-    edges.into_values().filter(|(_, normals)| is_sharp(normals)).map(|(edge, _)| edge).collect()
+    edges.into_iter().filter(|(_, (_, normals))| is_sharp(normals)).map(|(key, (ends, _))| (key, ends)).collect()
 }
 
 fn draw_triad(svg: &mut Svg, camera: &Camera, at: [f64; 2]) {
@@ -239,7 +251,7 @@ pub(super) mod tests {
     #[test]
     fn a_block_has_twelve_sharp_edges() {
         let shape = sample();
-        let edges = outline(&shape.quads.iter().collect::<Vec<_>>());
+        let edges = sharp_edges(&shape.quads.iter().collect::<Vec<_>>());
         assert_eq!(edges.len(), 12 * 14);
     }
 

@@ -2,7 +2,7 @@
 
 use super::axis::Axis;
 use super::color::{AXIS, GRID, INK, MUTED, SERIES};
-use super::number::{fixed, significant};
+use super::number::significant;
 use super::svg::{NORMAL, SMALL, Svg, TITLE, TextStyle, shortened, text_width};
 
 /// One parameter of one specimen.
@@ -49,7 +49,7 @@ impl SpreadPlot {
         let left = (names + 22.0).clamp(70.0, 260.0);
         let (top, height) = (62.0, ROW * self.rows.len() as f64);
         let columns = [left + PLOT + 74.0, left + PLOT + 148.0, left + PLOT + 196.0];
-        let mut svg = Svg::new(columns[2] + 60.0, top + height + 50.0);
+        let mut svg = Svg::new(columns[2] + 16.0, top + height + 50.0);
         svg.text([left, 18.0], &shortened(&self.title, TITLE, PLOT + 180.0), &TextStyle::title());
         let note = "dots: one noise draw each · bar: mean ± standard deviation found · bands: ±1, ±2 promised";
         svg.text([left, 36.0], note, &TextStyle::note());
@@ -83,7 +83,10 @@ impl SpreadPlot {
             svg.text([left - 12.0, y + 0.35 * NORMAL], &row_label(row), &TextStyle::new(NORMAL).end());
             draw_row(&mut svg, row, &axis, [left, y], SERIES[color % SERIES.len()]);
             let found_sd = standard_deviation(&row.found).map_or(f64::NAN, |(_, sd)| sd);
-            let with_unit = |v: f64| format!("{} {}", significant(v, 2), row.unit).trim_end().to_string();
+            let with_unit = |v: f64| {
+                let unit = if v.is_finite() { row.unit.as_str() } else { "" };
+                format!("{} {unit}", significant(v, 2)).trim_end().to_string()
+            };
             let cells = [with_unit(found_sd), with_unit(row.promised_sd), significant(found_sd / row.promised_sd, 2)];
             for (x, cell) in columns.into_iter().zip(cells) {
                 svg.text([x, y + 0.35 * SMALL], &cell, &TextStyle::new(SMALL).end());
@@ -155,13 +158,10 @@ fn draw_row(svg: &mut Svg, row: &SpreadRow, axis: &Axis, [left, y]: [f64; 2], co
     if below > 0 {
         svg.text([left + 2.0, y + 8.0], &format!("◂ {below}"), &TextStyle::note());
     }
-    if above > 0 {
-        svg.text([left + PLOT - 2.0, y + 8.0], &format!("{above} ▸"), &TextStyle::note().end());
-    }
-    if failed > 0 {
-        let text = format!("{} failed", fixed(f64::from(failed), 0));
-        svg.text([left + PLOT - 2.0, y - 4.0], &text, &TextStyle::note().end());
-    }
+    let failures = (failed > 0).then(|| format!("{failed} failed"));
+    let beyond = (above > 0).then(|| format!("{above} ▸"));
+    let notes: Vec<String> = failures.into_iter().chain(beyond).collect();
+    svg.text([left + PLOT - 2.0, y + 8.0], &notes.join(" · "), &TextStyle::note().end());
 }
 
 #[cfg(test)]
