@@ -192,6 +192,9 @@ impl Svg {
 
     /// Coloured cells: `color_of(i, j)` for column i from the left and row j from the top, None for nothing. Cells of one
     /// colour become one path, so that large maps stay small files.
+    ///
+    /// Print smooths the edges of abutting cells, which leaves white hairlines. A copy below, whose cells reach half a
+    /// cell under their right and lower neighbours, closes them.
     pub(super) fn cells(
         &mut self,
         [x, y, width, height]: [f64; 4],
@@ -201,18 +204,28 @@ impl Svg {
         if columns == 0 || rows == 0 || !finite(&[[x, y], [width, height]]) {
             return;
         }
-        let mut paths = std::collections::BTreeMap::<String, String>::new();
+        let colors: Vec<Option<String>> = (0..columns * rows).map(|c| color_of(c % columns, c / columns)).collect();
+        let is_filled = |i: usize, j: usize| i < columns && j < rows && colors[i + columns * j].is_some();
+        let mut layers = [std::collections::BTreeMap::<&str, String>::new(), std::collections::BTreeMap::new()];
         for j in 0..rows {
             let mut i = 0;
             while i < columns {
-                let color = color_of(i, j);
+                let color = &colors[i + columns * j];
                 let start = i;
-                while i < columns && color_of(i, j) == color {
+                while i < columns && colors[i + columns * j] == *color {
                     i += 1;
                 }
                 if let Some(color) = color {
                     let n = i - start;
-                    paths.entry(color).or_default().push_str(&format!("M{start} {j}h{n}v1h-{n}z"));
+                    let right = if is_filled(i, j) { ".5" } else { "" };
+                    // The reach below includes the corner under the right neighbour.
+                    let last = if right.is_empty() { i } else { i + 1 };
+                    let down = if (start..last).all(|c| is_filled(c, j + 1)) { ".5" } else { "" };
+                    if !(right.is_empty() && down.is_empty()) {
+                        let under = format!("M{start} {j}h{n}{right}v1{down}h-{n}{right}z");
+                        layers[0].entry(color).or_default().push_str(&under);
+                    }
+                    layers[1].entry(color).or_default().push_str(&format!("M{start} {j}h{n}v1h-{n}z"));
                 }
             }
         }
@@ -223,7 +236,7 @@ impl Svg {
             width / columns as f64,
             height / rows as f64
         ));
-        for (color, d) in paths {
+        for (color, d) in layers.into_iter().flatten() {
             self.body.push_str(&format!("<path d=\"{d}\" fill=\"{color}\"/>\n"));
         }
         self.body.push_str("</g>\n");
@@ -364,6 +377,29 @@ mod tests {
         svg.cells([0.0, 0.0, 10.0, 10.0], [4, 2], |i, j| (j == 0 || i > 1).then(|| "#123456".to_string()));
         let text = svg.finish("x");
         assert!(text.contains("d=\"M0 0h4v1h-4zM2 1h2v1h-2z\""));
+    }
+
+    /// The copy below never reaches into an empty cell.
+    #[test]
+    fn cells_do_not_reach_into_holes() {
+        let color = || Some("#123456".to_string());
+        let draw = |hole: [usize; 2]| {
+            let mut svg = Svg::new(10.0, 10.0);
+            svg.cells([0.0, 0.0, 10.0, 10.0], [2, 2], |i, j| {
+                if [i, j] == hole {
+                    None
+                } else if [i, j] == [0, 0] {
+                    color()
+                } else {
+                    Some("#654321".into())
+                }
+            });
+            svg.finish("x")
+        };
+        assert!(draw([9, 9]).contains("d=\"M0 0h1.5v1.5h-1.5z\""));
+        assert!(draw([1, 1]).contains("d=\"M0 0h1.5v1h-1.5z\""));
+        assert!(draw([1, 0]).contains("d=\"M0 0h1v1.5h-1z\""));
+        assert!(draw([0, 1]).contains("d=\"M0 0h1.5v1h-1.5z\""));
     }
 
     #[test]
