@@ -3,7 +3,8 @@
 use super::axis::Axis;
 use super::color::{AXIS, EMPTY, GRID, MUTED, SERIES};
 use super::number::significant;
-use super::svg::{NORMAL, SMALL, Svg, TITLE, TextStyle, shortened, text_width};
+use super::svg::{NORMAL, SMALL, Svg, TITLE, TextStyle};
+use super::text::{shortened, text_width};
 
 /// The values of one parameter.
 #[derive(Clone, Debug, Default)]

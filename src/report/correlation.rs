@@ -3,7 +3,8 @@
 use super::color::{AXIS, ColorMap, EMPTY, ink_on};
 use super::frame::draw_color_bar;
 use super::number::fixed;
-use super::svg::{NORMAL, Svg, TITLE, TextStyle, shortened, text_width};
+use super::svg::{NORMAL, Svg, TITLE, TextStyle};
+use super::text::{shortened, text_width};
 
 /// A correlation matrix.
 #[derive(Clone, Debug, Default)]

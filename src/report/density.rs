@@ -4,7 +4,8 @@ use super::axis::Axis;
 use super::color::{AXIS, ColorMap, EMPTY, GRID, MUTED};
 use super::frame::{Frame, draw_color_bar};
 use super::number::significant;
-use super::svg::{SMALL, Svg, TITLE, TextStyle, shortened};
+use super::svg::{SMALL, Svg, TITLE, TextStyle};
+use super::text::shortened;
 
 /// One panel: the densities of one specimen or one drive.
 #[derive(Clone, Debug, Default)]

@@ -14,7 +14,7 @@ pub enum ReportError {
         /// What the file system said.
         source: std::io::Error,
     },
-    /// A field has not one value per node or per element.
+    /// A field has not one value per node, element or quadrature point.
     #[error("field {name} has {found} values, the mesh has {expected} {of}")]
     LengthMismatch {
         /// Name of the field.
@@ -23,7 +23,7 @@ pub enum ReportError {
         found: usize,
         /// Values needed.
         expected: usize,
-        /// `nodes` or `elements`.
+        /// `nodes`, `elements` or `quadrature points`.
         of: &'static str,
     },
     /// An element names a node that does not exist.

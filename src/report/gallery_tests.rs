@@ -87,3 +87,75 @@ fn the_gallery_is_written_and_well_formed() {
         vtu.write(&folder.join(format!("{name}.vtu"))).expect("written");
     }
 }
+
+/// Two values out of these, everywhere: no picture panics, and none holds a number that is not one.
+#[test]
+fn no_value_breaks_a_picture() {
+    let values = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0, -0.0, -1.0, 1.0, 1e-320, 1e300, f64::MAX, f64::MIN];
+    let name = || "a <b> & \"c\"".to_string();
+    for a in values {
+        for b in values {
+            for flag in [false, true] {
+                let mut density = density::tests::sample(1);
+                density.stretch_range = [1.0, a];
+                density.panels[0].density[5] = b;
+                density.panels[0].median_stretch = Some(b);
+                let field = VoxelField {
+                    title: name(),
+                    values: vec![a, b],
+                    range: flag.then_some([a, b]),
+                    ..VoxelField::default()
+                };
+                let maps =
+                    VoxelMaps { shape: [2, 1, 1], origin_mm: [0.0; 3], voxel_mm: [1.0, 1.0, 2.0], fields: vec![field] };
+                let bars = GroupedBars {
+                    title: name(),
+                    series: vec![name(), name()],
+                    groups: vec![BarGroup { label: name(), values: vec![a, b] }],
+                    is_log: flag,
+                    reference: Some(b),
+                    ..GroupedBars::default()
+                };
+                let points = [PointKind::Best, PointKind::Front]
+                    .map(|kind| [[a, b], [b, a]].map(|[x, y]| ParetoPoint { x, y, label: name(), kind }))
+                    .concat();
+                let pareto =
+                    ParetoPlot { title: name(), is_log_x: flag, is_log_y: flag, points, ..ParetoPlot::default() };
+                let points = [a, b].map(|value| HistoryPoint { value, is_feasible: flag, phase: name() }).to_vec();
+                let history =
+                    HistoryPlot { title: name(), is_log: flag, base: Some(a), points, ..HistoryPlot::default() };
+                let row = SpreadRow { truth: a, found: vec![a, b, 1.0], promised_sd: b, ..SpreadRow::default() };
+                let spread = SpreadPlot { title: name(), rows: vec![row] };
+                let values = vec![a, b, a, b];
+                let correlation = CorrelationPlot { title: name(), labels: vec![name(), name()], values };
+                let bar =
+                    LimitBar { name: name(), value: a, limit: b, margin_relative: a, is_satisfied: flag, unit: name() };
+                let limits = LimitsPlot {
+                    title: name(),
+                    limits: vec![bar, LimitBar { margin_relative: b, ..LimitBar::default() }],
+                };
+                let item = RankedItem { label: name(), left: a, right: b, is_base: flag, is_best: !flag };
+                let ranking = RankingPlot { title: name(), items: vec![item.clone(), item], ..RankingPlot::default() };
+                let mut shape = shape::tests::sample();
+                shape.quads.truncate(2);
+                shape.quads[0].value = a;
+                shape.quads[1].value = b;
+                shape.quads[1].current[0] = [a, b, a];
+                for svg in [
+                    density.to_svg(),
+                    maps.to_svg(),
+                    bars.to_svg(),
+                    pareto.to_svg(),
+                    history.to_svg(),
+                    spread.to_svg(),
+                    correlation.to_svg(),
+                    limits.to_svg(),
+                    ranking.to_svg(),
+                    shape.to_svg(),
+                ] {
+                    assert_well_formed(&svg);
+                }
+            }
+        }
+    }
+}

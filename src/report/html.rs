@@ -2,7 +2,7 @@
 
 use super::ReportError;
 use super::html_parts::{CalloutKind, STYLE, Table, picture};
-use super::svg::escape;
+use super::text::escape;
 use super::vtu::write_file;
 use std::path::Path;
 

@@ -1,7 +1,7 @@
 //! Parts of the page: tables, callouts, figures, and their style.
 
 use super::base64::encode;
-use super::svg::escape;
+use super::text::escape;
 
 /// Alignment of a column.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,6 +1,7 @@
 //! Labels beside points, placed so that they cover neither each other nor the points.
 
-use super::svg::{Anchor, SMALL, text_width};
+use super::svg::{Anchor, SMALL};
+use super::text::text_width;
 
 /// Boxes that are taken: [left, top, right, bottom], px.
 pub(super) struct LabelPlacer {
@@ -60,21 +61,6 @@ fn overlap(a: &[f64; 4], b: &[f64; 4]) -> bool {
     a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]
 }
 
-/// Vertical positions as near as possible to `wanted` (increasing) that keep `spacing` from one another, within
-/// [low, high] where there is room.
-pub(super) fn spread_out(wanted: &[f64], spacing: f64, low: f64, high: f64) -> Vec<f64> {
-    let mut at = wanted.to_vec();
-    for i in 0..at.len() {
-        let least = if i == 0 { low } else { at[i - 1] + spacing };
-        at[i] = at[i].max(least);
-    }
-    for i in (0..at.len()).rev() {
-        let most = if i + 1 == at.len() { high } else { at[i + 1] - spacing };
-        at[i] = at[i].min(most);
-    }
-    at
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -91,12 +77,5 @@ mod tests {
         for (i, a) in placer.taken.iter().enumerate() {
             assert!(placer.taken[..i].iter().all(|b| !overlap(a, b)));
         }
-    }
-
-    #[test]
-    fn crowded_positions_are_spread() {
-        let at = spread_out(&[1.0, 1.0, 1.0, 50.0], 10.0, 0.0, 100.0);
-        assert!(at.windows(2).all(|p| p[1] - p[0] >= 10.0 - 1e-12));
-        assert!((at[3] - 50.0).abs() < 1e-12);
     }
 }

@@ -2,7 +2,8 @@
 
 use super::color::{ACCENT, AXIS, BAD};
 use super::number::{signed_percent, significant};
-use super::svg::{NORMAL, SMALL, Svg, TITLE, TextStyle, shortened, text_width};
+use super::svg::{NORMAL, SMALL, Svg, TITLE, TextStyle};
+use super::text::{shortened, text_width};
 
 /// One limit.
 #[derive(Clone, Debug, Default)]

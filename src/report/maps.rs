@@ -4,7 +4,8 @@ use super::axis::Axis;
 use super::color::{AXIS, ColorMap, EMPTY};
 use super::frame::{Frame, draw_color_bar};
 use super::number::{fixed, trimmed};
-use super::svg::{SMALL, Svg, TITLE, TextStyle, shortened};
+use super::svg::{SMALL, Svg, TITLE, TextStyle};
+use super::text::shortened;
 
 /// One scalar field on the voxel grid.
 #[derive(Clone, Debug, Default)]

@@ -40,6 +40,7 @@ mod shape;
 mod spread;
 mod surface;
 mod svg;
+mod text;
 mod vtu;
 mod vtu_cells;
 
@@ -63,5 +64,5 @@ pub use pareto::{ParetoPlot, ParetoPoint, PointKind};
 pub use ranking::{RankedItem, RankingPlot};
 pub use shape::{DeformedShape, ShapeQuad};
 pub use spread::{SpreadPlot, SpreadRow};
-pub use surface::surface_quads;
+pub use surface::{nodal_values, surface_quads};
 pub use vtu::{Vtu, element_means};

@@ -45,10 +45,13 @@ pub(super) fn trimmed(text: String) -> String {
 
 /// A relative value as signed per cent.
 pub(super) fn signed_percent(fraction: f64) -> String {
-    if !fraction.is_finite() {
-        return significant(fraction, 2);
-    }
     let percent = 100.0 * fraction;
+    if !percent.is_finite() {
+        return significant(percent, 2);
+    }
+    if percent.abs() >= 1e4 {
+        return format!("{} %", significant(percent, 2));
+    }
     let decimals = usize::from(percent.abs() < 9.95);
     let text = fixed(percent, decimals);
     if percent > 0.0 { format!("+{text} %") } else { format!("{text} %") }

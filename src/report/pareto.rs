@@ -4,7 +4,8 @@ use super::axis::Axis;
 use super::color::{ACCENT, AXIS, BASE, BEST, FAINT, MUTED};
 use super::frame::Frame;
 use super::labels::LabelPlacer;
-use super::svg::{SMALL, Svg, TITLE, TextStyle, shortened, text_width};
+use super::svg::{SMALL, Svg, TITLE, TextStyle};
+use super::text::{shortened, text_width};
 
 /// What a point of the trade-off is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,7 +2,8 @@
 
 use super::color::{BASE, BEST, FAINT, MUTED};
 use super::number::significant;
-use super::svg::{NORMAL, SMALL, Svg, TITLE, TextStyle, shortened};
+use super::svg::{NORMAL, SMALL, Svg, TITLE, TextStyle};
+use super::text::shortened;
 
 /// One design with its two values.
 #[derive(Clone, Debug, Default)]

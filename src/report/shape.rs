@@ -2,7 +2,8 @@
 
 use super::color::{AXIS, ColorMap, FAINT, MUTED};
 use super::frame::draw_color_bar;
-use super::svg::{SMALL, Svg, TITLE, TextStyle, shortened};
+use super::svg::{SMALL, Svg, TITLE, TextStyle};
+use super::text::shortened;
 use std::collections::BTreeMap;
 
 /// A facet of the surface. The corners go around it; three corners are given by repeating the last.

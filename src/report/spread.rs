@@ -3,7 +3,8 @@
 use super::axis::Axis;
 use super::color::{AXIS, GRID, INK, MUTED, SERIES};
 use super::number::significant;
-use super::svg::{NORMAL, SMALL, Svg, TITLE, TextStyle, shortened, text_width};
+use super::svg::{NORMAL, SMALL, Svg, TITLE, TextStyle};
+use super::text::{shortened, text_width};
 
 /// One parameter of one specimen.
 #[derive(Clone, Debug, Default)]

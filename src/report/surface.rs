@@ -1,6 +1,6 @@
 //! The surface of a mesh as facets for [`super::DeformedShape`].
 
-use super::ShapeQuad;
+use super::{ReportError, ShapeQuad};
 use crate::mesh::{ElementKind, Mesh};
 use std::collections::BTreeMap;
 
@@ -69,6 +69,43 @@ pub fn surface_quads(
     quads
 }
 
+/// Values at the nodes from values at the quadrature points (element after element, in the order of
+/// [`ElementKind::quadrature`]): each element gives a node the value of its nearest quadrature point, and elements that
+/// share a node are averaged. For pictures; derivatives of the result mean nothing. Nodes without an element get NaN.
+///
+/// # Errors
+/// [`ReportError::LengthMismatch`].
+pub fn nodal_values(mesh: &Mesh, quadrature_values: &[f64]) -> Result<Vec<f64>, ReportError> {
+    let points = mesh.element_kind.quadrature();
+    let expected = points.len() * mesh.num_elements();
+    if quadrature_values.len() != expected {
+        let (name, found) = ("quadrature values".to_string(), quadrature_values.len());
+        return Err(ReportError::LengthMismatch { name, found, expected, of: "quadrature points" });
+    }
+    // Several points are equally near to some nodes of the prism: all of them count.
+    let nearest: Vec<Vec<usize>> = mesh
+        .element_kind
+        .node_coordinates()
+        .iter()
+        .map(|node| {
+            let squared = |q: usize| (0..3).map(|c| (points[q].0[c] - node[c]).powi(2)).sum::<f64>();
+            let least = (0..points.len()).map(squared).fold(f64::INFINITY, f64::min);
+            (0..points.len()).filter(|&q| squared(q) < least + 1e-9).collect()
+        })
+        .collect();
+    let mut sums = vec![(0.0, 0.0); mesh.nodes.len()];
+    for element in 0..mesh.num_elements() {
+        let values = &quadrature_values[element * points.len()..];
+        for (&node, near) in mesh.element(element).iter().zip(&nearest) {
+            if let Some((sum, count)) = sums.get_mut(node as usize) {
+                *sum += near.iter().map(|&q| values[q]).sum::<f64>() / near.len() as f64;
+                *count += 1.0;
+            }
+        }
+    }
+    Ok(sums.into_iter().map(|(sum, count)| if count > 0.0 { sum / count } else { f64::NAN }).collect())
+}
+
 /// Facets of a face as positions in its list of nodes.
 fn facets(kind: ElementKind, face: usize) -> &'static [[usize; 4]] {
     match (kind, face) {
@@ -99,6 +136,22 @@ mod tests {
             let total: f64 = quads.iter().map(|q| area(&q.reference)).sum();
             assert!((total - exact).abs() < 1e-12);
             assert!(quads.iter().all(|q| (q.current[2][0] - q.reference[2][0] - 0.5).abs() < 1e-15));
+        }
+    }
+
+    #[test]
+    fn nodes_take_the_nearest_quadrature_points() {
+        for kind in [ElementKind::Hex27, ElementKind::Prism21] {
+            let mesh = row_of_cells(kind, 2);
+            let values: Vec<f64> =
+                (0..2).flat_map(|e| kind.quadrature().into_iter().map(move |q| q.0[2] + 10.0 * f64::from(e))).collect();
+            let nodal = nodal_values(&mesh, &values).expect("right length");
+            for (n, value) in nodal.iter().enumerate() {
+                // Gauss points lie at √0.6 ζ: a node sees the sign of its own ζ, in its own element.
+                let exact = 0.6f64.sqrt() * mesh.nodes[n][2] + if 2 * n < nodal.len() { 0.0 } else { 10.0 };
+                assert!((value - exact).abs() < 1e-12, "{kind:?} {n}");
+            }
+            assert!(matches!(nodal_values(&mesh, &values[1..]), Err(ReportError::LengthMismatch { .. })));
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::ReportError;
 use super::base64::encode;
-use super::svg::escape;
+use super::text::escape;
 use super::vtu_cells::{cell_type, nodes_in_vtk_order};
 use crate::mesh::Mesh;
 use std::path::Path;

@@ -86,10 +86,9 @@ mod tests {
             assert_eq!(unique.len(), order.len());
             let x = kind.node_coordinates();
             for (m, of) in middles.iter().enumerate() {
-                for c in 0..3 {
-                    let mean = of.iter().map(|&n| x[order[n]][c]).sum::<f64>() / of.len() as f64;
-                    assert!((x[order[corners + m]][c] - mean).abs() < 1e-15, "{kind:?} node {}", corners + m);
-                }
+                let mean = [0, 1, 2].map(|c| of.iter().map(|&n| x[order[n]][c]).sum::<f64>() / of.len() as f64);
+                let found = x[order[corners + m]];
+                assert!((0..3).all(|c| (found[c] - mean[c]).abs() < 1e-15), "{kind:?} node {}", corners + m);
             }
         }
     }
