@@ -62,12 +62,12 @@ impl DeformedShape {
         let mut order: Vec<(f64, usize)> =
             quads.iter().enumerate().map(|(i, q)| (camera.depth(center(&q.current)), i)).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        svg.open_facets();
         for (_, i) in order {
             let quad = quads[i];
             let color = self.shaded(quad, &camera, range);
             let points = quad.current.map(|p| camera.project(p));
-            // The stroke in the fill's colour closes the hairline gaps that anti-aliasing leaves.
-            svg.polygon(&points, &color, &color, 0.6);
+            svg.facet(&points, &color);
             for c in 0..4 {
                 let (a, b) = (c, (c + 1) % 4);
                 if sharp.contains_key(&edge_key(quad.reference[a], quad.reference[b])) {
@@ -75,6 +75,7 @@ impl DeformedShape {
                 }
             }
         }
+        svg.close_group();
         svg.open_translucent(0.45);
         draw_ghost(&mut svg, MUTED, "3 3");
         svg.close_group();
