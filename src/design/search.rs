@@ -405,15 +405,18 @@ impl State {
         order
     }
 
-    /// The best candidates to refine, at most two of a structure.
+    /// The best candidates to refine, one of each structure as far as there are structures, best first.
     fn starts(&self, count: usize) -> Vec<(usize, Vec<f64>)> {
-        let mut used: Vec<usize> = Vec::new();
-        let mut starts = Vec::new();
-        for index in self.order() {
-            let space = self.points[index].0;
-            if starts.len() < count && used.iter().filter(|s| **s == space).count() < 2 {
-                used.push(space);
-                starts.push(self.points[index].clone());
+        let order = self.order();
+        let mut starts: Vec<(usize, Vec<f64>)> = Vec::new();
+        for per_structure in 1..=count.max(1) {
+            let mut used = std::collections::HashMap::new();
+            for &index in &order {
+                let seen: &mut usize = used.entry(self.points[index].0).or_default();
+                *seen += 1;
+                if starts.len() < count && *seen == per_structure {
+                    starts.push(self.points[index].clone());
+                }
             }
         }
         starts
@@ -429,8 +432,8 @@ impl State {
             let candidate = &self.candidates[index];
             by_count.entry(candidate.specimen.holes.len()).or_insert_with(|| candidate.specimen.clone());
             let count: &mut usize = per_space.entry(self.points[index].0).or_default();
-            // Near copies along one refinement teach nothing: three of a structure.
-            if finalists.len() < study.budget.confirm && *count < 3 {
+            // Near copies along one refinement teach nothing: four of a structure.
+            if finalists.len() < study.budget.confirm && *count < 4 {
                 *count += 1;
                 finalists.push(candidate.specimen.clone());
             }
