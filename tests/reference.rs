@@ -1,7 +1,11 @@
 //! Forces and displacements of an independent finite-element code (tests/data/reference, made with FElupe) reproduced.
 //!
-//! The bound on each difference is the reference's stated error plus our own discretisation error, estimated as the
-//! difference between the standard mesh and one 1.5 times coarser (first order or better: singular bonded edges).
+//! The bound on each force is the reference's stated error plus that of our standard mesh: 2.5 times the difference from
+//! a mesh 0.7 times as coarse (the factor for order 1.4; the bonded edges are singular). A displacement is compared as a
+//! vector, on the finer mesh, with three times the reference's stated error. Why three: the stated error is half a
+//! Richardson step per component, on sequences that are not monotone, and where symmetry gives the exact value
+//! (u_x(0) = drive/2, u_y = 0 on the planes of antisymmetry) the reference misses it by up to ten stated errors, as the
+//! last test shows; ours is exact there.
 
 mod common;
 
@@ -49,55 +53,61 @@ fn solved(specimen: &Specimen, material: &Ogden, factor: f64) -> Solved {
     Solved { model, locator, path }
 }
 
+/// Reference length of a vector of per-component errors.
+fn length(x: [f64; 3]) -> f64 {
+    x.iter().map(|v| v * v).sum::<f64>().sqrt()
+}
+
+fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|i| a[i] - b[i])
+}
+
+/// Error of the standard mesh over its difference from one with elements 0.7 times the size, at order 1.4.
+const FROM_DIFFERENCE: f64 = 2.5;
+
 fn check(name: &str, text: &str) {
     let reference: Value = serde_json::from_str(text).unwrap();
     let specimen = Specimen::from_json(&reference["specimen"].to_string()).unwrap();
     let material = Ogden::from_json(&reference["material"].to_string()).unwrap();
-    let [fine, coarse] = [1.0, 1.5].map(|factor| solved(&specimen, &material, factor));
+    let [standard, fine] = [1.0, 0.7].map(|factor| solved(&specimen, &material, factor));
     let mut failures = Vec::new();
     for (step, expected) in reference["extrapolated"].as_array().unwrap().iter().enumerate() {
         let drive = expected["drive_mm"].as_f64().unwrap();
         assert!((fine.path[step].drive_mm - drive).abs() < 1e-12);
-        let samples = f64::from(specimen.samples_in_parallel);
-        let mut compare = |what: String, stated: (f64, f64), ours: f64, other: f64| {
-            let (value, error) = stated;
-            let own = (ours - other).abs();
-            if (ours - value).abs() > error + own {
-                failures.push(format!("{what}: {ours:.6} ± {own:.1e}, reference {value:.6} ± {error:.1e}"));
-            }
-            (ours - value) / error
-        };
-        let stated = |v: &Value| (v["value"].as_f64().unwrap(), v["error"].as_f64().unwrap());
-        let force = stated(&expected["force_x_n"]);
-        let (ours, other) = (fine.path[step].force_n, coarse.path[step].force_n);
-        let units = compare(format!("{name} {drive} mm force"), force, ours, other);
-        let mut worst: (f64, String) = (0.0, String::new());
+        let force = &expected["force_x_n"];
+        let (value, error) = (force["value"].as_f64().unwrap(), force["error"].as_f64().unwrap());
+        let (ours, finer) = (standard.path[step].force_n, fine.path[step].force_n);
+        let own = FROM_DIFFERENCE * (ours - finer).abs();
+        if (ours - value).abs() > error + own {
+            failures.push(format!("{name} {drive} mm force {ours:.5} ± {own:.5}, reference {value:.5} ± {error:.5}"));
+        }
+        let mut worst = (0.0, 0.0, String::new());
         for (point, entry) in expected["u_mm"].as_object().unwrap() {
             let at = vector(&entry["at_mm"]);
-            let (value, error) = (vector(&entry["value"]), vector(&entry["error"]));
-            let [ours, other] =
-                [&fine, &coarse].map(|s| displacement_at(s.model.mesh(), &s.locator, &s.path[step], at));
-            for i in 0..3 {
-                let what = format!("{name} {drive} mm {point} u{}", ["x", "y", "z"][i]);
-                let units = compare(what, (value[i], error[i]), ours[i], other[i]);
-                if units.abs() > worst.0.abs() {
-                    worst = (units, format!("{point} u{} by {:.1e} mm", ["x", "y", "z"][i], ours[i] - value[i]));
-                }
+            let (value, error) = (vector(&entry["value"]), length(vector(&entry["error"])));
+            let [ours, finer] =
+                [&standard, &fine].map(|s| displacement_at(s.model.mesh(), &s.locator, &s.path[step], at));
+            let own = FROM_DIFFERENCE * length(minus(ours, finer));
+            let off = length(minus(finer, value));
+            if off > 3.0 * error + own {
+                failures.push(format!(
+                    "{name} {drive} mm {point}: {finer:.5?} ± {own:.1e}, reference {value:.5?} ± {error:.1e}, off {off:.1e}"
+                ));
+            }
+            if off / error > worst.0 {
+                worst = (off / error, off, point.clone());
             }
         }
-        let normal = expected["force_y_n_per_sample"].get("value").and_then(Value::as_f64);
-        let normal = normal.map_or(String::new(), |n| {
-            format!("; normal force {:.4} (reference {n:.4})", fine.path[step].normal_force_n / samples)
-        });
         println!(
-            "{name} {drive} mm: force {ours:.5} N, reference {:.5} ± {:.5} ({units:+.2} errors, {:+.3} %), own mesh \
-             error {:.4} N; worst displacement {:+.1} errors ({}){normal}",
-            force.0,
-            force.1,
-            100.0 * (ours / force.0 - 1.0),
-            (ours - other).abs(),
+            "{name} {drive} mm: force {ours:.5} (finer {finer:.5}) N, reference {value:.5} ± {error:.5}: {:+.2} ({:+.2}) \
+             errors, {:+.3} ({:+.3}) %; worst displacement {:.1} errors, {:.1e} mm at {}",
+            (ours - value) / error,
+            (finer - value) / error,
+            100.0 * (ours / value - 1.0),
+            100.0 * (finer / value - 1.0),
             worst.0,
-            worst.1
+            worst.1,
+            worst.2
         );
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
@@ -131,4 +141,22 @@ fn bar_one_term() {
 #[test]
 fn bar_two_terms() {
     check("bar-two", include_str!("data/reference/bar-two.json"));
+}
+
+/// The block with two holes is symmetric under a half turn about z once half of the drive is taken off, so the
+/// displacement at the centre is (drive/2, 0, 0) exactly. The reference misses it by several of its stated errors.
+#[test]
+fn stated_errors_of_displacements_are_too_small_where_the_answer_is_known() {
+    let reference: Value = serde_json::from_str(include_str!("data/reference/two_hole-two.json")).unwrap();
+    let mut worst = 0.0f64;
+    for step in reference["extrapolated"].as_array().unwrap() {
+        let exact = [0.5 * step["drive_mm"].as_f64().unwrap(), 0.0, 0.0];
+        let centre = &step["u_mm"]["centre"];
+        let (value, error) = (vector(&centre["value"]), vector(&centre["error"]));
+        for i in 0..3 {
+            worst = worst.max((value[i] - exact[i]).abs() / error[i]);
+        }
+    }
+    println!("the reference misses the exact displacement of the centre by up to {worst:.1} stated errors");
+    assert!(worst > 3.0);
 }
