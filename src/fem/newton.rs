@@ -274,7 +274,7 @@ impl ForwardModel {
         s.sqrt().max(1e-6)
     }
 
-    fn finish(&mut self, mut state: Equilibrium, residual: &[[f64; 3]]) -> Equilibrium {
+    pub(super) fn finish(&mut self, mut state: Equilibrium, residual: &[[f64; 3]]) -> Equilibrium {
         let moved = self.reaction(residual);
         let mut fixed = [0.0; 3];
         for &v in &self.mesh.fixed_nodes {
