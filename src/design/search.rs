@@ -93,6 +93,9 @@ pub struct Found {
     pub num_evaluations: usize,
 }
 
+/// Points of a refinement and what they were judged.
+type Log = Vec<(Vec<f64>, Option<Judged>)>;
+
 type Tried = Result<Evaluated, EvaluationFailure>;
 
 struct Search<'a> {
@@ -185,10 +188,10 @@ impl Search<'_> {
         let mut batch: Vec<(usize, Vec<f64>)> = Vec::new();
         for (index, space) in spaces.iter().enumerate() {
             for drive in [base.drive_mm[0], study.vary.drive_mm.max] {
-                if let Some(vector) = space.vector_of(base, drive) {
-                    if is_makeable(&space.specimen(&vector), &study.limits, study.scan.voxel_mm) {
-                        batch.push((index, vector));
-                    }
+                if let Some(vector) = space.vector_of(base, drive)
+                    && is_makeable(&space.specimen(&vector), &study.limits, study.scan.voxel_mm)
+                {
+                    batch.push((index, vector));
                 }
             }
         }
@@ -264,7 +267,7 @@ impl Search<'_> {
         let total = starts.len() * budget.iterations;
         let done = AtomicUsize::new(0);
         let best = state.history.last().copied();
-        let outcomes: Vec<(Vec<(Vec<f64>, Option<Judged>)>, bool)> = starts
+        let outcomes: Vec<(Log, bool)> = starts
             .par_iter()
             .map(|(index, start)| {
                 let problem = Problem {
@@ -460,7 +463,7 @@ struct Problem<'a> {
     search: &'a Search<'a>,
     reference: &'a Reference<'a>,
     subspace: &'a Subspace,
-    log: std::sync::Mutex<Vec<(Vec<f64>, Option<Judged>)>>,
+    log: std::sync::Mutex<Log>,
     was_stopped: std::sync::atomic::AtomicBool,
     on_evaluation: &'a (dyn Fn() + Sync),
 }

@@ -299,7 +299,14 @@ impl Subspace {
         if specimen.test != self.structure.test || specimen.holes.len() != self.structure.num_holes() {
             return None;
         }
-        if self.structure.mirrors != [false, false] || specimen.holes.iter().any(|h| h.axis != self.structure.axis) {
+        // Only orbits of one hole: then hole i is orbit i, if it lies on the mirror planes that the orbit lies on.
+        let is_simple = self.structure.orbits.iter().zip(&specimen.holes).all(|(orbit, hole)| {
+            self.structure.images(*orbit) == 1
+                && hole.axis == self.structure.axis
+                && (!orbit.on_x || hole.center_mm[0].abs() < 1e-9)
+                && (!orbit.on_other || hole.center_mm[1].abs() < 1e-9)
+        });
+        if !is_simple || self.structure.orbits.len() != specimen.holes.len() {
             return None;
         }
         let mut vector = Vec::with_capacity(self.variables.len());

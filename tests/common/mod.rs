@@ -118,7 +118,7 @@ pub fn cube(kind: ElementKind, n: usize, map: impl Fn(Vector) -> Vector) -> Mesh
             let node = *known.entry(key).or_insert(next);
             if node == next {
                 mesh.nodes.push(map(p));
-                if p.iter().any(|&v| v < 1e-9 || v > 1.0 - 1e-9) {
+                if p.iter().any(|&v| !(1e-9..=1.0 - 1e-9).contains(&v)) {
                     mesh.fixed_nodes.push(node);
                 }
             }

@@ -3,6 +3,7 @@
 use super::super::continuum::tests::block;
 use super::super::information::tests::one_term;
 use super::*;
+use crate::mesh::mesh_specimen;
 use crate::voxel::VoxelOperator;
 
 fn scan() -> ScanSettings {
