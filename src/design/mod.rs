@@ -1,1 +1,6 @@
-//! design
+//! The design of specimens.
+
+mod local;
+mod qp;
+mod space;
+mod study;

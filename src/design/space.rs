@@ -1,0 +1,325 @@
+//! The search space: a few discrete structures (kind of test, direction and symmetry orbits of the holes), each with a
+//! continuous vector.
+//!
+//! Holes come in orbits under the study's mirrors: a hole on a mirror plane is its own image, others bring theirs along.
+
+use super::study::{Range, Study};
+use crate::mesh::DesignVariable;
+use crate::specimen::{Hole, HoleAxis, Specimen, Symmetry, TestKind};
+
+/// One orbit of holes: which of its two coordinates are held at zero by lying on a mirror.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Orbit {
+    /// x = 0.
+    pub on_x: bool,
+    /// Other coordinate = 0.
+    pub on_other: bool,
+}
+
+/// A discrete choice.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Structure {
+    /// Kind of test.
+    pub test: TestKind,
+    /// Direction of the holes.
+    pub axis: HoleAxis,
+    /// Orbits, sorted.
+    pub orbits: Vec<Orbit>,
+    mirrors: [bool; 2],
+}
+
+/// One component of the continuous vector.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Variable {
+    /// x of an orbit.
+    X(usize),
+    /// Other coordinate of an orbit.
+    Other(usize),
+    /// Diameter of an orbit.
+    Diameter(usize),
+    /// Drive.
+    Drive,
+    /// Length of the block.
+    Length,
+    /// Thickness of the block.
+    Thickness,
+    /// Width of the block.
+    Width,
+}
+
+/// A structure with the ranges of its variables.
+#[derive(Clone, Debug)]
+pub struct Subspace {
+    /// The discrete choice.
+    pub structure: Structure,
+    /// Variables in order.
+    pub variables: Vec<Variable>,
+    /// Their ranges.
+    pub ranges: Vec<Range>,
+    /// Diameters that exist, where only some do.
+    pub punches_mm: Option<Vec<f64>>,
+    template: Specimen,
+}
+
+impl Structure {
+    /// Number of holes.
+    pub fn num_holes(&self) -> usize {
+        self.orbits.iter().map(|o| self.images(*o)).sum()
+    }
+
+    fn images(&self, orbit: Orbit) -> usize {
+        let double = |mirror: bool, on: bool| if mirror && !on { 2 } else { 1 };
+        double(self.mirrors[0], orbit.on_x) * double(self.mirrors[1], orbit.on_other)
+    }
+}
+
+/// All structures of a study, fewest holes first.
+pub fn subspaces(study: &Study) -> Vec<Subspace> {
+    let axes = if study.vary.axes.is_empty() {
+        vec![study.base.hole_axis().unwrap_or(HoleAxis::Thickness)]
+    } else {
+        study.vary.axes.clone()
+    };
+    let max_holes = study.limits.max_holes.unwrap_or(usize::MAX).min(study.vary.hole_count.max);
+    let mut all = Vec::new();
+    for test in study.tests() {
+        let mut has_solid = false;
+        for &axis in &axes {
+            let mirrors = mirrors_of(study.limits.symmetry, axis);
+            let kinds = orbit_kinds(mirrors);
+            let mut stack = vec![Vec::new()];
+            let mut lists: Vec<Vec<Orbit>> = Vec::new();
+            while let Some(list) = stack.pop() {
+                let structure = Structure { test, axis, orbits: list.clone(), mirrors };
+                if structure.num_holes() > max_holes {
+                    continue;
+                }
+                if structure.num_holes() >= study.vary.hole_count.min {
+                    lists.push(list.clone());
+                }
+                for kind in &kinds {
+                    // Sorted lists only: the order of orbits does not matter. One centre holds one hole.
+                    let is_repeated_centre = kind.on_x && kind.on_other && list.last() == Some(kind);
+                    if list.last().is_none_or(|last| last <= kind) && !is_repeated_centre {
+                        let mut longer = list.clone();
+                        longer.push(*kind);
+                        stack.push(longer);
+                    }
+                }
+            }
+            for orbits in lists {
+                if orbits.is_empty() && std::mem::replace(&mut has_solid, true) {
+                    continue;
+                }
+                all.push(Subspace::new(study, Structure { test, axis, orbits, mirrors }));
+            }
+        }
+    }
+    all.sort_by_key(|s| s.structure.num_holes());
+    all
+}
+
+/// Which mirrors act on (x, other).
+fn mirrors_of(symmetry: Symmetry, axis: HoleAxis) -> [bool; 2] {
+    let x = matches!(symmetry, Symmetry::MirrorX | Symmetry::MirrorXAndZ | Symmetry::MirrorXAndY);
+    // Holes along the width are symmetric in z anyway.
+    let other = match axis {
+        HoleAxis::Thickness => matches!(symmetry, Symmetry::MirrorZ | Symmetry::MirrorXAndZ),
+        HoleAxis::Width => matches!(symmetry, Symmetry::MirrorY | Symmetry::MirrorXAndY),
+    };
+    [x, other]
+}
+
+fn orbit_kinds(mirrors: [bool; 2]) -> Vec<Orbit> {
+    let choices = |mirror: bool| if mirror { vec![false, true] } else { vec![false] };
+    let mut kinds = Vec::new();
+    for on_x in choices(mirrors[0]) {
+        for on_other in choices(mirrors[1]) {
+            kinds.push(Orbit { on_x, on_other });
+        }
+    }
+    kinds.sort();
+    kinds
+}
+
+impl Subspace {
+    fn new(study: &Study, structure: Structure) -> Subspace {
+        let mut template = study.base.clone();
+        template.test = structure.test;
+        let vary = &study.vary;
+        let (length, thickness, width) = (
+            vary.length_mm.map_or(template.block.length_mm, |r| r.max),
+            vary.thickness_mm.map_or(template.block.thickness_mm, |r| r.max),
+            vary.width_mm.map_or(template.block.width_mm, |r| r.max),
+        );
+        let other = match structure.axis {
+            HoleAxis::Thickness => width,
+            HoleAxis::Width => thickness,
+        };
+        let smallest_other = match structure.axis {
+            HoleAxis::Thickness => other,
+            HoleAxis::Width => other.min(thickness),
+        };
+        let edge = study.limits.min_ligament_hole_edge_mm;
+        let diameter = match (&study.limits.diameter_mm, &study.limits.punches_mm) {
+            (Some(d), _) => Range { min: d.min, max: d.max },
+            (_, Some(p)) => Range {
+                min: p.iter().copied().fold(f64::INFINITY, f64::min),
+                max: p.iter().copied().fold(0.0, f64::max),
+            },
+            _ => Range { min: 0.5, max: smallest_other },
+        };
+        // A hole wider than the section less its two ligaments cannot be made.
+        let widest = diameter.max.min(smallest_other - 2.0 * edge);
+        let diameter = Range { min: diameter.min, max: widest.max(diameter.min) };
+        let (mut variables, mut ranges) = (Vec::new(), Vec::new());
+        for (index, orbit) in structure.orbits.iter().enumerate() {
+            if !orbit.on_x {
+                let half = 0.5 * (length - diameter.min) - edge;
+                variables.push(Variable::X(index));
+                ranges.push(Range { min: if structure.mirrors[0] { 0.0 } else { -half }, max: half });
+            }
+            if !orbit.on_other {
+                let half = (0.5 * (other - diameter.min) - edge).max(0.0);
+                variables.push(Variable::Other(index));
+                ranges.push(Range { min: if structure.mirrors[1] { 0.0 } else { -half }, max: half });
+            }
+            variables.push(Variable::Diameter(index));
+            ranges.push(diameter);
+        }
+        for (variable, interval) in [
+            (Variable::Drive, Some(vary.drive_mm)),
+            (Variable::Length, vary.length_mm),
+            (Variable::Thickness, vary.thickness_mm),
+            (Variable::Width, vary.width_mm),
+        ] {
+            if let Some(interval) = interval {
+                variables.push(variable);
+                ranges.push(interval);
+            }
+        }
+        Subspace { structure, variables, ranges, punches_mm: study.limits.punches_mm.clone(), template }
+    }
+
+    /// The specimen of a vector with components in [0, 1]. A punched diameter is the nearest punch.
+    pub fn specimen(&self, vector: &[f64]) -> Specimen {
+        let mut specimen = self.template.clone();
+        let mut orbits = vec![([0.0; 2], 0.0); self.structure.orbits.len()];
+        for ((variable, range), t) in self.variables.iter().zip(&self.ranges).zip(vector) {
+            let value = range.min + t.clamp(0.0, 1.0) * (range.max - range.min);
+            match *variable {
+                Variable::X(o) => orbits[o].0[0] = value,
+                Variable::Other(o) => orbits[o].0[1] = value,
+                Variable::Diameter(o) => orbits[o].1 = self.nearest_punch(value),
+                Variable::Drive => specimen.drive_mm = vec![value],
+                Variable::Length => specimen.block.length_mm = value,
+                Variable::Thickness => specimen.block.thickness_mm = value,
+                Variable::Width => specimen.block.width_mm = value,
+            }
+        }
+        specimen.holes.clear();
+        for (orbit, (center, diameter_mm)) in self.structure.orbits.iter().zip(&orbits) {
+            for signs in self.image_signs(*orbit) {
+                specimen.holes.push(Hole {
+                    axis: self.structure.axis,
+                    center_mm: [signs[0] * center[0], signs[1] * center[1]],
+                    diameter_mm: *diameter_mm,
+                });
+            }
+        }
+        let count = specimen.holes.len();
+        let kind = match specimen.test {
+            TestKind::DoubleLapShear => "double-lap shear",
+            TestKind::Uniaxial => "uniaxial",
+        };
+        let direction = match self.structure.axis {
+            HoleAxis::Thickness => "thickness",
+            HoleAxis::Width => "width",
+        };
+        specimen.name = match count {
+            0 => format!("{kind}, solid"),
+            1 => format!("{kind}, 1 hole along the {direction}"),
+            n => format!("{kind}, {n} holes along the {direction}"),
+        };
+        specimen
+    }
+
+    /// Signs of the images of an orbit.
+    fn image_signs(&self, orbit: Orbit) -> Vec<[f64; 2]> {
+        let signs = |mirror: bool, on: bool| if mirror && !on { vec![1.0, -1.0] } else { vec![1.0] };
+        let mut all = Vec::new();
+        for sx in signs(self.structure.mirrors[0], orbit.on_x) {
+            for so in signs(self.structure.mirrors[1], orbit.on_other) {
+                all.push([sx, so]);
+            }
+        }
+        all
+    }
+
+    fn nearest_punch(&self, diameter: f64) -> f64 {
+        match &self.punches_mm {
+            None => diameter,
+            Some(list) => list
+                .iter()
+                .copied()
+                .min_by(|a, b| (a - diameter).abs().total_cmp(&(b - diameter).abs()))
+                .unwrap_or(diameter),
+        }
+    }
+
+    /// Whether a variable moves freely (a punched diameter does not).
+    pub fn is_continuous(&self, index: usize) -> bool {
+        self.punches_mm.is_none() || !matches!(self.variables[index], Variable::Diameter(_))
+    }
+
+    /// What a variable moves in the specimen, with signs; empty for the drive.
+    pub fn moves(&self, variable: Variable) -> Vec<(DesignVariable, f64)> {
+        let first =
+            |orbit: usize| -> usize { self.structure.orbits[..orbit].iter().map(|o| self.structure.images(*o)).sum() };
+        let of_orbit = |orbit: usize, make: fn(usize) -> DesignVariable, component: Option<usize>| {
+            self.image_signs(self.structure.orbits[orbit])
+                .iter()
+                .enumerate()
+                .map(|(i, signs)| (make(first(orbit) + i), component.map_or(1.0, |c| signs[c])))
+                .collect()
+        };
+        match variable {
+            Variable::X(o) => of_orbit(o, DesignVariable::HoleX, Some(0)),
+            Variable::Other(o) => of_orbit(o, DesignVariable::HoleOther, Some(1)),
+            Variable::Diameter(o) => of_orbit(o, DesignVariable::HoleDiameter, None),
+            Variable::Drive => Vec::new(),
+            Variable::Length => vec![(DesignVariable::BlockLength, 1.0)],
+            Variable::Thickness => vec![(DesignVariable::BlockThickness, 1.0)],
+            Variable::Width => vec![(DesignVariable::BlockWidth, 1.0)],
+        }
+    }
+
+    /// The vector of a specimen of this structure, or `None` where it is of another one or out of range.
+    pub fn vector_of(&self, specimen: &Specimen, drive_mm: f64) -> Option<Vec<f64>> {
+        if specimen.test != self.structure.test || specimen.holes.len() != self.structure.num_holes() {
+            return None;
+        }
+        if self.structure.mirrors != [false, false] || specimen.holes.iter().any(|h| h.axis != self.structure.axis) {
+            return None;
+        }
+        let mut vector = Vec::with_capacity(self.variables.len());
+        for (variable, range) in self.variables.iter().zip(&self.ranges) {
+            let value = match *variable {
+                Variable::X(o) => specimen.holes[o].center_mm[0],
+                Variable::Other(o) => specimen.holes[o].center_mm[1],
+                Variable::Diameter(o) => specimen.holes[o].diameter_mm,
+                Variable::Drive => drive_mm,
+                Variable::Length => specimen.block.length_mm,
+                Variable::Thickness => specimen.block.thickness_mm,
+                Variable::Width => specimen.block.width_mm,
+            };
+            let width = (range.max - range.min).max(1e-12);
+            let t = (value - range.min) / width;
+            if !(-1e-9..=1.0 + 1e-9).contains(&t) {
+                return None;
+            }
+            vector.push(t.clamp(0.0, 1.0));
+        }
+        Some(vector)
+    }
+}
