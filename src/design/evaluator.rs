@@ -12,9 +12,7 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "snake_case")]
 pub enum Fidelity {
     /// Coarse mesh, integrals over the specimen, central values of the priors.
-    Explore,
-    /// Coarse mesh, integrals over the specimen, all material states.
-    Refine,
+    Search,
     /// Standard mesh, sums over the scan's voxels, all material states.
     Confirm,
 }
@@ -30,14 +28,14 @@ pub struct MaterialState {
     pub weight: f64,
 }
 
-/// The states of a study at a fidelity: for each prior its central values, then (not when exploring) two sigma points.
+/// The states of a study at a fidelity: for each prior its central values, then (to confirm) two sigma points.
 ///
 /// The sigma points stand at all α (1 ± r) and all μ (1 ∓ r), r the relative standard deviation: the direction along which
 /// a fit of the initial shear modulus ½ Σ μα leaves them free. Weights ½, ¼, ¼.
 pub fn material_states(study: &Study, fidelity: Fidelity) -> Vec<MaterialState> {
     let mut states = Vec::new();
     for (material, prior) in study.materials.iter().enumerate() {
-        let is_robust = fidelity != Fidelity::Explore && prior.relative_sd > 0.0;
+        let is_robust = fidelity == Fidelity::Confirm && prior.relative_sd > 0.0;
         let central = if is_robust { 0.5 } else { 1.0 };
         states.push(MaterialState { material, values: prior.material.clone(), weight: central });
         if is_robust {
@@ -60,7 +58,7 @@ pub fn material_states(study: &Study, fidelity: Fidelity) -> Vec<MaterialState> 
 pub struct StateOutcome {
     /// 𝒮 of μ₁, α₁, μ₂, … in the study's normalisation.
     pub integrated: Vec<f64>,
-    /// Fisher information of κ, μ₁, α₁, …, row by row, in the parameters' units.
+    /// Fisher information of κ, μ₁, α₁, …, row by row, in the parameters' units; in rates it may be empty (not computed).
     pub information: Vec<f64>,
     /// Force of all samples, N.
     pub force_n: f64,
@@ -141,7 +139,8 @@ pub trait Evaluator: Sync {
         is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Outcome, EvaluationFailure>;
 
-    /// At [`Fidelity::Refine`], with derivatives.
+    /// At [`Fidelity::Search`], with derivatives; those of the information only where `needs_information` of the outcome
+    /// (they cost most), else they are left empty.
     ///
     /// # Errors
     /// [`EvaluationFailure`].
@@ -149,6 +148,7 @@ pub trait Evaluator: Sync {
         &self,
         specimen: &Specimen,
         motions: &[Motion],
+        needs_information: &(dyn Fn(&Outcome) -> bool + Sync),
         is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<OutcomeWithRates, EvaluationFailure>;
 }

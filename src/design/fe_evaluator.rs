@@ -33,6 +33,7 @@ struct Move {
 }
 
 type Cancel<'a> = &'a (dyn Fn() -> bool + Sync);
+type Needs<'a> = &'a (dyn Fn(&Outcome) -> bool + Sync);
 
 impl<'a> FeEvaluator<'a> {
     /// With search and standard meshes.
@@ -76,12 +77,13 @@ impl<'a> FeEvaluator<'a> {
         specimen: &Specimen,
         states: &[MaterialState],
         motions: &[Motion],
+        needs_information: Needs,
         is_cancelled: Cancel,
     ) -> Result<OutcomeWithRates, EvaluationFailure> {
         let mut model = self.search_model(specimen)?;
         let moves: Vec<Move> =
             motions.iter().map(|m| Move { velocity: velocity(&model, specimen, m), drive_mm: m.drive_mm }).collect();
-        self.search_on(&mut model, drive_of(specimen)?, states, &moves, is_cancelled)
+        self.search_on(&mut model, drive_of(specimen)?, states, &moves, needs_information, is_cancelled)
     }
 
     /// As [`Self::search`] on a model.
@@ -91,11 +93,11 @@ impl<'a> FeEvaluator<'a> {
         drive: f64,
         states: &[MaterialState],
         motions: &[Move],
+        needs_information: Needs,
         is_cancelled: Cancel,
     ) -> Result<OutcomeWithRates, EvaluationFailure> {
-        let differentiator = (!motions.is_empty()).then(|| Differentiator::new(model.mesh()));
         let mut outcome = Outcome::default();
-        let mut rates: Vec<Vec<StateOutcome>> = motions.iter().map(|_| Vec::new()).collect();
+        let mut solved = Vec::with_capacity(states.len());
         let mut last: Option<Equilibrium> = None;
         for state in states {
             let found = self.solve(model, state, drive, last.as_ref(), is_cancelled)?;
@@ -118,30 +120,32 @@ impl<'a> FeEvaluator<'a> {
                 force_n: found.force_n,
                 largest_stretch: largest_principal_stretch(&points),
             });
-            if let Some(differentiator) = &differentiator {
-                for (m, motion) in motions.iter().enumerate() {
-                    if is_cancelled() {
-                        return Err(EvaluationFailure::Cancelled);
-                    }
-                    let velocity = motion.velocity.as_deref();
-                    let path = model
-                        .path_sensitivity(material, &found, &sensitivities, velocity, motion.drive_mm)
-                        .map_err(of_solving)?;
-                    rates[m].push(differentiator.rate(
-                        &StateAt {
-                            study: self.study,
-                            material,
-                            mesh: model.mesh(),
-                            points: &points,
-                            sensitivities: &sensitivities,
-                            integrated: &integrated,
-                        },
-                        velocity,
-                        &path,
-                    ));
-                }
+            last = Some(found.clone());
+            if !motions.is_empty() {
+                solved.push((found, sensitivities, points, integrated));
             }
-            last = Some(found);
+        }
+        let mut rates: Vec<Vec<StateOutcome>> = motions.iter().map(|_| Vec::new()).collect();
+        if motions.is_empty() {
+            return Ok(OutcomeWithRates { outcome, rates });
+        }
+        let with_information = needs_information(&outcome);
+        let differentiator = Differentiator::new(model.mesh());
+        for (state, (found, sensitivities, points, integrated)) in states.iter().zip(&solved) {
+            let material = &state.values;
+            let sensitivities = if with_information { &sensitivities[..] } else { &[] };
+            for (motion, rates) in motions.iter().zip(&mut rates) {
+                if is_cancelled() {
+                    return Err(EvaluationFailure::Cancelled);
+                }
+                let velocity = motion.velocity.as_deref();
+                let path = model
+                    .path_sensitivity(material, found, sensitivities, velocity, motion.drive_mm)
+                    .map_err(of_solving)?;
+                let mesh = model.mesh();
+                let at = StateAt { study: self.study, material, mesh, points, sensitivities, integrated };
+                rates.push(differentiator.rate(&at, velocity, &path));
+            }
         }
         Ok(OutcomeWithRates { outcome, rates })
     }
@@ -232,17 +236,18 @@ impl Evaluator for FeEvaluator<'_> {
             return self.confirm(specimen, is_cancelled);
         }
         let states = material_states(self.study, fidelity);
-        Ok(self.search(specimen, &states, &[], is_cancelled)?.outcome)
+        Ok(self.search(specimen, &states, &[], &|_| false, is_cancelled)?.outcome)
     }
 
     fn evaluate_with_rates(
         &self,
         specimen: &Specimen,
         motions: &[Motion],
+        needs_information: Needs,
         is_cancelled: Cancel,
     ) -> Result<OutcomeWithRates, EvaluationFailure> {
-        let states = material_states(self.study, Fidelity::Refine);
-        self.search(specimen, &states, motions, is_cancelled)
+        let states = material_states(self.study, Fidelity::Search);
+        self.search(specimen, &states, motions, needs_information, is_cancelled)
     }
 }
 

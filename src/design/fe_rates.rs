@@ -123,6 +123,9 @@ impl Differentiator {
             if n == most {
                 largest_stretch = stretch_rate(f, &rate);
             }
+            if num == 0 {
+                continue;
+            }
             self.gather(at, n % rule, point.element, root, &path.parameters, (&mut local, &mut local_rate));
             for i in 0..num {
                 for j in 0..=i {

@@ -234,6 +234,7 @@ impl<'a> Judge<'a> {
         for (s, state) in self.states.iter().enumerate() {
             let covariance = RelativeCovariance::of(&state.values, &outcome.states[s].information)?;
             let n = outcome.states[s].information.len();
+            // A criterion's gradient needs every derivative of the information.
             if rates.iter().any(|r| r[s].information.len() != n) {
                 return None;
             }
@@ -290,14 +291,14 @@ impl<'a> Judge<'a> {
             let Some(base) = &self.base_log_sds[material] else { continue };
             let covariance = RelativeCovariance::of(&self.states[s].values, &outcome.states[s].information);
             let size = outcome.states[s].information.len();
-            let rows: Vec<Vec<f64>> = match &covariance {
-                Some(c) => rates
-                    .iter()
-                    .filter(|r| r[s].information.len() == size)
-                    .map(|r| c.log_sd_rates(&c.change(&r[s].information)))
-                    .collect(),
-                None => vec![vec![0.0; base.len()]; rates.len()],
-            };
+            // Derivatives that were left out belong to margins that are far from active: zero will do.
+            let rows: Vec<Vec<f64>> = rates
+                .iter()
+                .map(|r| match &covariance {
+                    Some(c) if r[s].information.len() == size => c.log_sd_rates(&c.change(&r[s].information)),
+                    _ => vec![0.0; base.len()],
+                })
+                .collect();
             for (i, name) in self.names(material).iter().enumerate() {
                 let prior = &self.study.materials[material].name;
                 // What the base determines and the design does not counts as worse by a factor e.
@@ -312,6 +313,19 @@ impl<'a> Judge<'a> {
                 });
             }
         }
+    }
+
+    /// Whether derivatives of the information matter at an outcome: always under a criterion of the covariance; else
+    /// where a guarded standard deviation comes within 20 % of the base's.
+    pub fn needs_information(&self, outcome: &Outcome) -> bool {
+        if self.study.objective.kind != ObjectiveKind::IntegratedSensitivity {
+            return true;
+        }
+        let mut guards = Vec::new();
+        if self.study.objective.guard_promised_sd && outcome.states.len() == self.states.len() {
+            self.push_guards(outcome, &[], &mut guards);
+        }
+        guards.iter().any(|g| g.linear.value < 0.2)
     }
 
     /// Relative standard deviations of μ₁, α₁, … at the central values of a material.
