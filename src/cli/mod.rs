@@ -3,11 +3,13 @@
 //! Results on stdout (`--json` for machines), progress on stderr, files in a folder. Exit codes: 0 done, 2 bad input,
 //! 3 no solution found, 4 a file cannot be written, 130 stopped by Ctrl-C.
 
+mod design;
 mod error;
 mod evaluate;
 mod input;
 mod interrupt;
 mod output;
+mod progress;
 mod solve;
 
 use clap::{Args, Parser, Subcommand};
@@ -34,6 +36,8 @@ enum Command {
     Solve(solve::SolveArguments),
     /// What a scan of a specimen would see, and what it would tell about the material.
     Evaluate(evaluate::EvaluateArguments),
+    /// The best specimen under the limits of a study, with the evidence.
+    Design(design::DesignArguments),
 }
 
 /// What every command takes.
@@ -84,6 +88,7 @@ pub fn run() -> ExitCode {
     let result = match &arguments.command {
         Command::Solve(a) => solve::run(a),
         Command::Evaluate(a) => evaluate::run(a),
+        Command::Design(a) => design::run(a),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

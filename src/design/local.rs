@@ -1,351 +1,374 @@
-//! Local search: sequential quadratic programming in a box-shaped trust region.
+//! Local improvement: sequential quadratic programming in a trust region, subproblems by Clarabel.
 //!
-//! maximise minᵢ fᵢ(x) subject to cⱼ(x) ≥ 0 (from the evaluation, approached from outside), gₖ(x) ≥ 0 (geometry, never
-//! violated by an iterate) and 0 ≤ x ≤ 1. The smallest component is kept smooth by its epigraph (see [`super::qp`]);
-//! curvature comes from damped BFGS updates of the Lagrangian; steps are judged by the merit
-//! φ = minᵢ fᵢ − ρ Σ max(0, −cⱼ). A failed evaluation or subproblem shrinks the region.
+//! Maximise t − ½ δᵀ B δ − ρ Σ slack over the step δ (scaled variables), with t below every linearised gain (or equal to
+//! their weighted mean), the linearised geometry margins kept exactly, the response margins up to a penalised slack, bounds
+//! and ‖δ‖∞ ≤ Δ. B is a damped BFGS approximation of the curvature of the Lagrangian. Every iterate keeps the geometry
+//! limits: a step that breaks one is shortened. A failed evaluation shortens the step as well.
 
-use super::qp::{Linear, Step, Subproblem, dot, solve};
+use clarabel::algebra::CscMatrix;
+use clarabel::solver::{
+    DefaultSettingsBuilder, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus, SupportedConeT,
+};
+use nalgebra::{DMatrix, DVector};
 
-/// What one evaluation yields.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct LocalPoint {
-    /// fᵢ: the least is maximised.
-    pub components: Vec<Linear>,
-    /// cⱼ ≥ 0.
-    pub constraints: Vec<Linear>,
-}
-
-/// A problem for [`maximise`].
-pub trait LocalProblem {
-    /// Why an evaluation fails.
-    type Failure;
-
-    /// Number of variables, each in [0, 1].
-    fn dimension(&self) -> usize;
-
-    /// Which variables may move.
-    fn is_free(&self, index: usize) -> bool;
-
-    /// gₖ with gradients; cheap.
-    fn margins(&self, x: &[f64]) -> Vec<Linear>;
-
-    /// fᵢ and cⱼ with gradients; expensive.
-    ///
-    /// # Errors
-    /// Any failure: the step is shrunk.
-    fn evaluate(&self, x: &[f64]) -> Result<LocalPoint, Self::Failure>;
-
-    /// Asked before each evaluation.
-    fn is_cancelled(&self) -> bool {
-        false
-    }
-}
-
-/// Settings of [`maximise`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LocalOptions {
-    /// Evaluations after the first.
-    pub max_evaluations: usize,
-    /// First half-width of the trust region, in units of the variables' ranges.
-    pub first_radius: f64,
-    /// The search ends when the region is smaller.
-    pub min_radius: f64,
-    /// The search ends when less than this is to be gained by the model.
-    pub min_gain: f64,
-    /// A constraint counts as kept from −this on.
-    pub tolerance: f64,
-}
-
-impl Default for LocalOptions {
-    fn default() -> Self {
-        LocalOptions { max_evaluations: 30, first_radius: 0.15, min_radius: 1e-3, min_gain: 1e-5, tolerance: 1e-4 }
-    }
-}
-
-/// Why a local search ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LocalEnd {
-    /// The model promises no further gain.
-    Converged,
-    /// The trust region became too small.
-    SmallRegion,
-    /// The evaluations were used up.
-    Budget,
-    /// The start violates the geometry, or its evaluation failed.
-    BadStart,
-    /// Stopped from outside.
-    Cancelled,
-}
-
-/// Result of [`maximise`].
+/// Values and gradients at a point. Gradients are per unit of the scaled variables.
 #[derive(Clone, Debug)]
-pub struct LocalResult {
-    /// The best point found that keeps all constraints, else the one with the best merit.
-    pub best: Vec<f64>,
-    /// minᵢ fᵢ there; −∞ where nothing was evaluated.
-    pub value: f64,
-    /// Σ max(0, −cⱼ) there.
-    pub violation: f64,
-    /// Evaluations made, the first included.
-    pub num_evaluations: usize,
-    /// Evaluations that failed.
-    pub num_failures: usize,
-    /// Why it ended.
-    pub end: LocalEnd,
+pub struct LocalModel {
+    /// Gains; the objective is their minimum (`weights` empty) or weighted mean.
+    pub gains: Vec<f64>,
+    /// Weights of a mean; empty for the minimum.
+    pub weights: Vec<f64>,
+    /// Response margins, to be ≥ 0.
+    pub margins: Vec<f64>,
+    /// `[gain][variable]`.
+    pub gain_gradients: Vec<Vec<f64>>,
+    /// `[margin][variable]`.
+    pub margin_gradients: Vec<Vec<f64>>,
 }
 
-/// Largest penalty ρ.
-const MAX_PENALTY: f64 = 1e4;
-/// First penalty: constraints are relative margins and components logarithms, whose exchange rate is of order one.
-const FIRST_PENALTY: f64 = 10.0;
-
-fn least(components: &[Linear]) -> f64 {
-    components.iter().map(|f| f.value).fold(f64::INFINITY, f64::min)
-}
-
-fn violation(constraints: &[Linear]) -> f64 {
-    constraints.iter().map(|c| (-c.value).max(0.0)).sum()
-}
-
-fn is_kept(constraints: &[Linear], tolerance: f64) -> bool {
-    constraints.iter().all(|c| c.value >= -tolerance)
-}
-
-struct Best {
-    x: Vec<f64>,
-    value: f64,
-    violation: f64,
-    is_kept: bool,
-}
-
-impl Best {
-    fn offer(&mut self, x: &[f64], point: &LocalPoint, tolerance: f64) {
-        let (value, violation) = (least(&point.components), violation(&point.constraints));
-        let is_kept = is_kept(&point.constraints, tolerance);
-        let is_better = match (is_kept, self.is_kept) {
-            (true, false) => true,
-            (false, true) => false,
-            (true, true) => value > self.value,
-            (false, false) => violation < self.violation || self.value == f64::NEG_INFINITY,
-        };
-        if is_better {
-            *self = Best { x: x.to_vec(), value, violation, is_kept };
+impl LocalModel {
+    fn objective(&self) -> f64 {
+        if self.weights.is_empty() {
+            self.gains.iter().copied().fold(f64::INFINITY, f64::min)
+        } else {
+            self.gains.iter().zip(&self.weights).map(|(g, w)| g * w).sum()
         }
+    }
+
+    /// Objective less the penalty on broken response margins.
+    pub fn merit(&self) -> f64 {
+        self.objective() - PENALTY * self.margins.iter().map(|m| (-m).max(0.0)).sum::<f64>()
     }
 }
 
-/// Maximises from `start`, which must keep the geometry margins.
-pub fn maximise<P: LocalProblem>(problem: &P, start: &[f64], options: &LocalOptions) -> LocalResult {
-    let n = problem.dimension();
+/// Weight of a broken response margin (both are logarithms of ratios).
+const PENALTY: f64 = 10.0;
+
+/// The problem that [`improve`] works on.
+pub trait LocalProblem {
+    /// Values and gradients at `x`; `None` where the evaluation fails.
+    fn model(&self, x: &[f64]) -> Option<LocalModel>;
+    /// Geometry margins at `x` (≥ 0 where they are kept): cheap, called often.
+    fn geometry(&self, x: &[f64]) -> Vec<f64>;
+    /// Variables that may move.
+    fn is_free(&self, index: usize) -> bool;
+}
+
+/// Settings of [`improve`].
+#[derive(Clone, Copy, Debug)]
+pub struct LocalSettings {
+    /// Evaluations.
+    pub max_evaluations: usize,
+    /// First trust region, in scaled variables.
+    pub radius: f64,
+    /// Trust region at which to stop.
+    pub smallest_radius: f64,
+}
+
+impl Default for LocalSettings {
+    fn default() -> Self {
+        LocalSettings { max_evaluations: 12, radius: 0.15, smallest_radius: 2e-3 }
+    }
+}
+
+/// Result of [`improve`].
+#[derive(Clone, Debug)]
+pub struct Improved {
+    /// Best point.
+    pub x: Vec<f64>,
+    /// Its merit.
+    pub merit: f64,
+    /// Merit after each evaluation.
+    pub history: Vec<f64>,
+}
+
+/// Improves `start`, which must keep the geometry limits. `None` where it cannot be evaluated.
+pub fn improve(problem: &dyn LocalProblem, start: &[f64], settings: &LocalSettings) -> Option<Improved> {
+    let n = start.len();
     let mut x = start.to_vec();
-    let mut best = Best { x: x.clone(), value: f64::NEG_INFINITY, violation: f64::INFINITY, is_kept: false };
-    let (mut evaluations, mut failures) = (0, 0);
-    let finish = |best: Best, evaluations, failures, end| LocalResult {
-        best: best.x,
-        value: best.value,
-        violation: best.violation,
-        num_evaluations: evaluations,
-        num_failures: failures,
-        end,
-    };
-    let mut margins = problem.margins(&x);
-    let is_inside = x.len() == n && x.iter().all(|v| (0.0..=1.0).contains(v));
-    if !is_inside || margins.iter().any(|g| !(g.value >= -1e-9 && g.is_usable(n))) {
-        return finish(best, 0, 0, LocalEnd::BadStart);
-    }
-    if problem.is_cancelled() {
-        return finish(best, 0, 0, LocalEnd::Cancelled);
-    }
-    evaluations += 1;
-    let Some(mut point) = usable(problem.evaluate(&x), n) else {
-        return finish(best, evaluations, 1, LocalEnd::BadStart);
-    };
-    best.offer(&x, &point, options.tolerance);
-    let mut hessian: Vec<Vec<f64>> =
-        (0..n).map(|i| (0..n).map(|j| if i == j { 0.05 } else { 0.0 }).collect()).collect();
-    let (mut radius, mut penalty) = (options.first_radius, FIRST_PENALTY);
-    let mut is_first_update = true;
-    let end = loop {
-        if evaluations > options.max_evaluations {
-            break LocalEnd::Budget;
-        }
-        if radius < options.min_radius {
-            break LocalEnd::SmallRegion;
-        }
-        let bound = |sign: f64| -> Vec<f64> {
-            (0..n)
-                .map(|i| match (problem.is_free(i), sign > 0.0) {
-                    (false, _) => 0.0,
-                    (true, true) => radius.min(1.0 - x[i]),
-                    (true, false) => -radius.min(x[i]),
-                })
-                .collect()
-        };
-        let (lower, upper) = (bound(-1.0), bound(1.0));
-        let subproblem = Subproblem {
-            hessian: &hessian,
-            components: &point.components,
-            constraints: &point.constraints,
-            margins: &margins,
-            lower: &lower,
-            upper: &upper,
-            penalty,
-        };
-        let Some(solution) = solve(&subproblem) else {
-            radius *= 0.4;
+    let mut model = problem.model(&x)?;
+    let mut merit = model.merit();
+    let mut history = vec![merit];
+    let mut hessian = DMatrix::<f64>::identity(n, n) * 0.1;
+    let mut radius = settings.radius;
+    while history.len() < settings.max_evaluations && radius > settings.smallest_radius {
+        let Some((mut step, multipliers)) = subproblem(problem, &x, &model, &hessian, radius) else {
+            radius *= 0.5;
             continue;
         };
-        if penalty < MAX_PENALTY && is_penalty_weak(&subproblem, &solution.step, options.tolerance) {
-            penalty *= 3.0;
+        let mut candidate = moved(&x, &step);
+        let mut shortenings = 0;
+        while problem.geometry(&candidate).iter().any(|m| *m < 0.0) && shortenings < 12 {
+            step *= 0.7;
+            candidate = moved(&x, &step);
+            shortenings += 1;
+        }
+        let length = step.amax();
+        if length < settings.smallest_radius || problem.geometry(&candidate).iter().any(|m| *m < 0.0) {
+            radius = (0.5 * radius).min(length);
             continue;
         }
-        let Some(step) = keep_geometry(problem, &x, solution.step.clone()) else {
-            radius *= 0.4;
+        let Some(next) = problem.model(&candidate) else {
+            history.push(merit);
+            radius = 0.5 * length;
             continue;
         };
-        let merit = |least: f64, violation: f64| least - penalty * violation;
-        let now = merit(least(&point.components), violation(&point.constraints));
-        let model = {
-            let f = point.components.iter().map(|f| f.at(&step)).fold(f64::INFINITY, f64::min);
-            let c: f64 = point.constraints.iter().map(|c| (-c.at(&step)).max(0.0)).sum();
-            merit(f, c) - 0.5 * dot(&step, &times(&hessian, &step))
-        };
-        let promised = model - now;
-        let length = step.iter().fold(0.0f64, |m, s| m.max(s.abs()));
-        if promised < options.min_gain {
-            break LocalEnd::Converged;
+        let gain = next.merit() - merit;
+        // The curvature along the step, whether it is taken or not.
+        let change = lagrangian_gradient(&model, &multipliers) - lagrangian_gradient(&next, &multipliers);
+        update_hessian(&mut hessian, &step, &change);
+        if gain > 0.0 {
+            radius = if gain > 1e-3 { (1.5 * radius).min(0.4) } else { radius };
+            x = candidate;
+            merit = next.merit();
+            model = next;
+        } else {
+            radius = 0.4 * length;
         }
-        if problem.is_cancelled() {
-            break LocalEnd::Cancelled;
-        }
-        let trial: Vec<f64> = x.iter().zip(&step).map(|(x, s)| (x + s).clamp(0.0, 1.0)).collect();
-        evaluations += 1;
-        let Some(next) = usable(problem.evaluate(&trial), n).filter(|p| has_shape_of(p, &point)) else {
-            if problem.is_cancelled() {
-                break LocalEnd::Cancelled;
-            }
-            failures += 1;
-            radius = 0.3 * length.min(radius);
-            continue;
-        };
-        best.offer(&trial, &next, options.tolerance);
-        let gained = merit(least(&next.components), violation(&next.constraints)) - now;
-        let ratio = gained / promised;
-        let next_margins = problem.margins(&trial);
-        let change = gradient_change(&solution, (&point, &margins), (&next, &next_margins));
-        update(&mut hessian, &step, &change, &mut is_first_update);
-        if ratio > 0.7 && length > 0.9 * radius {
-            radius = (2.0 * radius).min(0.5);
-        } else if ratio < 0.25 {
-            radius = 0.4 * length.min(radius);
-        }
-        if ratio > 0.02 {
-            x = trial;
-            point = next;
-            margins = next_margins;
-        }
-    };
-    finish(best, evaluations, failures, end)
+        history.push(merit);
+    }
+    Some(Improved { x, merit, history })
 }
 
-fn usable<F>(result: Result<LocalPoint, F>, n: usize) -> Option<LocalPoint> {
-    let point = result.ok()?;
-    let all_usable = point.components.iter().chain(&point.constraints).all(|l| l.is_usable(n));
-    (all_usable && !point.components.is_empty()).then_some(point)
+fn moved(x: &[f64], step: &DVector<f64>) -> Vec<f64> {
+    x.iter().zip(step.iter()).map(|(a, d)| (a + d).clamp(0.0, 1.0)).collect()
 }
 
-fn has_shape_of(a: &LocalPoint, b: &LocalPoint) -> bool {
-    a.components.len() == b.components.len() && a.constraints.len() == b.constraints.len()
-}
-
-/// Shortens a step until the geometry is kept; `None` where even a thousandth of it breaks it.
-fn keep_geometry<P: LocalProblem>(problem: &P, x: &[f64], mut step: Vec<f64>) -> Option<Vec<f64>> {
-    for _ in 0..10 {
-        let trial: Vec<f64> = x.iter().zip(&step).map(|(x, s)| (x + s).clamp(0.0, 1.0)).collect();
-        if problem.margins(&trial).iter().all(|g| g.value >= 0.0) {
-            return Some(step);
-        }
-        step.iter_mut().for_each(|s| *s *= 0.5);
-        // The first try is the full step; rounding of an active linear margin is mended by a hair.
-        if step.iter().all(|s| s.abs() < 1e-9) {
-            return None;
+/// Gradient of Σ multiplier × value over gains and margins.
+fn lagrangian_gradient(model: &LocalModel, multipliers: &[f64]) -> DVector<f64> {
+    let n = model.gain_gradients.first().map_or(0, Vec::len);
+    let mut sum = DVector::zeros(n);
+    for (row, weight) in model.gain_gradients.iter().chain(&model.margin_gradients).zip(multipliers) {
+        for (s, g) in sum.iter_mut().zip(row) {
+            *s += weight * g;
         }
     }
-    None
+    sum
 }
 
-/// Whether a much larger penalty would mend violations markedly better: it is exact only above the multipliers.
-fn is_penalty_weak(subproblem: &Subproblem, step: &[f64], tolerance: f64) -> bool {
-    let left_by = |step: &[f64]| subproblem.constraints.iter().map(|c| (-c.at(step)).max(0.0)).sum::<f64>();
-    let (left, now) = (left_by(step), violation(subproblem.constraints));
-    if left <= tolerance {
-        return false;
-    }
-    let strict = Subproblem { penalty: MAX_PENALTY, ..*subproblem };
-    solve(&strict).is_some_and(|s| {
-        let least = left_by(&s.step);
-        left - least > 0.1 * (now - least).max(tolerance)
-    })
-}
-
-fn times(matrix: &[Vec<f64>], vector: &[f64]) -> Vec<f64> {
-    matrix.iter().map(|row| dot(row, vector)).collect()
-}
-
-/// Change of the Lagrangian's gradient with the multipliers of `solution`.
-fn gradient_change(solution: &Step, old: (&LocalPoint, &[Linear]), new: (&LocalPoint, &[Linear])) -> Vec<f64> {
-    let mut change = vec![0.0; solution.step.len()];
-    let mut add = |weights: &[f64], old: &[Linear], new: &[Linear]| {
-        if old.len() != new.len() {
-            return;
-        }
-        for ((w, a), b) in weights.iter().zip(old).zip(new) {
-            for (c, (a, b)) in change.iter_mut().zip(a.gradient.iter().zip(&b.gradient)) {
-                *c -= w * (b - a);
-            }
-        }
-    };
-    add(&solution.component_weights, &old.0.components, &new.0.components);
-    add(&solution.constraint_weights, &old.0.constraints, &new.0.constraints);
-    add(&solution.margin_weights, old.1, new.1);
-    change
-}
-
-/// Powell's damped BFGS update: B stays positive definite whatever the curvature. Before the first one B is scaled to the
-/// curvature seen.
-fn update(hessian: &mut [Vec<f64>], step: &[f64], change: &[f64], is_first: &mut bool) {
-    let (ss, sy, yy) = (dot(step, step), dot(step, change), dot(change, change));
-    if ss < 1e-20 || !yy.is_finite() {
+/// Damped BFGS (Powell): keeps B positive definite.
+fn update_hessian(hessian: &mut DMatrix<f64>, step: &DVector<f64>, change: &DVector<f64>) {
+    let bs = &*hessian * step;
+    let sbs = step.dot(&bs);
+    if !(sbs > 1e-14) {
         return;
     }
-    if std::mem::replace(is_first, false) && sy > 1e-12 {
-        let scale = (yy / sy).clamp(1e-2, 1e3);
-        for (i, row) in hessian.iter_mut().enumerate() {
-            for (j, entry) in row.iter_mut().enumerate() {
-                *entry = if i == j { scale } else { 0.0 };
-            }
-        }
-    }
-    let bs = times(hessian, step);
-    let sbs = dot(step, &bs);
+    let sy = step.dot(change);
     let theta = if sy >= 0.2 * sbs { 1.0 } else { 0.8 * sbs / (sbs - sy) };
-    let y: Vec<f64> = change.iter().zip(&bs).map(|(y, b)| theta * y + (1.0 - theta) * b).collect();
-    let curvature = dot(step, &y);
-    if curvature < 1e-16 {
-        return;
+    let y = change * theta + &bs * (1.0 - theta);
+    let ys = step.dot(&y);
+    if ys > 1e-14 {
+        *hessian += &y * y.transpose() / ys - &bs * bs.transpose() / sbs;
     }
-    for (i, row) in hessian.iter_mut().enumerate() {
-        for (j, entry) in row.iter_mut().enumerate() {
-            *entry += y[i] * y[j] / curvature - bs[i] * bs[j] / sbs;
+}
+
+/// The step, and the multipliers of gains and margins; `None` where Clarabel has no usable answer.
+fn subproblem(
+    problem: &dyn LocalProblem,
+    x: &[f64],
+    model: &LocalModel,
+    hessian: &DMatrix<f64>,
+    radius: f64,
+) -> Option<(DVector<f64>, Vec<f64>)> {
+    let n = x.len();
+    let (num_gains, num_margins) = (model.gains.len(), model.margins.len());
+    let is_minimum = model.weights.is_empty();
+    // Unknowns: δ (n), t, slack per margin.
+    let size = n + 1 + num_margins;
+    let mut p = CscBuilder::new(size, size);
+    for j in 0..n {
+        for i in 0..=j {
+            p.push(i, j, hessian[(i, j)]);
         }
     }
-    // Without exact curvature a floor keeps the subproblem well posed.
-    for (i, row) in hessian.iter_mut().enumerate() {
-        row[i] += 1e-6;
+    for j in n..size {
+        p.push(j, j, 1e-9);
+    }
+    let mut q = vec![0.0; size];
+    q[n] = -1.0;
+    q[n + 1..].fill(PENALTY);
+    // Rows a·unknowns ≤ b.
+    let mut rows: Vec<(Vec<(usize, f64)>, f64)> = Vec::new();
+    let gradient_row = |g: &[f64]| g.iter().enumerate().map(|(i, v)| (i, -v)).collect::<Vec<_>>();
+    if is_minimum {
+        for (value, g) in model.gains.iter().zip(&model.gain_gradients) {
+            let mut row = gradient_row(g);
+            row.push((n, 1.0));
+            rows.push((row, *value));
+        }
+    } else {
+        let mut mean = vec![0.0; n];
+        for (g, w) in model.gain_gradients.iter().zip(&model.weights) {
+            for (m, v) in mean.iter_mut().zip(g) {
+                *m += w * v;
+            }
+        }
+        let mut row = gradient_row(&mean);
+        row.push((n, 1.0));
+        rows.push((row, model.objective()));
+    }
+    for (m, (value, g)) in model.margins.iter().zip(&model.margin_gradients).enumerate() {
+        let mut row = gradient_row(g);
+        row.push((n + 1 + m, -1.0));
+        rows.push((row, *value));
+        rows.push((vec![(n + 1 + m, -1.0)], 0.0));
+    }
+    for (value, g) in problem.geometry(x).iter().zip(geometry_gradient(problem, x)) {
+        rows.push((gradient_row(&g), *value));
+    }
+    for (i, xi) in x.iter().enumerate() {
+        let reach = if problem.is_free(i) { radius } else { 0.0 };
+        rows.push((vec![(i, 1.0)], reach.min(1.0 - xi)));
+        rows.push((vec![(i, -1.0)], reach.min(*xi)));
+    }
+    let mut a = CscBuilder::new(rows.len(), size);
+    let mut b = Vec::with_capacity(rows.len());
+    for (r, (row, limit)) in rows.iter().enumerate() {
+        for &(c, v) in row {
+            a.push(r, c, v);
+        }
+        b.push(*limit);
+    }
+    let cones: [SupportedConeT<f64>; 1] = [NonnegativeConeT(rows.len())];
+    let settings = DefaultSettingsBuilder::default().verbose(false).max_iter(80).build().ok()?;
+    let mut solver = DefaultSolver::new(&p.finish(), &q, &a.finish(), &b, &cones, settings).ok()?;
+    solver.solve();
+    // A step of reduced accuracy is still a step: the evaluation decides. Anything else is none.
+    match solver.solution.status {
+        SolverStatus::Solved
+        | SolverStatus::AlmostSolved
+        | SolverStatus::InsufficientProgress
+        | SolverStatus::MaxIterations => {}
+        _ => return None,
+    }
+    let solution = &solver.solution.x;
+    if solution.iter().any(|v| !v.is_finite()) {
+        return None;
+    }
+    let step = DVector::from_iterator(n, solution[..n].iter().map(|d| d.clamp(-radius, radius)));
+    let z = &solver.solution.z;
+    let mut multipliers = Vec::with_capacity(num_gains + num_margins);
+    if is_minimum {
+        multipliers.extend(z[..num_gains].iter().copied());
+    } else {
+        multipliers.extend(&model.weights);
+    }
+    let offset = if is_minimum { num_gains } else { 1 };
+    for m in 0..num_margins {
+        multipliers.push(z[offset + 2 * m]);
+    }
+    Some((step, multipliers))
+}
+
+/// Central differences of the closed-form margins.
+fn geometry_gradient(problem: &dyn LocalProblem, x: &[f64]) -> Vec<Vec<f64>> {
+    let h = 1e-6;
+    let count = problem.geometry(x).len();
+    let mut rows = vec![vec![0.0; x.len()]; count];
+    for i in 0..x.len() {
+        let (mut a, mut b) = (x.to_vec(), x.to_vec());
+        a[i] += h;
+        b[i] -= h;
+        let (ga, gb) = (problem.geometry(&a), problem.geometry(&b));
+        for ((row, pa), pb) in rows.iter_mut().zip(&ga).zip(&gb) {
+            row[i] = (pa - pb) / (2.0 * h);
+        }
+    }
+    rows
+}
+
+/// Collects entries by column.
+struct CscBuilder {
+    rows: usize,
+    columns: Vec<Vec<(usize, f64)>>,
+}
+
+impl CscBuilder {
+    fn new(rows: usize, columns: usize) -> Self {
+        CscBuilder { rows, columns: vec![Vec::new(); columns] }
+    }
+
+    fn push(&mut self, row: usize, column: usize, value: f64) {
+        self.columns[column].push((row, value));
+    }
+
+    fn finish(mut self) -> CscMatrix<f64> {
+        let (mut pointers, mut indices, mut values) = (vec![0], Vec::new(), Vec::new());
+        for column in &mut self.columns {
+            column.sort_by_key(|e| e.0);
+            for &(r, v) in column.iter() {
+                indices.push(r);
+                values.push(v);
+            }
+            pointers.push(indices.len());
+        }
+        CscMatrix::new(self.rows, self.columns.len(), pointers, indices, values)
     }
 }
 
 #[cfg(test)]
-#[path = "local_tests.rs"]
-mod tests;
+mod tests {
+    use super::*;
+
+    /// max min(1 − (x − 0.7)², 1.2 − y − x/2) on the unit square with x + y ≤ 1.1: at the kink and off the bounds.
+    struct Kink;
+
+    impl LocalProblem for Kink {
+        fn model(&self, v: &[f64]) -> Option<LocalModel> {
+            let (x, y) = (v[0], v[1]);
+            Some(LocalModel {
+                gains: vec![1.0 - (x - 0.7).powi(2) - (y - 0.9).powi(2), 1.2 - y],
+                weights: Vec::new(),
+                margins: vec![0.6 - x],
+                gain_gradients: vec![vec![-2.0 * (x - 0.7), -2.0 * (y - 0.9)], vec![0.0, -1.0]],
+                margin_gradients: vec![vec![-1.0, 0.0]],
+            })
+        }
+        fn geometry(&self, v: &[f64]) -> Vec<f64> {
+            vec![1.1 - v[0] - v[1]]
+        }
+        fn is_free(&self, _: usize) -> bool {
+            true
+        }
+    }
+
+    /// The optimum: gains equal, x at the margin or the geometry limit. With x = 0.6, 1 − 0.01 − (y − 0.9)² = 1.2 − y has
+    /// the root y = (2.8 − √(2.8² − 4·1.02))/2 = 0.4302; x + y = 1.03 keeps the geometry, so it is the optimum.
+    #[test]
+    fn finds_the_kink_on_the_margin() {
+        let settings = LocalSettings { max_evaluations: 60, radius: 0.2, smallest_radius: 1e-6 };
+        let found = improve(&Kink, &[0.1, 0.8], &settings).expect("evaluates everywhere");
+        let y = 0.5 * (2.8 - (2.8f64 * 2.8 - 4.0 * 1.02).sqrt());
+        assert!((found.x[0] - 0.6).abs() < 2e-3 && (found.x[1] - y).abs() < 2e-3, "{:?} {y}", found.x);
+        assert!(found.history.windows(2).all(|w| w[1] >= w[0]));
+    }
+
+    struct Mean;
+
+    impl LocalProblem for Mean {
+        fn model(&self, v: &[f64]) -> Option<LocalModel> {
+            // Fails in a corner: such steps are shortened.
+            (v[0] < 0.8).then(|| LocalModel {
+                gains: vec![-(v[0] - 0.75).powi(2), -3.0 * (v[1] - 0.25).powi(2)],
+                weights: vec![0.5, 0.5],
+                margins: vec![],
+                gain_gradients: vec![vec![-2.0 * (v[0] - 0.75), 0.0], vec![0.0, -6.0 * (v[1] - 0.25)]],
+                margin_gradients: vec![],
+            })
+        }
+        fn geometry(&self, _: &[f64]) -> Vec<f64> {
+            Vec::new()
+        }
+        fn is_free(&self, _: usize) -> bool {
+            true
+        }
+    }
+
+    #[test]
+    fn finds_a_smooth_optimum_beside_failures() {
+        let settings = LocalSettings { max_evaluations: 60, radius: 0.3, smallest_radius: 1e-6 };
+        let found = improve(&Mean, &[0.2, 0.9], &settings).expect("the start evaluates");
+        // Merit is flat at the optimum: 1e-4 of it is 1e-2 in the variables.
+        assert!((found.x[0] - 0.75).abs() < 1e-2 && (found.x[1] - 0.25).abs() < 1e-2, "{:?}", found.x);
+    }
+}

@@ -1,12 +1,31 @@
-//! The design of specimens.
+//! The search for a better specimen.
 
-mod criteria;
-mod evaluator;
-mod fe_evaluator;
-mod fe_rates;
+mod checkpoint;
+mod confirm;
+mod explore;
+mod findings;
 mod local;
-mod margins;
 mod objective;
-mod qp;
+mod response;
+mod result;
+mod search;
 mod space;
 mod study;
+
+pub use checkpoint::{Checkpoint, CheckpointError};
+pub use confirm::{Confirmed, CriterionValues, Gain, MaterialEvaluation, confirm};
+pub use explore::{geometry_margins, is_makeable, sample};
+pub use findings::Disagreement;
+pub use local::{Improved, LocalModel, LocalProblem, LocalSettings, improve};
+pub use objective::{Judged, Reference};
+pub use response::{
+    Evaluated, EvaluationFailure, Evaluator, MaterialSample, Response, TEARING_FRACTION, sample_materials,
+    tearing_stretch,
+};
+pub use result::{DesignEntry, DesignResult, MaterialVerification, Verification};
+pub use search::{Candidate, Found, Progress, ProgressSink, SearchError, base_at_drive, search, study_hash};
+pub use space::{Orbit, Structure, Subspace, Variable, subspaces};
+pub use study::{
+    Budget, Combine, CountRange, MaterialPrior, Objective, ObjectiveKind, Range, Study, StudyError, Vary,
+    VerificationSettings,
+};

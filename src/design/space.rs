@@ -3,10 +3,9 @@
 //!
 //! Holes come in orbits under the study's mirrors: a hole on a mirror plane is its own image, others bring theirs along.
 
-use super::evaluator::Motion;
 use super::study::{Range, Study};
 use crate::mesh::DesignVariable;
-use crate::specimen::{Hole, HoleAxis, Outline, Specimen, Symmetry, TestKind};
+use crate::specimen::{Hole, HoleAxis, Specimen, Symmetry, TestKind};
 
 /// One orbit of holes: which of its two coordinates are held at zero by lying on a mirror.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -173,8 +172,6 @@ impl Subspace {
         // A hole wider than the section less its two ligaments cannot be made.
         let widest = diameter.max.min(smallest_other - 2.0 * edge);
         let diameter = Range { min: diameter.min, max: widest.max(diameter.min) };
-        let most = study.limits.max_drive_mm.unwrap_or(f64::INFINITY);
-        let drive = Range { min: vary.drive_mm.min.min(most), max: vary.drive_mm.max.min(most) };
         let (mut variables, mut ranges) = (Vec::new(), Vec::new());
         for (index, orbit) in structure.orbits.iter().enumerate() {
             if !orbit.on_x {
@@ -191,7 +188,7 @@ impl Subspace {
             ranges.push(diameter);
         }
         for (variable, interval) in [
-            (Variable::Drive, Some(drive)),
+            (Variable::Drive, Some(vary.drive_mm)),
             (Variable::Length, vary.length_mm),
             (Variable::Thickness, vary.thickness_mm),
             (Variable::Width, vary.width_mm),
@@ -295,61 +292,6 @@ impl Subspace {
             Variable::Thickness => vec![(DesignVariable::BlockThickness, 1.0)],
             Variable::Width => vec![(DesignVariable::BlockWidth, 1.0)],
         }
-    }
-
-    /// What moves per unit of a component of the vector.
-    pub fn motion(&self, index: usize) -> Motion {
-        let width = self.ranges[index].max - self.ranges[index].min;
-        let variable = self.variables[index];
-        Motion {
-            shape: self.moves(variable).into_iter().map(|(v, sign)| (v, sign * width)).collect(),
-            drive_mm: if variable == Variable::Drive { width } else { 0.0 },
-        }
-    }
-
-    /// Whether the outline is a dumb-bell's.
-    pub fn is_dumbbell(&self) -> bool {
-        self.template.outline != Outline::Block
-    }
-
-    /// The vector with punched diameters put on the nearest punch.
-    pub fn snapped(&self, vector: &[f64]) -> Vec<f64> {
-        let snap = |index: usize, t: f64| {
-            let range = self.ranges[index];
-            let width = range.max - range.min;
-            if self.is_continuous(index) || width <= 0.0 {
-                return t;
-            }
-            ((self.nearest_punch(range.min + t * width) - range.min) / width).clamp(0.0, 1.0)
-        };
-        vector.iter().enumerate().map(|(i, t)| snap(i, *t)).collect()
-    }
-
-    /// The vector with orbits of a kind sorted by their position (and diameter): permutations of equal holes are one design.
-    pub fn canonical(&self, vector: &[f64]) -> Vec<f64> {
-        let orbits = &self.structure.orbits;
-        let place = |orbit: usize| -> Vec<usize> {
-            let belongs = |v: &Variable| matches!(*v, Variable::X(o) | Variable::Other(o) | Variable::Diameter(o) if o == orbit);
-            (0..self.variables.len()).filter(|&i| belongs(&self.variables[i])).collect()
-        };
-        let mut sorted = vector.to_vec();
-        let mut first = 0;
-        while first < orbits.len() {
-            let count = orbits[first..].iter().take_while(|o| **o == orbits[first]).count();
-            let places: Vec<Vec<usize>> = (first..first + count).map(place).collect();
-            let mut values: Vec<Vec<f64>> = places.iter().map(|p| p.iter().map(|&i| vector[i]).collect()).collect();
-            values.sort_by(|a, b| {
-                let order = a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne());
-                order.unwrap_or(std::cmp::Ordering::Equal)
-            });
-            for (places, values) in places.iter().zip(&values) {
-                for (&i, v) in places.iter().zip(values) {
-                    sorted[i] = *v;
-                }
-            }
-            first += count;
-        }
-        sorted
     }
 
     /// The vector of a specimen of this structure, or `None` where it is of another one or out of range.

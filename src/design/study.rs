@@ -178,30 +178,12 @@ pub enum Combine {
     GeometricMean,
 }
 
-/// Which form of 𝒮 counts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Normalisation {
-    /// Sum over voxels: a removed voxel is a lost measurement.
-    #[default]
-    Sum,
-    /// Mean per voxel.
-    MeanPerVoxel,
-    /// Volume integral.
-    VolumeIntegral,
-}
-
 /// The objective.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Objective {
     /// What is maximised.
     pub kind: ObjectiveKind,
-    /// Which form of 𝒮 counts where 𝒮 is maximised.
-    pub normalisation: Normalisation,
-    /// Weights of parameters by name (1 where absent): exponents of the geometric mean; 0 leaves a parameter out, under
-    /// `maximin` too.
-    pub weights: std::collections::BTreeMap<String, f64>,
     /// How gains combine.
     pub combine: Combine,
     /// Besides: no μᵢ or αᵢ of any material may be promised a larger standard deviation than by the base.
@@ -321,12 +303,7 @@ impl Study {
                 .map_err(|e| StudyError::Inconsistent { message: format!("material '{}': {e}", prior.name) })?;
             range("materials.relative_sd", prior.relative_sd, 0.0, 0.5, "from 0 to 0.5")?;
             range("materials.weight", prior.weight, 1e-6, 1e6, "positive")?;
-            if self.materials.iter().filter(|other| other.name == prior.name).count() > 1 {
-                return Err(StudyError::Inconsistent { message: format!("two materials are named '{}'", prior.name) });
-            }
         }
-        self.validate_scan()?;
-        self.validate_weights()?;
         let vary = &self.vary;
         range("vary.hole_count.max", vary.hole_count.max as f64, 0.0, 8.0, "from 0 to 8")?;
         if vary.hole_count.min > vary.hole_count.max {
@@ -358,47 +335,6 @@ impl Study {
             });
         }
         Ok(())
-    }
-
-    fn validate_scan(&self) -> Result<(), StudyError> {
-        for voxel in self.scan.voxel_mm {
-            range("scan.voxel_mm", voxel, 1e-3, 1e3, "positive, at most 1000 mm")?;
-        }
-        for sd in self.scan.noise_sd_mm {
-            range("scan.noise_sd_mm", sd, 1e-9, 1e3, "positive, at most 1000 mm")?;
-        }
-        range("scan.force_sd_n", self.scan.force_sd_n, 1e-9, 1e6, "positive, at most 1000000 N")
-    }
-
-    fn validate_weights(&self) -> Result<(), StudyError> {
-        let names: Vec<String> =
-            self.materials.iter().flat_map(|m| m.material.parameters()).map(|p| p.name()).collect();
-        for (name, &weight) in &self.objective.weights {
-            range("objective.weights", weight, 0.0, 1e6, "from 0 to 1000000")?;
-            if name == "kappa" || !names.contains(name) {
-                let message = format!("objective.weights: '{name}' is not a mu or alpha of the materials");
-                return Err(StudyError::Inconsistent { message });
-            }
-        }
-        let is_weighed = |name: &String| self.objective.weights.get(name).is_none_or(|w| *w > 0.0);
-        if !names.iter().any(|n| n != "kappa" && is_weighed(n)) {
-            return Err(StudyError::Inconsistent { message: "objective.weights leaves no parameter".into() });
-        }
-        Ok(())
-    }
-
-    /// Drive at which the base specimen is compared, mm: its largest one within the study's range and limit, else the
-    /// largest allowed.
-    pub fn base_drive_mm(&self) -> f64 {
-        let most = self.limits.max_drive_mm.unwrap_or(f64::INFINITY).min(self.vary.drive_mm.max);
-        let own = self.base.drive_mm.iter().copied().filter(|d| *d <= most * (1.0 + 1e-9));
-        let largest = own.fold(0.0, f64::max);
-        if largest > 0.0 { largest } else { most }
-    }
-
-    /// The base specimen with the one drive at which it is compared.
-    pub fn base_at_drive(&self) -> Specimen {
-        Specimen { drive_mm: vec![self.base_drive_mm()], ..self.base.clone() }
     }
 
     /// Kinds of test to try.

@@ -24,12 +24,32 @@ impl ForwardModel {
     /// Deformation and stress at every quadrature point, element after element, in the order of
     /// [`crate::mesh::ElementKind::quadrature`].
     pub fn quadrature_fields(&self, material: &Ogden, equilibrium: &Equilibrium) -> Vec<QuadraturePoint> {
+        self.fields_of(material, &self.mesh.nodes, &equilibrium.displacement, Some(&equilibrium.pressure))
+    }
+
+    /// As [`Self::quadrature_fields`] with the nodes at other `positions` and any displacement; the pressure is the
+    /// condensed one.
+    pub fn quadrature_fields_at(
+        &self,
+        material: &Ogden,
+        positions: &[[f64; 3]],
+        displacement: &[[f64; 3]],
+    ) -> Vec<QuadraturePoint> {
+        self.fields_of(material, positions, displacement, None)
+    }
+
+    fn fields_of(
+        &self,
+        material: &Ogden,
+        positions: &[[f64; 3]],
+        displacement: &[[f64; 3]],
+        pressure: Option<&[[f64; 4]]>,
+    ) -> Vec<QuadraturePoint> {
         let mut out = ElementOutput::default();
         let n = self.tables.num_nodes();
         let mut points = Vec::with_capacity(n * self.mesh.num_elements());
         for e in 0..self.mesh.num_elements() {
-            let input =
-                self.input(e, &self.mesh.nodes, &equilibrium.displacement, Some(&equilibrium.pressure), material);
+            let input = self.input(e, positions, displacement, pressure, material);
             // An equilibrium has no inverted element, so the kernel fills every field.
             self.kernels.residual(&self.tables, &input, &mut out);
             for q in 0..n {

@@ -1,1 +1,68 @@
-//! report
+//! The report room: pictures as SVG, fields for ParaView and one page of HTML that a person reads.
+//!
+//! Every picture is a plain structure (labels, units, numbers) with a `to_svg` method. The SVG stands alone, holds no
+//! identifiers and no style sheet, and so can be put inline into a page any number of times. Pictures never fail:
+//! without data they say so, and what is not finite is left out or named as missing. The same data give the same bytes.
+//!
+//! | Picture | Structure |
+//! |---|---|
+//! | where the voxels lie in (λ, k) | [`DensityPlot`] |
+//! | sections through and means of voxel fields | [`VoxelMaps`] |
+//! | values per parameter, base beside best | [`GroupedBars`] |
+//! | information against force | [`ParetoPlot`] |
+//! | best-so-far over evaluations | [`HistoryPlot`] |
+//! | spread found beside spread promised | [`SpreadPlot`] |
+//! | correlation of the parameters | [`CorrelationPlot`] |
+//! | the deformed specimen | [`DeformedShape`] |
+//! | how far each limit is | [`LimitsPlot`] |
+//! | two rankings of the same designs | [`RankingPlot`] |
+//!
+//! Files: [`Vtu`] for ParaView, [`Report`] for the browser.
+
+mod axis;
+mod bars;
+mod base64;
+mod color;
+mod correlation;
+mod density;
+mod error;
+mod frame;
+mod history;
+mod html;
+mod html_parts;
+mod labels;
+mod limits;
+mod maps;
+mod number;
+mod pareto;
+mod ranking;
+mod shape;
+mod spread;
+mod surface;
+mod svg;
+mod text;
+mod vtu;
+mod vtu_cells;
+
+#[cfg(test)]
+mod gallery_tests;
+#[cfg(test)]
+mod test_xml;
+
+pub use bars::{BarGroup, GroupedBars};
+pub use color::ColorMap;
+pub use correlation::CorrelationPlot;
+pub use density::{DensityPanel, DensityPlot};
+pub use error::ReportError;
+pub use history::{HistoryPlot, HistoryPoint};
+pub use html::{Report, ReportHeader};
+pub use html_parts::{Align, CalloutKind, Column, Table};
+pub use limits::{LimitBar, LimitsPlot};
+pub use maps::{VoxelField, VoxelMaps};
+pub use number::{significant, symbol_of_parameter};
+pub use pareto::{ParetoPlot, ParetoPoint, PointKind};
+pub use ranking::{RankedItem, RankingPlot};
+pub use shape::{DeformedShape, ShapeQuad};
+pub use spread::{SpreadPlot, SpreadRow};
+pub use surface::{nodal_values, surface_quads};
+pub use vtu::{Vtu, element_means};

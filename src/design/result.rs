@@ -1,0 +1,180 @@
+//! The result of a design search (`design/1`) and what it says in plain words.
+
+use super::confirm::{Confirmed, MaterialEvaluation};
+use super::findings::{Disagreement, disagreement, findings};
+use super::search::{Found, study_hash};
+use super::study::{Objective, Study};
+use crate::calibration::ParameterSpread;
+use crate::provenance::VERSION;
+use crate::sensitivity::Evaluation;
+use crate::specimen::Specimen;
+use serde::{Deserialize, Serialize};
+
+/// A finished search.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DesignResult {
+    /// Always `design/1`.
+    pub schema: String,
+    /// Name of the study.
+    pub name: String,
+    /// The base specimen at its drive.
+    pub base: DesignEntry,
+    /// The winner.
+    pub best: DesignEntry,
+    /// Every confirmed design, best first, those within every limit before others.
+    pub ranked: Vec<DesignEntry>,
+    /// Indices in `ranked` of the trade-off between information (D-optimal figure of the first material) and force: none
+    /// of the others has both less force and a smaller standard deviation.
+    pub pareto: Vec<usize>,
+    /// Where integrated sensitivity and Fisher information rank designs differently, per material.
+    pub disagreement: Vec<Disagreement>,
+    /// What the numbers say, in plain words.
+    pub findings: Vec<String>,
+    /// Calibration of the best and of the base specimen on synthetic noisy scans, first material.
+    pub verification: Verification,
+    /// The same for every material.
+    pub verification_by_material: Vec<MaterialVerification>,
+    /// What was maximised.
+    pub objective: Objective,
+    /// Largest objective within limits after each evaluation, at search fidelity.
+    pub history: Vec<f64>,
+    /// Evaluations at search fidelity.
+    pub num_evaluations: usize,
+    /// Those that failed, with their reasons.
+    pub failures: Vec<String>,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Version of the program.
+    pub version: String,
+    /// SHA-256 of the study, hexadecimal.
+    pub input_hash: String,
+}
+
+/// One design of a result.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DesignEntry {
+    /// The design; its only drive is the one it is scanned at.
+    pub specimen: Specimen,
+    /// The first material's evaluation.
+    pub evaluation: Evaluation,
+    /// Gain over the base specimen.
+    pub objective: f64,
+    /// The limit with the smallest margin, in words.
+    pub closest_limit: String,
+    /// Everything confirmed: all materials, gains, limits.
+    pub by_material: Vec<MaterialEvaluation>,
+    /// Gains per material and parameter.
+    pub gains: Vec<super::confirm::Gain>,
+    /// Every limit, closest first.
+    pub limits: Vec<crate::specimen::LimitMargin>,
+    /// Whether all limits and the guard are kept.
+    pub is_within_limits: bool,
+    /// Volume of material, mm³.
+    pub volume_mm3: f64,
+}
+
+/// Spread found against spread promised.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Verification {
+    /// Of the best design.
+    pub best: Vec<ParameterSpread>,
+    /// Of the base specimen.
+    pub base: Vec<ParameterSpread>,
+}
+
+/// One material's verification.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MaterialVerification {
+    /// Name of the prior.
+    pub material: String,
+    /// Of the best design.
+    pub best: Vec<ParameterSpread>,
+    /// Of the base specimen.
+    pub base: Vec<ParameterSpread>,
+}
+
+impl DesignEntry {
+    /// `None` where nothing was evaluated.
+    fn of(confirmed: &Confirmed) -> Option<DesignEntry> {
+        Some(DesignEntry {
+            specimen: confirmed.specimen.clone(),
+            evaluation: confirmed.by_material.first()?.evaluation.clone(),
+            objective: confirmed.objective,
+            closest_limit: confirmed.closest_limit().map_or("none".into(), |m| {
+                format!("{}: {:.3} (limit {:.3}, margin {:.1} %)", m.name, m.value, m.limit, 100.0 * m.margin_relative)
+            }),
+            by_material: confirmed.by_material.clone(),
+            gains: confirmed.gains.clone(),
+            limits: confirmed.limits.clone(),
+            is_within_limits: confirmed.is_within_limits,
+            volume_mm3: confirmed.volume_mm3,
+        })
+    }
+
+    /// D-optimal figure of the first material: generalised relative standard deviation.
+    pub fn information(&self) -> Option<f64> {
+        self.by_material.first()?.relative_sd_by_criterion.d_optimal
+    }
+
+    /// Largest force over the materials, N.
+    pub fn force_n(&self) -> f64 {
+        self.by_material.iter().map(|m| m.force_n).fold(0.0, f64::max)
+    }
+}
+
+impl DesignResult {
+    /// Puts a search's findings together; `None` if nothing was confirmed.
+    pub fn new(study: &Study, found: &Found) -> Option<DesignResult> {
+        let ranked: Vec<DesignEntry> = found.ranked.iter().filter_map(DesignEntry::of).collect();
+        let base = DesignEntry::of(&found.base)?;
+        let best = ranked.first()?.clone();
+        let disagreement = disagreement(study, &base, &ranked);
+        Some(DesignResult {
+            schema: "design/1".into(),
+            name: study.name.clone(),
+            pareto: pareto(&ranked),
+            findings: findings(study, &base, &ranked, &disagreement),
+            disagreement,
+            base,
+            best,
+            ranked,
+            verification: Verification::default(),
+            verification_by_material: Vec::new(),
+            objective: study.objective,
+            history: found.history.clone(),
+            num_evaluations: found.num_evaluations,
+            failures: found.failures.clone(),
+            seed: study.seed,
+            version: VERSION.into(),
+            input_hash: study_hash(study),
+        })
+    }
+
+    /// Adds what the verification found.
+    pub fn add_verification(&mut self, by_material: Vec<MaterialVerification>) {
+        if let Some(first) = by_material.first() {
+            self.verification = Verification { best: first.best.clone(), base: first.base.clone() };
+        }
+        self.verification_by_material = by_material;
+    }
+}
+
+/// Entries that no other entry beats in both force and information.
+fn pareto(ranked: &[DesignEntry]) -> Vec<usize> {
+    let values: Vec<(f64, f64)> =
+        ranked.iter().map(|e| (e.force_n(), e.information().unwrap_or(f64::INFINITY))).collect();
+    let mut front: Vec<usize> = (0..values.len())
+        .filter(|&i| {
+            ranked[i].is_within_limits
+                && !values.iter().enumerate().any(|(j, v)| {
+                    j != i && v.0 <= values[i].0 && v.1 <= values[i].1 && (v.0 < values[i].0 || v.1 < values[i].1)
+                })
+        })
+        .collect();
+    front.sort_by(|a, b| values[*a].0.total_cmp(&values[*b].0));
+    front
+}

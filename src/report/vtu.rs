@@ -1,0 +1,275 @@
+//! Field files for ParaView: VTK's XML format for unstructured grids, numbers as base64.
+
+use super::ReportError;
+use super::base64::encode;
+use super::text::escape;
+use super::vtu_cells::{cell_type, nodes_in_vtk_order};
+use crate::mesh::Mesh;
+use std::path::Path;
+
+/// A mesh with fields, to be written as a `.vtu` file.
+///
+/// Hexahedra become triquadratic ones, prisms biquadratic wedges, which lack the bubble nodes in their triangles; nodes
+/// that no cell shows are left out. A mirrored mesh is written as it is, the half or quarter; ParaView's filter
+/// *Reflect* completes it. Lengths in mm. Tensors have nine components, row after row: F_xX, F_xY, F_xZ, F_yX, …
+///
+/// ```
+/// use lambdak::mesh::{ElementKind, Mesh, Mirror};
+/// use lambdak::report::Vtu;
+///
+/// let mesh = Mesh {
+///     element_kind: ElementKind::Hex27,
+///     nodes: ElementKind::Hex27.node_coordinates(),
+///     connectivity: (0..27).collect(),
+///     mirror: Mirror::default(),
+///     fixed_nodes: vec![],
+///     moved_nodes: vec![],
+///     mirror_y_nodes: vec![],
+///     mirror_z_nodes: vec![],
+/// };
+/// let mut vtu = Vtu::new(&mesh)?;
+/// vtu.point_vectors("displacement_mm", &[[0.0; 3]; 27])?;
+/// vtu.cell_scalars("jacobian", &[1.0])?;
+/// assert!(vtu.to_xml().contains("UnstructuredGrid"));
+/// # Ok::<(), lambdak::report::ReportError>(())
+/// ```
+pub struct Vtu<'a> {
+    mesh: &'a Mesh,
+    /// Nodes that are written, in the mesh's order.
+    used: Vec<usize>,
+    /// Number in the file of each node of the mesh.
+    number: Vec<u64>,
+    point_arrays: String,
+    cell_arrays: String,
+}
+
+impl<'a> Vtu<'a> {
+    /// A file of the mesh's reference state without fields.
+    ///
+    /// # Errors
+    /// [`ReportError::BrokenConnectivity`], [`ReportError::UnknownNode`].
+    pub fn new(mesh: &'a Mesh) -> Result<Self, ReportError> {
+        let nodes_per_element = mesh.element_kind.num_nodes();
+        if !mesh.connectivity.len().is_multiple_of(nodes_per_element) {
+            return Err(ReportError::BrokenConnectivity { found: mesh.connectivity.len(), nodes_per_element });
+        }
+        let num_nodes = mesh.nodes.len();
+        let mut is_used = vec![false; num_nodes];
+        for element in 0..mesh.num_elements() {
+            for &local in nodes_in_vtk_order(mesh.element_kind) {
+                let node = mesh.element(element)[local] as usize;
+                *is_used.get_mut(node).ok_or(ReportError::UnknownNode { element, node, num_nodes })? = true;
+            }
+        }
+        let used: Vec<usize> = (0..num_nodes).filter(|&n| is_used[n]).collect();
+        let mut number = vec![0; num_nodes];
+        for (i, &node) in used.iter().enumerate() {
+            number[node] = i as u64;
+        }
+        Ok(Vtu { mesh, used, number, point_arrays: String::new(), cell_arrays: String::new() })
+    }
+
+    /// Adds one number per node of the mesh.
+    ///
+    /// # Errors
+    /// [`ReportError::LengthMismatch`].
+    pub fn point_scalars(&mut self, name: &str, values: &[f64]) -> Result<&mut Self, ReportError> {
+        self.add_points(name, &values.iter().map(|v| [*v]).collect::<Vec<_>>())
+    }
+
+    /// Adds one vector per node of the mesh, such as the displacement.
+    ///
+    /// # Errors
+    /// [`ReportError::LengthMismatch`].
+    pub fn point_vectors(&mut self, name: &str, values: &[[f64; 3]]) -> Result<&mut Self, ReportError> {
+        self.add_points(name, values)
+    }
+
+    /// Adds one number per element.
+    ///
+    /// # Errors
+    /// [`ReportError::LengthMismatch`].
+    pub fn cell_scalars(&mut self, name: &str, values: &[f64]) -> Result<&mut Self, ReportError> {
+        self.add_cells(name, &values.iter().map(|v| [*v]).collect::<Vec<_>>())
+    }
+
+    /// Adds three numbers per element, such as the principal stretches.
+    ///
+    /// # Errors
+    /// [`ReportError::LengthMismatch`].
+    pub fn cell_vectors(&mut self, name: &str, values: &[[f64; 3]]) -> Result<&mut Self, ReportError> {
+        self.add_cells(name, values)
+    }
+
+    /// Adds one tensor per element, such as F or the Cauchy stress.
+    ///
+    /// # Errors
+    /// [`ReportError::LengthMismatch`].
+    pub fn cell_tensors(&mut self, name: &str, values: &[[[f64; 3]; 3]]) -> Result<&mut Self, ReportError> {
+        let rows: Vec<[f64; 9]> = values
+            .iter()
+            .map(|t| [t[0][0], t[0][1], t[0][2], t[1][0], t[1][1], t[1][2], t[2][0], t[2][1], t[2][2]])
+            .collect();
+        self.add_cells(name, &rows)
+    }
+
+    fn add_points<const N: usize>(&mut self, name: &str, values: &[[f64; N]]) -> Result<&mut Self, ReportError> {
+        check_length(name, values.len(), self.mesh.nodes.len(), "nodes")?;
+        let shown: Vec<[f64; N]> = self.used.iter().map(|&n| values[n]).collect();
+        self.point_arrays.push_str(&float_array(name, &shown));
+        Ok(self)
+    }
+
+    fn add_cells<const N: usize>(&mut self, name: &str, values: &[[f64; N]]) -> Result<&mut Self, ReportError> {
+        check_length(name, values.len(), self.mesh.num_elements(), "elements")?;
+        self.cell_arrays.push_str(&float_array(name, values));
+        Ok(self)
+    }
+
+    /// The file's text.
+    pub fn to_xml(&self) -> String {
+        let order = nodes_in_vtk_order(self.mesh.element_kind);
+        let num_cells = self.mesh.num_elements();
+        let points: Vec<[f64; 3]> = self.used.iter().map(|&n| self.mesh.nodes[n]).collect();
+        let connectivity = (0..num_cells).flat_map(|e| {
+            let nodes = self.mesh.element(e);
+            order.iter().map(move |&local| self.number[nodes[local] as usize])
+        });
+        let offsets = (1..=num_cells).map(|e| (e * order.len()) as u64);
+        let integers = |name: &str, values: &mut dyn Iterator<Item = u64>| {
+            // VTK's ids are signed; node numbers are far below 2⁶³, so the bytes are the same.
+            data_array("Int64", name, 1, &values.flat_map(u64::to_le_bytes).collect::<Vec<u8>>())
+        };
+        format!(
+            "<?xml version=\"1.0\"?>\n\
+             <VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n\
+             <UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{num_cells}\">\n\
+             <PointData>\n{}</PointData>\n<CellData>\n{}</CellData>\n<Points>\n{}</Points>\n<Cells>\n{}{}{}</Cells>\n\
+             </Piece>\n</UnstructuredGrid>\n</VTKFile>\n",
+            self.used.len(),
+            self.point_arrays,
+            self.cell_arrays,
+            float_array("position_mm", &points),
+            integers("connectivity", &mut connectivity.into_iter()),
+            integers("offsets", &mut offsets.into_iter()),
+            data_array("UInt8", "types", 1, &vec![cell_type(self.mesh.element_kind); num_cells]),
+        )
+    }
+
+    /// Writes the file.
+    ///
+    /// # Errors
+    /// [`ReportError::Write`].
+    pub fn write(&self, path: &Path) -> Result<(), ReportError> {
+        write_file(path, self.to_xml().as_bytes())
+    }
+}
+
+/// Means over each element of values at its quadrature points: `samples` are (element, weight, values). Elements
+/// without a sample get NaN.
+pub fn element_means<const N: usize>(
+    num_elements: usize,
+    samples: impl IntoIterator<Item = (usize, f64, [f64; N])>,
+) -> Vec<[f64; N]> {
+    let mut sums = vec![([0.0; N], 0.0); num_elements];
+    for (element, weight, values) in samples {
+        if let Some((sum, total)) = sums.get_mut(element) {
+            *total += weight;
+            for (s, v) in sum.iter_mut().zip(values) {
+                *s += weight * v;
+            }
+        }
+    }
+    sums.into_iter().map(|(sum, total)| sum.map(|s| if total > 0.0 { s / total } else { f64::NAN })).collect()
+}
+
+/// Writes a file, with the path in the error.
+pub(super) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
+    std::fs::write(path, bytes).map_err(|source| ReportError::Write { path: path.to_path_buf(), source })
+}
+
+fn check_length(name: &str, found: usize, expected: usize, of: &'static str) -> Result<(), ReportError> {
+    if found == expected {
+        Ok(())
+    } else {
+        Err(ReportError::LengthMismatch { name: name.to_string(), found, expected, of })
+    }
+}
+
+fn float_array<const N: usize>(name: &str, values: &[[f64; N]]) -> String {
+    data_array("Float64", name, N, &values.iter().flatten().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>())
+}
+
+/// One array: its length in bytes as UInt64, then its bytes, together in base64.
+fn data_array(kind: &str, name: &str, components: usize, bytes: &[u8]) -> String {
+    let mut block = (bytes.len() as u64).to_le_bytes().to_vec();
+    block.extend_from_slice(bytes);
+    format!(
+        "<DataArray type=\"{kind}\" Name=\"{}\" NumberOfComponents=\"{components}\" format=\"binary\">{}</DataArray>\n",
+        escape(name),
+        encode(&block)
+    )
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::super::test_xml::assert_well_formed;
+    use super::*;
+    use crate::mesh::{ElementKind, Mirror};
+
+    /// A row of `n` cells along x; hexahedra of edge 2 mm, prisms beside one another.
+    pub(in super::super) fn row_of_cells(kind: ElementKind, n: u32) -> Mesh {
+        let local = kind.node_coordinates();
+        let per = local.len() as u32;
+        let nodes = (0..n).flat_map(|e| local.iter().map(move |p| [p[0] + 2.0 * f64::from(e), p[1], p[2]])).collect();
+        Mesh {
+            element_kind: kind,
+            nodes,
+            connectivity: (0..n * per).collect(),
+            mirror: Mirror::default(),
+            fixed_nodes: vec![],
+            moved_nodes: vec![],
+            mirror_y_nodes: vec![],
+            mirror_z_nodes: vec![],
+        }
+    }
+
+    #[test]
+    fn files_are_well_formed_and_count_their_points() {
+        for (kind, shown) in [(ElementKind::Hex27, 27), (ElementKind::Prism21, 18)] {
+            let mesh = row_of_cells(kind, 2);
+            let mut vtu = Vtu::new(&mesh).expect("valid mesh");
+            vtu.point_vectors("u <mm>", &mesh.nodes).expect("fits");
+            vtu.cell_tensors("F", &[[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, f64::NAN]]; 2]).expect("fits");
+            let text = vtu.to_xml();
+            assert_well_formed(&text);
+            assert!(text.contains(&format!("NumberOfPoints=\"{}\" NumberOfCells=\"2\"", 2 * shown)));
+            assert_eq!(text, vtu.to_xml());
+        }
+    }
+
+    #[test]
+    fn wrong_input_is_refused() {
+        let mut mesh = row_of_cells(ElementKind::Hex27, 1);
+        {
+            let mut vtu = Vtu::new(&mesh).expect("valid mesh");
+            assert!(matches!(
+                vtu.point_scalars("p", &[1.0]).map(|_| ()),
+                Err(ReportError::LengthMismatch { found: 1, expected: 27, .. })
+            ));
+            let path = std::env::temp_dir().join("lambdak-no-such-folder").join("x.vtu");
+            assert!(matches!(vtu.write(&path), Err(ReportError::Write { .. })));
+        }
+        mesh.connectivity[3] = 99;
+        assert!(matches!(Vtu::new(&mesh).map(|_| ()), Err(ReportError::UnknownNode { node: 99, .. })));
+        mesh.connectivity.pop();
+        assert!(matches!(Vtu::new(&mesh).map(|_| ()), Err(ReportError::BrokenConnectivity { found: 26, .. })));
+    }
+
+    #[test]
+    fn means_are_weighted() {
+        let samples = [(0, 1.0, [1.0]), (0, 3.0, [5.0]), (2, 2.0, [7.0]), (9, 1.0, [0.0])];
+        let means = element_means(3, samples);
+        assert!((means[0][0] - 4.0).abs() < 1e-15 && means[1][0].is_nan() && (means[2][0] - 7.0).abs() < 1e-15);
+    }
+}
