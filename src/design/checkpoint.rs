@@ -22,6 +22,12 @@ pub enum CheckpointError {
         /// Why.
         source: std::io::Error,
     },
+    /// The file holds something else; it is left alone.
+    #[error("{} is not a checkpoint (its first line is no header); choose another --out folder or remove the file", path.display())]
+    NotACheckpoint {
+        /// The file.
+        path: PathBuf,
+    },
     /// It belongs to another study or version.
     #[error(
         "checkpoint {} belongs to another study or version (its hash is {found}, this study's {expected}); \
@@ -67,8 +73,12 @@ impl Checkpoint {
         let fail = |source| CheckpointError::Io { path: path.into(), source };
         let mut known = HashMap::new();
         let mut good_bytes = 0u64;
+        // A header cut off by a crash has no line end; a whole line that is no header was written by something else.
+        let mut lines_of_something_else = false;
         if path.exists() {
-            let text = std::fs::read_to_string(path).map_err(fail)?;
+            let bytes = std::fs::read(path).map_err(fail)?;
+            let text = String::from_utf8_lossy(&bytes);
+            lines_of_something_else = text.contains('\n');
             for (number, line) in text.split_inclusive('\n').enumerate() {
                 let Ok(parsed) = serde_json::from_str::<Line>(line) else { break };
                 if !line.ends_with('\n') {
@@ -88,6 +98,9 @@ impl Checkpoint {
                 }
                 good_bytes += line.len() as u64;
             }
+        }
+        if good_bytes == 0 && lines_of_something_else {
+            return Err(CheckpointError::NotACheckpoint { path: path.into() });
         }
         let mut file = OpenOptions::new().create(true).append(true).open(path).map_err(fail)?;
         file.set_len(good_bytes).map_err(fail)?;
@@ -161,5 +174,64 @@ mod tests {
         drop(again);
         assert_eq!(Checkpoint::open(&path, "abc").expect("still good").num_resumed(), 2);
         assert!(matches!(Checkpoint::open(&path, "other"), Err(CheckpointError::OtherStudy { .. })));
+    }
+
+    /// A file that is no checkpoint is refused and left as it is; a header cut off by a crash is written anew.
+    #[test]
+    fn leaves_other_files_alone() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("notes.txt");
+        for other in ["shopping list\nmilk\n", "\u{0}\u{1}\n", "{}\n", "[1, 2]\n{\"key\":\"a\",\"value\":1}\n"] {
+            std::fs::write(&path, other).expect("writable");
+            let refused = Checkpoint::open(&path, "abc");
+            assert!(matches!(refused, Err(CheckpointError::NotACheckpoint { .. })), "{other:?}");
+            assert_eq!(std::fs::read_to_string(&path).expect("readable"), other);
+        }
+        std::fs::write(&path, b"\xff\xfe\n").expect("writable");
+        assert!(matches!(Checkpoint::open(&path, "abc"), Err(CheckpointError::NotACheckpoint { .. })));
+        std::fs::write(&path, "{\"key\":\"stu").expect("writable");
+        assert_eq!(Checkpoint::open(&path, "abc").expect("begun anew").num_resumed(), 0);
+        assert_eq!(Checkpoint::open(&path, "abc").expect("a good file").num_resumed(), 0);
+    }
+
+    /// A damaged line ends what is trusted: the lines before it are kept, what follows is computed again.
+    #[test]
+    fn trusts_nothing_behind_a_damaged_line() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("checkpoint.jsonl");
+        let first = Checkpoint::open(&path, "abc").expect("a new file");
+        for (key, value) in [("a", 1.0), ("b", 2.0), ("c", 3.0)] {
+            first.get_or(key, || Some(value));
+        }
+        drop(first);
+        let text = std::fs::read_to_string(&path).expect("readable");
+        std::fs::write(&path, text.replace("\"b\"", "\"b")).expect("writable");
+        let again = Checkpoint::open(&path, "abc").expect("usable");
+        assert_eq!(again.num_resumed(), 1);
+        assert_eq!(again.get_or("c", || Some(4.0)), Some(4.0));
+    }
+
+    /// Every finite float comes back with its bits, also through the file.
+    #[test]
+    fn floats_keep_their_bits() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("checkpoint.jsonl");
+        let mut bits = 0x9e37_79b9_7f4a_7c15u64;
+        let values: Vec<f64> = std::iter::repeat_with(|| {
+            // xorshift: any bit pattern.
+            bits ^= bits << 13;
+            bits ^= bits >> 7;
+            bits ^= bits << 17;
+            f64::from_bits(bits)
+        })
+        .filter(|v| v.is_finite())
+        .take(20_000)
+        .collect();
+        let first = Checkpoint::open(&path, "abc").expect("a new file");
+        first.get_or("a", || Some(values.clone()));
+        drop(first);
+        let again = Checkpoint::open(&path, "abc").expect("usable");
+        let back = again.get_or("a", || None::<Vec<f64>>).expect("it is there");
+        assert!(values.iter().zip(&back).all(|(a, b)| a.to_bits() == b.to_bits()));
     }
 }

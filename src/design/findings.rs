@@ -59,7 +59,8 @@ pub fn disagreement(study: &Study, base: &DesignEntry, ranked: &[DesignEntry]) -
             for i in 0..ranked.len() {
                 for j in 0..i {
                     let product = (by_sum[i] - by_sum[j]) * (by_information[i] - by_information[j]);
-                    agreeing += if product > 0.0 { 1 } else { -1 };
+                    // Ties (and what is not a number) count for neither.
+                    agreeing += i64::from(product > 0.0) - i64::from(product < 0.0);
                     pairs += 1;
                 }
             }

@@ -9,6 +9,8 @@ mod objective;
 mod response;
 mod result;
 mod search;
+#[cfg(test)]
+mod search_tests;
 mod space;
 mod study;
 

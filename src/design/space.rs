@@ -5,7 +5,7 @@
 
 use super::study::{Range, Study};
 use crate::mesh::DesignVariable;
-use crate::specimen::{Hole, HoleAxis, Specimen, Symmetry, TestKind};
+use crate::specimen::{Hole, HoleAxis, MIRROR_TOLERANCE_MM, Specimen, Symmetry, TestKind};
 
 /// One orbit of holes: which of its two coordinates are held at zero by lying on a mirror.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -294,27 +294,22 @@ impl Subspace {
         }
     }
 
-    /// The vector of a specimen of this structure, or `None` where it is of another one or out of range.
+    /// The vector of a specimen of this structure at `drive_mm`, or `None` where it is of another one, lacks the study's
+    /// symmetry or is out of range.
     pub fn vector_of(&self, specimen: &Specimen, drive_mm: f64) -> Option<Vec<f64>> {
         if specimen.test != self.structure.test || specimen.holes.len() != self.structure.num_holes() {
             return None;
         }
-        // Only orbits of one hole: then hole i is orbit i, if it lies on the mirror planes that the orbit lies on.
-        let is_simple = self.structure.orbits.iter().zip(&specimen.holes).all(|(orbit, hole)| {
-            self.structure.images(*orbit) == 1
-                && hole.axis == self.structure.axis
-                && (!orbit.on_x || hole.center_mm[0].abs() < 1e-9)
-                && (!orbit.on_other || hole.center_mm[1].abs() < 1e-9)
-        });
-        if !is_simple || self.structure.orbits.len() != specimen.holes.len() {
+        if specimen.holes.iter().any(|h| h.axis != self.structure.axis) {
             return None;
         }
+        let holes = self.representatives(&specimen.holes)?;
         let mut vector = Vec::with_capacity(self.variables.len());
         for (variable, range) in self.variables.iter().zip(&self.ranges) {
             let value = match *variable {
-                Variable::X(o) => specimen.holes[o].center_mm[0],
-                Variable::Other(o) => specimen.holes[o].center_mm[1],
-                Variable::Diameter(o) => specimen.holes[o].diameter_mm,
+                Variable::X(o) => holes[o].center_mm[0],
+                Variable::Other(o) => holes[o].center_mm[1],
+                Variable::Diameter(o) => holes[o].diameter_mm,
                 Variable::Drive => drive_mm,
                 Variable::Length => specimen.block.length_mm,
                 Variable::Thickness => specimen.block.thickness_mm,
@@ -328,5 +323,35 @@ impl Subspace {
             vector.push(t.clamp(0.0, 1.0));
         }
         Some(vector)
+    }
+
+    /// For each orbit the hole that stands for it (on the positive side of every mirror), where the holes are exactly the
+    /// orbits of this structure.
+    fn representatives(&self, holes: &[Hole]) -> Option<Vec<Hole>> {
+        let near = |a: f64, b: f64| (a - b).abs() <= MIRROR_TOLERANCE_MM;
+        let mut left: Vec<Hole> = holes.to_vec();
+        let mut found = Vec::with_capacity(self.structure.orbits.len());
+        for orbit in &self.structure.orbits {
+            let is_on = [orbit.on_x, orbit.on_other];
+            let fits = |hole: &Hole| {
+                (0..2).all(|c| {
+                    let value = hole.center_mm[c];
+                    !self.structure.mirrors[c]
+                        || if is_on[c] { near(value, 0.0) } else { value > MIRROR_TOLERANCE_MM }
+                })
+            };
+            let hole = *left.iter().find(|h| fits(h))?;
+            for signs in self.image_signs(*orbit) {
+                let image = [signs[0] * hole.center_mm[0], signs[1] * hole.center_mm[1]];
+                let index = left.iter().position(|h| {
+                    near(h.center_mm[0], image[0])
+                        && near(h.center_mm[1], image[1])
+                        && near(h.diameter_mm, hole.diameter_mm)
+                })?;
+                left.remove(index);
+            }
+            found.push(hole);
+        }
+        left.is_empty().then_some(found)
     }
 }
