@@ -148,11 +148,6 @@ impl MaterialEvaluation {
         step.integrated_sensitivity.iter().find(|s| s.parameter == parameter).map(|s| s.sum)
     }
 
-    /// Whether a parameter's relative standard deviation is below the identifiability limit.
-    pub fn is_visible(&self, parameter: &str) -> bool {
-        self.evaluation.promised_sd.iter().any(|p| p.parameter == parameter && p.identifiable)
-    }
-
     /// Promised standard deviation of a parameter.
     pub fn promised(&self, parameter: &str) -> Option<f64> {
         self.evaluation.promised_sd.iter().find(|p| p.parameter == parameter).and_then(|p| p.value)
@@ -178,11 +173,7 @@ impl Confirmed {
                 }
                 if study.objective.guard_promised_sd {
                     let is_main = own.material == study.materials[0].name;
-                    let is_kept = if is_main {
-                        promised.is_none_or(|p| p >= 1.0 - 1e-9)
-                    } else {
-                        !of_base.is_visible(parameter) || own.is_visible(parameter)
-                    };
+                    let is_kept = !is_main || promised.is_none_or(|p| p >= 1.0 - 1e-9);
                     self.is_within_limits &= is_kept;
                 }
                 self.gains.push(Gain {

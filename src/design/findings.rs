@@ -178,6 +178,10 @@ pub fn findings(
                     "Material \"{}\": {parameter} cannot be seen with the base specimen and can with the best one (relative standard deviation {:.1} %).",
                     prior.name, 100.0 * o
                 )),
+                (Some(b), Some(o)) if b <= 0.5 && o > 0.5 => said.push(format!(
+                    "Caution. Material \"{}\": {parameter} can be seen with the base specimen (relative standard deviation {:.0} %) and no longer with the best one ({:.0} %). If this material is likely, take a design with holes from the list.",
+                    prior.name, 100.0 * b, 100.0 * o
+                )),
                 (_, Some(o)) if o > 0.5 => said.push(format!(
                     "Material \"{}\": {parameter} cannot be seen with either specimen (relative standard deviation {:.0} % with the best one).",
                     prior.name, 100.0 * o

@@ -3,7 +3,6 @@
 
 use super::response::{Evaluated, MaterialSample, Response};
 use super::study::{Combine, ObjectiveKind, Study};
-use crate::sensitivity::IDENTIFIABILITY_LIMIT;
 use crate::specimen::ManufacturingLimits;
 
 /// The base specimen's responses, against which gains are counted.
@@ -62,22 +61,12 @@ impl<'a> Reference<'a> {
         margins
     }
 
-    /// The guard: for the first material no standard deviation may grow; for the others, whatever the base shows must
-    /// stay visible, with 3 % kept for the difference between search and confirmation. +∞ where nothing is asked.
+    /// The guard: for the first material no standard deviation may grow. +∞ where nothing is asked.
     fn allowances(&self, prior: usize) -> Vec<f64> {
-        let central = self.samples.iter().position(|s| s.prior == prior).map(|s| &self.base[s]);
-        let Some(central) = central else { return Vec::new() };
-        let of = |log_relative_sd: &f64| {
-            if !self.study.objective.guard_promised_sd {
-                f64::INFINITY
-            } else if prior == 0 {
-                0.0
-            } else {
-                let room = (0.97 * IDENTIFIABILITY_LIMIT).ln() - log_relative_sd;
-                if *log_relative_sd <= IDENTIFIABILITY_LIMIT.ln() { room.max(0.0) } else { f64::INFINITY }
-            }
-        };
-        central.log_relative_sd.iter().map(of).collect()
+        let is_guarded = self.study.objective.guard_promised_sd && prior == 0;
+        let sample = self.samples.iter().position(|s| s.prior == prior);
+        let count = sample.map_or(0, |s| self.base[s].log_relative_sd.len());
+        vec![if is_guarded { 0.0 } else { f64::INFINITY }; count]
     }
 
     /// Judges an evaluation.
