@@ -19,6 +19,10 @@ pub fn elimination_order(graph: &Graph) -> Vec<u32> {
     order
 }
 
+/// METIS draws from the C library's `rand`, whose state is the process's: calls at the same time would disturb each other's
+/// orders, and with them the last digits of every solution. One at a time each call seeds it anew.
+static METIS: std::sync::Mutex<()> = std::sync::Mutex::new(());
+
 /// METIS_NodeND; `None` where the library refuses (empty graph, no memory), in which case any order is correct.
 fn nested_dissection(graph: &Graph) -> Option<Vec<u32>> {
     let mut n = (graph.offsets.len() - 1) as i32;
@@ -28,6 +32,8 @@ fn nested_dissection(graph: &Graph) -> Option<Vec<u32>> {
     let (mut offsets, mut neighbours) = (graph.offsets.clone(), graph.neighbours.clone());
     let mut options = [-1i32; metis_sys::METIS_NOPTIONS as usize];
     let (mut perm, mut inverse) = (vec![0i32; n as usize], vec![0i32; n as usize]);
+    // The lock guards no data, so a poisoned one is as good.
+    let _one_at_a_time = METIS.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     // SAFETY: the arrays have the lengths that METIS documents (n + 1, offsets[n], METIS_NOPTIONS, n, n), indices are
     // in range by construction, and all outlive the call.
     let status = unsafe {
