@@ -7,7 +7,11 @@ use crate::calibration::{CalibrationError, ParameterSpread, VerifyOptions, verif
 use crate::design::{
     Checkpoint, DesignEntry, DesignResult, MaterialVerification, SearchError, Study, search, study_hash,
 };
-use crate::specimen::Specimen;
+use crate::fem::ForwardModel;
+use crate::mesh::MeshOptions;
+use crate::report::{DesignPictures, deformed_picture, design_report, histogram_picture};
+use crate::sensitivity::{DriveSelection, EvaluationOptions, evaluate_model};
+use crate::specimen::{Specimen, to_dxf, to_stl, to_svg};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -72,9 +76,45 @@ pub(super) fn run(a: &DesignArguments) -> Result<(), CliError> {
     }
     if let Some(folder) = &folder {
         output::write_file(folder, "design.json", output::to_json(&result)?.as_bytes())?;
+        write_report(&study, &result, folder)?;
         output::write_file(folder, "best-specimen.json", best_specimen(&result).to_json().as_bytes())?;
     }
     output::print(&if a.common.json { output::to_json(&result)? } else { summary(&result, folder.as_deref()) })
+}
+
+/// The page, and what the mould maker needs.
+fn write_report(study: &Study, result: &DesignResult, folder: &Path) -> Result<(), CliError> {
+    let pictures = pictures(study, result)?;
+    output::write_file(folder, "report.html", design_report(result, &pictures).as_bytes())?;
+    let best = best_specimen(result);
+    output::write_file(folder, "best-specimen.svg", to_svg(&best).as_bytes())?;
+    output::write_file(folder, "best-specimen.dxf", to_dxf(&best).as_bytes())?;
+    let stl = to_stl(&best).map_err(|e| CliError::Numerics(e.to_string()))?;
+    output::write_file(folder, "best-specimen.stl", &stl)?;
+    Ok(())
+}
+
+/// Base and best once more, for the pictures that need fields.
+fn pictures(study: &Study, result: &DesignResult) -> Result<DesignPictures, CliError> {
+    let material = &study.materials[0].material;
+    let mut evaluated = Vec::new();
+    let mut deformed = Vec::new();
+    for (label, specimen) in [("base", &result.base.specimen), ("best", &result.best.specimen)] {
+        let options =
+            EvaluationOptions { mesh: MeshOptions::search(specimen), ..EvaluationOptions::standard(specimen) };
+        let failed = |e: &dyn std::fmt::Display| CliError::Numerics(format!("pictures: {e}"));
+        let mut model = ForwardModel::of_specimen(specimen, &options.mesh).map_err(|e| failed(&e))?;
+        let drives = DriveSelection::DriveMm(specimen.drive_mm.clone());
+        let (_, maps) = evaluate_model(&mut model, specimen, material, &study.scan, &drives, &options, &|| false)
+            .map_err(|e| failed(&e))?;
+        if let Some(state) = maps.equilibria.last() {
+            let svg = deformed_picture(&model, material, state).map_err(|e| failed(&e))?;
+            deformed.push((svg, format!("{label}: {}", specimen.name)));
+        }
+        evaluated.push((label, maps));
+    }
+    let panels: Vec<_> = evaluated.iter().map(|(label, maps)| ((*label).to_string(), maps, 0)).collect();
+    Ok(DesignPictures { histogram: histogram_picture(&panels), deformed })
 }
 
 /// The winner under a name of its own.

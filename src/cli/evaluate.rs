@@ -3,6 +3,7 @@
 use super::error::CliError;
 use super::solve::solve_error;
 use super::{Common, Subject, input, interrupt, output};
+use crate::report::{bar_pictures, histogram_picture, map_pictures};
 use crate::sensitivity::{
     DriveSelection, Evaluation, EvaluationError, EvaluationMaps, EvaluationOptions, PartialVoxels, ScanSettings,
     evaluate,
@@ -60,8 +61,14 @@ pub(super) fn run(a: &EvaluateArguments) -> Result<(), CliError> {
     output::print(&if a.common.json { output::to_json(&evaluation)? } else { summary(&specimen.name, &evaluation) })
 }
 
-fn write_files(folder: &Path, evaluation: &Evaluation, _maps: &EvaluationMaps) -> Result<(), CliError> {
+fn write_files(folder: &Path, evaluation: &Evaluation, maps: &EvaluationMaps) -> Result<(), CliError> {
     output::write_file(folder, "evaluation.json", output::to_json(evaluation)?.as_bytes())?;
+    let panels: Vec<_> =
+        maps.drives.iter().enumerate().map(|(index, d)| (format!("drive {:.2} mm", d.drive_mm), maps, index)).collect();
+    output::write_file(folder, "histogram.svg", histogram_picture(&panels).as_bytes())?;
+    for (name, svg) in map_pictures(maps).into_iter().chain(bar_pictures(evaluation)) {
+        output::write_file(folder, &format!("{name}.svg"), svg.as_bytes())?;
+    }
     Ok(())
 }
 

@@ -5,6 +5,7 @@ use super::{Common, Subject, input, interrupt, output};
 use crate::fem::{Equilibrium, ForwardModel, PrepareError, QuadraturePoint, SolveError, SolveOptions, SolveResult};
 use crate::kinematics::decompose;
 use crate::provenance::input_hash;
+use crate::report::{ReportError, deformed_picture, vtu_of};
 use clap::Args;
 
 #[derive(Args)]
@@ -40,6 +41,13 @@ pub(super) fn run(a: &SolveArguments) -> Result<(), CliError> {
         result.push(&found, extremes(&fields), model.statistics());
         last = Some(found);
     }
+    if let (Some(folder), Some(state)) = (&folder, &last) {
+        let report_error = |e: ReportError| CliError::Numerics(e.to_string());
+        let vtu = vtu_of(&model, &material, state).map_err(report_error)?;
+        output::write_file(folder, "solution.vtu", vtu.as_bytes())?;
+        let picture = deformed_picture(&model, &material, state).map_err(report_error)?;
+        output::write_file(folder, "deformed.svg", picture.as_bytes())?;
+    }
     if let Some(folder) = &folder {
         output::write_file(folder, "solve.json", output::to_json(&result)?.as_bytes())?;
     }
@@ -60,6 +68,9 @@ pub(super) fn run(a: &SolveArguments) -> Result<(), CliError> {
             step.jacobian_range[0],
             step.jacobian_range[1]
         );
+    }
+    if let Some(folder) = &folder {
+        text += &format!("\nfiles: {}/solution.vtu (ParaView), deformed.svg, solve.json\n", folder.display());
     }
     output::print(&text)
 }

@@ -372,3 +372,7 @@ mod tests {
         assert!((found.x[0] - 0.75).abs() < 1e-2 && (found.x[1] - 0.25).abs() < 1e-2, "{:?}", found.x);
     }
 }
+
+#[cfg(test)]
+#[path = "local_tests.rs"]
+mod known_optima;

@@ -93,6 +93,9 @@ pub struct Found {
     pub num_evaluations: usize,
 }
 
+/// Points of a refinement and what they were judged.
+type Log = Vec<(Vec<f64>, Option<Judged>)>;
+
 type Tried = Result<Evaluated, EvaluationFailure>;
 
 struct Search<'a> {
@@ -185,10 +188,10 @@ impl Search<'_> {
         let mut batch: Vec<(usize, Vec<f64>)> = Vec::new();
         for (index, space) in spaces.iter().enumerate() {
             for drive in [base.drive_mm[0], study.vary.drive_mm.max] {
-                if let Some(vector) = space.vector_of(base, drive) {
-                    if is_makeable(&space.specimen(&vector), &study.limits, study.scan.voxel_mm) {
-                        batch.push((index, vector));
-                    }
+                if let Some(vector) = space.vector_of(base, drive)
+                    && is_makeable(&space.specimen(&vector), &study.limits, study.scan.voxel_mm)
+                {
+                    batch.push((index, vector));
                 }
             }
         }
@@ -264,7 +267,7 @@ impl Search<'_> {
         let total = starts.len() * budget.iterations;
         let done = AtomicUsize::new(0);
         let best = state.history.last().copied();
-        let outcomes: Vec<(Vec<(Vec<f64>, Option<Judged>)>, bool)> = starts
+        let outcomes: Vec<(Log, bool)> = starts
             .par_iter()
             .map(|(index, start)| {
                 let problem = Problem {
@@ -405,15 +408,18 @@ impl State {
         order
     }
 
-    /// The best candidates to refine, at most two of a structure.
+    /// The best candidates to refine, one of each structure as far as there are structures, best first.
     fn starts(&self, count: usize) -> Vec<(usize, Vec<f64>)> {
-        let mut used: Vec<usize> = Vec::new();
-        let mut starts = Vec::new();
-        for index in self.order() {
-            let space = self.points[index].0;
-            if starts.len() < count && used.iter().filter(|s| **s == space).count() < 2 {
-                used.push(space);
-                starts.push(self.points[index].clone());
+        let order = self.order();
+        let mut starts: Vec<(usize, Vec<f64>)> = Vec::new();
+        for per_structure in 1..=count.max(1) {
+            let mut used = std::collections::HashMap::new();
+            for &index in &order {
+                let seen: &mut usize = used.entry(self.points[index].0).or_default();
+                *seen += 1;
+                if starts.len() < count && *seen == per_structure {
+                    starts.push(self.points[index].clone());
+                }
             }
         }
         starts
@@ -429,8 +435,8 @@ impl State {
             let candidate = &self.candidates[index];
             by_count.entry(candidate.specimen.holes.len()).or_insert_with(|| candidate.specimen.clone());
             let count: &mut usize = per_space.entry(self.points[index].0).or_default();
-            // Near copies along one refinement teach nothing: three of a structure.
-            if finalists.len() < study.budget.confirm && *count < 3 {
+            // Near copies along one refinement teach nothing: four of a structure.
+            if finalists.len() < study.budget.confirm && *count < 4 {
                 *count += 1;
                 finalists.push(candidate.specimen.clone());
             }
@@ -457,7 +463,7 @@ struct Problem<'a> {
     search: &'a Search<'a>,
     reference: &'a Reference<'a>,
     subspace: &'a Subspace,
-    log: std::sync::Mutex<Vec<(Vec<f64>, Option<Judged>)>>,
+    log: std::sync::Mutex<Log>,
     was_stopped: std::sync::atomic::AtomicBool,
     on_evaluation: &'a (dyn Fn() + Sync),
 }

@@ -16,6 +16,7 @@ mod ordering;
 mod result;
 mod stages;
 mod topology;
+mod verification;
 
 pub use derivatives::{ParameterSensitivity, PathSensitivity};
 pub use error::{SolveError, StepFailure};

@@ -30,8 +30,6 @@ pub struct ForwardModel {
     pub(super) multiplicity: f64,
     /// Largest first load step, mm.
     pub(super) first_step_mm: f64,
-    /// Counts the equilibria found.
-    pub(super) serial: u64,
     /// The equilibrium at which the stored tangent stands, if any.
     pub(super) tangent_at: u64,
     pub(super) statistics: Statistics,
@@ -99,7 +97,6 @@ impl ForwardModel {
             multiplicity: f64::from(1u32 << planes) * f64::from(specimen.samples_in_parallel),
             // One step to a shear strain of 0.8 takes five or six iterations; stretching is more nonlinear.
             first_step_mm: if axis == 1 { 0.85 } else { 0.3 } * extent,
-            serial: 0,
             tangent_at: 0,
             statistics: Statistics::default(),
             guide: None,

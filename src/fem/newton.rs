@@ -6,6 +6,7 @@
 use super::error::{SolveError, StepFailure};
 use super::model::{ForwardModel, Statistics};
 use crate::material::{MAX_TERMS, Ogden};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Settings of [`ForwardModel::solve`].
 #[derive(Clone, Copy, Debug)]
@@ -22,7 +23,7 @@ pub struct SolveOptions {
 
 impl Default for SolveOptions {
     fn default() -> Self {
-        SolveOptions { tolerance: 1e-6, max_iterations: 14, min_step: 1.0 / 512.0 }
+        SolveOptions { tolerance: 1e-6, max_iterations: 14, min_step: 1.0 / 64.0 }
     }
 }
 
@@ -229,7 +230,7 @@ impl ForwardModel {
                 }
             }
             let right = self.collect(&residual, -1.0);
-            last = norm(&right) / self.reaction_scale(&residual);
+            last = norm(&right) / self.reaction_scale(material, &residual);
             if last < options.tolerance {
                 return Ok(self.finish(trial, &residual));
             }
@@ -266,15 +267,16 @@ impl ForwardModel {
     }
 
     /// What a residual is measured against: the forces on the plates, or, near rest, a thousandth of μ × 1 mm².
-    fn reaction_scale(&self, residual: &[[f64; 3]]) -> f64 {
+    fn reaction_scale(&self, material: &Ogden, residual: &[[f64; 3]]) -> f64 {
+        let mu = material.terms.iter().map(|t| 0.5 * t.mu_kpa * t.alpha).sum::<f64>().abs().max(1e-12);
         let mut s = 0.0;
         for v in self.mesh.moved_nodes.iter().chain(&self.mesh.fixed_nodes) {
             s += residual[*v as usize].iter().map(|x| x * x).sum::<f64>();
         }
-        s.sqrt().max(1e-6)
+        s.sqrt().max(1e-3 * mu)
     }
 
-    fn finish(&mut self, mut state: Equilibrium, residual: &[[f64; 3]]) -> Equilibrium {
+    pub(super) fn finish(&mut self, mut state: Equilibrium, residual: &[[f64; 3]]) -> Equilibrium {
         let moved = self.reaction(residual);
         let mut fixed = [0.0; 3];
         for &v in &self.mesh.fixed_nodes {
@@ -285,12 +287,17 @@ impl ForwardModel {
         // kPa·mm² = 10⁻³ N.
         state.force_n = moved[0] * self.multiplicity * 1e-3;
         state.normal_force_n = if self.mesh.mirror.y { 0.0 } else { moved[1] * self.multiplicity * 1e-3 };
-        self.serial += 1;
-        state.serial = self.serial;
-        self.tangent_at = self.serial;
+        state.serial = next_serial();
+        self.tangent_at = state.serial;
         state.reaction_imbalance = (moved[0] + fixed[0]).abs() / moved[0].abs().max(1e-12);
         state
     }
+}
+
+/// A number that no other equilibrium of this process has.
+fn next_serial() -> u64 {
+    static NEXT: AtomicU64 = AtomicU64::new(1);
+    NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
 /// A Newton step that can be shortened.

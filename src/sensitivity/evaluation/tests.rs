@@ -3,6 +3,7 @@
 use super::super::continuum::tests::block;
 use super::super::information::tests::one_term;
 use super::*;
+use crate::mesh::mesh_specimen;
 use crate::voxel::VoxelOperator;
 
 fn scan() -> ScanSettings {
@@ -18,14 +19,14 @@ fn hash_follows_the_inputs() {
     let specimen = block("hash");
     let options = EvaluationOptions::standard(&specimen);
     let drives = DriveSelection::DriveMm(vec![2.0]);
-    let hash = input_hash(&specimen, &one_term(), &scan(), &drives, &options);
+    let hash = hash_of_inputs(&specimen, &one_term(), &scan(), &drives, &options);
     assert_eq!(hash.len(), 64);
-    assert_eq!(hash, input_hash(&specimen, &one_term(), &scan(), &drives, &options));
+    assert_eq!(hash, hash_of_inputs(&specimen, &one_term(), &scan(), &drives, &options));
     let others = [
-        input_hash(&block("other"), &one_term(), &scan(), &drives, &options),
-        input_hash(&specimen, &Ogden { bulk_kpa: 1.0, ..one_term() }, &scan(), &drives, &options),
-        input_hash(&specimen, &one_term(), &ScanSettings { force_sd_n: 0.03, ..scan() }, &drives, &options),
-        input_hash(&specimen, &one_term(), &scan(), &DriveSelection::MedianStretch(1.2), &options),
+        hash_of_inputs(&block("other"), &one_term(), &scan(), &drives, &options),
+        hash_of_inputs(&specimen, &Ogden { bulk_kpa: 1.0, ..one_term() }, &scan(), &drives, &options),
+        hash_of_inputs(&specimen, &one_term(), &ScanSettings { force_sd_n: 0.03, ..scan() }, &drives, &options),
+        hash_of_inputs(&specimen, &one_term(), &scan(), &DriveSelection::MedianStretch(1.2), &options),
     ];
     assert!(others.iter().all(|other| *other != hash));
 }

@@ -1,0 +1,313 @@
+//! The page that a person reads after a design search.
+
+use super::{
+    BarGroup, CalloutKind, Column, GroupedBars, HistoryPlot, HistoryPoint, LimitBar, LimitsPlot, ParetoPlot,
+    ParetoPoint, PointKind, RankedItem, RankingPlot, Report, ReportHeader, SpreadPlot, SpreadRow, Table, significant,
+    symbol_of_parameter,
+};
+use crate::design::{DesignEntry, DesignResult};
+use crate::specimen::to_svg;
+
+/// Pictures made elsewhere, put in the page where they belong.
+#[derive(Clone, Debug, Default)]
+pub struct DesignPictures {
+    /// (λ, k) histograms, base beside best, with the first material.
+    pub histogram: String,
+    /// Deformed base and best.
+    pub deformed: Vec<(String, String)>,
+}
+
+fn show(value: Option<f64>, digits: usize) -> String {
+    value.map_or("–".into(), |v| significant(v, digits))
+}
+
+/// The report of `result`.
+pub fn design_report(result: &DesignResult, pictures: &DesignPictures) -> String {
+    let header = ReportHeader {
+        subtitle: format!("Best specimen found: {}", result.best.specimen.name),
+        program_version: result.version.clone(),
+        input_hash: result.input_hash.clone(),
+        seed: Some(result.seed),
+        facts: vec![
+            ("Designs evaluated".into(), result.num_evaluations.to_string()),
+            ("Designs that failed".into(), result.failures.len().to_string()),
+            ("Designs confirmed".into(), result.ranked.len().to_string()),
+        ],
+    };
+    let mut page = Report::new(result.name.clone(), header);
+    page.section("What was found");
+    for (index, sentence) in result.findings.iter().enumerate() {
+        if index == 0 {
+            page.callout(CalloutKind::Finding, "The best specimen", sentence);
+        }
+    }
+    page.list(&result.findings[1.min(result.findings.len())..]);
+    page.figures(&[(to_svg(&result.best.specimen), "Drawing of the best specimen; dimensions in mm.")]);
+    if !pictures.deformed.is_empty() {
+        page.subsection("Under load");
+        page.figures(&pictures.deformed);
+    }
+    page.section("Best against base");
+    page.table(&gains_table(&result.best));
+    page.figures(&gain_bars(result));
+    if !pictures.histogram.is_empty() {
+        page.figure(
+            &pictures.histogram,
+            "Where the voxels lie: stretch amplitude λ against deformation mode k (0 equibiaxial, ½ pure shear, 1 uniaxial), \
+             logarithmic density, first material.",
+        );
+    }
+    if !result.verification_by_material.is_empty() {
+        verification(&mut page, result);
+    }
+    page.section("Designs compared");
+    page.table(&ranked_table(result));
+    page.figures(&[(pareto_plot(result).to_svg(), "Information against force; the front is marked.")]);
+    for (index, d) in result.disagreement.iter().enumerate() {
+        let items = result.ranked.iter().enumerate().map(|(i, entry)| RankedItem {
+            label: format!("{}. {}", i + 1, short(entry)),
+            left: -(d.rank_by_integrated_sensitivity[i] as f64),
+            right: -(d.rank_by_information[i] as f64),
+            is_base: false,
+            is_best: i == 0,
+        });
+        let plot = RankingPlot {
+            title: format!("Rankings, material \"{}\"", d.material),
+            left_label: "integrated sensitivity".into(),
+            right_label: "Fisher information (D)".into(),
+            larger_left_is_better: true,
+            larger_right_is_better: true,
+            items: items.collect(),
+        };
+        let caption = format!(
+            "The two measures' rankings of the confirmed designs; Kendall's τ = {}.",
+            show(result.disagreement[index].kendall_tau, 2)
+        );
+        page.figure(&plot.to_svg(), &caption);
+    }
+    page.section("Limits of the best specimen");
+    let limits = LimitsPlot {
+        title: String::new(),
+        limits: result
+            .best
+            .limits
+            .iter()
+            .map(|m| LimitBar {
+                name: m.name.clone(),
+                unit: String::new(),
+                value: m.value,
+                limit: m.limit,
+                margin_relative: m.margin_relative,
+                is_satisfied: m.is_satisfied,
+            })
+            .collect(),
+    };
+    page.figure(&limits.to_svg(), "Relative margin to every limit, closest first.");
+    page.section("The search");
+    let history = HistoryPlot {
+        title: String::new(),
+        y_label: "gain over the base".into(),
+        larger_is_better: true,
+        is_log: false,
+        base: Some(1.0),
+        points: result
+            .history
+            .iter()
+            .map(|v| HistoryPoint {
+                value: if *v > 0.0 { *v } else { f64::NAN },
+                is_feasible: true,
+                phase: String::new(),
+            })
+            .collect(),
+    };
+    page.figure(&history.to_svg(), "Best gain within all limits after each evaluation, at search fidelity.");
+    page.paragraph(&format!(
+        "Objective: {:?}, combined by {:?}{}. Gains are relative to the base specimen at its drive; confirmed values come from \
+         the standard mesh and the scan's own voxels. Seed {}.",
+        result.objective.kind,
+        result.objective.combine,
+        if result.objective.guard_promised_sd { ", no promised standard deviation worse than the base's" } else { "" },
+        result.seed
+    ));
+    page.to_html()
+}
+
+fn short(entry: &DesignEntry) -> String {
+    match entry.specimen.holes.as_slice() {
+        [] => "solid".into(),
+        holes => {
+            let diameters: Vec<String> = holes.iter().map(|h| format!("⌀{:.1}", h.diameter_mm)).collect();
+            format!("{} × {}", holes.len(), diameters.join(" "))
+        }
+    }
+}
+
+fn gains_table(best: &DesignEntry) -> Table {
+    Table {
+        caption: "Gains of the best specimen over the base; above 1 is better.".into(),
+        columns: vec![
+            Column::words("Material"),
+            Column::words("Parameter"),
+            Column::numbers("Integrated sensitivity", "×"),
+            Column::numbers("Promised sd, base / best", "×"),
+        ],
+        rows: best
+            .gains
+            .iter()
+            .map(|g| {
+                vec![
+                    g.material.clone(),
+                    symbol_of_parameter(&g.parameter),
+                    show(g.integrated_sensitivity, 3),
+                    show(g.promised_sd, 3),
+                ]
+            })
+            .collect(),
+        ..Table::default()
+    }
+}
+
+fn gain_bars(result: &DesignResult) -> Vec<(String, String)> {
+    result
+        .base
+        .by_material
+        .iter()
+        .zip(&result.best.by_material)
+        .map(|(base, best)| {
+            let groups = base
+                .evaluation
+                .promised_sd
+                .iter()
+                .zip(&best.evaluation.promised_sd)
+                .map(|(a, b)| BarGroup {
+                    label: symbol_of_parameter(&a.parameter),
+                    values: [a, b].map(|p| p.relative_sd.map_or(f64::NAN, |r| 100.0 * r)).to_vec(),
+                })
+                .collect();
+            let bars = GroupedBars {
+                title: format!("Promised standard deviation, material \"{}\"", base.material),
+                axis_label: "% of the parameter".into(),
+                series: vec!["base".into(), "best".into()],
+                groups,
+                is_log: true,
+                missing_label: "not determined".into(),
+                ..GroupedBars::default()
+            };
+            (bars.to_svg(), "What one scan promises, all parameters being fitted together.".to_string())
+        })
+        .collect()
+}
+
+fn ranked_table(result: &DesignResult) -> Table {
+    let row = |label: String, entry: &DesignEntry| {
+        vec![
+            label,
+            short(entry),
+            significant(entry.specimen.drive_mm.last().copied().unwrap_or(f64::NAN), 3),
+            significant(entry.force_n(), 3),
+            significant(entry.objective, 4),
+            show(entry.information().map(|i| 100.0 * i), 3),
+            if entry.is_within_limits { entry.closest_limit.clone() } else { "breaks a limit or the guard".into() },
+        ]
+    };
+    let mut rows = vec![row("base".into(), &result.base)];
+    rows.extend(result.ranked.iter().enumerate().map(|(i, e)| row((i + 1).to_string(), e)));
+    Table {
+        caption: "Confirmed designs, best first.".into(),
+        columns: vec![
+            Column::words("Rank"),
+            Column::words("Holes"),
+            Column::numbers("Drive", "mm"),
+            Column::numbers("Force", "N"),
+            Column::numbers("Gain", "×"),
+            Column::numbers("Generalised sd", "%"),
+            Column::words("Closest limit"),
+        ],
+        rows,
+        emphasised_rows: vec![1],
+        note: "Generalised sd: (det C)^(1/2n) of all μ and α of the first material.".into(),
+    }
+}
+
+fn pareto_plot(result: &DesignResult) -> ParetoPlot {
+    let point = |label: String, entry: &DesignEntry, kind: PointKind| ParetoPoint {
+        x: entry.force_n(),
+        y: entry.information().map_or(f64::NAN, |i| 100.0 * i),
+        label,
+        kind,
+    };
+    let mut points = vec![point("base".into(), &result.base, PointKind::Base)];
+    for (index, entry) in result.ranked.iter().enumerate() {
+        let kind = if index == 0 {
+            PointKind::Best
+        } else if !entry.is_within_limits {
+            PointKind::Infeasible
+        } else if result.pareto.contains(&index) {
+            PointKind::Front
+        } else {
+            PointKind::Dominated
+        };
+        points.push(point((index + 1).to_string(), entry, kind));
+    }
+    ParetoPlot {
+        title: String::new(),
+        x_label: "force, N (largest over the materials)".into(),
+        y_label: "generalised sd, %".into(),
+        is_log_x: false,
+        is_log_y: false,
+        larger_x_is_better: false,
+        larger_y_is_better: false,
+        points,
+    }
+}
+
+fn verification(page: &mut Report, result: &DesignResult) {
+    page.section("Verification");
+    page.paragraph(
+        "Both specimens were calibrated on synthetic scans of a known material, made on a finer and different mesh than the \
+         one used for fitting, with fresh noise in every draw. The spread of the estimates is set beside the spread promised.",
+    );
+    for v in &result.verification_by_material {
+        let mut table_rows = Vec::new();
+        let mut rows = Vec::new();
+        for (label, list) in [("best", &v.best), ("base", &v.base)] {
+            for p in list {
+                table_rows.push(vec![
+                    label.to_string(),
+                    symbol_of_parameter(&p.parameter),
+                    significant(p.truth, 4),
+                    significant(p.mean, 4),
+                    significant(p.found_sd, 3),
+                    show(p.promised_sd, 3),
+                    show(p.promised_sd.map(|sd| p.found_sd / sd), 3),
+                    format!("{}", p.draws),
+                ]);
+                rows.push(SpreadRow {
+                    specimen: label.into(),
+                    parameter: symbol_of_parameter(&p.parameter),
+                    unit: if p.parameter.starts_with("alpha") { String::new() } else { "kPa".into() },
+                    truth: p.truth,
+                    found: p.estimates.clone(),
+                    promised_sd: p.promised_sd.unwrap_or(f64::NAN),
+                });
+            }
+        }
+        page.table(&Table {
+            caption: format!("Material \"{}\".", v.material),
+            columns: vec![
+                Column::words("Specimen"),
+                Column::words("Parameter"),
+                Column::numbers("Truth", ""),
+                Column::numbers("Mean", ""),
+                Column::numbers("Found sd", ""),
+                Column::numbers("Promised sd", ""),
+                Column::numbers("Found / promised", ""),
+                Column::numbers("Draws", ""),
+            ],
+            rows: table_rows,
+            ..Table::default()
+        });
+        let plot = SpreadPlot { title: format!("Material \"{}\"", v.material), rows };
+        page.figure(&plot.to_svg(), "Each draw's estimate, the truth, and ± the promised standard deviation.");
+    }
+}

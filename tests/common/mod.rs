@@ -1,0 +1,201 @@
+//! What the finite-element tests share: specimens, materials, hand-made meshes of a cube, norms, random numbers.
+
+#![allow(dead_code)] // Each test binary uses a part.
+
+use lambdak::fem::{Equilibrium, ForwardModel, SolveError, SolveOptions};
+use lambdak::material::{Ogden, OgdenTerm};
+use lambdak::mesh::{ElementKind, Mesh, MeshOptions, Mirror, mesh_specimen};
+use lambdak::specimen::{Block, Hole, HoleAxis, Outline, Specimen, TestKind};
+use std::collections::HashMap;
+
+pub type Vector = [f64; 3];
+pub type Matrix = [[f64; 3]; 3];
+
+/// κ and terms (μ, α).
+pub fn ogden(bulk_kpa: f64, terms: &[(f64, f64)]) -> Ogden {
+    Ogden {
+        schema: "ogden/1".into(),
+        bulk_kpa,
+        terms: terms.iter().map(|&(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha }).collect(),
+    }
+}
+
+/// Ecoflex 00-20, one term.
+pub fn one_term() -> Ogden {
+    ogden(2173.0, &[(17.0, 1.91)])
+}
+
+/// Ecoflex 00-20, two terms.
+pub fn two_terms() -> Ogden {
+    ogden(2200.0, &[(16.0, 1.9), (0.35, 8.0)])
+}
+
+/// A block (length, thickness, width) with holes (first, second coordinate, diameter).
+pub fn specimen(test: TestKind, extents: Vector, axis: HoleAxis, holes: &[Vector]) -> Specimen {
+    let [length_mm, thickness_mm, width_mm] = extents;
+    Specimen {
+        schema: "specimen/1".into(),
+        name: format!("{test:?} {extents:?} {axis:?} {holes:?}"),
+        test,
+        block: Block { length_mm, thickness_mm, width_mm },
+        outline: Outline::Block,
+        holes: holes.iter().map(|h| Hole { axis, center_mm: [h[0], h[1]], diameter_mm: h[2] }).collect(),
+        drive_mm: vec![1.0],
+        samples_in_parallel: 1,
+    }
+}
+
+pub const SHEAR_BLOCK: Vector = [25.4, 6.4, 19.1];
+
+pub fn solid() -> Specimen {
+    specimen(TestKind::DoubleLapShear, SHEAR_BLOCK, HoleAxis::Thickness, &[])
+}
+
+pub fn two_holes() -> Specimen {
+    let holes = [[-4.2333, 0.0, 5.0], [4.2333, 0.0, 5.0]];
+    specimen(TestKind::DoubleLapShear, SHEAR_BLOCK, HoleAxis::Thickness, &holes)
+}
+
+/// Two holes without any symmetry.
+pub fn off_axis() -> Specimen {
+    let holes = [[-5.0, 3.0, 4.0], [4.0, -2.0, 5.0]];
+    specimen(TestKind::DoubleLapShear, SHEAR_BLOCK, HoleAxis::Thickness, &holes)
+}
+
+pub fn bar() -> Specimen {
+    specimen(TestKind::Uniaxial, [40.0, 4.0, 12.0], HoleAxis::Thickness, &[[0.0, 0.0, 4.0]])
+}
+
+/// Model of a specimen with elements `factor` times the standard size.
+pub fn model(specimen: &Specimen, factor: f64) -> ForwardModel {
+    let mesh = mesh_specimen(specimen, &MeshOptions::scaled(specimen, factor)).unwrap();
+    ForwardModel::new(mesh, specimen).unwrap()
+}
+
+pub fn tight() -> SolveOptions {
+    SolveOptions { tolerance: 1e-11, ..SolveOptions::default() }
+}
+
+pub fn never() -> bool {
+    false
+}
+
+pub fn solve(model: &mut ForwardModel, material: &Ogden, drive_mm: f64) -> Result<Equilibrium, SolveError> {
+    model.solve(material, drive_mm, None, &tight(), &never)
+}
+
+/// The unit cube in n × n × n cells (hexahedra, or twice as many prisms), its nodes moved by `map`. Every boundary node
+/// is in `fixed_nodes`. The middle node of a prism's triangle is where the quadratic map of the other six takes it.
+pub fn cube(kind: ElementKind, n: usize, map: impl Fn(Vector) -> Vector) -> Mesh {
+    let local = kind.node_coordinates();
+    let mut mesh = Mesh {
+        element_kind: kind,
+        nodes: Vec::new(),
+        connectivity: Vec::new(),
+        mirror: Mirror::default(),
+        fixed_nodes: Vec::new(),
+        moved_nodes: Vec::new(),
+        mirror_y_nodes: Vec::new(),
+        mirror_z_nodes: Vec::new(),
+    };
+    let mut known: HashMap<[i64; 3], u32> = HashMap::new();
+    let h = 1.0 / n as f64;
+    let halves = if kind == ElementKind::Prism21 { 2 } else { 1 };
+    for cell in 0..n * n * n * halves {
+        let (half, c) = (cell % halves, cell / halves);
+        let corner = [c % n, c / n % n, c / (n * n)].map(|i| i as f64 * h);
+        let mut element = Vec::new();
+        for x in &local {
+            let place = match (kind, half) {
+                (ElementKind::Hex27, _) => x.map(|v| 0.5 * (v + 1.0)),
+                (ElementKind::Prism21, 0) => [x[0], x[1], 0.5 * (x[2] + 1.0)],
+                (ElementKind::Prism21, _) => [1.0 - x[0], 1.0 - x[1], 0.5 * (x[2] + 1.0)],
+            };
+            let p = [0, 1, 2].map(|i| corner[i] + h * place[i]);
+            // Nodes sit at multiples of h/6, so rounding to 1e-6 tells them apart.
+            let key = p.map(|v| (v * 1e6).round() as i64);
+            let next = mesh.nodes.len() as u32;
+            let node = *known.entry(key).or_insert(next);
+            if node == next {
+                mesh.nodes.push(map(p));
+                if p.iter().any(|&v| !(1e-9..=1.0 - 1e-9).contains(&v)) {
+                    mesh.fixed_nodes.push(node);
+                }
+            }
+            element.push(node);
+        }
+        mesh.connectivity.extend(element);
+    }
+    if kind == ElementKind::Prism21 {
+        for e in 0..mesh.num_elements() {
+            let element = mesh.element(e).to_vec();
+            for level in element.chunks(7) {
+                let at = |s: usize, i: usize| mesh.nodes[level[s] as usize][i];
+                let centre = [0, 1, 2]
+                    .map(|i| 4.0 / 9.0 * (at(3, i) + at(4, i) + at(5, i)) - (at(0, i) + at(1, i) + at(2, i)) / 9.0);
+                mesh.nodes[level[6] as usize] = centre;
+            }
+        }
+    }
+    mesh
+}
+
+/// A specimen to hand to [`ForwardModel::new`] with a mesh of [`cube`]; only its extents are read.
+pub fn unit_block() -> Specimen {
+    specimen(TestKind::DoubleLapShear, [1.0; 3], HoleAxis::Thickness, &[])
+}
+
+pub fn determinant(f: &Matrix) -> f64 {
+    f[0][0] * (f[1][1] * f[2][2] - f[1][2] * f[2][1]) - f[0][1] * (f[1][0] * f[2][2] - f[1][2] * f[2][0])
+        + f[0][2] * (f[1][0] * f[2][1] - f[1][1] * f[2][0])
+}
+
+pub fn multiply(a: &Matrix, b: &Matrix) -> Matrix {
+    [0, 1, 2].map(|i| [0, 1, 2].map(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
+}
+
+/// Inverse of a 3 × 3 matrix.
+pub fn inverse(f: &Matrix) -> Matrix {
+    let d = determinant(f);
+    [0, 1, 2].map(|i| {
+        [0, 1, 2].map(|j| {
+            let (r, s, c, t) = ((j + 1) % 3, (j + 2) % 3, (i + 1) % 3, (i + 2) % 3);
+            (f[r][c] * f[s][t] - f[r][t] * f[s][c]) / d
+        })
+    })
+}
+
+/// Square root of the sum of squares.
+pub fn norm(x: &[Vector]) -> f64 {
+    x.iter().flatten().map(|v| v * v).sum::<f64>().sqrt()
+}
+
+/// Norm of a + factor b.
+pub fn norm_of_sum(a: &[Vector], factor: f64, b: &[Vector]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (0..3).map(|i| (a[i] + factor * b[i]).powi(2)).sum::<f64>()).sum::<f64>().sqrt()
+}
+
+/// SplitMix64: a fixed sequence per seed.
+pub struct Random(u64);
+
+impl Random {
+    pub fn new(seed: u64) -> Self {
+        Random(seed)
+    }
+
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    pub fn below(&mut self, n: u64) -> usize {
+        (self.next() % n) as usize
+    }
+}
