@@ -16,6 +16,7 @@ fn two_variables(kind: ObjectiveKind) -> Study {
     study.vary.hole_count = CountRange { min: 2, max: 2 };
     study.vary.axes = vec![crate::specimen::HoleAxis::Thickness];
     study.vary.drive_mm = Range { min: 5.0, max: 5.0 };
+    (study.vary.length_mm, study.vary.thickness_mm, study.vary.width_mm) = (None, None, None);
     study.objective = Objective { kind, guard_promised_sd: false, ..study.objective };
     study.budget = Budget { explore: 16, refine: 2, iterations: 10, confirm: 1 };
     study

@@ -71,7 +71,11 @@ fn every_gradient_passes_the_taylor_test() {
         let stretch = here.len() - 1;
         let near = 1e-4;
         let slope = (value(near)[stretch] - value(-near)[stretch]) / (2.0 * near);
-        assert!((slope - gradient[stretch]).abs() < 1e-3 * slope.abs().max(0.01), "{variable:?}: {slope} {}", gradient[stretch]);
+        assert!(
+            (slope - gradient[stretch]).abs() < 1e-3 * slope.abs().max(0.01),
+            "{variable:?}: {slope} {}",
+            gradient[stretch]
+        );
         for i in 0..stretch {
             let coarse = (sides[0][i] - sides[1][i]) / (2.0 * h);
             let fine = (sides[2][i] - sides[3][i]) / h;

@@ -336,8 +336,7 @@ impl Subspace {
             let fits = |hole: &Hole| {
                 (0..2).all(|c| {
                     let value = hole.center_mm[c];
-                    !self.structure.mirrors[c]
-                        || if is_on[c] { near(value, 0.0) } else { value > MIRROR_TOLERANCE_MM }
+                    !self.structure.mirrors[c] || if is_on[c] { near(value, 0.0) } else { value > MIRROR_TOLERANCE_MM }
                 })
             };
             let hole = *left.iter().find(|h| fits(h))?;
