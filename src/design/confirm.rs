@@ -148,6 +148,11 @@ impl MaterialEvaluation {
         step.integrated_sensitivity.iter().find(|s| s.parameter == parameter).map(|s| s.sum)
     }
 
+    /// Whether a parameter's relative standard deviation is below the identifiability limit.
+    pub fn is_visible(&self, parameter: &str) -> bool {
+        self.evaluation.promised_sd.iter().any(|p| p.parameter == parameter && p.identifiable)
+    }
+
     /// Promised standard deviation of a parameter.
     pub fn promised(&self, parameter: &str) -> Option<f64> {
         self.evaluation.promised_sd.iter().find(|p| p.parameter == parameter).and_then(|p| p.value)
@@ -171,8 +176,14 @@ impl Confirmed {
                 if study.objective.kind == ObjectiveKind::IntegratedSensitivity {
                     ln_gains.push(integrated.map_or(f64::NEG_INFINITY, f64::ln));
                 }
-                if study.objective.guard_promised_sd && promised.is_some_and(|p| p < 1.0 - 1e-9) {
-                    self.is_within_limits = false;
+                if study.objective.guard_promised_sd {
+                    let is_main = own.material == study.materials[0].name;
+                    let is_kept = if is_main {
+                        promised.is_none_or(|p| p >= 1.0 - 1e-9)
+                    } else {
+                        !of_base.is_visible(parameter) || own.is_visible(parameter)
+                    };
+                    self.is_within_limits &= is_kept;
                 }
                 self.gains.push(Gain {
                     material: own.material.clone(),

@@ -105,7 +105,7 @@ pub fn findings(
     let weakest = best.gains.iter().filter_map(|g| Some((g, g.promised_sd?))).min_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((gain, ratio)) = weakest {
         said.push(format!(
-            "It promises every standard deviation at least {ratio:.2} times smaller than the base does (the least gain is that of {} with material \"{}\").",
+            "Promised standard deviations, base over best: {ratio:.3} or more for every parameter and material (above 1: better; the least is that of {} with material \"{}\").",
             gain.parameter, gain.material
         ));
     }

@@ -3,6 +3,7 @@
 
 use super::response::{Evaluated, MaterialSample, Response};
 use super::study::{Combine, ObjectiveKind, Study};
+use crate::sensitivity::IDENTIFIABILITY_LIMIT;
 use crate::specimen::ManufacturingLimits;
 
 /// The base specimen's responses, against which gains are counted.
@@ -47,15 +48,36 @@ impl<'a> Reference<'a> {
         }
     }
 
-    fn margins(&self, response: &Response, base: &Response) -> Vec<f64> {
+    /// `allowances[i]` is the ln of the factor by which the i-th relative standard deviation may exceed the base's.
+    fn margins(&self, response: &Response, base: &Response, allowances: &[f64]) -> Vec<f64> {
         let limits: &ManufacturingLimits = &self.study.limits;
         let mut margins = Vec::new();
-        if self.study.objective.guard_promised_sd {
-            margins.extend(base.log_relative_sd.iter().zip(&response.log_relative_sd).map(|(b, r)| b - r));
+        for ((b, r), allowance) in base.log_relative_sd.iter().zip(&response.log_relative_sd).zip(allowances) {
+            if allowance.is_finite() {
+                margins.push(b + allowance - r);
+            }
         }
         margins.extend(limits.max_force_n.map(|limit| limit.ln() - response.log_force));
         margins.extend(limits.max_local_stretch.map(|limit| limit.ln() - response.log_stretch));
         margins
+    }
+
+    /// The guard: for the first material no standard deviation may grow; for the others, whatever the base shows must
+    /// stay visible, with 3 % kept for the difference between search and confirmation. +∞ where nothing is asked.
+    fn allowances(&self, prior: usize) -> Vec<f64> {
+        let central = self.samples.iter().position(|s| s.prior == prior).map(|s| &self.base[s]);
+        let Some(central) = central else { return Vec::new() };
+        let of = |log_relative_sd: &f64| {
+            if !self.study.objective.guard_promised_sd {
+                f64::INFINITY
+            } else if prior == 0 {
+                0.0
+            } else {
+                let room = (0.97 * IDENTIFIABILITY_LIMIT).ln() - log_relative_sd;
+                if *log_relative_sd <= IDENTIFIABILITY_LIMIT.ln() { room.max(0.0) } else { f64::INFINITY }
+            }
+        };
+        central.log_relative_sd.iter().map(of).collect()
     }
 
     /// Judges an evaluation.
@@ -84,11 +106,12 @@ impl<'a> Reference<'a> {
                 }
                 sum
             };
+            let allowances = self.allowances(prior);
             let gains = mean(&|s| self.gains(&evaluated.responses[s], &self.base[s]));
             let share = if is_averaged { total } else { 1.0 / num_priors as f64 };
             judged.weights.extend(std::iter::repeat_n(share / gains.len() as f64, gains.len()));
             judged.gains.extend(gains);
-            judged.margins.extend(mean(&|s| self.margins(&evaluated.responses[s], &self.base[s])));
+            judged.margins.extend(mean(&|s| self.margins(&evaluated.responses[s], &self.base[s], &allowances)));
             if let Some(first) = evaluated.gradients.first() {
                 judged.gain_gradients.resize(first.len(), Vec::new());
                 judged.margin_gradients.resize(first.len(), Vec::new());
@@ -98,8 +121,12 @@ impl<'a> Reference<'a> {
                     judged.gain_gradients[v].extend(mean(&|s| self.gains(&slope(s), &zero(s))));
                     // The margins are affine in the responses: their slope is the difference from the constant part.
                     judged.margin_gradients[v].extend(mean(&|s| {
-                        let constant = self.margins(&zero(s), &zero(s));
-                        self.margins(&slope(s), &zero(s)).iter().zip(constant).map(|(a, b)| a - b).collect()
+                        let constant = self.margins(&zero(s), &zero(s), &allowances);
+                        self.margins(&slope(s), &zero(s), &allowances)
+                            .iter()
+                            .zip(constant)
+                            .map(|(a, b)| a - b)
+                            .collect()
                     }));
                 }
             }

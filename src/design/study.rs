@@ -186,7 +186,8 @@ pub struct Objective {
     pub kind: ObjectiveKind,
     /// How gains combine.
     pub combine: Combine,
-    /// Besides: no μᵢ or αᵢ of any material may be promised a larger standard deviation than by the base.
+    /// Besides: no μᵢ or αᵢ of the first material may be promised a larger standard deviation than by the base, and every
+    /// parameter of the other materials that the base makes identifiable must stay so.
     pub guard_promised_sd: bool,
 }
 

@@ -266,14 +266,14 @@ impl ForwardModel {
         }
     }
 
-    /// What a residual is measured against: the forces on the plates, or, near rest, a thousandth of μ × 1 mm².
+    /// What a residual is measured against: the forces on the plates, or, near rest, μ × 1 mm².
     fn reaction_scale(&self, material: &Ogden, residual: &[[f64; 3]]) -> f64 {
         let mu = material.terms.iter().map(|t| 0.5 * t.mu_kpa * t.alpha).sum::<f64>().abs().max(1e-12);
         let mut s = 0.0;
         for v in self.mesh.moved_nodes.iter().chain(&self.mesh.fixed_nodes) {
             s += residual[*v as usize].iter().map(|x| x * x).sum::<f64>();
         }
-        s.sqrt().max(1e-3 * mu)
+        s.sqrt().max(mu)
     }
 
     pub(super) fn finish(&mut self, mut state: Equilibrium, residual: &[[f64; 3]]) -> Equilibrium {

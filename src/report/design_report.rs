@@ -126,7 +126,7 @@ pub fn design_report(result: &DesignResult, pictures: &DesignPictures) -> String
          the standard mesh and the scan's own voxels. Seed {}.",
         result.objective.kind,
         result.objective.combine,
-        if result.objective.guard_promised_sd { ", no promised standard deviation worse than the base's" } else { "" },
+        if result.objective.guard_promised_sd { ", the first material's promised standard deviations no worse than the base's, the others' parameters kept visible" } else { "" },
         result.seed
     ));
     page.to_html()
