@@ -27,6 +27,12 @@ pub struct LocalModel {
 }
 
 impl LocalModel {
+    /// What is not finite counts as a failed evaluation: a minimum would pass over a NaN.
+    fn is_finite(&self) -> bool {
+        let rows = self.gain_gradients.iter().chain(&self.margin_gradients).flatten();
+        self.gains.iter().chain(&self.margins).chain(rows).all(|v| v.is_finite())
+    }
+
     fn objective(&self) -> f64 {
         if self.weights.is_empty() {
             self.gains.iter().copied().fold(f64::INFINITY, f64::min)
@@ -86,7 +92,7 @@ pub struct Improved {
 pub fn improve(problem: &dyn LocalProblem, start: &[f64], settings: &LocalSettings) -> Option<Improved> {
     let n = start.len();
     let mut x = start.to_vec();
-    let mut model = problem.model(&x)?;
+    let mut model = problem.model(&x).filter(LocalModel::is_finite)?;
     let mut merit = model.merit();
     let mut history = vec![merit];
     let mut hessian = DMatrix::<f64>::identity(n, n) * 0.1;
@@ -108,7 +114,7 @@ pub fn improve(problem: &dyn LocalProblem, start: &[f64], settings: &LocalSettin
             radius = (0.5 * radius).min(length);
             continue;
         }
-        let Some(next) = problem.model(&candidate) else {
+        let Some(next) = problem.model(&candidate).filter(LocalModel::is_finite) else {
             history.push(merit);
             radius = 0.5 * length;
             continue;
@@ -372,3 +378,7 @@ mod tests {
         assert!((found.x[0] - 0.75).abs() < 1e-2 && (found.x[1] - 0.25).abs() < 1e-2, "{:?}", found.x);
     }
 }
+
+#[cfg(test)]
+#[path = "local_tests.rs"]
+mod known_optima;

@@ -4,6 +4,8 @@ mod checkpoint;
 mod confirm;
 mod explore;
 mod findings;
+#[cfg(test)]
+mod grid_tests;
 mod local;
 mod objective;
 mod response;

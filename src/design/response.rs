@@ -350,3 +350,7 @@ pub fn tearing_stretch(values: impl Iterator<Item = (f64, f64)>) -> f64 {
         })
         .unwrap_or(1.0)
 }
+
+#[cfg(test)]
+#[path = "response_tests.rs"]
+mod tests;

@@ -1,0 +1,98 @@
+//! Gradients of responses against solves on moved meshes.
+
+use super::*;
+use crate::design::space::subspaces;
+use crate::mesh::{mesh_specimen, morphed};
+use std::path::Path;
+
+fn study() -> Study {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("geometries/studies");
+    let text = std::fs::read_to_string(folder.join("two-hole-shear.json")).expect("the study is there");
+    let mut study = Study::from_json(&text, &folder).expect("the study is valid");
+    study.limits.symmetry = crate::specimen::Symmetry::None;
+    study.vary.thickness_mm = Some(super::super::study::Range { min: 5.0, max: 8.0 });
+    study.vary.length_mm = Some(super::super::study::Range { min: 20.0, max: 30.0 });
+    study.vary.width_mm = Some(super::super::study::Range { min: 15.0, max: 22.0 });
+    study.materials.iter_mut().for_each(|m| m.relative_sd = 0.0);
+    study
+}
+
+/// f(±h) on the same mesh with moved nodes is f ± h f′ + O(h²): for every kind of variable and every response, the
+/// remainders fall fourfold when h is halved, and the extrapolated central difference is the gradient.
+#[test]
+fn every_gradient_passes_the_taylor_test() {
+    let study = study();
+    let mut specimen = study.base.clone();
+    specimen.drive_mm = vec![5.0];
+    specimen.holes[0].center_mm = [-4.6, 1.3];
+    specimen.holes[0].diameter_mm = 4.2;
+    let all = subspaces(&study);
+    let space = all
+        .iter()
+        .find(|s| s.structure.num_holes() == 2 && s.structure.axis == crate::specimen::HoleAxis::Thickness)
+        .expect("two holes are allowed");
+    let evaluator = Evaluator::new(&study).with_coarseness(1.5);
+    let material = &evaluator.samples()[1].material;
+    let options = SolveOptions { tolerance: 1e-10, ..SolveOptions::default() };
+    let mesh = mesh_specimen(&specimen, &evaluator.mesh_options(&specimen)).expect("a mesh");
+    let at = |mesh: crate::mesh::Mesh, drive: f64, thicker_mm: f64| {
+        // The model takes the plates' distance from the specimen.
+        let mut moved = specimen.clone();
+        moved.block.thickness_mm += thicker_mm;
+        let mut model = ForwardModel::new(mesh, &moved).expect("a model");
+        let state = model.solve(material, drive, None, &options, &|| false).expect("an equilibrium");
+        let sensitivities = model.material_sensitivities(material, &state).expect("sensitivities");
+        let positions = model.mesh().nodes.clone();
+        let response = evaluator
+            .response(&model, material, &positions, &state.displacement, &sensitivities, state.force_n)
+            .expect("a response");
+        (model, state, sensitivities, response.to_vector())
+    };
+    let (mut model, state, sensitivities, here) = at(mesh.clone(), 5.0, 0.0);
+    for &variable in &space.variables {
+        // The second hole's variables are of the same kinds as the first's.
+        if matches!(variable, Variable::X(1) | Variable::Other(1) | Variable::Diameter(1)) {
+            continue;
+        }
+        let gradient = evaluator
+            .gradient(&mut model, material, &state, &sensitivities, &specimen, space, variable, here.len())
+            .expect("a gradient");
+        let value = |h: f64| -> Vec<f64> {
+            let mut moved = mesh.clone();
+            for (design_variable, sign) in space.moves(variable) {
+                moved = morphed(&moved, &shape_velocity(&mesh, &specimen, design_variable), sign * h);
+            }
+            let of = |which: Variable| if variable == which { h } else { 0.0 };
+            at(moved, 5.0 + of(Variable::Drive), of(Variable::Thickness)).3
+        };
+        let h = 0.08;
+        let sides = [value(h), value(-h), value(0.5 * h), value(-0.5 * h)];
+        // The tearing stretch is that of one quadrature point, another one after a large step: its slope is local.
+        let stretch = here.len() - 1;
+        let near = 1e-4;
+        let slope = (value(near)[stretch] - value(-near)[stretch]) / (2.0 * near);
+        assert!(
+            (slope - gradient[stretch]).abs() < 1e-3 * slope.abs().max(0.01),
+            "{variable:?}: {slope} {}",
+            gradient[stretch]
+        );
+        for i in 0..stretch {
+            let coarse = (sides[0][i] - sides[1][i]) / (2.0 * h);
+            let fine = (sides[2][i] - sides[3][i]) / h;
+            let limit = (4.0 * fine - coarse) / 3.0;
+            // What extrapolation leaves is O(h⁴); all responses are logarithms, whose slopes are of order 0.01 to 1 per mm.
+            assert!(
+                (limit - gradient[i]).abs() < 2e-4 + 2e-3 * gradient[i].abs(),
+                "{variable:?}, response {i}: difference {limit}, gradient {}",
+                gradient[i]
+            );
+            let remainder = |f: f64, h: f64| (f - here[i] - h * gradient[i]).abs();
+            let (large, small) = (remainder(sides[0][i], h), remainder(sides[2][i], 0.5 * h));
+            // Below this the remainder is the solver's and the difference's own error.
+            if large > 1e-4 {
+                let order = (large / small).log2();
+                assert!((1.6..2.6).contains(&order), "{variable:?}, response {i}: order {order} ({large} {small})");
+            }
+        }
+    }
+}
