@@ -20,6 +20,8 @@ const SMALLEST_PART: f64 = 1e-3;
 const RIDGE: f64 = 1e-12;
 /// A limit counts as reached where less than this is left of it (scaled parameters).
 const REACHED: f64 = 1e-6;
+/// A violation of a limit below this is rounding (scaled parameters).
+const ROUNDING: f64 = 1e-12;
 /// Largest violation of a limit that a solution of Clarabel's may have before it is drawn back (scaled parameters).
 const FEASIBILITY: f64 = 1e-5;
 
@@ -153,10 +155,11 @@ impl Constraints {
             Some(x) if limits.iter().all(|(row, room, _)| used(row, &x) <= *room) => x,
             _ => {
                 let mut x = solve_limited(&damped, &gradient, &limits)?;
-                // Rest is within all limits, so drawing back towards it is too.
+                // Rest is within all limits, so drawing back towards it is too. A violation by rounding is let be: where no
+                // room is left it would draw the whole step back.
                 let part = limits
                     .iter()
-                    .filter(|(row, room, _)| used(row, &x) > *room)
+                    .filter(|(row, room, _)| used(row, &x) > *room + ROUNDING)
                     .map(|(row, room, _)| room / used(row, &x))
                     .fold(1.0, f64::min);
                 x *= part;
@@ -175,6 +178,38 @@ impl Constraints {
         }
         Ok(Step { change, distance: (2.0 * decrease.max(0.0)).sqrt(), reached })
     }
+}
+
+/// The same optimum to rounding: the limits that `x` reaches taken as equations. `None` where that is not the optimum
+/// after all (another limit broken, a multiplier of the wrong sign, limits that depend on each other).
+fn polished(
+    matrix: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    limits: &[(Vec<f64>, f64, String)],
+    x: &DVector<f64>,
+) -> Option<DVector<f64>> {
+    let used = |row: &[f64], x: &DVector<f64>| row.iter().zip(x.iter()).map(|(r, x)| r * x).sum::<f64>();
+    let active: Vec<usize> = (0..limits.len()).filter(|&r| limits[r].1 - used(&limits[r].0, x) < REACHED).collect();
+    let (m, n) = (gradient.len(), gradient.len() + active.len());
+    // Multipliers are measured against the gradient, rows have the height of their largest coefficient.
+    let heights: Vec<f64> = active.iter().map(|&r| limits[r].0.iter().fold(1e-300f64, |s, c| s.max(c.abs()))).collect();
+    let mut kkt = DMatrix::zeros(n, n);
+    let mut right = DVector::zeros(n);
+    kkt.view_mut((0, 0), (m, m)).copy_from(matrix);
+    right.rows_mut(0, m).copy_from(gradient);
+    for (k, (&r, height)) in active.iter().zip(&heights).enumerate() {
+        for (j, c) in limits[r].0.iter().enumerate() {
+            kkt[(m + k, j)] = c / height;
+            kkt[(j, m + k)] = c / height;
+        }
+        right[m + k] = limits[r].1 / height;
+    }
+    let solution = kkt.lu().solve(&right).filter(|s| s.iter().all(|v| v.is_finite()))?;
+    let exact = solution.rows(0, m).into_owned();
+    let is_feasible = limits.iter().all(|(row, room, _)| used(row, &exact) <= *room + ROUNDING);
+    let smallest = -1e-8 * gradient.amax().max(1.0);
+    let has_signs = solution.rows(m, active.len()).iter().all(|multiplier| *multiplier >= smallest);
+    (is_feasible && has_signs).then_some(exact)
 }
 
 fn solve_limited(
@@ -222,11 +257,12 @@ fn solve_limited(
         DefaultSolver::new(&p, &q, &a, &b, &[NonnegativeConeT(limits.len())], settings).map_err(|_| unsolved())?;
     solver.solve();
     let x = DVector::from_iterator(m, solver.solution.x.iter().map(|x| x * size));
+    let x = polished(matrix, gradient, limits, &x).unwrap_or(x);
     let is_feasible = limits
         .iter()
         .all(|(row, room, _)| row.iter().zip(x.iter()).map(|(r, x)| r * x).sum::<f64>() <= room + FEASIBILITY);
     let model = 0.5 * x.dot(&(matrix * &x)) - gradient.dot(&x);
-    let is_descent = model.is_finite() && model <= 0.0;
+    let is_descent = model.is_finite() && model <= ROUNDING * size;
     let status = solver.solution.status;
     let is_answer = match status {
         SolverStatus::Solved | SolverStatus::AlmostSolved => true,

@@ -51,6 +51,24 @@ fn trust_limits_cut_each_parameter() {
     assert_eq!(step.reached, ["kappa: step", "mu_1: step"]);
 }
 
+/// At a limit without any room the other parameters still move.
+#[test]
+fn a_reached_limit_leaves_the_others_free() {
+    let start = ogden(2000.0, &[[16.0, 1.9]]);
+    let constraints = Constraints::new(&start, &FitOptions::default()).unwrap();
+    let mut at = start.clone();
+    at.bulk_kpa = constraints.bulk_range[0];
+    let s = system(&at, DMatrix::from_diagonal(&DVector::from_row_slice(&[1e6, 1e4, 1e4])), &[-4e6, 1e3, -1e3]);
+    let step = constraints.step(&s, 0.0, false).unwrap();
+    for (found, exact) in step.change.iter().zip([0.0, 0.1, -0.1]) {
+        // Rounding: the limit is an equation in the end.
+        assert!((found - exact).abs() < 1e-11, "{found} {exact}");
+    }
+    assert_eq!(step.reached, ["kappa: smallest"]);
+    // Of the free part only: √(2 (100 − 50 + 100 − 50)).
+    assert!((step.distance - 200f64.sqrt()).abs() < 1e-3, "{}", step.distance);
+}
+
 /// Exponents that the data draw together stop at the gap, at the point nearest in the metric of the data.
 #[test]
 fn exponents_keep_their_distance() {
