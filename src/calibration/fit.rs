@@ -1,83 +1,208 @@
 //! Maximum-likelihood fit of Ogden parameters to voxel displacements and forces.
 //!
-//! Minimises χ² = Σ_drives [ Σ_voxels |u_model − u|²/σ² + (F_model − F)²/σ_F² ] by Levenberg–Marquardt in scaled parameters
-//! (ln κ; μ, α relative to their present values), with ∂u/∂ξ and ∂F/∂ξ from the factorised tangent. The step solves a
-//! quadratic program with Clarabel: stability μᵢαᵢ > 0 keeps each parameter's sign, and a step changes none by more than a
-//! given fraction. The model is averaged over the voxels as the data are.
+//! Levenberg–Marquardt on the χ² of [`super::system`], with ∂u/∂ξ and ∂F/∂ξ from the factorised tangent and the model
+//! averaged over the voxels as the data are. Every equilibrium starts from the last one. The step keeps to the limits of
+//! [`super::step`]: each μᵢαᵢ keeps its sign, exponents keep their order and distance, κ stays where the elements are good.
+//!
+//! The fit has converged when the optimum of the linear model at the present parameters is nearer than a fraction of a
+//! standard deviation, in every combination of parameters. A small step alone proves nothing: damping makes steps small.
 
+use super::error::CalibrationError;
+use super::step::Constraints;
 use super::synthetic::Measurement;
-use crate::fem::{Equilibrium, ForwardModel, PrepareError, SolveError, SolveOptions};
+use super::system::{NormalSystem, Prediction};
+use crate::fem::{Equilibrium, ForwardModel, SolveError, SolveOptions};
 use crate::material::{Ogden, Parameter};
-use crate::sensitivity::{FisherInformation, InformationError, ScanSettings};
-use crate::voxel::{VoxelError, VoxelOperator};
-use clarabel::algebra::CscMatrix;
-use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus};
-use nalgebra::{DMatrix, DVector};
+use crate::sensitivity::{FisherInformation, ScanSettings};
+use crate::voxel::VoxelOperator;
 
-/// Why a calibration has no result.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum CalibrationError {
-    /// No model of the specimen.
-    #[error(transparent)]
-    Prepare(#[from] PrepareError),
-    /// No equilibrium at the start or at a trial.
-    #[error(transparent)]
-    Solve(#[from] SolveError),
-    /// Grid and specimen do not fit.
-    #[error(transparent)]
-    Voxel(#[from] VoxelError),
-    /// Noise or sensitivities are unusable.
-    #[error(transparent)]
-    Information(#[from] InformationError),
-    /// The fit did not settle.
-    #[error(
-        "the fit did not converge in {iterations} iterations (last relative step {step:.2e}); start closer or raise the limit"
-    )]
-    NotConverged {
-        /// Iterations made.
-        iterations: usize,
-        /// Largest scaled step of the last one.
-        step: f64,
+/// What is known of κ, which nearly incompressible materials hardly show.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Bulk {
+    /// Nothing: κ is fitted.
+    #[default]
+    Free,
+    /// ln κ is Gaussian: the prior of `bulk_log_prior_sd` in an evaluation.
+    LogPrior {
+        /// Centre, kPa.
+        center_kpa: f64,
+        /// Standard deviation of ln κ.
+        log_sd: f64,
     },
+    /// κ stays as in the start.
+    Held,
 }
 
 /// Settings of [`fit`].
 #[derive(Clone, Copy, Debug)]
 pub struct FitOptions {
-    /// Levenberg–Marquardt iterations.
+    /// Levenberg–Marquardt iterations, rejected ones included.
     pub max_iterations: usize,
-    /// Converged when no scaled parameter moves by more than this fraction of its standard deviation.
+    /// Converged when the optimum of the linear model is nearer than this, in standard deviations of the worst combination
+    /// of parameters.
     pub tolerance: f64,
+    /// Smallest distance η of two exponents. The paper's is 1.
+    pub min_alpha_gap: f64,
+    /// κ.
+    pub bulk: Bulk,
     /// The equilibria.
     pub solve: SolveOptions,
 }
 
 impl Default for FitOptions {
     fn default() -> Self {
-        FitOptions { max_iterations: 25, tolerance: 0.02, solve: SolveOptions::default() }
+        FitOptions {
+            max_iterations: 25,
+            tolerance: 0.02,
+            min_alpha_gap: 1.0,
+            bulk: Bulk::Free,
+            solve: SolveOptions::default(),
+        }
     }
 }
 
-/// A fitted material.
+/// A fitted material. Its existence means that the fit converged; one that did not is a [`CalibrationError`].
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// The estimate.
     pub material: Ogden,
-    /// Fisher information at the estimate.
+    /// Fisher information at the estimate, prior included; its covariance is that of the estimate.
     pub information: FisherInformation,
-    /// χ² per datum.
+    /// χ² / (data − fitted parameters): 1 where model and noise are right.
     pub chi2_per_datum: f64,
-    /// Iterations made.
+    /// The paper's ℓ_u: mean over voxels of |u_model − u|² / |u|²_max, mean over drives. Voxels count alike.
+    pub loss_u: f64,
+    /// The paper's ℓ_F = (1 − F_model/F)², mean over drives.
+    pub loss_f: f64,
+    /// Iterations made, rejected ones included.
     pub iterations: usize,
-    /// Equilibria of the estimate, one per drive: a warm start for the next fit.
+    /// Distance from the optimum of the linear model, in standard deviations.
+    pub distance: f64,
+    /// Limits at which the estimate stands, in words. Where there are any, the covariance is too wide.
+    pub reached_limits: Vec<String>,
+    /// Equilibria of the estimate, one per drive.
     pub states: Vec<Equilibrium>,
+    pub(super) is_bulk_held: bool,
 }
 
-/// A parameter and a step change it by at most this fraction (κ: this in ln κ).
-const MAX_CHANGE: f64 = 0.4;
+impl Fit {
+    /// Standard deviation of a parameter in its unit; none where the data do not determine it or it was held.
+    pub fn sd(&self, parameter: Parameter) -> Option<f64> {
+        if self.is_bulk_held && parameter == Parameter::Kappa {
+            return None;
+        }
+        self.information.covariance().sd(self.information.index_of(parameter).ok()?)
+    }
+}
 
-/// Fits `start` to `data`. `warm` are equilibria of any material at the same drives, if there are some.
+/// Where a fit starts: a material with its equilibria and their derivatives. One start serves any number of data sets.
+#[derive(Clone, Debug)]
+pub struct FitStart {
+    constraints: Constraints,
+    prediction: Prediction,
+    options: FitOptions,
+}
+
+impl FitStart {
+    /// Solves `material` at `drives_mm`; every fit from here uses `options`.
+    ///
+    /// # Errors
+    /// [`CalibrationError`]: an invalid material or option, exponents too close, no equilibrium.
+    pub fn new(
+        model: &mut ForwardModel,
+        operator: &VoxelOperator,
+        drives_mm: &[f64],
+        material: &Ogden,
+        options: &FitOptions,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<FitStart, CalibrationError> {
+        check_options(options)?;
+        let constraints = Constraints::new(material, options)?;
+        let prediction = Prediction::new(model, operator, drives_mm, material, None, options, is_cancelled)?;
+        Ok(FitStart { constraints, prediction, options: *options })
+    }
+
+    /// The same start with another prior or none; κ is held or not as before.
+    pub(super) fn with_bulk(&self, bulk: Bulk) -> FitStart {
+        FitStart { options: FitOptions { bulk, ..self.options }, ..self.clone() }
+    }
+
+    /// Fits `data`, which must be of the start's drives. The result depends on the data and the start alone, not on what
+    /// `model` solved before.
+    ///
+    /// # Errors
+    /// [`CalibrationError`].
+    pub fn fit(
+        &self,
+        model: &mut ForwardModel,
+        operator: &VoxelOperator,
+        scan: &ScanSettings,
+        data: &Measurement,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Fit, CalibrationError> {
+        let options = &self.options;
+        data.check(operator.num_voxels(), self.prediction.states.len())?;
+        let mut prediction = self.prediction.clone();
+        let mut system = NormalSystem::new(&prediction, scan, data, options.bulk)?;
+        let mut damping = 0.0;
+        let mut failure = None;
+        let mut iterations = 0;
+        loop {
+            let full = self.constraints.step(&system, 0.0, false)?;
+            if full.distance < options.tolerance {
+                let fitted = system.parameters.len() - usize::from(options.bulk == Bulk::Held);
+                let prior = usize::from(matches!(options.bulk, Bulk::LogPrior { .. }));
+                let freedom = (system.num_data + prior).saturating_sub(fitted).max(1);
+                return Ok(Fit {
+                    material: prediction.material,
+                    information: system.information,
+                    chi2_per_datum: system.chi2 / freedom as f64,
+                    loss_u: system.loss_u,
+                    loss_f: system.loss_f,
+                    iterations,
+                    distance: full.distance,
+                    reached_limits: full.reached,
+                    states: prediction.states,
+                    is_bulk_held: options.bulk == Bulk::Held,
+                });
+            }
+            if iterations >= options.max_iterations {
+                return Err(match failure {
+                    Some(source) => CalibrationError::NoEquilibrium { iterations, source },
+                    None => {
+                        CalibrationError::NotConverged { iterations, distance: full.distance, limit: options.tolerance }
+                    }
+                });
+            }
+            iterations += 1;
+            let step = self.constraints.step(&system, damping, true)?;
+            let trial = system.moved(&prediction.material, &step.change);
+            let near = Some(&prediction.states[..]);
+            match Prediction::new(model, operator, &data.drives_mm, &trial, near, options, is_cancelled) {
+                Ok(next) => {
+                    failure = None;
+                    let next_system = NormalSystem::new(&next, scan, data, options.bulk)?;
+                    // Equal up to the equilibria's accuracy counts: near the optimum nothing is gained any more.
+                    if next_system.chi2 <= system.chi2 * (1.0 + 1e-9) {
+                        prediction = next;
+                        system = next_system;
+                        damping = if damping > 1e-6 { damping * 0.1 } else { 0.0 };
+                    } else {
+                        damping = (damping * 10.0).max(1e-3);
+                    }
+                }
+                Err(CalibrationError::Solve(cause @ SolveError::Cancelled { .. })) => return Err(cause.into()),
+                Err(CalibrationError::Solve(cause)) => {
+                    failure = Some(cause);
+                    damping = (damping * 10.0).max(1e-3);
+                }
+                Err(other) => return Err(other),
+            }
+        }
+    }
+}
+
+/// Fits `start` to `data`: [`FitStart::new`] and [`FitStart::fit`] in one.
 ///
 /// # Errors
 /// [`CalibrationError`].
@@ -87,206 +212,38 @@ pub fn fit(
     scan: &ScanSettings,
     data: &Measurement,
     start: &Ogden,
-    warm: Option<&[Equilibrium]>,
     options: &FitOptions,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Fit, CalibrationError> {
-    let mut material = start.clone();
-    let mut states = solve_all(model, &material, data, warm, options, is_cancelled)?;
-    let mut system = NormalSystem::new(model, operator, scan, data, &material, &states)?;
-    let mut damping = 1e-4;
-    let mut last_step = f64::INFINITY;
-    for iteration in 1..=options.max_iterations {
-        let Some(step) = system.step(damping) else {
-            damping *= 10.0;
-            continue;
-        };
-        let trial = system.moved(&material, &step);
-        let tried = solve_all(model, &trial, data, Some(&states), options, is_cancelled)
-            .and_then(|s| Ok((NormalSystem::new(model, operator, scan, data, &trial, &s)?, s)));
-        if let Err(CalibrationError::Solve(SolveError::Cancelled { .. })) = tried {
-            tried?;
-            continue;
-        }
-        match tried {
-            // Equal up to rounding counts: at the optimum nothing is gained any more.
-            Ok((next, next_states)) if next.chi2 <= system.chi2 * (1.0 + 1e-9) => {
-                last_step = system.step_in_sd(&step);
-                material = trial;
-                states = next_states;
-                system = next;
-                damping = (damping * 0.1).max(1e-12);
-                if last_step < options.tolerance {
-                    return Ok(Fit {
-                        material,
-                        information: system.information,
-                        chi2_per_datum: system.chi2 / system.num_data as f64,
-                        iterations: iteration,
-                        states,
-                    });
-                }
-            }
-            _ => damping = (damping * 10.0).max(1e-6),
-        }
-    }
-    Err(CalibrationError::NotConverged { iterations: options.max_iterations, step: last_step })
+    data.check(operator.num_voxels(), data.drives_mm.len())?;
+    let start = FitStart::new(model, operator, &data.drives_mm, start, options, is_cancelled)?;
+    start.fit(model, operator, scan, data, is_cancelled)
 }
 
-fn solve_all(
-    model: &mut ForwardModel,
-    material: &Ogden,
-    data: &Measurement,
-    warm: Option<&[Equilibrium]>,
-    options: &FitOptions,
-    is_cancelled: &dyn Fn() -> bool,
-) -> Result<Vec<Equilibrium>, CalibrationError> {
-    let mut states: Vec<Equilibrium> = Vec::with_capacity(data.drives_mm.len());
-    for (index, &drive) in data.drives_mm.iter().enumerate() {
-        let near = warm.and_then(|w| w.get(index)).or(states.last());
-        let state = model
-            .solve(material, drive, near, &options.solve, is_cancelled)
-            .or_else(|_| model.solve(material, drive, None, &options.solve, is_cancelled))?;
-        states.push(state);
+fn check_options(options: &FitOptions) -> Result<(), CalibrationError> {
+    let positive = |name, value: f64| {
+        let requirement = "positive and finite";
+        if value > 0.0 && value.is_finite() {
+            Ok(())
+        } else {
+            Err(CalibrationError::InvalidValue { name, value, requirement })
+        }
+    };
+    positive("tolerance", options.tolerance)?;
+    if !(options.min_alpha_gap >= 0.0 && options.min_alpha_gap.is_finite()) {
+        return Err(CalibrationError::InvalidValue {
+            name: "min_alpha_gap",
+            value: options.min_alpha_gap,
+            requirement: "finite and not negative",
+        });
     }
-    Ok(states)
+    if let Bulk::LogPrior { center_kpa, log_sd } = options.bulk {
+        positive("the prior's centre of kappa", center_kpa)?;
+        positive("the prior's standard deviation of ln kappa", log_sd)?;
+    }
+    Ok(())
 }
 
-/// χ², its gradient and Gauss–Newton matrix in scaled parameters.
-struct NormalSystem {
-    parameters: Vec<Parameter>,
-    values: Vec<f64>,
-    information: FisherInformation,
-    matrix: DMatrix<f64>,
-    gradient: DVector<f64>,
-    chi2: f64,
-    num_data: usize,
-}
-
-impl NormalSystem {
-    fn new(
-        model: &mut ForwardModel,
-        operator: &VoxelOperator,
-        scan: &ScanSettings,
-        data: &Measurement,
-        material: &Ogden,
-        states: &[Equilibrium],
-    ) -> Result<NormalSystem, CalibrationError> {
-        let parameters = material.parameters();
-        let n = parameters.len();
-        let values: Vec<f64> = parameters.iter().map(|p| material.value(*p)).collect();
-        let mut information = FisherInformation::none(material);
-        let mut gradient = DVector::zeros(n);
-        let (mut chi2, mut num_data) = (0.0, 0);
-        let weights = scan.noise_sd_mm.map(|sd| 1.0 / (sd * sd));
-        for (d, state) in states.iter().enumerate() {
-            let sensitivities = model.material_sensitivities(material, state)?;
-            let model_displacement = operator.average(&state.displacement)?;
-            let averaged =
-                sensitivities.iter().map(|s| operator.average(&s.displacement)).collect::<Result<Vec<_>, _>>()?;
-            let forces: Vec<f64> = sensitivities.iter().map(|s| s.force_n).collect();
-            for (v, (m, u)) in model_displacement.iter().zip(&data.displacements[d]).enumerate() {
-                for c in 0..3 {
-                    let misfit = u[c] - m[c];
-                    if !misfit.is_finite() {
-                        continue;
-                    }
-                    let weight = weights[c] * data.weights[v];
-                    chi2 += weight * misfit * misfit;
-                    num_data += 1;
-                    for (g, s) in gradient.iter_mut().zip(&averaged) {
-                        *g += weight * misfit * s[v][c];
-                    }
-                }
-            }
-            let force_misfit = data.forces_n[d] - state.force_n;
-            let weight = 1.0 / (scan.force_sd_n * scan.force_sd_n);
-            chi2 += weight * force_misfit * force_misfit;
-            num_data += 1;
-            for (g, f) in gradient.iter_mut().zip(&forces) {
-                *g += weight * force_misfit * f;
-            }
-            let weights = &data.weights;
-            information.add(&FisherInformation::of_drive(material, &averaged, weights, &forces, &scan.noise())?)?;
-        }
-        let scales = DVector::from_iterator(n, values.iter().map(|v| v.abs().max(1e-9)));
-        let matrix = DMatrix::from_fn(n, n, |i, j| information.matrix()[(i, j)] * scales[i] * scales[j]);
-        let gradient = gradient.component_mul(&scales);
-        Ok(NormalSystem { parameters, values, information, matrix, gradient, chi2, num_data })
-    }
-
-    /// Levenberg–Marquardt step within the bounds; `None` where Clarabel has no usable answer.
-    fn step(&self, damping: f64) -> Option<DVector<f64>> {
-        let n = self.values.len();
-        let (mut pointers, mut rows, mut entries) = (vec![0], Vec::new(), Vec::new());
-        for j in 0..n {
-            for i in 0..=j {
-                let extra = if i == j { damping * self.matrix[(i, i)].max(1e-12) } else { 0.0 };
-                rows.push(i);
-                entries.push(self.matrix[(i, j)] + extra);
-            }
-            pointers.push(rows.len());
-        }
-        // Scaled to a unit largest entry: interior-point tolerances are absolute.
-        let largest = entries.iter().fold(1e-300f64, |s, x| s.max(x.abs()));
-        for e in &mut entries {
-            *e /= largest;
-        }
-        let p = CscMatrix::new(n, n, pointers, rows, entries);
-        let q: Vec<f64> = self.gradient.iter().map(|g| -g / largest).collect();
-        let mut pointers = vec![0];
-        let (mut rows, mut entries) = (Vec::new(), Vec::new());
-        for j in 0..n {
-            rows.extend([j, n + j]);
-            entries.extend([1.0, -1.0]);
-            pointers.push(rows.len());
-        }
-        let a = CscMatrix::new(2 * n, n, pointers, rows, entries);
-        let b = vec![MAX_CHANGE; 2 * n];
-        let settings = DefaultSettingsBuilder::default()
-            .verbose(false)
-            .tol_gap_abs(1e-14)
-            .tol_gap_rel(1e-12)
-            .tol_feas(1e-12)
-            .build()
-            .ok()?;
-        let mut solver = DefaultSolver::new(&p, &q, &a, &b, &[NonnegativeConeT(2 * n)], settings).ok()?;
-        solver.solve();
-        let is_usable = matches!(
-            solver.solution.status,
-            SolverStatus::Solved | SolverStatus::AlmostSolved | SolverStatus::InsufficientProgress
-        );
-        let inside = DVector::from_column_slice(&solver.solution.x);
-        // Where no bound is active the normal equations give the same step to more digits.
-        let free = (&self.matrix + DMatrix::from_diagonal(&(self.matrix.diagonal() * damping))).cholesky();
-        if let Some(exact) = free.map(|c| c.solve(&self.gradient))
-            && exact.amax() <= MAX_CHANGE
-        {
-            return Some(exact);
-        }
-        (is_usable && inside.iter().all(|x| x.is_finite())).then_some(inside)
-    }
-
-    fn moved(&self, material: &Ogden, step: &DVector<f64>) -> Ogden {
-        let mut next = material.clone();
-        for (i, &parameter) in self.parameters.iter().enumerate() {
-            let value = self.values[i];
-            let change = step[i].clamp(-MAX_CHANGE, MAX_CHANGE);
-            next.set(
-                parameter,
-                if parameter == Parameter::Kappa { value * change.exp() } else { value * (1.0 + change) },
-            );
-        }
-        next
-    }
-
-    /// The step measured in standard deviations of the parameters.
-    fn step_in_sd(&self, step: &DVector<f64>) -> f64 {
-        let covariance = self.information.covariance();
-        (0..step.len())
-            .map(|i| match covariance.relative_sd(i) {
-                Some(sd) => step[i].abs() / sd,
-                None => 0.0,
-            })
-            .fold(0.0, f64::max)
-    }
-}
+#[cfg(test)]
+#[path = "fit_tests.rs"]
+mod tests;

@@ -1,10 +1,16 @@
 //! Calibration: from a scan's displacements and forces to the material's parameters, and the proof that a design's promise
 //! is kept.
 
+mod error;
 mod fit;
+mod step;
 mod synthetic;
+mod system;
+#[cfg(test)]
+mod test_problem;
 mod verify;
 
-pub use fit::{CalibrationError, Fit, FitOptions, fit};
+pub use error::CalibrationError;
+pub use fit::{Bulk, Fit, FitOptions, FitStart, fit};
 pub use synthetic::{Measurement, SyntheticScan};
-pub use verify::{ParameterSpread, VerifyOptions, verify};
+pub use verify::{ParameterSpread, Verification, VerifyOptions, verify, verify_in_full};

@@ -1,6 +1,6 @@
 //! Synthetic measurements: the truth solved on a mesh of its own, averaged over the scan's voxels, with noise added.
 
-use super::fit::CalibrationError;
+use super::error::CalibrationError;
 use crate::fem::{ForwardModel, SolveOptions};
 use crate::material::Ogden;
 use crate::mesh::MeshOptions;
@@ -24,6 +24,45 @@ pub struct Measurement {
     pub weights: Vec<f64>,
 }
 
+impl Measurement {
+    /// Weights of the voxels at one drive: zero where a component is missing (not finite).
+    pub(super) fn weights_of(&self, drive_index: usize) -> Vec<f64> {
+        self.displacements[drive_index]
+            .iter()
+            .zip(&self.weights)
+            .map(|(u, w)| if u.iter().all(|x| x.is_finite()) { *w } else { 0.0 })
+            .collect()
+    }
+
+    /// Checks lengths and numbers. Missing voxels are allowed, missing forces are not.
+    ///
+    /// # Errors
+    /// [`CalibrationError::DataLength`], [`CalibrationError::InvalidValue`].
+    pub fn check(&self, num_voxels: usize, num_drives: usize) -> Result<(), CalibrationError> {
+        let length = |what, found: usize, expected: usize| {
+            if found == expected { Ok(()) } else { Err(CalibrationError::DataLength { what, found, expected }) }
+        };
+        length("list of drives", self.drives_mm.len(), num_drives.max(1))?;
+        length("list of displacement fields", self.displacements.len(), num_drives)?;
+        length("list of forces", self.forces_n.len(), num_drives)?;
+        length("list of voxel weights", self.weights.len(), num_voxels)?;
+        let value = |name, value: f64, is_good: bool, requirement| {
+            if is_good { Ok(()) } else { Err(CalibrationError::InvalidValue { name, value, requirement }) }
+        };
+        for &w in &self.weights {
+            value("a voxel weight", w, w.is_finite() && w >= 0.0, "finite and not negative")?;
+        }
+        for (d, field) in self.displacements.iter().enumerate() {
+            length("displacement field", field.len(), num_voxels)?;
+            let force = self.forces_n[d];
+            value("a force (N)", force, force.is_finite() && force.abs() > 0.0, "finite and not zero")?;
+            let num_used = self.weights_of(d).iter().filter(|w| **w > 0.0).count() as f64;
+            value("the number of voxels with a displacement", num_used, num_used > 0.0, "positive")?;
+        }
+        Ok(())
+    }
+}
+
 /// The noiseless scan of a true material, from which noisy measurements are drawn.
 #[derive(Clone, Debug)]
 pub struct SyntheticScan {
@@ -35,8 +74,8 @@ pub struct SyntheticScan {
 }
 
 impl SyntheticScan {
-    /// Solves `material` on a mesh with `mesh` settings, which should be finer than, and other than, the one used for
-    /// fitting.
+    /// Solves `material` at the specimen's drives on a mesh with `mesh` settings, which should be finer than, and other
+    /// than, the one used for fitting.
     ///
     /// # Errors
     /// [`CalibrationError`].
@@ -45,12 +84,13 @@ impl SyntheticScan {
         material: &Ogden,
         scan: &ScanSettings,
         mesh: &MeshOptions,
+        solve: &SolveOptions,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<SyntheticScan, CalibrationError> {
         let mut model = ForwardModel::of_specimen(specimen, mesh)?;
         let mask = VoxelMask::covering(specimen, scan.voxel_mm)?;
         let operator = VoxelOperator::new(specimen, model.mesh(), &mask, Sampling::default())?;
-        let path = model.solve_path(material, &specimen.drive_mm, &SolveOptions::default(), is_cancelled)?;
+        let path = model.solve_path(material, &specimen.drive_mm, solve, is_cancelled)?;
         let displacements =
             path.iter().map(|state| operator.average(&state.displacement)).collect::<Result<Vec<_>, _>>()?;
         let truth = Measurement {
@@ -67,6 +107,14 @@ impl SyntheticScan {
         &self.truth
     }
 
+    /// A standard normal number for draw `draw`, independent of the noise of all draws.
+    pub(super) fn prior_draw(seed: u64, draw: u64) -> f64 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        // Streams of the noise count up from zero, these down from the top.
+        rng.set_stream(u64::MAX - draw);
+        StandardNormal.sample(&mut rng)
+    }
+
     /// The measurement with noise; the same `seed` and `draw` give the same numbers.
     pub fn draw(&self, seed: u64, draw: u64) -> Measurement {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -79,7 +127,8 @@ impl SyntheticScan {
         for displacements in &mut noisy.displacements {
             for (u, weight) in displacements.iter_mut().zip(&self.truth.weights) {
                 for (value, sd) in u.iter_mut().zip(self.scan.noise_sd_mm) {
-                    *value += normal(sd / weight.sqrt());
+                    // A voxel without weight is not measured; what stands there does not count.
+                    *value += if *weight > 0.0 { normal(sd / weight.sqrt()) } else { 0.0 };
                 }
             }
         }

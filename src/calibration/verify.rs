@@ -1,8 +1,15 @@
 //! Verification of a design: calibrate on many noisy synthetic scans and set the spread found beside the spread promised.
+//!
+//! The truth is solved on a finer and different mesh. Every draw is fitted from one blind start, off the truth in every
+//! parameter; only the equilibria of that start are shared, because they do not depend on the data. Two errors are told
+//! apart: the scatter over the draws, which the Fisher information promises, and the shift that the fitting mesh makes,
+//! which is what a fit to the noiseless scan misses the truth by.
 
-use super::fit::{CalibrationError, FitOptions, fit};
+use super::error::CalibrationError;
+use super::fit::{Bulk, Fit, FitOptions, FitStart};
 use super::synthetic::SyntheticScan;
-use crate::fem::{Equilibrium, ForwardModel, SolveOptions};
+use super::system::Prediction;
+use crate::fem::ForwardModel;
 use crate::material::{Ogden, Parameter};
 use crate::mesh::MeshOptions;
 use crate::sensitivity::{FisherInformation, IDENTIFIABILITY_LIMIT, ScanSettings};
@@ -19,9 +26,11 @@ pub struct ParameterSpread {
     pub parameter: String,
     /// The value that made the data.
     pub truth: f64,
-    /// Mean of the estimates.
+    /// Mean of the estimates; NaN (null in JSON) without any.
+    #[serde(with = "nan_as_null")]
     pub mean: f64,
-    /// Standard deviation of the estimates.
+    /// Standard deviation of the estimates; NaN (null in JSON) with fewer than two.
+    #[serde(with = "nan_as_null")]
     pub found_sd: f64,
     /// What the Fisher information of the fitting mesh promises; null where undetermined.
     pub promised_sd: Option<f64>,
@@ -33,6 +42,25 @@ pub struct ParameterSpread {
     pub failed_draws: usize,
     /// The estimates, in the order of the draws.
     pub estimates: Vec<f64>,
+    /// What a fit to the noiseless scan misses the truth by: the fitting mesh's error. Null where that fit failed.
+    #[serde(default)]
+    pub discretisation_bias: Option<f64>,
+    /// Draws whose estimate stands at a limit of the fit; their scatter is not the promised one.
+    #[serde(default)]
+    pub limited_draws: usize,
+}
+
+/// JSON has no NaN.
+mod nan_as_null {
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    pub fn serialize<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+        if value.is_finite() { serializer.serialize_f64(*value) } else { serializer.serialize_none() }
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+        Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
+    }
 }
 
 /// Settings of [`verify`].
@@ -46,7 +74,8 @@ pub struct VerifyOptions {
     pub draws: usize,
     /// Seed of the noise.
     pub seed: u64,
-    /// The fit.
+    /// The fit. A prior on κ is drawn anew around the truth for every draw, as an independent earlier measurement would
+    /// be; a held κ is held at the truth.
     pub fit: FitOptions,
 }
 
@@ -64,10 +93,23 @@ impl VerifyOptions {
     }
 }
 
+/// All that a verification found.
+#[derive(Debug)]
+pub struct Verification {
+    /// Per parameter.
+    pub spreads: Vec<ParameterSpread>,
+    /// The fit to the noiseless scan.
+    pub noiseless: Result<Fit, CalibrationError>,
+    /// The fits, in the order of the draws.
+    pub fits: Vec<Result<Fit, CalibrationError>>,
+}
+
 /// Where every fit starts: 30 % away from the truth in each parameter, alternating, κ a factor of two.
-fn blind_start(truth: &Ogden) -> Ogden {
+fn blind_start(truth: &Ogden, bulk: Bulk) -> Ogden {
     let mut start = truth.clone();
-    start.bulk_kpa *= 2.0;
+    if bulk != Bulk::Held {
+        start.bulk_kpa *= 2.0;
+    }
     for (index, term) in start.terms.iter_mut().enumerate() {
         let sign = if index % 2 == 0 { 1.0 } else { -1.0 };
         term.mu_kpa *= 1.0 + 0.3 * sign;
@@ -77,10 +119,11 @@ fn blind_start(truth: &Ogden) -> Ogden {
 }
 
 /// Calibrates on `options.draws` noisy scans of `truth`; draws run in parallel, each from the same blind start, and come
-/// back in order.
+/// back in order, with the same bits at any number of threads. `on_draw` is called after each.
 ///
 /// # Errors
-/// [`CalibrationError`] where the truth cannot be solved, or the work was cancelled. A fit that does not converge is counted.
+/// [`CalibrationError`] where the truth or the start cannot be solved, the settings are wrong or the work was cancelled.
+/// A draw whose fit does not converge is counted.
 pub fn verify(
     specimen: &Specimen,
     truth: &Ogden,
@@ -89,88 +132,137 @@ pub fn verify(
     on_draw: &(dyn Fn() + Sync),
     is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<ParameterSpread>, CalibrationError> {
-    let synthetic = SyntheticScan::new(specimen, truth, scan, &options.truth_mesh, &|| is_cancelled())?;
-    let mut model = ForwardModel::of_specimen(specimen, &options.fit_mesh)?;
-    let operator = VoxelOperator::new(specimen, model.mesh(), &synthetic.mask, Sampling::default())?;
-    let start = blind_start(truth);
-    let solve = SolveOptions::default();
-    // The blind start's own path is the same for all draws: solved once.
-    let warm = model.solve_path(&start, &specimen.drive_mm, &solve, &|| is_cancelled())?;
-    let promised =
-        promise(&mut model, &operator, truth, scan, &synthetic.noiseless().weights, &specimen.drive_mm, &|| {
-            is_cancelled()
-        })?;
-    let chunk = options.draws.div_ceil(rayon::current_num_threads().max(1)).max(1);
-    let draws: Vec<u64> = (0..options.draws as u64).collect();
-    let estimates: Vec<Vec<Option<Ogden>>> = draws
-        .par_chunks(chunk)
-        .map(|chunk| -> Result<Vec<Option<Ogden>>, CalibrationError> {
-            // A model per thread: each draw depends on its own noise alone.
-            let mut model = ForwardModel::of_specimen(specimen, &options.fit_mesh)?;
-            let mut found = Vec::with_capacity(chunk.len());
-            for &draw in chunk {
-                let data = synthetic.draw(options.seed, draw);
-                let result =
-                    fit(&mut model, &operator, scan, &data, &start, Some(&warm), &options.fit, &|| is_cancelled());
-                on_draw();
-                if is_cancelled() {
-                    result?;
-                    continue;
-                }
-                found.push(result.ok().map(|fit| fit.material));
-            }
-            Ok(found)
-        })
-        .collect::<Result<_, _>>()?;
-    let estimates: Vec<Option<Ogden>> = estimates.into_iter().flatten().collect();
-    Ok(spread(truth, &estimates, &promised))
+    Ok(verify_in_full(specimen, truth, scan, options, on_draw, is_cancelled)?.spreads)
 }
 
-/// The information that the fitting model promises at the truth.
-fn promise(
-    model: &mut ForwardModel,
-    operator: &VoxelOperator,
+/// As [`verify`], with every fit.
+///
+/// # Errors
+/// As [`verify`].
+pub fn verify_in_full(
+    specimen: &Specimen,
     truth: &Ogden,
     scan: &ScanSettings,
-    weights: &[f64],
-    drives_mm: &[f64],
-    is_cancelled: &dyn Fn() -> bool,
-) -> Result<FisherInformation, CalibrationError> {
-    let mut information = FisherInformation::none(truth);
-    let path: Vec<Equilibrium> = model.solve_path(truth, drives_mm, &SolveOptions::default(), is_cancelled)?;
-    for state in &path {
-        let sensitivities = model.material_sensitivities(truth, state)?;
-        let averaged =
-            sensitivities.iter().map(|s| operator.average(&s.displacement)).collect::<Result<Vec<_>, _>>()?;
-        let forces: Vec<f64> = sensitivities.iter().map(|s| s.force_n).collect();
-        information.add(&FisherInformation::of_drive(truth, &averaged, weights, &forces, &scan.noise())?)?;
-    }
-    Ok(information)
+    options: &VerifyOptions,
+    on_draw: &(dyn Fn() + Sync),
+    is_cancelled: &(dyn Fn() -> bool + Sync),
+) -> Result<Verification, CalibrationError> {
+    let chunk = options.draws.div_ceil(rayon::current_num_threads().max(1)).max(1);
+    // A model per thread, made one after another: the library that orders the unknowns shares its random state between
+    // threads, and another order means other last digits.
+    let num_models = options.draws.div_ceil(chunk).max(1);
+    let mut models = (0..num_models)
+        .map(|_| ForwardModel::of_specimen(specimen, &options.fit_mesh))
+        .collect::<Result<Vec<_>, _>>()?;
+    let solve = &options.fit.solve;
+    let synthetic = SyntheticScan::new(specimen, truth, scan, &options.truth_mesh, solve, &|| is_cancelled())?;
+    verify_with(&mut models, specimen, truth, &synthetic, options, on_draw, is_cancelled)
 }
 
-fn spread(truth: &Ogden, estimates: &[Option<Ogden>], promised: &FisherInformation) -> Vec<ParameterSpread> {
+/// Draws shared out to `models`, which are alike.
+fn verify_with(
+    models: &mut [ForwardModel],
+    specimen: &Specimen,
+    truth: &Ogden,
+    synthetic: &SyntheticScan,
+    options: &VerifyOptions,
+    on_draw: &(dyn Fn() + Sync),
+    is_cancelled: &(dyn Fn() -> bool + Sync),
+) -> Result<Verification, CalibrationError> {
+    let scan = &synthetic.scan;
+    let stop = || is_cancelled();
+    let chunk = options.draws.div_ceil(models.len().max(1)).max(1);
+    let Some(model) = models.first_mut() else {
+        let requirement = "positive";
+        return Err(CalibrationError::InvalidValue { name: "the number of models", value: 0.0, requirement });
+    };
+    let operator = VoxelOperator::new(specimen, model.mesh(), &synthetic.mask, Sampling::default())?;
+    let data = synthetic.noiseless();
+    // The noiseless scan's prior is centred on the truth.
+    let centred = match options.fit.bulk {
+        Bulk::LogPrior { log_sd, .. } => Bulk::LogPrior { center_kpa: truth.bulk_kpa, log_sd },
+        other => other,
+    };
+    let fit_options = FitOptions { bulk: centred, ..options.fit };
+    let blind = blind_start(truth, centred);
+    let start = FitStart::new(model, &operator, &data.drives_mm, &blind, &fit_options, &stop)?;
+    let noiseless = match start.fit(model, &operator, scan, data, &stop) {
+        Err(e) if !e.is_of_the_data() => return Err(e),
+        other => other,
+    };
+    // The promise holds at the truth, as an evaluation's does.
+    let at_truth = Prediction::new(model, &operator, &data.drives_mm, truth, None, &fit_options, &stop)?;
+    let weights = vec![data.weights.clone(); data.drives_mm.len()];
+    let promised = at_truth.information(scan, &weights, centred)?;
+    let draws: Vec<u64> = (0..options.draws as u64).collect();
+    let fits: Vec<Vec<Result<Fit, CalibrationError>>> = models
+        .par_iter_mut()
+        .zip(draws.par_chunks(chunk))
+        .map(|(model, chunk)| {
+            let mut fits = Vec::with_capacity(chunk.len());
+            for &draw in chunk {
+                let noisy = synthetic.draw(options.seed, draw);
+                let own = match centred {
+                    Bulk::LogPrior { center_kpa, log_sd } => start.with_bulk(Bulk::LogPrior {
+                        center_kpa: center_kpa * (log_sd * SyntheticScan::prior_draw(options.seed, draw)).exp(),
+                        log_sd,
+                    }),
+                    _ => start.clone(),
+                };
+                let result = own.fit(model, &operator, scan, &noisy, &|| is_cancelled());
+                on_draw();
+                match result {
+                    Err(e) if !e.is_of_the_data() => return Err(e),
+                    other => fits.push(other),
+                }
+            }
+            Ok(fits)
+        })
+        .collect::<Result<_, _>>()?;
+    let fits: Vec<Result<Fit, CalibrationError>> = fits.into_iter().flatten().collect();
+    let spreads = spread(truth, &fits, noiseless.as_ref().ok(), &promised, centred == Bulk::Held);
+    Ok(Verification { spreads, noiseless, fits })
+}
+
+/// Statistics per parameter. A held κ is not estimated: nothing is promised of it and it is not identifiable.
+fn spread(
+    truth: &Ogden,
+    fits: &[Result<Fit, CalibrationError>],
+    noiseless: Option<&Fit>,
+    promised: &FisherInformation,
+    is_bulk_held: bool,
+) -> Vec<ParameterSpread> {
     let covariance = promised.covariance();
-    let good: Vec<&Ogden> = estimates.iter().flatten().collect();
+    let good: Vec<&Fit> = fits.iter().filter_map(|f| f.as_ref().ok()).collect();
     truth
         .parameters()
         .into_iter()
         .enumerate()
-        .map(|(index, parameter): (usize, Parameter)| {
-            let values: Vec<f64> = good.iter().map(|m| m.value(parameter)).collect();
+        .map(|(index, parameter)| {
+            let is_held = is_bulk_held && parameter == Parameter::Kappa;
+            let values: Vec<f64> = good.iter().map(|f| f.material.value(parameter)).collect();
+            // 0/0 is the NaN that is meant.
             let count = values.len() as f64;
-            let mean = values.iter().sum::<f64>() / count.max(1.0);
-            let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+            let mean = values.iter().sum::<f64>() / count;
+            let squares = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+            let found_sd = if values.len() < 2 { f64::NAN } else { (squares / (count - 1.0)).sqrt() };
             ParameterSpread {
                 parameter: parameter.name(),
                 truth: truth.value(parameter),
                 mean,
-                found_sd: variance.sqrt(),
-                promised_sd: covariance.sd(index),
-                identifiable: covariance.relative_sd(index).is_some_and(|r| r <= IDENTIFIABILITY_LIMIT),
+                found_sd,
+                promised_sd: covariance.sd(index).filter(|_| !is_held),
+                identifiable: !is_held && covariance.relative_sd(index).is_some_and(|r| r < IDENTIFIABILITY_LIMIT),
                 draws: good.len(),
-                failed_draws: estimates.len() - good.len(),
+                failed_draws: fits.len() - good.len(),
                 estimates: values,
+                discretisation_bias: noiseless.map(|f| f.material.value(parameter) - truth.value(parameter)),
+                limited_draws: good.iter().filter(|f| !f.reached_limits.is_empty()).count(),
             }
         })
         .collect()
 }
+
+#[cfg(test)]
+#[path = "verify_tests.rs"]
+mod tests;

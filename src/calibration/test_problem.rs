@@ -1,0 +1,65 @@
+//! A small problem for the tests of this room: a solid block, sheared to 1, on a coarse mesh.
+
+use super::fit::FitOptions;
+use super::synthetic::SyntheticScan;
+use crate::fem::{ForwardModel, SolveOptions};
+use crate::material::{Ogden, OgdenTerm};
+use crate::mesh::MeshOptions;
+use crate::sensitivity::{PartialVoxels, ScanSettings};
+use crate::specimen::{Block, Outline, Specimen, TestKind};
+use crate::voxel::{Sampling, VoxelOperator};
+
+pub(super) fn block() -> Specimen {
+    Specimen {
+        schema: "specimen/1".into(),
+        name: "small block".into(),
+        test: TestKind::DoubleLapShear,
+        block: Block { length_mm: 12.0, thickness_mm: 4.0, width_mm: 9.0 },
+        outline: Outline::Block,
+        holes: vec![],
+        drive_mm: vec![4.0],
+        samples_in_parallel: 2,
+    }
+}
+
+pub(super) fn ogden(bulk_kpa: f64, terms: &[[f64; 2]]) -> Ogden {
+    Ogden {
+        schema: "ogden/1".into(),
+        bulk_kpa,
+        terms: terms.iter().map(|&[mu_kpa, alpha]| OgdenTerm { mu_kpa, alpha }).collect(),
+    }
+}
+
+/// Compressible enough for κ to be seen.
+pub(super) fn truth() -> Ogden {
+    ogden(200.0, &[[17.0, 1.91]])
+}
+
+pub(super) fn scan() -> ScanSettings {
+    ScanSettings {
+        voxel_mm: [1.0, 0.5, 1.0],
+        noise_sd_mm: [0.02, 0.03, 0.04],
+        force_sd_n: 0.01,
+        partial_voxels: PartialVoxels::Uniform,
+    }
+}
+
+pub(super) fn coarse(specimen: &Specimen) -> MeshOptions {
+    MeshOptions::scaled(specimen, 2.5)
+}
+
+/// Equilibria as good as rounding allows.
+pub(super) fn tight() -> FitOptions {
+    let solve = SolveOptions { tolerance: 1e-11, ..SolveOptions::default() };
+    FitOptions { tolerance: 1e-6, solve, ..FitOptions::default() }
+}
+
+/// A model, its voxels, and the scan of `material` made on the same mesh.
+pub(super) fn same_mesh(material: &Ogden) -> (ForwardModel, VoxelOperator, SyntheticScan) {
+    let specimen = block();
+    let mesh = coarse(&specimen);
+    let model = ForwardModel::of_specimen(&specimen, &mesh).unwrap();
+    let synthetic = SyntheticScan::new(&specimen, material, &scan(), &mesh, &tight().solve, &|| false).unwrap();
+    let operator = VoxelOperator::new(&specimen, model.mesh(), &synthetic.mask, Sampling::default()).unwrap();
+    (model, operator, synthetic)
+}
