@@ -42,13 +42,19 @@ const ACCURACY: f64 = 1e-8;
 
 impl ForwardModel {
     /// Makes the stored tangent that of `equilibrium`, and a factor near it.
-    fn ensure_tangent(&mut self, material: &Ogden, equilibrium: &Equilibrium) -> Result<(), SolveError> {
+    pub(super) fn ensure_tangent(&mut self, material: &Ogden, equilibrium: &Equilibrium) -> Result<(), SolveError> {
         if self.tangent_at == equilibrium.serial && equilibrium.serial != 0 && self.system.has_factor() {
             return Ok(());
         }
         let mut residual = vec![[0.0; 3]; self.mesh.nodes.len()];
-        self.assemble_tangent(material, &equilibrium.displacement, Some(&equilibrium.pressure), &mut residual)
-            .map_err(|cause| at(equilibrium, cause))?;
+        self.assemble_tangent(
+            material,
+            equilibrium.drive_mm,
+            &equilibrium.displacement,
+            Some(&equilibrium.pressure),
+            &mut residual,
+        )
+        .map_err(|cause| at(equilibrium, cause))?;
         self.system.factorise(&self.topology)?;
         self.tangent_at = equilibrium.serial;
         Ok(())

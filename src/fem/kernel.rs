@@ -17,6 +17,7 @@
 //!
 //! Quadrature points are worked on eight at a time, nodes of the stiffness likewise.
 
+use super::departures::Fibre;
 use crate::material::{LANES, Lanes, Ogden, Parameter, SpectralState, Tensor};
 use crate::mesh::ElementKind;
 
@@ -91,6 +92,12 @@ pub struct ElementInput<'a> {
     pub pressure: Option<[f64; 4]>,
     /// The material.
     pub material: &'a Ogden,
+    /// Factor on the isochoric stiffness at the quadrature points; one if absent.
+    pub stiffness_factor: Option<&'a [Lanes; MAX_GROUPS]>,
+    /// ln of the volume ratio free of pressure at the quadrature points; zero if absent.
+    pub log_growth: Option<&'a [Lanes; MAX_GROUPS]>,
+    /// Fibres.
+    pub fibre: Option<Fibre>,
 }
 
 /// A direction in which the condensed residual is differentiated.
@@ -209,6 +216,55 @@ fn contract(a: &Tensor, b: &Tensor) -> Lanes {
         }
     }
     s
+}
+
+#[inline(always)]
+fn scaled(a: &Tensor, factor: Lanes) -> Tensor {
+    let mut out = *a;
+    for x in out.iter_mut().flatten() {
+        *x = *x * factor;
+    }
+    out
+}
+
+/// F a and I₄ − 1 = |F a|² − 1.
+#[inline(always)]
+fn fibre_state(fibre: &Fibre, f: &Tensor) -> ([Lanes; 3], Lanes) {
+    let a = fibre.direction;
+    let stretched = [0, 1, 2].map(|i| f[i][0] * a[0] + f[i][1] * a[1] + f[i][2] * a[2]);
+    let square = stretched[0] * stretched[0] + stretched[1] * stretched[1] + stretched[2] * stretched[2];
+    (stretched, square - 1.0)
+}
+
+/// Adds ∂Ψ_f/∂F = 2 k (I₄ − 1) F a ⊗ a.
+#[inline(always)]
+fn add_fibre_stress(fibre: &Fibre, f: &Tensor, stress: &mut Tensor) {
+    let (stretched, excess) = fibre_state(fibre, f);
+    for i in 0..3 {
+        for j in 0..3 {
+            stress[i][j] += excess * stretched[i] * (2.0 * fibre.modulus_kpa * fibre.direction[j]);
+        }
+    }
+}
+
+/// Adds ∂²Ψ_f/∂F∂F = 4 k (F a ⊗ a) ⊗ (F a ⊗ a) + 2 k (I₄ − 1) δ_ik a_J a_L.
+#[inline(always)]
+fn add_fibre_tangent(fibre: &Fibre, f: &Tensor, tangent: &mut [[Lanes; 9]; 9]) {
+    let (stretched, excess) = fibre_state(fibre, f);
+    let (a, k) = (fibre.direction, fibre.modulus_kpa);
+    for i in 0..3 {
+        for j in 0..3 {
+            for m in 0..3 {
+                for l in 0..3 {
+                    let mut t = stretched[i] * stretched[m] * (4.0 * k * a[j] * a[l]);
+                    if i == m {
+                        t += excess * (2.0 * k * a[j] * a[l]);
+                    }
+                    tangent[3 * i + j][3 * m + l] += t;
+                }
+            }
+        }
+    }
 }
 
 /// Geometry, F and the pressure basis. Returns false where an element is inverted.
@@ -358,7 +414,10 @@ fn element<const FMA: bool, const TANGENT: bool>(
             out.min_jacobian = smallest;
             return false;
         }
-        let log = ratio.ln();
+        let log = match input.log_growth {
+            Some(growth) => ratio.ln() - growth[g],
+            None => ratio.ln(),
+        };
         let first = log * kappa / ratio * out.volume[g];
         let second = (Lanes::splat(1.0) - log) * kappa / (ratio * ratio) * out.volume[g];
         for m in 0..4 {
@@ -382,9 +441,14 @@ fn element<const FMA: bool, const TANGENT: bool>(
             p += out.basis[m][g] * out.pressure[m];
             gap += out.basis[m][g] * out.pressure_gap[m];
         }
-        let kirchhoff = p * out.jacobian[g];
         let state = SpectralState::new(input.material, &out.deformation_gradient[g]);
-        out.stress[g] = state.first_piola_kirchhoff_stress(kirchhoff);
+        // P is linear in the energy: f Ψ_iso with pressure p is f (Ψ_iso with pressure p/f).
+        let factor = input.stiffness_factor.map_or(Lanes::splat(1.0), |f| f[g]);
+        let kirchhoff = p * out.jacobian[g] / factor;
+        out.stress[g] = scaled(&state.first_piola_kirchhoff_stress(kirchhoff), factor);
+        if let Some(fibre) = &input.fibre {
+            add_fibre_stress(fibre, &out.deformation_gradient[g], &mut out.stress[g]);
+        }
         for i in 0..3 {
             for j in 0..3 {
                 weighted[g][i][j] = (out.stress[g][i][j] + gap * out.cofactor[g][i][j]) * out.volume[g];
@@ -392,6 +456,14 @@ fn element<const FMA: bool, const TANGENT: bool>(
         }
         if TANGENT {
             state.material_tangent::<FMA>(input.material, kirchhoff, kirchhoff, &mut out.tangent[g]);
+            for row in &mut out.tangent[g] {
+                for x in row.iter_mut() {
+                    *x = *x * factor;
+                }
+            }
+            if let Some(fibre) = &input.fibre {
+                add_fibre_tangent(fibre, &out.deformation_gradient[g], &mut out.tangent[g]);
+            }
             for row in &mut out.tangent[g] {
                 for x in row.iter_mut() {
                     *x = *x * out.volume[g];
@@ -559,14 +631,23 @@ fn directional<const FMA: bool>(
             p += out.basis[m][g] * out.pressure[m];
             dp += out.basis[m][g] * delta_pressure[m];
         }
-        let kirchhoff = p * out.jacobian[g];
         let state = SpectralState::new(input.material, &out.deformation_gradient[g]);
+        let factor = input.stiffness_factor.map_or(Lanes::splat(1.0), |f| f[g]);
+        let kirchhoff = p * out.jacobian[g] / factor;
         let mut s = match direction.parameter {
-            Some(parameter) => state.stress_parameter_derivative(input.material, parameter),
+            Some(parameter) => scaled(&state.stress_parameter_derivative(input.material, parameter), factor),
             None => tensor,
         };
         if direction.displacements.is_some() {
             state.material_tangent::<FMA>(input.material, kirchhoff, kirchhoff, &mut out.tangent[g]);
+            for row in &mut out.tangent[g] {
+                for x in row.iter_mut() {
+                    *x = *x * factor;
+                }
+            }
+            if let Some(fibre) = &input.fibre {
+                add_fibre_tangent(fibre, &out.deformation_gradient[g], &mut out.tangent[g]);
+            }
             for i in 0..3 {
                 for j in 0..3 {
                     for k in 0..3 {

@@ -4,6 +4,7 @@
 //! mixed Newton iterations, sparse Cholesky factors, and derivatives with respect to material, shape and drive from the
 //! factorised tangent.
 
+mod departures;
 mod derivatives;
 mod error;
 mod fields;
@@ -18,6 +19,7 @@ mod stages;
 mod topology;
 mod verification;
 
+pub use departures::{DepartureSensitivity, Departures, FIRM_BOND_KPA_PER_MM, Fibre, Field, PlateMotion};
 pub use derivatives::{ParameterSensitivity, PathSensitivity};
 pub use error::{SolveError, StepFailure};
 pub use fields::QuadraturePoint;

@@ -1,5 +1,6 @@
 //! The forward model: a mesh made ready for solving, and the loops over its elements.
 
+use super::departures::Prepared;
 use super::error::{SolveError, StepFailure};
 use super::kernel::{Direction, ElementInput, ElementOutput, ElementTables, Kernels, MAX_GROUPS, MAX_NODES};
 use super::linear::LinearSystem;
@@ -26,6 +27,22 @@ pub struct ForwardModel {
     /// Elements with a node on the moved plate.
     pub(super) driven_elements: Vec<u32>,
     pub(super) is_moved: Vec<bool>,
+    /// Nodes that move with a plate.
+    pub(super) is_held: Vec<bool>,
+    /// No departures: the coarse model for first guesses applies.
+    pub(super) is_nominal: bool,
+    /// Plate nodes that move under springs instead of with the plate.
+    pub(super) is_released: Vec<bool>,
+    /// Those nodes with the area of the face that they stand for, mm².
+    pub(super) released: Vec<(u32, f64)>,
+    /// Centres of the fixed and of the moved face, mm.
+    pub(super) face_centers: [[f64; 3]; 2],
+    /// Departures from the nominal experiment.
+    pub(super) prepared: Prepared,
+    /// Forces of the springs at the last assembly of the tangent.
+    pub(super) spring_forces: Vec<(u32, [f64; 3])>,
+    /// Reference positions of the quadrature points; empty until a field needs them.
+    pub(super) point_positions: Vec<[[Lanes; MAX_GROUPS]; 3]>,
     /// Multiplicity of the meshed part (2 per mirror plane) × samples in parallel.
     pub(super) multiplicity: f64,
     /// Largest first load step, mm.
@@ -62,11 +79,42 @@ impl ForwardModel {
     /// # Errors
     /// [`SolveError::InvalidMesh`]; [`SolveError::Linear`] where memory does not suffice.
     pub fn new(mesh: Mesh, specimen: &Specimen) -> Result<Self, SolveError> {
-        let topology = Topology::new(&mesh);
+        Self::with_released(mesh, specimen, &|_, _| false)
+    }
+
+    /// As [`Self::new`], with the nodes of the bonded faces for which `is_released`(position, whether on the moved face)
+    /// held by springs, whose stiffness is [`super::Departures::bond_kpa_per_mm`].
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_released(
+        mesh: Mesh,
+        specimen: &Specimen,
+        is_released: &dyn Fn([f64; 3], bool) -> bool,
+    ) -> Result<Self, SolveError> {
+        let areas = mesh.face_areas();
+        let mut released = Vec::new();
+        let mut flags = vec![false; mesh.nodes.len()];
+        for (nodes, is_moved) in [(&mesh.fixed_nodes, false), (&mesh.moved_nodes, true)] {
+            for &v in nodes.iter() {
+                if is_released(mesh.nodes[v as usize], is_moved) {
+                    flags[v as usize] = true;
+                    released.push((v, areas[v as usize]));
+                }
+            }
+        }
+        let topology = Topology::new(&mesh, &flags);
         let system = LinearSystem::new(&topology)?;
         let mut is_moved = vec![false; mesh.nodes.len()];
         for &v in &mesh.moved_nodes {
             is_moved[v as usize] = true;
+        }
+        let mut is_held = is_moved.clone();
+        for &v in &mesh.fixed_nodes {
+            is_held[v as usize] = true;
+        }
+        for &(v, _) in &released {
+            is_held[v as usize] = false;
         }
         let driven_elements = (0..mesh.num_elements() as u32)
             .filter(|&e| mesh.element(e as usize).iter().any(|&v| is_moved[v as usize]))
@@ -78,7 +126,7 @@ impl ForwardModel {
         let lift = mesh.nodes.iter().map(|x| x[axis] / extent + 0.5).collect();
         let planes = u32::from(mesh.mirror.y) + u32::from(mesh.mirror.z);
         let num_elements = mesh.num_elements();
-        let model = ForwardModel {
+        let mut model = ForwardModel {
             tables: ElementTables::new(mesh.element_kind),
             kernels: Kernels::detect(),
             topology,
@@ -94,6 +142,18 @@ impl ForwardModel {
             lift,
             driven_elements,
             is_moved,
+            is_held,
+            is_nominal: true,
+            is_released: flags,
+            released,
+            face_centers: [-0.5, 0.5].map(|side| {
+                let mut center = [0.0; 3];
+                center[axis] = side * extent;
+                center
+            }),
+            prepared: Prepared::default(),
+            spring_forces: Vec::new(),
+            point_positions: Vec::new(),
             multiplicity: f64::from(1u32 << planes) * f64::from(specimen.samples_in_parallel),
             // One step to a shear strain of 0.8 takes five or six iterations; stretching is more nonlinear.
             first_step_mm: if axis == 1 { 0.85 } else { 0.3 } * extent,
@@ -103,6 +163,7 @@ impl ForwardModel {
             mesh,
         };
         model.check_geometry()?;
+        model.set_departures(&super::Departures::default());
         Ok(model)
     }
 
@@ -146,6 +207,24 @@ impl ForwardModel {
 
     /// Gathers the input of element `e`.
     pub(super) fn input<'a>(
+        &'a self,
+        e: usize,
+        positions: &[[f64; 3]],
+        displacements: &[[f64; 3]],
+        pressure: Option<&[[f64; 4]]>,
+        material: &'a Ogden,
+    ) -> ElementInput<'a> {
+        let input = self.nominal_input(e, positions, displacements, pressure, material);
+        ElementInput {
+            stiffness_factor: self.prepared.factor.get(e),
+            log_growth: self.prepared.growth.get(e),
+            fibre: self.prepared.departures.fibre,
+            ..input
+        }
+    }
+
+    /// As [`Self::input`], without departures.
+    pub(super) fn nominal_input<'a>(
         &self,
         e: usize,
         positions: &[[f64; 3]],
@@ -158,6 +237,9 @@ impl ForwardModel {
             displacements: [[0.0; 3]; MAX_NODES],
             pressure: pressure.map(|p| p[e]),
             material,
+            stiffness_factor: None,
+            log_growth: None,
+            fibre: None,
         };
         for (a, &v) in self.mesh.element(e).iter().enumerate() {
             input.positions[a] = positions[v as usize];
@@ -205,6 +287,7 @@ impl ForwardModel {
     pub(super) fn assemble_tangent(
         &mut self,
         material: &Ogden,
+        drive_mm: f64,
         displacement: &[[f64; 3]],
         pressure: Option<&[[f64; 4]]>,
         residual: &mut [[f64; 3]],
@@ -234,6 +317,8 @@ impl ForwardModel {
         if let Some(failure) = failure {
             return Err(failure);
         }
+        self.spring_forces = self.add_spring_forces(drive_mm, displacement, residual);
+        self.add_spring_stiffness();
         self.pin();
         Ok(())
     }

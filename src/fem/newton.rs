@@ -74,6 +74,7 @@ impl ForwardModel {
         }
         self.statistics = Statistics::default();
         if start.is_none_or(|s| s.drive_mm != drive_mm)
+            && self.is_nominal
             && let Some(found) = self.solve_guided(material, drive_mm, options, is_cancelled)
         {
             return Ok(found);
@@ -203,8 +204,8 @@ impl ForwardModel {
             }
         }
         for (v, x) in trial.displacement.iter_mut().enumerate() {
-            if self.is_moved[v] {
-                *x = [drive_mm, 0.0, 0.0];
+            if self.is_held[v] {
+                *x = self.imposed(v, drive_mm);
             }
         }
         let mut residual = vec![[0.0; 3]; self.mesh.nodes.len()];
@@ -217,7 +218,7 @@ impl ForwardModel {
                 return Err(StepFailure::NotConverged { iterations: iteration, residual: last });
             }
             if let Err(failure) =
-                self.assemble_tangent(material, &trial.displacement, Some(&trial.pressure), &mut residual)
+                self.assemble_tangent(material, drive_mm, &trial.displacement, Some(&trial.pressure), &mut residual)
             {
                 // The step inverts an element: take half of it, or give up.
                 match &mut update {
@@ -271,17 +272,28 @@ impl ForwardModel {
         let mu = material.terms.iter().map(|t| 0.5 * t.mu_kpa * t.alpha).sum::<f64>().abs().max(1e-12);
         let mut s = 0.0;
         for v in self.mesh.moved_nodes.iter().chain(&self.mesh.fixed_nodes) {
-            s += residual[*v as usize].iter().map(|x| x * x).sum::<f64>();
+            if !self.is_released[*v as usize] {
+                s += residual[*v as usize].iter().map(|x| x * x).sum::<f64>();
+            }
         }
+        // Released nodes pass their forces on through the springs.
+        s += self.spring_forces.iter().flat_map(|f| f.1).map(|x| x * x).sum::<f64>();
         s.sqrt().max(mu)
     }
 
     pub(super) fn finish(&mut self, mut state: Equilibrium, residual: &[[f64; 3]]) -> Equilibrium {
-        let moved = self.reaction(residual);
+        let mut moved = self.reaction(residual);
         let mut fixed = [0.0; 3];
         for &v in &self.mesh.fixed_nodes {
             for i in 0..3 {
                 fixed[i] += residual[v as usize][i];
+            }
+        }
+        // What the sample pulls with, not what balances it.
+        for (v, force) in &self.spring_forces {
+            let sum = if self.is_moved[*v as usize] { &mut moved } else { &mut fixed };
+            for i in 0..3 {
+                sum[i] -= force[i];
             }
         }
         // kPa·mm² = 10⁻³ N.

@@ -12,12 +12,18 @@ impl ForwardModel {
     /// [`SolveError::Diverged`] where an element is inverted.
     pub fn assemble_stage(&mut self, material: &Ogden, equilibrium: &Equilibrium) -> Result<f64, SolveError> {
         let mut residual = vec![[0.0; 3]; self.mesh.nodes.len()];
-        self.assemble_tangent(material, &equilibrium.displacement, Some(&equilibrium.pressure), &mut residual)
-            .map_err(|cause: StepFailure| SolveError::Diverged {
-                reached_mm: equilibrium.drive_mm,
-                asked_mm: equilibrium.drive_mm,
-                cause,
-            })?;
+        self.assemble_tangent(
+            material,
+            equilibrium.drive_mm,
+            &equilibrium.displacement,
+            Some(&equilibrium.pressure),
+            &mut residual,
+        )
+        .map_err(|cause: StepFailure| SolveError::Diverged {
+            reached_mm: equilibrium.drive_mm,
+            asked_mm: equilibrium.drive_mm,
+            cause,
+        })?;
         Ok(self.collect(&residual, 1.0).iter().fold(0.0, |s, x| s.max(x.abs())))
     }
 

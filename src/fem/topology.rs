@@ -33,12 +33,12 @@ pub struct Topology {
 }
 
 impl Topology {
-    /// Numbers the free nodes of `mesh`.
-    pub fn new(mesh: &Mesh) -> Topology {
+    /// Numbers the free nodes of `mesh`: those not on a plate, and those on a plate that are released.
+    pub fn new(mesh: &Mesh, is_released: &[bool]) -> Topology {
         let num_nodes = mesh.nodes.len();
         let mut is_free = vec![true; num_nodes];
         for &v in mesh.fixed_nodes.iter().chain(&mesh.moved_nodes) {
-            is_free[v as usize] = false;
+            is_free[v as usize] = is_released[v as usize];
         }
         // A node that no element uses would make the matrix singular.
         let mut is_used = vec![false; num_nodes];

@@ -33,7 +33,7 @@ impl ForwardModel {
         let mut residual = vec![[0.0; 3]; self.mesh.nodes.len()];
         let mut iteration = 0;
         loop {
-            self.assemble_tangent(material, &displacement, Some(&pressure), &mut residual).map_err(diverged)?;
+            self.assemble_tangent(material, 0.0, &displacement, Some(&pressure), &mut residual).map_err(diverged)?;
             if let Some(load) = load {
                 for (r, f) in residual.iter_mut().zip(load) {
                     for i in 0..3 {

@@ -16,6 +16,7 @@ mod check;
 mod domain;
 mod element;
 mod error;
+mod face_area;
 mod grading;
 mod locator;
 mod morph;
