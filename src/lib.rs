@@ -15,6 +15,7 @@ pub mod kinematics;
 pub mod material;
 pub mod mesh;
 pub mod provenance;
+pub mod recording;
 pub mod report;
 pub mod sensitivity;
 pub mod specimen;

@@ -1,0 +1,100 @@
+//! Why a recording was not read or written.
+
+use super::nifti::NiftiError;
+use crate::specimen::SpecimenError;
+use crate::voxel::VoxelError;
+use std::path::PathBuf;
+
+/// Why a recording was not read or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecordingError {
+    /// A file cannot be read or written.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A file is larger than allowed.
+    #[error("{}: {bytes} bytes (limit: {limit})", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Its size.
+        bytes: u64,
+        /// The limit.
+        limit: u64,
+    },
+    /// `recording.json` does not fit the schema.
+    #[error("recording.json: {0}")]
+    Json(String),
+    /// The specimen in `recording.json` is not valid.
+    #[error("recording.json: specimen: {0}")]
+    Specimen(#[from] SpecimenError),
+    /// A file name is more than a name in the recording's folder.
+    #[error("'{name}' is not the plain name of a file in the recording's folder")]
+    FileName {
+        /// The name.
+        name: String,
+    },
+    /// An image cannot be used.
+    #[error("{}: {source}", path.display())]
+    Image {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: NiftiError,
+    },
+    /// The images of a recording do not lie on one grid.
+    #[error("{}: its grid {found} is not the mask's {expected}", path.display())]
+    Grid {
+        /// The file.
+        path: PathBuf,
+        /// Its grid.
+        found: String,
+        /// The mask's.
+        expected: String,
+    },
+    /// The grid cannot be used.
+    #[error("mask: {0}")]
+    Voxel(#[from] VoxelError),
+    /// The mask marks nothing.
+    #[error("the mask marks no voxel; there is nothing to compare")]
+    EmptyMask,
+    /// No voxel of the mask has a displacement.
+    #[error("step {step}: none of the mask's {num_voxels} voxels has a finite displacement")]
+    NoDisplacement {
+        /// Which step, from 1.
+        step: usize,
+        /// Voxels of the mask.
+        num_voxels: usize,
+    },
+    /// A number is out of range.
+    #[error("{name} is {value}; it must be {requirement}")]
+    Value {
+        /// Which number.
+        name: String,
+        /// Its value.
+        value: f64,
+        /// What it must be.
+        requirement: &'static str,
+    },
+    /// A load curve cannot be read.
+    #[error("{}: line {line}: {message}", path.display())]
+    LoadCurve {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// What is wrong.
+        message: String,
+    },
+    /// The recording holds wrapped phases instead of displacements.
+    #[error("step {step} holds raw phases; unwrap them first")]
+    Raw {
+        /// Which step, from 1.
+        step: usize,
+    },
+}

@@ -1,0 +1,71 @@
+//! Recordings: a folder with `recording.json`, images and a load curve (see the formats page).
+
+mod error;
+mod load_curve;
+mod nifti;
+mod read;
+mod write;
+
+pub use error::RecordingError;
+pub use load_curve::LoadCurve;
+pub use nifti::{Image, NiftiError, Samples};
+pub use read::ReadLimits;
+
+use crate::specimen::Specimen;
+use crate::voxel::VoxelGrid;
+
+/// What a scan and a load cell recorded of one specimen.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    /// Its name.
+    pub id: String,
+    /// The specimen as drawn; the made sample need not obey.
+    pub specimen: Specimen,
+    /// The images' grid.
+    pub grid: VoxelGrid,
+    /// Which voxels hold material, in the grid's order (x fastest).
+    pub mask: Vec<bool>,
+    /// One step per drive.
+    pub steps: Vec<RecordedStep>,
+    /// Noise of a displacement as given, per component, mm; `None` where unknown.
+    pub noise_sd_mm: Option<[f64; 3]>,
+    /// The filter that the displacements went through.
+    pub filter: Filter,
+    /// The whole loading history.
+    pub load: Option<LoadCurve>,
+    /// Free remarks of whoever recorded.
+    pub notes: Option<serde_json::Value>,
+}
+
+/// One drive of a recording.
+#[derive(Clone, Debug)]
+pub struct RecordedStep {
+    /// What the actuator was told, mm.
+    pub drive_mm: f64,
+    /// Mean force over the window, all samples together, N.
+    pub force_n: Option<f64>,
+    /// Standard deviation of the load cell's slow drift, N.
+    pub force_sd_n: Option<f64>,
+    /// When the scan was made, s: start and end.
+    pub window_s: Option<[f64; 2]>,
+    /// u at each voxel, mm, in the grid's order; NaN where missing.
+    pub displacement: Vec<[f64; 3]>,
+}
+
+/// A filter that displacements went through.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Filter {
+    /// None.
+    #[default]
+    None,
+    /// Means over 2×2×2 voxels.
+    Hamming2,
+}
+
+impl Recording {
+    /// Number of voxels in the mask.
+    pub fn num_voxels(&self) -> usize {
+        self.mask.iter().filter(|m| **m).count()
+    }
+}

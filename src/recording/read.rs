@@ -1,0 +1,253 @@
+//! Reading a recording's folder.
+
+use super::nifti::{INTENT_DISPLACEMENT, Image, NiftiError};
+use super::{Filter, LoadCurve, RecordedStep, Recording, RecordingError};
+use crate::specimen::Specimen;
+use crate::voxel::VoxelGrid;
+use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// The schema that this version reads and writes.
+pub const SCHEMA: &str = "mru-recording/1";
+/// Grids of two images agree to this part of a voxel: their affines are stored in single precision.
+const GRID_TOLERANCE: f64 = 1e-3;
+
+/// What reading may take.
+#[derive(Clone, Copy, Debug)]
+pub struct ReadLimits {
+    /// Largest file, bytes.
+    pub max_file_bytes: u64,
+    /// Most numbers of an image.
+    pub max_values: u64,
+    /// Most steps.
+    pub max_steps: usize,
+}
+
+impl Default for ReadLimits {
+    fn default() -> Self {
+        ReadLimits { max_file_bytes: 1 << 30, max_values: 200_000_000, max_steps: 1000 }
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RecordingJson {
+    pub(super) schema: String,
+    pub(super) id: String,
+    pub(super) specimen: serde_json::Value,
+    pub(super) steps: Vec<StepJson>,
+    pub(super) mask: String,
+    pub(super) acquisition: AcquisitionJson,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) load: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) notes: Option<serde_json::Value>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct StepJson {
+    pub(super) drive_mm: f64,
+    #[serde(default)]
+    pub(super) force_n: Option<f64>,
+    #[serde(default)]
+    pub(super) force_sd_n: Option<f64>,
+    #[serde(default)]
+    pub(super) window_s: Option<[f64; 2]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) displacement: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) raw: Option<serde_json::Value>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct AcquisitionJson {
+    pub(super) voxel_mm: [f64; 3],
+    #[serde(default)]
+    pub(super) noise_sd_mm: Option<[f64; 3]>,
+    #[serde(default)]
+    pub(super) filter: Filter,
+}
+
+impl Recording {
+    /// Reads the recording in `folder`.
+    ///
+    /// # Errors
+    /// [`RecordingError`]: a file that is missing, damaged, too large or not of the format.
+    pub fn read(folder: &Path, limits: &ReadLimits) -> Result<Recording, RecordingError> {
+        let text = read_text(&folder.join("recording.json"), limits)?;
+        let json: RecordingJson = serde_json::from_str(&text).map_err(|e| RecordingError::Json(e.to_string()))?;
+        if json.schema != SCHEMA {
+            return Err(RecordingError::Json(format!("schema is '{}'; this version reads {SCHEMA}", json.schema)));
+        }
+        if json.steps.is_empty() || json.steps.len() > limits.max_steps {
+            let value = json.steps.len() as f64;
+            return Err(RecordingError::Value {
+                name: "the number of steps".into(),
+                value,
+                requirement: "at least one and not above the limit",
+            });
+        }
+        let specimen = Specimen::from_json(&json.specimen.to_string())?;
+        let (mask_path, mask_image) = image(folder, &json.mask, limits)?;
+        let grid =
+            grid_of(&mask_image, [1, 1]).map_err(|source| RecordingError::Image { path: mask_path, source })??;
+        let mask: Vec<bool> = mask_image.values.iter().map(|v| *v > 0.5).collect();
+        let num_voxels = mask.iter().filter(|m| **m).count();
+        if num_voxels == 0 {
+            return Err(RecordingError::EmptyMask);
+        }
+        let mut steps = Vec::with_capacity(json.steps.len());
+        for (n, step) in json.steps.iter().enumerate() {
+            check_step(n, step)?;
+            let Some(name) = &step.displacement else {
+                return Err(RecordingError::Raw { step: n + 1 });
+            };
+            let displacement = read_displacement(folder, name, &grid, limits)?;
+            let is_measured = |(m, u): (&bool, &[f64; 3])| *m && u.iter().all(|x| x.is_finite());
+            if !mask.iter().zip(&displacement).any(is_measured) {
+                return Err(RecordingError::NoDisplacement { step: n + 1, num_voxels });
+            }
+            steps.push(RecordedStep {
+                drive_mm: step.drive_mm,
+                force_n: step.force_n,
+                force_sd_n: step.force_sd_n,
+                window_s: step.window_s,
+                displacement,
+            });
+        }
+        if let Some(sd) = json.acquisition.noise_sd_mm {
+            for value in sd {
+                positive("acquisition.noise_sd_mm", value)?;
+            }
+        }
+        let load = match &json.load {
+            None => None,
+            Some(name) => {
+                let path = folder.join(plain(name)?);
+                Some(LoadCurve::from_csv(&read_text(&path, limits)?, &path)?)
+            }
+        };
+        Ok(Recording {
+            id: json.id,
+            specimen,
+            grid,
+            mask,
+            steps,
+            noise_sd_mm: json.acquisition.noise_sd_mm,
+            filter: json.acquisition.filter,
+            load,
+            notes: json.notes,
+        })
+    }
+}
+
+fn check_step(n: usize, step: &StepJson) -> Result<(), RecordingError> {
+    let finite = |name: &str, value: f64| {
+        let name = format!("steps[{n}].{name}");
+        if value.is_finite() { Ok(()) } else { Err(RecordingError::Value { name, value, requirement: "finite" }) }
+    };
+    finite("drive_mm", step.drive_mm)?;
+    step.force_n.map_or(Ok(()), |f| finite("force_n", f))?;
+    step.force_sd_n.map_or(Ok(()), |sd| positive(&format!("steps[{n}].force_sd_n"), sd))?;
+    if let Some([start, end]) = step.window_s
+        && !(start < end)
+    {
+        let name = format!("steps[{n}].window_s");
+        return Err(RecordingError::Value { name, value: end, requirement: "after its start" });
+    }
+    Ok(())
+}
+
+fn positive(name: &str, value: f64) -> Result<(), RecordingError> {
+    if value > 0.0 && value.is_finite() {
+        Ok(())
+    } else {
+        Err(RecordingError::Value { name: name.into(), value, requirement: "positive and finite" })
+    }
+}
+
+/// A name that stays in the folder.
+pub(super) fn plain(name: &str) -> Result<&str, RecordingError> {
+    let is_plain = !name.is_empty() && !name.contains(['/', '\\', ':', '\0']) && name != "." && name != "..";
+    if is_plain { Ok(name) } else { Err(RecordingError::FileName { name: name.into() }) }
+}
+
+fn open(path: &Path, limits: &ReadLimits) -> Result<File, RecordingError> {
+    let fail = |source| RecordingError::File { path: path.into(), source };
+    let file = File::open(path).map_err(fail)?;
+    let bytes = file.metadata().map_err(fail)?.len();
+    if bytes > limits.max_file_bytes {
+        return Err(RecordingError::TooLarge { path: path.into(), bytes, limit: limits.max_file_bytes });
+    }
+    Ok(file)
+}
+
+fn read_text(path: &Path, limits: &ReadLimits) -> Result<String, RecordingError> {
+    let mut text = String::new();
+    let mut file = open(path, limits)?.take(limits.max_file_bytes);
+    file.read_to_string(&mut text).map_err(|source| RecordingError::File { path: path.into(), source })?;
+    Ok(text)
+}
+
+fn image(folder: &Path, name: &str, limits: &ReadLimits) -> Result<(PathBuf, Image), RecordingError> {
+    let path = folder.join(plain(name)?);
+    let file = std::io::BufReader::new(open(&path, limits)?);
+    match Image::read(file, limits.max_values) {
+        Ok(image) => Ok((path, image)),
+        Err(source) => Err(RecordingError::Image { path, source }),
+    }
+}
+
+/// The grid of an image with `[time points, components]`.
+fn grid_of(image: &Image, [time, components]: [usize; 2]) -> Result<Result<VoxelGrid, RecordingError>, NiftiError> {
+    let [nx, ny, nz, t, c] = image.shape;
+    if [t, c] != [time, components] {
+        return Err(NiftiError::Shape { found: image.shape, expected_time: time, expected_components: components });
+    }
+    let edges = [0, 1, 2].map(|a| image.affine[a][a]);
+    for i in 0..3 {
+        for j in 0..3 {
+            let is_off = i != j && !(image.affine[i][j].abs() <= 1e-4 * edges[i].abs().max(1e-12));
+            if is_off || !(edges[i] > 0.0) {
+                return Err(NiftiError::Orientation);
+            }
+        }
+    }
+    let origin = [0, 1, 2].map(|a| image.affine[a][3]);
+    Ok(VoxelGrid::new(origin, edges, [nx, ny, nz]).map_err(RecordingError::from))
+}
+
+fn read_displacement(
+    folder: &Path,
+    name: &str,
+    expected: &VoxelGrid,
+    limits: &ReadLimits,
+) -> Result<Vec<[f64; 3]>, RecordingError> {
+    let (path, image) = image(folder, name, limits)?;
+    if image.intent != INTENT_DISPLACEMENT {
+        return Err(RecordingError::Image { path, source: NiftiError::Intent { found: image.intent } });
+    }
+    let grid = match grid_of(&image, [1, 3]) {
+        Ok(grid) => grid?,
+        Err(source) => return Err(RecordingError::Image { path, source }),
+    };
+    let is_near = (0..3).all(|a| {
+        let edge = expected.voxel_mm[a];
+        (grid.origin_mm[a] - expected.origin_mm[a]).abs() < GRID_TOLERANCE * edge
+            && (grid.voxel_mm[a] - edge).abs() < GRID_TOLERANCE * edge
+    });
+    if grid.shape != expected.shape || !is_near {
+        let words = |g: &VoxelGrid| format!("{:?} at {:?} mm, voxel {:?} mm", g.shape, g.origin_mm, g.voxel_mm);
+        return Err(RecordingError::Grid { path, found: words(&grid), expected: words(expected) });
+    }
+    let n = grid.num_voxels();
+    Ok((0..n).map(|v| [0, 1, 2].map(|c| image.values[v + c * n])).collect())
+}
+
+#[cfg(test)]
+#[path = "read_tests.rs"]
+mod tests;
