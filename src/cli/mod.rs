@@ -3,6 +3,9 @@
 //! Results on stdout (`--json` for machines), progress on stderr, files in a folder. Exit codes: 0 done, 2 bad input,
 //! 3 no solution found, 4 a file cannot be written, 130 stopped by Ctrl-C.
 
+mod curve_input;
+mod curve_tables;
+mod curves;
 mod design;
 mod error;
 mod evaluate;
@@ -11,6 +14,7 @@ mod interrupt;
 mod output;
 mod progress;
 mod solve;
+mod uniaxial;
 
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -38,6 +42,10 @@ enum Command {
     Evaluate(evaluate::EvaluateArguments),
     /// The best specimen under the limits of a study, with the evidence.
     Design(design::DesignArguments),
+    /// The traditional route: one uniaxial curve, of a strip or a dumb-bell, fitted with Ogden terms.
+    Uniaxial(uniaxial::UniaxialArguments),
+    /// Ogden terms fitted to curves of several homogeneous tests together.
+    Curves(curves::CurvesArguments),
 }
 
 /// What every command takes.
@@ -89,6 +97,8 @@ pub fn run() -> ExitCode {
         Command::Solve(a) => solve::run(a),
         Command::Evaluate(a) => evaluate::run(a),
         Command::Design(a) => design::run(a),
+        Command::Uniaxial(a) => uniaxial::run(a),
+        Command::Curves(a) => curves::run(a),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

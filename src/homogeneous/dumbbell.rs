@@ -158,7 +158,7 @@ pub fn fit_dumbbell(
     let drives: Vec<f64> = (1..=NUM_DRIVES).map(|i| largest * (i as f64 / NUM_DRIVES as f64).powf(1.5)).collect();
     let length = dumbbell::effective_length_mm();
     let mut stretch: Vec<f64> = displacement_mm.iter().map(|d| 1.0 + d / length).collect();
-    let (mut round, mut last_change) = (0, f64::INFINITY);
+    let mut round = 0;
     loop {
         round += 1;
         let curve = Curve::new("uniaxial", HomogeneousTest::Uniaxial, &stretch, &stress)?;
@@ -171,7 +171,7 @@ pub fn fit_dumbbell(
         let table = ForceTable::new(&at, &gauge)?;
         let next = table.forces(displacement_mm)?;
         let strain = next.iter().fold(0.0f64, |a, s| a.max((s - 1.0).abs()));
-        last_change = next.iter().zip(&stretch).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / strain;
+        let last_change = next.iter().zip(&stretch).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / strain;
         if last_change <= options.tolerance || round >= options.max_rounds {
             let forces: Vec<f64> = std::iter::once(0.0).chain(conversion.iter().map(|c| c.force_n)).collect();
             let modelled = ForceTable::new(&at, &forces)?.forces(displacement_mm)?;
