@@ -82,7 +82,9 @@ pub(super) fn run(a: &CurvesArguments) -> Result<(), CliError> {
         return Err(CliError::Option { option: "keep-back", message: "no test is left to fit".into() });
     }
     let bad = |message: String| CliError::Input { path: path.clone(), message };
-    let sequence = fit_curves(&fitted, &a.fit.options(a.neo_hookean)).map_err(|e| bad(e.to_string()))?;
+    let mut options = a.fit.options(a.neo_hookean);
+    options.also_stable_at = kept_back.iter().flat_map(|c| c.states.iter().copied()).collect();
+    let sequence = fit_curves(&fitted, &options).map_err(|e| bad(e.to_string()))?;
     let used = if a.exact {
         sequence
             .fits

@@ -9,7 +9,7 @@ use super::verdict::{
     BeforeAfter, CurveCause, CurveTrace, Hypothesis, HypothesisEvidence, LoadCurveVerdict, MatchBeforeAfter, Verdict,
 };
 use crate::homogeneous::{
-    Curve, CurveFitError, CurveFitOptions, CurveMatch, bic, f_exceedance, fit_curves, independent_count,
+    Curve, CurveFitError, CurveFitOptions, CurveMatch, f_exceedance, fit_curves, independent_count,
     neighbour_correlation,
 };
 
@@ -88,8 +88,8 @@ pub enum LoadCurveAnalysisError {
 /// Analyses load curves of one material: is there a mismatch to an elastic material, what explains it, and does the
 /// explanation predict what was kept back ([`LoadCurve::num_fitted`])?
 ///
-/// Every curve is taken to be of a fresh specimen. Noise is taken as white; residuals that are correlated after all count
-/// for fewer data.
+/// Every curve is taken to be of a fresh specimen. Correlated residuals count for fewer data: models are compared by the
+/// residuals and by the innovations of a first-order autoregression, intervals widened by the correlation of neighbours.
 ///
 /// # Errors
 /// [`LoadCurveAnalysisError`].
@@ -244,16 +244,37 @@ impl Search<'_> {
         self.problem.fit(&layout, &[x])
     }
 
-    /// BIC of the simpler model − BIC of the richer one, with the data that the richer one's residuals are worth.
+    /// BIC of the simpler model − BIC of the richer one, F and its probability.
+    ///
+    /// Neighbouring residuals may be correlated. Evidence is weighed twice, each time with the number of independent data
+    /// that the richer model's values are worth: in the residuals themselves, and in their innovations (see
+    /// [`innovations`]), which show what is sharp in time and weak in size. The stronger one counts; for white residuals they
+    /// are the same.
     fn delta_bic(&self, simple: &Fitted, rich: &Fitted) -> (f64, f64, f64) {
-        let (k0, k1) = (simple.x.len(), rich.x.len());
-        let n = independent_count(&self.problem.by_curve(&rich.residual), k1 as f64 + 10.0);
-        let delta = bic(simple.sum_of_squares, k0, n) - bic(rich.sum_of_squares, k1, n);
-        let added = (k1 as f64 - k0 as f64).max(1.0);
-        let left = (n - k1 as f64).max(1.0);
-        let f =
-            ((simple.sum_of_squares - rich.sum_of_squares).max(0.0) / added) / (rich.sum_of_squares / left).max(1e-300);
-        (delta, f, f_exceedance(f, added, left))
+        let (k0, k1) = (simple.x.len() as f64, rich.x.len() as f64);
+        let weigh = |(s0, s1, n): (f64, f64, f64)| {
+            let delta = n * (s0 / s1.max(1e-300)).ln() - (k1 - k0) * n.ln();
+            let (added, left) = ((k1 - k0).max(1.0), (n - k1).max(1.0));
+            let f = ((s0 - s1).max(0.0) / added) / (s1 / left).max(1e-300);
+            (delta, f, f_exceedance(f, added, left))
+        };
+        let [a, b] = self.left_over(simple, rich).map(weigh);
+        if a.0 >= b.0 { a } else { b }
+    }
+
+    /// Sums of squares of two models and how many independent data the second one's are worth: of the residuals, and of the
+    /// innovations.
+    fn left_over(&self, first: &Fitted, second: &Fitted) -> [(f64, f64, f64); 2] {
+        let least = second.x.len() as f64 + 10.0;
+        let levels = independent_count(&self.problem.by_curve(&second.residual), least);
+        let split = |f: &Fitted| innovations(&self.problem.by_curve(&f.residual));
+        let square = |lists: &[Vec<f64>]| lists.iter().flatten().map(|v| v * v).sum::<f64>();
+        let (a, b) = (split(first), split(second));
+        let views: Vec<&[f64]> = b.iter().map(Vec::as_slice).collect();
+        [
+            (first.sum_of_squares, second.sum_of_squares, levels),
+            (square(&a), square(&b), independent_count(&views, least)),
+        ]
     }
 
     /// Adds hypotheses while they pay.
@@ -355,8 +376,12 @@ impl Search<'_> {
                         _ => break,
                     }
                 }
-                let n = independent_count(&self.problem.by_curve(&current.residual), current.x.len() as f64 + 10.0);
-                let gap = bic(rival.sum_of_squares, rival.x.len(), n) - bic(current.sum_of_squares, current.x.len(), n);
+                let added = rival.x.len() as f64 - current.x.len() as f64;
+                let gap = self
+                    .left_over(&rival, &current)
+                    .map(|(s0, s1, n)| n * (s0 / s1.max(1e-300)).ln() + added * n.ln())
+                    .into_iter()
+                    .fold(f64::NEG_INFINITY, f64::max);
                 if gap < AMBIGUOUS_BIC {
                     ambiguous_with.push(other.name().to_string());
                 }
@@ -463,6 +488,19 @@ impl Search<'_> {
             traces,
         }
     }
+}
+
+/// Residuals less what their neighbour before predicts, eᵢ = rᵢ − ρ rᵢ₋₁, per list; the first of a list is √(1 − ρ²) r₁.
+/// ρ is the correlation of neighbours where noise alone would not show it, else 0.
+fn innovations(residuals: &[&[f64]]) -> Vec<Vec<f64>> {
+    let n: f64 = residuals.iter().map(|r| r.len() as f64).sum();
+    let found = neighbour_correlation(residuals);
+    let rho = if found * n.sqrt() > 2.0 { found.min(0.999) } else { 0.0 };
+    let first = (1.0 - rho * rho).sqrt();
+    residuals
+        .iter()
+        .map(|r| (0..r.len()).map(|i| if i == 0 { first * r[0] } else { r[i] - rho * r[i - 1] }).collect())
+        .collect()
 }
 
 /// Standard deviation of the scatter of residuals about the line through their neighbours (so that structure does not

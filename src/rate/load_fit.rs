@@ -11,6 +11,8 @@ use nalgebra::{DMatrix, DVector};
 const NUM_TIMES: usize = 9;
 /// Exponents that are tried for a new term.
 const NEW_EXPONENTS: [f64; 9] = [-10.0, -6.0, -3.5, -1.5, 1.2, 3.5, 6.0, 9.0, 14.0];
+/// Gains of load cells and errors of areas that a test house would not notice; beyond them another cause is at work.
+const GAIN_RANGE: [f64; 2] = [0.8, 1.25];
 /// A new term starts with this part of the stress.
 const NEW_PART: f64 = 0.02;
 
@@ -144,7 +146,7 @@ impl Problem<'_> {
                 steps[layout.offset()] = f64::MAX.sqrt();
             }
             for g in layout.gains()..layout.num_unknowns() {
-                limits.extend([Limit::at_least(g, 0.2), Limit::at_most(g, 5.0)]);
+                limits.extend([Limit::at_least(g, GAIN_RANGE[0]), Limit::at_most(g, GAIN_RANGE[1])]);
             }
             let settings = LeastSquaresOptions { max_evaluations: 120, tolerance: 1e-8 };
             let found = minimise(start, &limits, &steps, &settings, &mut |x| self.evaluate(layout, x));
