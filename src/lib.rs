@@ -10,6 +10,7 @@
 pub mod calibration;
 pub mod cli;
 pub mod design;
+pub mod diagnosis;
 pub mod fem;
 pub mod homogeneous;
 pub mod kinematics;
