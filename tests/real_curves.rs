@@ -148,7 +148,7 @@ fn load_curve(path: &Path, test: HomogeneousTest) -> LoadCurve {
 fn print(v: &LoadCurveVerdict) {
     println!("{:?}: {}", v.verdict, v.summary);
     for c in &v.causes {
-        println!("  {} ΔBIC {:.1} {:?}", c.name, c.delta_bic, c.ambiguous_with);
+        println!("  {} ({}) ΔBIC {:.1} {:?}", c.name, c.model, c.delta_bic, c.ambiguous_with);
         for p in &c.parameters {
             println!("    {} {:.4} {:?}", p.name, p.value, p.interval_95);
         }

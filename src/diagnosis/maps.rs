@@ -79,10 +79,8 @@ impl ScoreMap {
     fn best_block(&self, is_allowed: impl Fn(f64) -> bool) -> Option<Block> {
         let counts = self.division.counts;
         let mut best: Option<Block> = None;
-        let ranges: Vec<Vec<[usize; 2]>> = counts
-            .iter()
-            .map(|&n| (0..n).flat_map(|a| (a..n).map(move |b| [a, b])).collect())
-            .collect();
+        let ranges: Vec<Vec<[usize; 2]>> =
+            counts.iter().map(|&n| (0..n).flat_map(|a| (a..n).map(move |b| [a, b])).collect()).collect();
         for &x in &ranges[0] {
             for &y in &ranges[1] {
                 for &z in &ranges[2] {
@@ -132,9 +130,8 @@ pub fn debond_map(
         TestKind::Uniaxial => ([1, FACE_PARTS[1], FACE_PARTS[1]], 0, [1, 2]),
     };
     let division = Division::of(&specimen, counts);
-    let directions = laboratory.bond_derivatives(material, prediction, is_moved_face, division.num_parts(), &|x| {
-        division.part_of(x)
-    })?;
+    let directions = laboratory
+        .bond_derivatives(material, prediction, is_moved_face, division.num_parts(), &|x| division.part_of(x))?;
     let map = ScoreMap::new(division, test, &directions);
     let found = map.best_block(|compliance| compliance > 0.0).map(|block| {
         let side = if is_moved_face { 1.0 } else { -1.0 };
@@ -146,7 +143,10 @@ pub fn debond_map(
                 let [low, high] = division.edges(a, block.ranges[a][0], block.ranges[a][1]);
                 let half = division.half_mm[a];
                 // An edge on the face's own boundary is put past it.
-                [if low <= -half + 1e-9 { -half - 0.4 } else { low }, if high >= half - 1e-9 { half + 0.4 } else { high }]
+                [
+                    if low <= -half + 1e-9 { -half - 0.4 } else { low },
+                    if high >= half - 1e-9 { half + 0.4 } else { high },
+                ]
             }),
             half_mm: axes.map(|a| division.half_mm[a]),
         };
@@ -211,7 +211,13 @@ pub fn jumps(observed: &Observed, residual: &Trace) -> Vec<Wrap> {
             let limit = JUMP_SD * observed.noise_sd_mm[component];
             let sign = |v: u32| {
                 let r = field[v as usize][component];
-                if r > limit { 1i8 } else if r < -limit { -1 } else { 0 }
+                if r > limit {
+                    1i8
+                } else if r < -limit {
+                    -1
+                } else {
+                    0
+                }
             };
             let mut is_seen = vec![false; mask.num_voxels()];
             for start in 0..mask.num_voxels() as u32 {
@@ -232,8 +238,7 @@ pub fn jumps(observed: &Observed, residual: &Trace) -> Vec<Wrap> {
                             if !is_inside {
                                 continue;
                             }
-                            let neighbour =
-                                place[if forward { voxel + strides[axis] } else { voxel - strides[axis] }];
+                            let neighbour = place[if forward { voxel + strides[axis] } else { voxel - strides[axis] }];
                             if neighbour != u32::MAX && !is_seen[neighbour as usize] && sign(neighbour) == s {
                                 is_seen[neighbour as usize] = true;
                                 members.push(neighbour);

@@ -4,7 +4,7 @@
 use super::load_curve::{LoadCurve, LoadCurveError};
 use super::load_fit::{Fitted, Problem};
 use super::model::{Layout, Physics, Prepared};
-use super::summary::{describe_cause, material_of_fit, sentence};
+use super::summary::{describe_cause, material_of_fit, model_name, sentence};
 use super::verdict::{
     BeforeAfter, CurveCause, CurveTrace, Hypothesis, HypothesisEvidence, LoadCurveVerdict, MatchBeforeAfter, Verdict,
 };
@@ -233,7 +233,10 @@ impl Search<'_> {
         x.drain(at..at + count);
         let p = &mut layout.physics;
         match h {
-            Hypothesis::Relaxation => p.num_relaxations = 0,
+            Hypothesis::Relaxation => {
+                p.num_relaxations = 0;
+                p.is_nominal = false;
+            }
             Hypothesis::Mullins => p.has_softening = false,
             Hypothesis::Barrelling => p.has_barrelling = false,
             Hypothesis::Friction => p.has_friction = false,
@@ -389,6 +392,7 @@ impl Search<'_> {
             named.push(CurveCause {
                 name: h.name().into(),
                 category: h.category().into(),
+                model: model_name(h, current.layout.physics).into(),
                 parameters: describe_cause(h, &current, self.problem),
                 delta_bic,
                 ambiguous_with,
@@ -399,6 +403,7 @@ impl Search<'_> {
             named.push(CurveCause {
                 name: Hypothesis::Terms.name().into(),
                 category: Hypothesis::Terms.category().into(),
+                model: model_name(Hypothesis::Terms, current.layout.physics).into(),
                 parameters: Vec::new(),
                 delta_bic,
                 ambiguous_with: Vec::new(),

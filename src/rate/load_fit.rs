@@ -167,9 +167,19 @@ impl Problem<'_> {
 
     /// The fit with one more relaxation, from the times where a linear step gains most.
     pub(crate) fn with_relaxation(&self, from: &Fitted) -> Option<Fitted> {
+        if from.layout.physics.num_relaxations > 0 {
+            return self.with_relaxation_as(from, from.layout.physics.is_nominal);
+        }
+        // The first relaxation chooses what is convolved.
+        let found = [false, true].map(|is_nominal| self.with_relaxation_as(from, is_nominal));
+        found.into_iter().flatten().min_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares))
+    }
+
+    fn with_relaxation_as(&self, from: &Fitted, is_nominal: bool) -> Option<Fitted> {
         self.times()?;
         let [low, high] = time_range(&self.clock());
-        let physics = Physics { num_relaxations: from.layout.physics.num_relaxations + 1, ..from.layout.physics };
+        let physics =
+            Physics { num_relaxations: from.layout.physics.num_relaxations + 1, is_nominal, ..from.layout.physics };
         let layout = Layout { physics, ..from.layout.clone() };
         let mut ranked: Vec<(f64, Vec<f64>)> = Vec::new();
         for i in 0..NUM_TIMES {
@@ -193,7 +203,7 @@ impl Problem<'_> {
             }
         }
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let starts: Vec<Vec<f64>> = ranked.into_iter().take(2).map(|(_, x)| x).collect();
+        let starts: Vec<Vec<f64>> = ranked.into_iter().take(3).map(|(_, x)| x).collect();
         self.fit(&layout, &starts)
     }
 

@@ -1,6 +1,7 @@
 //! Parameters and sentences of a verdict.
 
 use super::load_fit::{Fitted, Problem};
+use super::model::Physics;
 use super::verdict::{CauseParameter, CurveCause, CurveMaterial, Hypothesis, MatchBeforeAfter, Verdict};
 use crate::homogeneous::{Interval, covariance, independent_count, t_quantile};
 use nalgebra::DMatrix;
@@ -24,6 +25,20 @@ fn uncertainty(fitted: &Fitted, problem: &Problem) -> Uncertainty {
     let t95 = t_quantile(0.05, (independent - k).max(1.0));
     let half = (0..fitted.x.len()).map(|i| t95 * covariance[(i, i)].max(0.0).sqrt()).collect();
     Uncertainty { half, covariance, is_determined, t95 }
+}
+
+/// The fitted model of a cause in words.
+pub(super) fn model_name(hypothesis: Hypothesis, physics: Physics) -> &'static str {
+    match hypothesis {
+        Hypothesis::Relaxation if physics.is_nominal => "Prony series of the nominal stress (quasi-linear)",
+        Hypothesis::Relaxation => "Prony series of the isochoric second Piola-Kirchhoff stress (Simo)",
+        Hypothesis::Mullins => "Ogden-Roxburgh softening",
+        Hypothesis::Terms => "further Ogden terms",
+        Hypothesis::Barrelling => "stiffening 1 + b / stretch^3 in compression",
+        Hypothesis::Offset => "constant offset of the stress",
+        Hypothesis::Gain => "gain of each curve relative to the first",
+        Hypothesis::Friction => "constant friction against the motion",
+    }
 }
 
 /// The parameters of a cause in a fit.

@@ -92,6 +92,8 @@ pub struct CurveCause {
     pub name: String,
     /// [`Hypothesis::category`].
     pub category: String,
+    /// The model that was fitted, in words.
+    pub model: String,
     /// Its parameters.
     pub parameters: Vec<CauseParameter>,
     /// By how much BIC rises without it.
