@@ -3,6 +3,9 @@
 //! Results on stdout (`--json` for machines), progress on stderr, files in a folder. Exit codes: 0 done, 2 bad input,
 //! 3 no solution found, 4 a file cannot be written, 130 stopped by Ctrl-C.
 
+mod curve_input;
+mod curve_tables;
+mod curves;
 mod design;
 mod diagnose;
 mod error;
@@ -12,6 +15,7 @@ mod interrupt;
 mod output;
 mod progress;
 mod solve;
+mod uniaxial;
 
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -41,6 +45,10 @@ enum Command {
     Design(design::DesignArguments),
     /// Where a recording and its model differ, and what physics was left out.
     Diagnose(diagnose::DiagnoseArguments),
+    /// The traditional route: one uniaxial curve, of a strip or a dumb-bell, fitted with Ogden terms.
+    Uniaxial(uniaxial::UniaxialArguments),
+    /// Ogden terms fitted to curves of several homogeneous tests together.
+    Curves(curves::CurvesArguments),
 }
 
 /// What every command takes.
@@ -93,6 +101,8 @@ pub fn run() -> ExitCode {
         Command::Evaluate(a) => evaluate::run(a),
         Command::Design(a) => design::run(a),
         Command::Diagnose(a) => diagnose::run(a),
+        Command::Uniaxial(a) => uniaxial::run(a),
+        Command::Curves(a) => curves::run(a),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -22,6 +22,20 @@ pub(crate) struct Channels {
     pub(crate) energy_by_term: Vec<[f64; 2]>,
 }
 
+impl Channels {
+    /// The nominal stress as the only channel (Fung's quasi-linear model).
+    pub(crate) fn nominal(mut self) -> Channels {
+        let [a, b] = self.weight;
+        let sum = |s: [f64; 2]| [a * s[0] + b * s[1], 0.0];
+        self.stress = sum(self.stress);
+        for term in &mut self.by_term {
+            *term = term.map(sum);
+        }
+        self.weight = [1.0, 0.0];
+        self
+    }
+}
+
 /// Σⱼ (e^{αeⱼ} − 1)/α² for Σ e = 0, and its derivative with respect to α.
 fn energy_sum(alpha: f64, e: [f64; 3]) -> (f64, f64) {
     let largest = e.iter().fold(0.0f64, |a, b| a.max(b.abs()));

@@ -3,7 +3,7 @@
 
 use super::prony::{HistoryError, PronyTerm, check_times, memory};
 use super::starts::{PronyStart, prony_starts};
-use super::table::{ForceTable, TableError};
+use crate::homogeneous::{ForceTable, TableError};
 use crate::homogeneous::{
     Interval, LeastSquaresOptions, Limit, Selection, compare, covariance, independent_count, minimise, t_quantile,
 };
