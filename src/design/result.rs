@@ -1,9 +1,10 @@
 //! The result of a design search (`design/1`) and what it says in plain words.
 
+use super::aim::Objective;
 use super::confirm::{Confirmed, MaterialEvaluation};
 use super::findings::{Disagreement, disagreement, findings};
 use super::search::{Found, study_hash};
-use super::study::{Objective, Study};
+use super::study::Study;
 use crate::calibration::ParameterSpread;
 use crate::provenance::VERSION;
 use crate::sensitivity::Evaluation;
@@ -73,6 +74,9 @@ pub struct DesignEntry {
     pub is_within_limits: bool,
     /// Volume of material, mm³.
     pub volume_mm3: f64,
+    /// What is to be known about how it came here: a limit that only the fine mesh broke, or a repair.
+    #[serde(default)]
+    pub remark: Option<String>,
 }
 
 /// Spread found against spread promised.
@@ -112,6 +116,7 @@ impl DesignEntry {
             limits: confirmed.limits.clone(),
             is_within_limits: confirmed.is_within_limits,
             volume_mm3: confirmed.volume_mm3,
+            remark: confirmed.remark.clone(),
         })
     }
 
@@ -144,7 +149,7 @@ impl DesignResult {
             ranked,
             verification: Verification::default(),
             verification_by_material: Vec::new(),
-            objective: study.objective,
+            objective: study.objective.clone(),
             history: found.history.clone(),
             num_evaluations: found.num_evaluations,
             failures: found.failures.clone(),

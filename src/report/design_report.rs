@@ -122,11 +122,9 @@ pub fn design_report(result: &DesignResult, pictures: &DesignPictures) -> String
     };
     page.figure(&history.to_svg(), "Best gain within all limits after each evaluation, at search fidelity.");
     page.paragraph(&format!(
-        "Objective: {:?}, combined by {:?}{}. Gains are relative to the base specimen at its drive; confirmed values come from \
-         the standard mesh and the scan's own voxels. Seed {}.",
-        result.objective.kind,
-        result.objective.combine,
-        if result.objective.guard_promised_sd { ", the first material's promised standard deviations no worse than the base's" } else { "" },
+        "{} Gains are relative to the base specimen at its drive; confirmed values come from the standard mesh and the scan's own \
+         voxels. Seed {}.",
+        result.objective.words(),
         result.seed
     ));
     page.to_html()
