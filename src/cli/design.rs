@@ -254,7 +254,7 @@ fn summary(result: &DesignResult, folder: Option<&Path>) -> String {
             e.specimen.drive_mm.last().copied().unwrap_or(0.0),
             e.force_n(),
             e.objective,
-            if e.is_within_limits { e.closest_limit.clone() } else { "breaks a limit or the guard".into() }
+            if e.is_within_limits { e.closest_limit.clone() } else { format!("not kept: {}", e.not_kept()) }
         )
     };
     text += &line("base", &result.base);

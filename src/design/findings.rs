@@ -1,5 +1,6 @@
 //! What a result says, in plain words: each sentence is computed from the numbers beside it.
 
+use super::aim::Normalisation;
 use super::result::DesignEntry;
 use super::study::Study;
 use crate::sensitivity::IDENTIFIABILITY_LIMIT;
@@ -125,6 +126,7 @@ pub fn findings(
 ) -> Vec<String> {
     let Some(best) = ranked.first() else { return Vec::new() };
     let mut said = vec![winner(base, best)];
+    said.extend(what_size_does(study, base, best));
     for (index, prior) in study.materials.iter().enumerate() {
         said.extend(gains_of_material(best, &prior.name));
         said.extend(what_holes_do(base, ranked, index, &prior.name));
@@ -137,7 +139,10 @@ pub fn findings(
 
 fn winner(base: &DesignEntry, best: &DesignEntry) -> String {
     let drive = |e: &DesignEntry| e.specimen.drive_mm.last().copied().unwrap_or(0.0);
-    if best.specimen.holes == base.specimen.holes && best.specimen.block == base.specimen.block && best.objective < 1.0005 {
+    if best.specimen.holes == base.specimen.holes
+        && best.specimen.block == base.specimen.block
+        && best.objective < 1.0005
+    {
         return format!(
             "No design within the limits beats the base specimen at {:.2} mm. Widen the limits or the ranges, or search longer.",
             drive(base)
@@ -155,12 +160,44 @@ fn winner(base: &DesignEntry, best: &DesignEntry) -> String {
     )
 }
 
+/// Where blocks may differ: what of the gain is size and what is geometry.
+fn what_size_does(study: &Study, base: &DesignEntry, best: &DesignEntry) -> Option<String> {
+    if best.specimen.block == base.specimen.block {
+        return None;
+    }
+    let ratio = best.volume_mm3 / base.volume_mm3;
+    let sums = best.gains.iter().filter_map(|g| g.integrated_sensitivity);
+    let per_volume: Vec<f64> = match study.objective.normalisation {
+        Normalisation::MeanPerVoxel => sums.collect(),
+        Normalisation::Sum | Normalisation::VolumeIntegral => sums.map(|s| s / ratio).collect(),
+    };
+    // Twice the voxels of the same information halve the variance.
+    let sds: Vec<f64> = best.gains.iter().filter_map(|g| g.promised_sd).map(|s| s / ratio.sqrt()).collect();
+    let (Some(per_volume), Some(sds)) = (factors(&per_volume), factors(&sds)) else { return None };
+    let size = |e: &DesignEntry| {
+        let b = &e.specimen.block;
+        format!("{:.1} × {:.2} × {:.1} mm", b.length_mm, b.thickness_mm, b.width_mm)
+    };
+    Some(format!(
+        "Part of this is size: the block is {} (base: {}) and holds {:.2} times the base's material, which alone makes integrated \
+         sensitivities ×{ratio:.2} and standard deviations ×{:.2} better. Shape and strain make the rest: {per_volume} in the \
+         integrated sensitivities and {sds} in the standard deviations.",
+        size(best),
+        size(base),
+        ratio,
+        ratio.sqrt()
+    ))
+}
+
 /// Both measures of one material, parameter by parameter where they get worse.
 fn gains_of_material(best: &DesignEntry, material: &str) -> Option<String> {
     let of_material: Vec<_> = best.gains.iter().filter(|g| g.material == material).collect();
     let sums: Vec<f64> = of_material.iter().filter_map(|g| g.integrated_sensitivity).collect();
     let sds: Vec<f64> = of_material.iter().filter_map(|g| g.promised_sd).collect();
-    let mut text = format!("Material \"{material}\": against the base, the best specimen's integrated sensitivities are {}", factors(&sums)?);
+    let mut text = format!(
+        "Material \"{material}\": against the base, the best specimen's integrated sensitivities are {}",
+        factors(&sums)?
+    );
     match factors(&sds) {
         None => text += "; no standard deviation is determined.",
         Some(range) => text += &format!("; its promised standard deviations are smaller by {range}."),
@@ -169,7 +206,9 @@ fn gains_of_material(best: &DesignEntry, material: &str) -> Option<String> {
         .iter()
         .filter_map(|g| Some((g, g.promised_sd?)))
         .filter(|(_, ratio)| *ratio < 0.9995)
-        .map(|(g, ratio)| format!("{} is promised {:.1} % less precisely", symbol(&g.parameter), 100.0 * (1.0 / ratio - 1.0)))
+        .map(|(g, ratio)| {
+            format!("{} is promised {:.1} % less precisely", symbol(&g.parameter), 100.0 * (1.0 / ratio - 1.0))
+        })
         .collect();
     if !lost.is_empty() {
         text += &format!(" A factor below 1 is a loss: {}.", lost.join(", "));
@@ -199,7 +238,11 @@ fn what_holes_do(base: &DesignEntry, ranked: &[DesignEntry], index: usize, mater
     let mut said = Vec::new();
     if let Some((count, (sum, _))) = holed.iter().max_by(|a, b| a.1.0.total_cmp(&b.1.0)) {
         let ratio = sum / solid_sum;
-        let verdict = if ratio > 1.005 { "holes help the integrated sensitivity" } else { "holes do not help the integrated sensitivity" };
+        let verdict = if ratio > 1.005 {
+            "holes help the integrated sensitivity"
+        } else {
+            "holes do not help the integrated sensitivity"
+        };
         let reason = if ratio > 1.005 { "" } else { ": a removed voxel is a lost measurement" };
         said.push(format!(
             "Material \"{material}\": {verdict}. The best confirmed specimen with holes ({}) has {} of it than the best solid block{reason}.",

@@ -125,6 +125,12 @@ impl DesignEntry {
         self.by_material.first()?.relative_sd_by_criterion.d_optimal
     }
 
+    /// Limits that are not kept, in words; guards are meant where every limit is.
+    pub fn not_kept(&self) -> String {
+        let names: Vec<&str> = self.limits.iter().filter(|m| !m.is_satisfied).map(|m| m.name.as_str()).collect();
+        if names.is_empty() { "guard on the promised standard deviations".into() } else { names.join(", ") }
+    }
+
     /// Largest force over the materials, N.
     pub fn force_n(&self) -> f64 {
         self.by_material.iter().map(|m| m.force_n).fold(0.0, f64::max)

@@ -114,6 +114,11 @@ impl State {
         let mut per_space = std::collections::HashMap::new();
         let mut by_count = std::collections::BTreeMap::new();
         for index in self.order() {
+            // One design may come twice: sampled, and as the start of a refinement.
+            let is_known = |&other: &usize| is_same(&self.candidates[other].specimen, &self.candidates[index].specimen);
+            if chosen.iter().any(is_known) {
+                continue;
+            }
             by_count.entry(self.candidates[index].specimen.holes.len()).or_insert(index);
             let count: &mut usize = per_space.entry(self.points[index].0).or_default();
             // Near copies along one refinement teach nothing: four of a structure.
@@ -123,7 +128,7 @@ impl State {
             }
         }
         for index in by_count.into_values() {
-            if !chosen.iter().any(|&other| self.candidates[other].specimen == self.candidates[index].specimen) {
+            if !chosen.contains(&index) {
                 chosen.push(index);
             }
         }
@@ -140,4 +145,21 @@ impl State {
         let unfinished = Unfinished::new(study, stage, &self.candidates, self.num_evaluations);
         SearchError::Stopped { unfinished: Box::new(unfinished) }
     }
+}
+
+/// Whether two designs differ by no more than a mould maker can see (1 µm).
+fn is_same(a: &Specimen, b: &Specimen) -> bool {
+    const TOLERANCE_MM: f64 = 1e-3;
+    let near = |a: f64, b: f64| (a - b).abs() <= TOLERANCE_MM;
+    let lengths = |s: &Specimen| {
+        [s.block.length_mm, s.block.thickness_mm, s.block.width_mm, s.drive_mm.last().copied().unwrap_or(0.0)]
+    };
+    a.test == b.test
+        && a.holes.len() == b.holes.len()
+        && lengths(a).iter().zip(lengths(b)).all(|(a, b)| near(*a, b))
+        && a.holes.iter().zip(&b.holes).all(|(a, b)| {
+            a.axis == b.axis
+                && near(a.diameter_mm, b.diameter_mm)
+                && (0..2).all(|c| near(a.center_mm[c], b.center_mm[c]))
+        })
 }

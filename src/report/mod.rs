@@ -26,6 +26,7 @@ mod color;
 mod correlation;
 mod density;
 mod design_report;
+mod design_verification;
 mod error;
 mod frame;
 mod history;
