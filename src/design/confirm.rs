@@ -3,8 +3,8 @@
 use super::aim::Normalisation;
 use super::objective::{Judged, Reference};
 use super::response::{
-    Evaluated, EvaluationFailure, Response, criteria_as_relative_sd, log_or_undetermined, normalised, sample_materials,
-    tearing_stretch,
+    Evaluated, EvaluationFailure, Evaluator, Response, criteria_as_relative_sd, log_or_undetermined, normalised,
+    sample_materials, tearing_stretch,
 };
 use super::study::Study;
 use crate::fem::ForwardModel;
@@ -98,25 +98,18 @@ pub fn confirm(
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Confirmed, EvaluationFailure> {
     let mut by_material: Vec<MaterialEvaluation> = Vec::new();
-    let mut responses = Vec::new();
-    let (mut force, mut stretch) = (0.0f64, 0.0f64);
     let options = EvaluationOptions::standard(specimen);
     let mut model = ForwardModel::of_specimen(specimen, &options.mesh)?;
-    for sample in sample_materials(&study.materials) {
+    for prior in &study.materials {
         let drives = DriveSelection::DriveMm(specimen.drive_mm.clone());
         let (evaluation, maps) =
-            evaluate_model(&mut model, specimen, &sample.material, &study.scan, &drives, &options, is_cancelled)
+            evaluate_model(&mut model, specimen, &prior.material, &study.scan, &drives, &options, is_cancelled)
                 .map_err(failure)?;
-        let name = &study.materials[sample.prior].name;
-        let found = of_material(&model, name, &sample.material, evaluation, &maps);
-        force = force.max(found.force_n.abs());
-        stretch = stretch.max(found.tearing_stretch);
-        responses.push(found.response(study));
-        // The central values come first.
-        if by_material.len() == sample.prior {
-            by_material.push(found);
-        }
+        by_material.push(of_material(&model, &prior.name, &prior.material, evaluation, &maps));
     }
+    let responses = responses(study, specimen, &by_material, is_cancelled)?;
+    let largest = |f: fn(&Response) -> f64| responses.iter().map(f).fold(f64::NEG_INFINITY, f64::max).exp();
+    let (force, stretch) = (largest(|r| r.log_force), largest(|r| r.log_stretch));
     let mut limits = study.limits.check_geometry(specimen, study.scan.voxel_mm);
     let drive = specimen.drive_mm.last().copied().unwrap_or(0.0);
     limits.extend(study.limits.check_response(drive, force, stretch));
@@ -132,6 +125,32 @@ pub fn confirm(
         volume_mm3: specimen.volume_mm3(),
         remark: None,
     })
+}
+
+/// Responses at every material sample. Those at the central values are the evaluations'; a variant's is the centre's plus the
+/// difference that the variant makes on the search's mesh: differences of logarithms at one mesh are far more accurate than
+/// the values, and cost little.
+fn responses(
+    study: &Study,
+    specimen: &Specimen,
+    by_material: &[MaterialEvaluation],
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Vec<Response>, EvaluationFailure> {
+    let samples = sample_materials(&study.materials);
+    let central: Vec<Vec<f64>> = by_material.iter().map(|m| m.response(study).to_vector()).collect();
+    if samples.len() == central.len() {
+        return Ok(central.iter().map(|v| Response::from_vector(v)).collect());
+    }
+    let searched = Evaluator::with_variants(study).evaluate(specimen, None, is_cancelled)?;
+    let coarse: Vec<Vec<f64>> = searched.responses.iter().map(Response::to_vector).collect();
+    let of_sample = |index: usize| {
+        let prior = samples[index].prior;
+        // A prior's central values come first among its samples.
+        let centre = samples.iter().position(|s| s.prior == prior).unwrap_or(index);
+        let moved = central[prior].iter().zip(coarse[index].iter().zip(&coarse[centre]));
+        Response::from_vector(&moved.map(|(value, (variant, centre))| value + variant - centre).collect::<Vec<_>>())
+    };
+    Ok((0..samples.len()).map(of_sample).collect())
 }
 
 fn failure(error: EvaluationError) -> EvaluationFailure {

@@ -196,14 +196,17 @@ pub struct Evaluator<'a> {
 impl<'a> Evaluator<'a> {
     /// For `study`: at the priors' central values, and at their variants if its budget says so.
     pub fn new(study: &'a Study) -> Evaluator<'a> {
-        let samples = if study.budget.variants_in_search {
-            sample_materials(&study.materials)
-        } else {
-            let central: Vec<MaterialPrior> =
-                study.materials.iter().map(|prior| MaterialPrior { relative_sd: 0.0, ..prior.clone() }).collect();
-            sample_materials(&central)
-        };
-        Evaluator { study, samples, coarseness: 1.0 }
+        if study.budget.variants_in_search {
+            return Self::with_variants(study);
+        }
+        let central: Vec<MaterialPrior> =
+            study.materials.iter().map(|prior| MaterialPrior { relative_sd: 0.0, ..prior.clone() }).collect();
+        Evaluator { study, samples: sample_materials(&central), coarseness: 1.0 }
+    }
+
+    /// For `study`, always at the variants too.
+    pub fn with_variants(study: &'a Study) -> Evaluator<'a> {
+        Evaluator { study, samples: sample_materials(&study.materials), coarseness: 1.0 }
     }
 
     /// The same with elements larger by `factor`: for tests.
