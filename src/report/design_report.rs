@@ -65,9 +65,9 @@ pub fn design_report(result: &DesignResult, pictures: &DesignPictures) -> String
     page.figures(&[(pareto_plot(result).to_svg(), "Information against force; the front is marked.")]);
     for (index, d) in result.disagreement.iter().enumerate() {
         let items = result.ranked.iter().enumerate().map(|(i, entry)| RankedItem {
-            label: format!("{}. {}", i + 1, short(entry)),
-            left: -(d.rank_by_integrated_sensitivity[i] as f64),
-            right: -(d.rank_by_information[i] as f64),
+            label: format!("{}. {}", i + 1, count_of_holes(entry)),
+            left: least_sensitivity_gain(entry, &d.material),
+            right: information_gain(entry, &result.base, index),
             is_base: false,
             is_best: i == 0,
         });
@@ -80,8 +80,9 @@ pub fn design_report(result: &DesignResult, pictures: &DesignPictures) -> String
             items: items.collect(),
         };
         let caption = format!(
-            "The two measures' rankings of the confirmed designs; Kendall's τ = {}.",
-            show(result.disagreement[index].kendall_tau, 2)
+            "The confirmed designs ranked by the least gain in 𝒮 and by the gain in the generalised standard deviation, both over \
+             the base; Kendall's τ = {}.",
+            show(d.kendall_tau, 2)
         );
         page.figure(&plot.to_svg(), &caption);
     }
@@ -128,6 +129,26 @@ pub fn design_report(result: &DesignResult, pictures: &DesignPictures) -> String
         result.seed
     ));
     page.to_html()
+}
+
+fn count_of_holes(entry: &DesignEntry) -> String {
+    match entry.specimen.holes.len() {
+        0 => "solid".into(),
+        1 => "1 hole".into(),
+        n => format!("{n} holes"),
+    }
+}
+
+/// The least gain in 𝒮 over a material's parameters; NaN without any.
+fn least_sensitivity_gain(entry: &DesignEntry, material: &str) -> f64 {
+    let of_material = entry.gains.iter().filter(|g| g.material == material);
+    of_material.filter_map(|g| g.integrated_sensitivity).reduce(f64::min).unwrap_or(f64::NAN)
+}
+
+/// Gain in a material's generalised standard deviation; NaN where it is not determined.
+fn information_gain(entry: &DesignEntry, base: &DesignEntry, material: usize) -> f64 {
+    let of = |e: &DesignEntry| e.by_material.get(material)?.relative_sd_by_criterion.d_optimal;
+    of(base).zip(of(entry)).map_or(f64::NAN, |(base, own)| base / own)
 }
 
 /// The holes in brief: equal diameters together.
