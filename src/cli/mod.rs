@@ -4,6 +4,7 @@
 //! 3 no solution found, 4 a file cannot be written, 130 stopped by Ctrl-C.
 
 mod design;
+mod diagnose;
 mod error;
 mod evaluate;
 mod input;
@@ -38,6 +39,8 @@ enum Command {
     Evaluate(evaluate::EvaluateArguments),
     /// The best specimen under the limits of a study, with the evidence.
     Design(design::DesignArguments),
+    /// Where a recording and its model differ, and what physics was left out.
+    Diagnose(diagnose::DiagnoseArguments),
 }
 
 /// What every command takes.
@@ -89,6 +92,7 @@ pub fn run() -> ExitCode {
         Command::Solve(a) => solve::run(a),
         Command::Evaluate(a) => evaluate::run(a),
         Command::Design(a) => design::run(a),
+        Command::Diagnose(a) => diagnose::run(a),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

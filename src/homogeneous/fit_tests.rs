@@ -74,7 +74,14 @@ fn intervals_cover_and_terms_are_counted() {
         let sequence = fit_curves(&data, &options).unwrap();
         chosen += usize::from(sequence.chosen().num_terms == 2);
         let fit = &sequence.fits[1];
-        println!("Z {:?}", fit.parameters.iter().zip(values).map(|(p, v)| ((p.value - v) / p.sd.unwrap(), p.sd.unwrap() / v)).collect::<Vec<_>>());
+        println!(
+            "Z {:?}",
+            fit.parameters
+                .iter()
+                .zip(values)
+                .map(|(p, v)| ((p.value - v) / p.sd.unwrap(), p.sd.unwrap() / v))
+                .collect::<Vec<_>>()
+        );
         for (i, p) in fit.parameters.iter().enumerate() {
             let [low, high] = p.interval_95.unwrap();
             inside[i] += usize::from(low <= values[i] && values[i] <= high);

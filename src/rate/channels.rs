@@ -111,8 +111,7 @@ mod tests {
     /// Σ w S is the elastic nominal stress, with the same derivatives: rounding only.
     #[test]
     fn weighted_channels_are_the_nominal_stress() {
-        let terms =
-            [ShearTerm { modulus_kpa: 30.0, alpha: 1.9 }, ShearTerm { modulus_kpa: 4.0, alpha: -3.0 }];
+        let terms = [ShearTerm { modulus_kpa: 30.0, alpha: 1.9 }, ShearTerm { modulus_kpa: 4.0, alpha: -3.0 }];
         for test in TESTS {
             for step in [-0.4, -0.001, 0.0, 0.3, 1.5] {
                 let state = test.at(test.rest() + step);
