@@ -3,7 +3,7 @@
 use super::error::CliError;
 use super::progress::Bar;
 use super::{Common, input, interrupt, output};
-use crate::calibration::{ParameterSpread, VerifyOptions, verify};
+use crate::calibration::{ParameterSpread, VerifyOptions, verify_in_full};
 use crate::design::{
     Checkpoint, DesignEntry, DesignResult, MaterialVerification, Progress, SearchError, Study, Unfinished, search,
     study_hash,
@@ -39,6 +39,9 @@ pub(super) struct DesignArguments {
     #[command(flatten)]
     common: Common,
 }
+
+/// Iterations that a fit of the verification may take.
+const VERIFY_ITERATIONS: usize = 60;
 
 /// Files of a stopped run, beside its checkpoint.
 const UNFINISHED: [&str; 2] = ["unfinished-design.json", "unfinished-best-specimen.json"];
@@ -203,15 +206,18 @@ fn verify_both(
     let total = 2 * study.materials.len() * draws;
     let done = AtomicUsize::new(0);
     let mut error = None;
-    let mut of = |specimen: &Specimen, material: &Ogden| -> Option<Vec<ParameterSpread>> {
-        let options = VerifyOptions::new(specimen, draws, study.seed);
+    let mut of = |specimen: &Specimen, material: &Ogden| -> Option<(Vec<ParameterSpread>, Option<String>)> {
+        let mut options = VerifyOptions::new(specimen, draws, study.seed);
+        // A weakly determined second term makes a long valley: the way along it may take more than the usual iterations.
+        options.fit.max_iterations = VERIFY_ITERATIONS;
         let before = done.load(Ordering::Relaxed);
         let on_draw = || {
             let count = done.fetch_add(1, Ordering::Relaxed) + 1;
             bar.show(&Progress { stage: "verify", done: count, total, best: Some(result.best.objective) });
         };
-        let key = input_hash(&serde_json::json!({ "specimen": specimen, "material": material, "kind": "verify" }));
-        let spreads =
+        let key =
+            input_hash(&serde_json::json!({ "specimen": specimen, "material": material, "kind": "verification" }));
+        let verified =
             checkpoint.get_or(&key, || match verify(specimen, material, &study.scan, &options, &on_draw, is_stopped) {
                 Ok(spreads) => Some(spreads),
                 Err(e) => {
@@ -220,15 +226,16 @@ fn verify_both(
                 }
             });
         done.store(before + draws, Ordering::Relaxed);
-        spreads
+        verified
     };
     let mut verified = Vec::new();
     for prior in &study.materials {
         let best = of(&result.best.specimen, &prior.material);
         let base = best.as_ref().and_then(|_| of(&result.base.specimen, &prior.material));
         match (best, base) {
-            (Some(best), Some(base)) => {
-                verified.push(MaterialVerification { material: prior.name.clone(), best, base });
+            (Some((best, best_failure)), Some((base, base_failure))) => {
+                let material = prior.name.clone();
+                verified.push(MaterialVerification { material, best, base, best_failure, base_failure });
             }
             _ if is_stopped() => return Ok(None),
             _ => {
@@ -278,16 +285,26 @@ fn summary(result: &DesignResult, folder: Option<&Path>) -> String {
         text += "  specimen   parameter        truth         mean     found sd   promised sd   ratio   draws\n";
         for (label, list) in [("best", &v.best), ("base", &v.base)] {
             for p in list {
-                let (promised, ratio) = match p.promised_sd {
-                    Some(sd) => (format!("{sd:.4}"), format!("{:.2}", p.found_sd / sd)),
-                    None => ("-".into(), "-".into()),
+                let show = |v: Option<f64>, digits: usize| {
+                    v.filter(|v| v.is_finite()).map_or("-".into(), |v| format!("{v:.digits$}"))
                 };
+                let ratio = p.promised_sd.map(|sd| p.found_sd / sd);
                 text += &format!(
-                    "  {:<10} {:<10} {:>11.4} {:>12.4} {:>12.4} {:>13} {:>7} {:>7}\n",
-                    label, p.parameter, p.truth, p.mean, p.found_sd, promised, ratio, p.draws
+                    "  {:<10} {:<10} {:>11.4} {:>12} {:>12} {:>13} {:>7} {:>7}\n",
+                    label,
+                    p.parameter,
+                    p.truth,
+                    show(Some(p.mean), 4),
+                    show(Some(p.found_sd), 4),
+                    show(p.promised_sd, 4),
+                    show(ratio, 2),
+                    p.draws
                 );
             }
         }
+    }
+    for sentence in result.verification_failures() {
+        text += &format!("\n* {sentence}\n");
     }
     if let Some(folder) = folder {
         text += &format!("\nreport: {}\n", folder.join("report.html").display());

@@ -99,6 +99,12 @@ pub struct MaterialVerification {
     pub best: Vec<ParameterSpread>,
     /// Of the base specimen.
     pub base: Vec<ParameterSpread>,
+    /// Why the first of the best design's fits that failed did so; null if none failed.
+    #[serde(default)]
+    pub best_failure: Option<String>,
+    /// The same of the base specimen.
+    #[serde(default)]
+    pub base_failure: Option<String>,
 }
 
 impl DesignEntry {
@@ -163,6 +169,25 @@ impl DesignResult {
             version: VERSION.into(),
             input_hash: study_hash(study),
         })
+    }
+
+    /// Where fits of the verification failed, in words.
+    pub fn verification_failures(&self) -> Vec<String> {
+        let mut said = Vec::new();
+        for v in &self.verification_by_material {
+            for (label, list, reason) in [("best", &v.best, &v.best_failure), ("base", &v.base, &v.base_failure)] {
+                if let (Some(p), Some(reason)) = (list.first(), reason) {
+                    said.push(format!(
+                        "Caution. Verification, material \"{}\", {label} specimen: {} of {} calibrations failed, the first because: \
+                         {reason}. Its promised standard deviations are not verified by these.",
+                        v.material,
+                        p.failed_draws,
+                        p.draws + p.failed_draws
+                    ));
+                }
+            }
+        }
+        said
     }
 
     /// Adds what the verification found.

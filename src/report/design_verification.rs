@@ -47,6 +47,7 @@ pub(super) fn verification(page: &mut Report, result: &DesignResult) {
          30 % off the truth. The spread of the estimates is set beside the spread promised: a ratio near 1 means that the promise \
          can be trusted.",
     );
+    page.list(&result.verification_failures());
     for v in &result.verification_by_material {
         let (mut table_rows, mut rows) = (Vec::new(), Vec::new());
         for (label, list) in [("best", &v.best), ("base", &v.base)] {
