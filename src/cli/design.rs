@@ -217,14 +217,18 @@ fn verify_both(
         };
         let key =
             input_hash(&serde_json::json!({ "specimen": specimen, "material": material, "kind": "verification" }));
-        let verified =
-            checkpoint.get_or(&key, || match verify(specimen, material, &study.scan, &options, &on_draw, is_stopped) {
-                Ok(spreads) => Some(spreads),
+        let verified = checkpoint.get_or(&key, || {
+            match verify_in_full(specimen, material, &study.scan, &options, &on_draw, is_stopped) {
+                Ok(found) => {
+                    let reason = found.fits.iter().find_map(|fit| fit.as_ref().err().map(ToString::to_string));
+                    Some((found.spreads, reason))
+                }
                 Err(e) => {
                     error = Some(e);
                     None
                 }
-            });
+            }
+        });
         done.store(before + draws, Ordering::Relaxed);
         verified
     };

@@ -155,8 +155,8 @@ fn random_study(draw: &mut Draw) -> Study {
     study.vary.tests = vec![[TestKind::Uniaxial, TestKind::DoubleLapShear][draw.below(2)]];
     study.vary.hole_count = CountRange { min: 0, max: 4 };
     study.vary.drive_mm = Range { min: 1.0, max: draw.between(2.0, 20.0) };
-    study.vary.width_mm = (draw.below(2) == 0).then(|| Range { min: 8.0, max: 14.0 });
-    study.vary.length_mm = (draw.below(2) == 0).then(|| Range { min: 30.0, max: 45.0 });
+    study.vary.width_mm = (draw.below(2) == 0).then_some(Range { min: 8.0, max: 14.0 });
+    study.vary.length_mm = (draw.below(2) == 0).then_some(Range { min: 30.0, max: 45.0 });
     study.seed = draw.below(1000) as u64;
     study
 }
