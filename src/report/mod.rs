@@ -29,6 +29,7 @@ mod curve_pictures;
 mod curves;
 mod density;
 mod design_report;
+mod design_verification;
 mod diagnosis_report;
 mod error;
 mod frame;
