@@ -463,10 +463,10 @@ impl Work<'_, '_> {
                 if cause.name() == "fibre" { paths.into_iter().take(1).collect() } else { paths }
             })
             .collect();
-        let flat: Vec<&dyn Fn(f64) -> Scene> = own.iter().flatten().map(|p| &**p as _).collect();
+        let flat: Vec<(&dyn Fn(f64) -> Scene, bool)> = own.iter().flatten().map(|(p, b)| (&**p as _, *b)).collect();
         let known = paths_of(&current.causes);
         let num_known = known.len();
-        let all: Vec<&dyn Fn(f64) -> Scene> = known.iter().map(|p| &**p as _).chain(flat).collect();
+        let all: Vec<(&dyn Fn(f64) -> Scene, bool)> = known.iter().map(|(p, b)| (&**p as _, *b)).chain(flat).collect();
         let mut columns =
             self.laboratory.derivatives(&current.material, &scene, &current.prediction, true, &all, STEP)?;
         let parameters = current.material.parameters();

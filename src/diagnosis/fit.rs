@@ -103,7 +103,7 @@ pub fn derivatives(
 ) -> Result<Vec<Trace>, DiagnosisError> {
     let scene = scene_of(causes);
     let paths = paths_of(causes);
-    let paths: Vec<&dyn Fn(f64) -> Scene> = paths.iter().map(|p| &**p as _).collect();
+    let paths: Vec<(&dyn Fn(f64) -> Scene, bool)> = paths.iter().map(|(p, b)| (&**p as _, *b)).collect();
     let mut columns = laboratory.derivatives(material, &scene, prediction, true, &paths, STEP)?;
     for (trace, parameter) in columns.iter_mut().zip(material.parameters()) {
         *trace = trace.scaled(material.value(parameter));
@@ -111,19 +111,20 @@ pub fn derivatives(
     Ok(columns)
 }
 
-/// A path of scenes.
-pub type Path<'a> = Box<dyn Fn(f64) -> Scene + 'a>;
+/// A path of scenes, and whether it changes the sample.
+pub type Path<'a> = (Box<dyn Fn(f64) -> Scene + 'a>, bool);
 
 /// One path per parameter of the causes, in units of its scale.
 pub fn paths_of(causes: &[Supposed]) -> Vec<Path<'_>> {
     let mut paths: Vec<Path> = Vec::new();
     for (index, supposed) in causes.iter().enumerate() {
         for (n, parameter) in supposed.cause.parameters().into_iter().enumerate() {
-            paths.push(Box::new(move |t: f64| {
+            let path = move |t: f64| {
                 let mut moved = causes.to_vec();
                 moved[index].values[n] += t * parameter.scale;
                 scene_of(&moved)
-            }));
+            };
+            paths.push((Box::new(path), supposed.cause.changes_sample()));
         }
     }
     paths

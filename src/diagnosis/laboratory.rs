@@ -159,8 +159,9 @@ impl<'a> Laboratory<'a> {
     }
 
     /// Derivatives of `prediction`, that of `material` and `scene`: with respect to every material parameter (in the order of
-    /// [`Ogden::parameters`]), then along each t ↦ path(t) at t = 0, where path(0) must be `scene`. Paths are differenced over
-    /// ±`step` in what is cheap, the residual, the image and the load; holes by the derivative of the mesh's nodes.
+    /// [`Ogden::parameters`]), then along each t ↦ path(t) at t = 0, where path(0) must be `scene` and the flag says whether the
+    /// path changes the sample. Paths are differenced over ±`step` in what is cheap, the residual, the image and the load;
+    /// holes by the derivative of the mesh's nodes.
     ///
     /// # Errors
     /// [`DiagnosisError::Solve`].
@@ -170,13 +171,13 @@ impl<'a> Laboratory<'a> {
         scene: &Scene,
         prediction: &Prediction,
         with_material: bool,
-        paths: &[&dyn Fn(f64) -> Scene],
+        paths: &[(&dyn Fn(f64) -> Scene, bool)],
         step: f64,
     ) -> Result<Vec<Trace>, DiagnosisError> {
         let at = self.station(scene)?;
         let parameters: Vec<Parameter> = if with_material { material.parameters() } else { Vec::new() };
         let mut of_material = vec![Trace::default(); parameters.len()];
-        let ends: Vec<[Scene; 2]> = paths.iter().map(|path| [path(step), path(-step)]).collect();
+        let ends: Vec<[Scene; 2]> = paths.iter().map(|(path, _)| [path(step), path(-step)]).collect();
         let velocities: Vec<Option<Vec<[f64; 3]>>> = ends.iter().map(|e| self.hole_velocity(e, step)).collect();
         // Per path: change of the voxel averages and of the force, before the image and the load cell.
         let mut changes = vec![Trace::default(); paths.len()];
@@ -200,7 +201,7 @@ impl<'a> Laboratory<'a> {
                     trace.force.push(if has_force { s.force_n * (1.0 + scene.force_gain) } else { 0.0 });
                 }
             }
-            for (index, path) in paths.iter().enumerate() {
+            for (index, (path, changes_sample)) in paths.iter().enumerate() {
                 let (field, force) = match &velocities[index] {
                     Some(velocity) => {
                         let s = station.model.path_sensitivity(material, state, &[], Some(velocity), 0.0)?;
@@ -215,7 +216,7 @@ impl<'a> Laboratory<'a> {
                         }
                         (field, s.force_n)
                     }
-                    None if is_physical_change(&ends[index][0], &ends[index][1]) => {
+                    None if *changes_sample => {
                         let at_t = |t: f64| path(t).departures(measured, scale, face_axis);
                         let s = station.model.departure_sensitivity(material, state, &at_t, step)?;
                         (station.view.average(&s.displacement)?, s.force_n)
@@ -426,15 +427,6 @@ impl<'a> Laboratory<'a> {
 
 fn hole_variables(hole: usize) -> [DesignVariable; 3] {
     [DesignVariable::HoleDiameter(hole), DesignVariable::HoleX(hole), DesignVariable::HoleOther(hole)]
-}
-
-fn is_physical_change(ahead: &Scene, behind: &Scene) -> bool {
-    !ahead.stiffness.is_empty()
-        || (ahead.log_growth - behind.log_growth).abs() > 0.0
-        || ahead.fibre != behind.fibre
-        || ahead.plates != behind.plates
-        || (ahead.compliance_mm_per_n - behind.compliance_mm_per_n).abs() > 0.0
-        || ahead.looseness.iter().any(|l| !l.is_empty())
 }
 
 /// Stiffness (kPa/mm) of the sample under a node of its bond: shear modulus / node spacing.

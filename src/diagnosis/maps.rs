@@ -175,7 +175,7 @@ pub fn inclusion_map(
             }) as _
         })
         .collect();
-    let paths: Vec<&dyn Fn(f64) -> Scene> = paths.iter().map(|p| &**p).collect();
+    let paths: Vec<(&dyn Fn(f64) -> Scene, bool)> = paths.iter().map(|p| (&**p, true)).collect();
     let directions = laboratory.derivatives(material, &Scene::default(), prediction, false, &paths, 0.02)?;
     let map = ScoreMap::new(division, test, &directions);
     let found = map.best_block(|_| true).map(|block| {

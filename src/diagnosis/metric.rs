@@ -10,7 +10,6 @@
 
 use super::trace::Trace;
 use crate::calibration::Observed;
-use crate::specimen::TestKind;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Numbers of boxes along x, y, z at each level.
@@ -31,6 +30,8 @@ pub struct Metric {
     /// Per voxel: its box at each level (indices into one list).
     boxes: Vec<[u32; LEVELS.len()]>,
     num_boxes: usize,
+    /// Per box: S.
+    variances: Vec<f64>,
     /// Per step: drive / largest drive.
     scale: Vec<f64>,
     capacitance: Vec<Cholesky<f64, Dyn>>,
@@ -52,10 +53,8 @@ impl Metric {
         let mask = &observed.mask;
         let b = observed.specimen.block;
         let half = [0.5 * b.length_mm, 0.5 * b.thickness_mm, 0.5 * b.width_mm];
-        let pull = 0;
-        let end_axis = match observed.specimen.test {
-            TestKind::DoubleLapShear | TestKind::Uniaxial => pull,
-        };
+        // Sheared or pulled, the singular edges lie at the ends along x.
+        let end_axis = 0;
         let mut first = [0u32; LEVELS.len()];
         let mut num_boxes = 0;
         for (level, counts) in LEVELS.iter().enumerate() {
@@ -96,14 +95,23 @@ impl Metric {
             .collect();
         let precision = observed.noise_sd_mm.map(|sd| 1.0 / (sd * sd * observed.noise_correlation()));
         let (force_precision, has_force) = force_precision(observed);
-        let mut metric =
-            Metric { precision, is_used, boxes, num_boxes, scale, capacitance: Vec::new(), force_precision, has_force };
-        metric.capacitance = metric.capacitances(&variance);
+        let mut metric = Metric {
+            precision,
+            is_used,
+            boxes,
+            num_boxes,
+            variances: variance,
+            scale,
+            capacitance: Vec::new(),
+            force_precision,
+            has_force,
+        };
+        metric.capacitance = metric.capacitances();
         metric
     }
 
     /// S⁻¹ + Bᵀ N⁻¹ B per component.
-    fn capacitances(&self, variance: &[f64]) -> Vec<Cholesky<f64, Dyn>> {
+    fn capacitances(&self) -> Vec<Cholesky<f64, Dyn>> {
         let n = self.num_boxes;
         let mut gram = DMatrix::<f64>::zeros(n, n);
         for (used, scale) in self.is_used.iter().zip(&self.scale) {
@@ -119,7 +127,7 @@ impl Metric {
             .iter()
             .map(|precision| {
                 let mut matrix = &gram * *precision;
-                for (i, v) in variance.iter().enumerate() {
+                for (i, v) in self.variances.iter().enumerate() {
                     // A box without voxels has no moments; any positive number serves.
                     matrix[(i, i)] += 1.0 / v.max(1e-12);
                 }
@@ -211,3 +219,7 @@ fn force_precision(observed: &Observed) -> (DMatrix<f64>, Vec<bool>) {
     }
     (precision, has_force)
 }
+
+#[cfg(test)]
+#[path = "metric_tests.rs"]
+mod tests;

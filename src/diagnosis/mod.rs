@@ -28,6 +28,3 @@ pub use result::{BeforeAfter, CauseResult, DiagnosisResult, ParameterResult, Ran
 pub use scene::{ImageChange, Jump, Scene};
 pub use score::{Score, ScoreTest};
 pub use trace::Trace;
-
-#[cfg(test)]
-mod explore;

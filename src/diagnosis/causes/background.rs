@@ -38,4 +38,8 @@ impl Cause for Background {
     fn location(&self, _: &[f64], _: &Specimen) -> Option<Location> {
         None
     }
+
+    fn changes_sample(&self) -> bool {
+        false
+    }
 }

@@ -31,4 +31,8 @@ impl Cause for CellOffset {
     fn location(&self, _: &[f64], _: &Specimen) -> Option<Location> {
         None
     }
+
+    fn changes_sample(&self) -> bool {
+        false
+    }
 }

@@ -99,8 +99,4 @@ impl Cause for Debond {
         let region = format!("patch of the {sign}{} bonded face", Self::axis_name(self.face.0));
         Some(Location { region, center_mm, extent_mm })
     }
-
-    fn is_scored(&self) -> bool {
-        false
-    }
 }

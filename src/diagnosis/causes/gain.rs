@@ -33,4 +33,8 @@ impl Cause for Gain {
     fn location(&self, _: &[f64], _: &Specimen) -> Option<Location> {
         None
     }
+
+    fn changes_sample(&self) -> bool {
+        false
+    }
 }

@@ -61,8 +61,4 @@ impl Cause for Inclusion {
         let region = if values[0] > 0.0 { "stiff inclusion" } else { "soft inclusion" };
         Some(Location { region: region.into(), center_mm: [values[1], values[2], values[3]], extent_mm: [d; 3] })
     }
-
-    fn is_scored(&self) -> bool {
-        false
-    }
 }

@@ -90,8 +90,8 @@ pub trait Cause: Send + Sync {
     fn apply(&self, values: &[f64], scene: &mut Scene);
     /// Where it is, if it is somewhere.
     fn location(&self, values: &[f64], specimen: &Specimen) -> Option<Location>;
-    /// Whether its effect at `start` is zero, so that a score test at the nominal fit makes sense.
-    fn is_scored(&self) -> bool {
+    /// Whether it changes the sample or its loading, and not only what is recorded of them.
+    fn changes_sample(&self) -> bool {
         true
     }
 }

@@ -36,4 +36,8 @@ impl Cause for Registration {
     fn location(&self, _: &[f64], _: &Specimen) -> Option<Location> {
         None
     }
+
+    fn changes_sample(&self) -> bool {
+        false
+    }
 }

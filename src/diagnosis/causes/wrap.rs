@@ -49,4 +49,8 @@ impl Cause for Wrap {
     fn location(&self, _: &[f64], _: &Specimen) -> Option<Location> {
         Some(self.location.clone())
     }
+
+    fn changes_sample(&self) -> bool {
+        false
+    }
 }
