@@ -3,13 +3,16 @@
 mod error;
 mod load_curve;
 mod nifti;
+mod raw;
 mod read;
 mod write;
 
 pub use error::RecordingError;
 pub use load_curve::LoadCurve;
 pub use nifti::{Image, NiftiError, Samples};
+pub use raw::{RawRecording, RawStep};
 pub use read::ReadLimits;
+pub use write::{write_scalars, write_vectors};
 
 use crate::specimen::Specimen;
 use crate::voxel::VoxelGrid;
