@@ -1,0 +1,102 @@
+use super::*;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+const SHAPE: [usize; 3] = [26, 38, 26];
+
+/// A field that is hard to unwrap.
+struct Case {
+    name: &'static str,
+    /// Turns of the phase along a line of voxels through the thickness.
+    num_turns: f64,
+    /// Standard deviation of the phase at full signal, rad.
+    noise: f64,
+    /// Amplitude of disturbances like those at the ends of a sample, rad.
+    wave: f64,
+    has_holes: bool,
+}
+
+const CASES: [Case; 6] = [
+    Case { name: "shear, 5 turns per line", num_turns: 5.0, noise: 0.1, wave: 2.0, has_holes: false },
+    Case { name: "the same, two holes", num_turns: 5.0, noise: 0.1, wave: 2.0, has_holes: true },
+    Case { name: "noise 0.3 rad, holes", num_turns: 5.0, noise: 0.3, wave: 2.0, has_holes: true },
+    Case { name: "noise 0.5 rad, holes", num_turns: 5.0, noise: 0.5, wave: 2.0, has_holes: true },
+    Case { name: "shear, 11 turns per line, holes", num_turns: 11.0, noise: 0.1, wave: 3.0, has_holes: true },
+    Case { name: "the same, noise 0.3 rad", num_turns: 11.0, noise: 0.3, wave: 3.0, has_holes: true },
+];
+
+/// True phase, measured phase, standard deviation (as the magnitude tells it).
+fn image(case: &Case, seed: u64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let [nx, ny, nz] = SHAPE;
+    let (mut truth, mut phase, mut sd) = (Vec::new(), Vec::new(), Vec::new());
+    for v in 0..nx * ny * nz {
+        let at = |n: usize, of: usize| (n as f64 + 0.5) / of as f64 - 0.5;
+        let (x, y, z) = (at(v % nx, nx), at(v / nx % ny, ny), at(v / (nx * ny), nz));
+        let end = (-((0.5 - x.abs()) / 0.12)).exp();
+        let value = TAU * case.num_turns * (y + 0.03 * (TAU * y).sin()) + case.wave * end * (TAU * (y + 0.7 * z)).sin();
+        // Low signal: a hole of air, and a rim around it.
+        let distance = [[-0.17, 0.0], [0.17, 0.0]].iter().map(|c| (x - c[0]).hypot(1.3 * (z - c[1]))).fold(9.0, f64::min);
+        let magnitude = match case.has_holes {
+            true if distance < 0.1 => 1e-3,
+            true if distance < 0.14 => 0.4,
+            _ => 1.0,
+        };
+        let noise = |rng: &mut ChaCha8Rng| -> f64 { StandardNormal.sample(rng) };
+        let (re, im) = (magnitude + case.noise * noise(&mut rng), case.noise * noise(&mut rng));
+        truth.push(value);
+        phase.push(wrapped(value + im.atan2(re)));
+        sd.push(case.noise / re.hypot(im).max(1e-9));
+    }
+    (truth, phase, sd)
+}
+
+/// Kept voxels with another number of turns than the truth (up to one number for all), before and after exclusion.
+fn num_wrong(truth: &[f64], phase: &[f64]) -> usize {
+    let turns: Vec<i64> =
+        truth.iter().zip(phase).filter(|(_, p)| p.is_finite()).map(|(t, p)| ((p - t) / TAU).round() as i64).collect();
+    let mut sorted = turns.clone();
+    sorted.sort_unstable();
+    let usual = sorted[sorted.len() / 2];
+    turns.iter().filter(|t| **t != usual).count()
+}
+
+/// The table of docs/unwrapping.md; `cargo test unwrapping_table -- --nocapture --ignored` prints it.
+#[test]
+#[ignore = "prints the table of docs/unwrapping.md"]
+fn unwrapping_table() {
+    for case in &CASES {
+        for method in [Method::Margin, Method::SecondDifference, Method::LeastSquares] {
+            let (mut wrong, mut kept_wrong, mut left_out, mut total, mut seconds) = (0, 0, 0, 0, 0.0);
+            for seed in 0..10 {
+                let (truth, phase, sd) = image(case, seed);
+                let image = WrappedImage { shape: SHAPE, phase: &phase, sd: &sd };
+                let used: Vec<u32> = (0..sd.len() as u32).filter(|&v| sd[v as usize] <= 0.7).collect();
+                let graph = Graph::new(&image, &used);
+                let start = std::time::Instant::now();
+                let whole = match method {
+                    Method::Margin => quality::by_margin(&graph),
+                    Method::SecondDifference => quality::by_second_difference(&graph),
+                    Method::LeastSquares => least_squares::congruent(&graph),
+                };
+                seconds += start.elapsed().as_secs_f64();
+                let true_used: Vec<f64> = used.iter().map(|&v| truth[v as usize]).collect();
+                wrong += num_wrong(&true_used, &whole);
+                let result = unwrap(&image, &UnwrapOptions { method, ..UnwrapOptions::default() });
+                kept_wrong += num_wrong(&truth, &result.phase);
+                left_out += result.num_inconsistent + result.num_unconnected;
+                total += used.len();
+            }
+            let percent = |n: usize| 100.0 * n as f64 / total as f64;
+            println!(
+                "| {} | {method:?} | {:.3} % | {:.3} % | {:.4} % | {:.0} ms |",
+                case.name,
+                percent(wrong),
+                percent(left_out),
+                percent(kept_wrong),
+                100.0 * seconds
+            );
+        }
+    }
+}
