@@ -3,6 +3,8 @@
 
 mod error;
 mod fit;
+mod noise;
+mod observed;
 mod step;
 mod synthetic;
 mod system;
@@ -12,5 +14,7 @@ mod verify;
 
 pub use error::CalibrationError;
 pub use fit::{Bulk, Fit, FitOptions, FitStart, fit};
+pub use noise::estimate_noise_sd_mm;
+pub use observed::{Observed, ObservedForce, ObservedStep, View};
 pub use synthetic::{Measurement, SyntheticScan};
 pub use verify::{ParameterSpread, Verification, VerifyOptions, verify, verify_in_full};

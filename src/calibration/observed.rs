@@ -1,0 +1,170 @@
+//! A recording made ready for comparison with a model: its voxels, its noise, and the operator that sees a model as the scan
+//! saw the sample.
+
+use super::error::CalibrationError;
+use super::noise::estimate_noise_sd_mm;
+use crate::mesh::Mesh;
+use crate::recording::{Filter, Recording};
+use crate::specimen::Specimen;
+use crate::voxel::{HammingFilter, Sampling, VoxelMask, VoxelOperator};
+
+/// Least filled part of a voxel that is compared: the average over a sliver is that of a place on the wall, where the made
+/// sample may differ from the drawing.
+const LEAST_FRACTION: f64 = 0.3;
+
+/// A force with its uncertainty.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ObservedForce {
+    /// All samples together, N.
+    pub value_n: f64,
+    /// Standard deviation, N.
+    pub sd_n: f64,
+}
+
+/// One drive of an [`Observed`] recording.
+#[derive(Clone, Debug)]
+pub struct ObservedStep {
+    /// Commanded drive, mm.
+    pub drive_mm: f64,
+    /// The force, where it was recorded.
+    pub force: Option<ObservedForce>,
+    /// u of the compared voxels, mm, in the mask's order; NaN where missing.
+    pub displacement: Vec<[f64; 3]>,
+}
+
+/// A recording made ready for comparison.
+#[derive(Clone, Debug)]
+pub struct Observed {
+    /// The specimen as drawn.
+    pub specimen: Specimen,
+    /// The voxels compared.
+    pub mask: VoxelMask,
+    /// One per drive.
+    pub steps: Vec<ObservedStep>,
+    /// Noise of a value as given or estimated, per component, mm.
+    pub noise_sd_mm: [f64; 3],
+    /// Whether the noise was estimated because the recording does not state it.
+    pub is_noise_estimated: bool,
+    /// The filter that the values went through.
+    pub filter: Filter,
+    /// Voxels that the recording marks but that the specimen as drawn (nearly) does not fill: not compared.
+    pub num_outside: usize,
+    /// Marks of the compared voxels on the grid.
+    flags: Vec<bool>,
+}
+
+impl Observed {
+    /// Prepares `recording`. Forces without a standard deviation get `force_sd_n`.
+    ///
+    /// # Errors
+    /// [`CalibrationError::Voxel`] where the recording's mask and the specimen do not overlap.
+    pub fn new(recording: &Recording, force_sd_n: f64) -> Result<Observed, CalibrationError> {
+        let specimen = recording.specimen.clone();
+        let mask = match recording.filter {
+            Filter::None => VoxelMask::from_flags(&specimen, recording.grid.clone(), &recording.mask, LEAST_FRACTION)?,
+            Filter::Hamming2 => {
+                let (_, filter) = HammingFilter::for_recording(&specimen, recording.grid.clone(), &recording.mask)?;
+                filter.mask().clone()
+            }
+        };
+        let flags = mask.spread(&vec![true; mask.num_voxels()], false);
+        let steps: Vec<ObservedStep> = recording
+            .steps
+            .iter()
+            .map(|step| ObservedStep {
+                drive_mm: step.drive_mm,
+                force: step
+                    .force_n
+                    .map(|value_n| ObservedForce { value_n, sd_n: step.force_sd_n.unwrap_or(force_sd_n) }),
+                displacement: mask.voxels.iter().map(|&v| step.displacement[v as usize]).collect(),
+            })
+            .collect();
+        let noise_sd_mm = match recording.noise_sd_mm {
+            Some(sd) => sd,
+            None => {
+                let fields: Vec<&[[f64; 3]]> = recording.steps.iter().map(|s| &s.displacement[..]).collect();
+                estimate_noise_sd_mm(&recording.grid, &flags, &fields, recording.filter)?
+            }
+        };
+        Ok(Observed {
+            num_outside: recording.num_voxels() - mask.num_voxels(),
+            is_noise_estimated: recording.noise_sd_mm.is_none(),
+            filter: recording.filter,
+            specimen,
+            mask,
+            steps,
+            noise_sd_mm,
+            flags,
+        })
+    }
+
+    /// How many neighbouring values carry the same noise: 1 without a filter, 8 for `hamming2` (the sum of the noise's
+    /// correlations with all neighbours, (½ + 1 + ½)³). For fields smoother than the filter, a sum of n values knows as much
+    /// as n / this independent ones.
+    pub fn noise_correlation(&self) -> f64 {
+        match self.filter {
+            Filter::None => 1.0,
+            Filter::Hamming2 => 8.0,
+        }
+    }
+
+    /// How the scan sees a field on `mesh`, a mesh of `specimen`: the nominal one or one with other holes.
+    ///
+    /// # Errors
+    /// [`CalibrationError::Voxel`].
+    pub fn view(&self, specimen: &Specimen, mesh: &Mesh) -> Result<View, CalibrationError> {
+        // Whatever part of a compared voxel the specimen still fills is what the scan averages over.
+        let least = 1e-3;
+        let (acquired, filter) = match self.filter {
+            Filter::None => (VoxelMask::from_flags(specimen, self.mask.grid.clone(), &self.flags, least)?, None),
+            Filter::Hamming2 => {
+                let (acquired, filter) = HammingFilter::for_recording(specimen, self.mask.grid.clone(), &self.flags)?;
+                (acquired, Some(filter))
+            }
+        };
+        let seen = filter.as_ref().map_or(&acquired, |f| f.mask());
+        let places: Vec<u32> = (0..seen.num_voxels() as u32).collect();
+        let place_of = seen.spread(&places, u32::MAX);
+        let places = self.mask.voxels.iter().map(|&v| place_of[v as usize]).collect();
+        let operator = VoxelOperator::new(specimen, mesh, &acquired, Sampling::default())?;
+        Ok(View { operator, filter, places })
+    }
+}
+
+/// How the scan sees a nodal field of one mesh.
+#[derive(Clone, Debug)]
+pub struct View {
+    operator: VoxelOperator,
+    filter: Option<HammingFilter>,
+    /// Place of each compared voxel among those seen; `u32::MAX` where the specimen does not fill it.
+    places: Vec<u32>,
+}
+
+impl View {
+    /// Voxel averages (filtered as the data were) of a nodal field, in the order of the compared voxels; NaN where the mesh's
+    /// specimen has no material.
+    ///
+    /// # Errors
+    /// [`CalibrationError::Voxel`] where `field` is not of the mesh.
+    pub fn average(&self, field: &[[f64; 3]]) -> Result<Vec<[f64; 3]>, CalibrationError> {
+        let values = self.operator.average(field)?;
+        let values = match &self.filter {
+            Some(filter) => filter.apply(&values)?,
+            None => values,
+        };
+        Ok(self.places.iter().map(|&p| values.get(p as usize).copied().unwrap_or([f64::NAN; 3])).collect())
+    }
+
+    /// Voxel averages of ∂u_i/∂X_j (row i), likewise.
+    ///
+    /// # Errors
+    /// As [`Self::average`].
+    pub fn gradients(&self, field: &[[f64; 3]]) -> Result<Vec<[[f64; 3]; 3]>, CalibrationError> {
+        let mut f = self.operator.average_gradient(field)?;
+        if let Some(filter) = &self.filter {
+            let flat: Vec<[f64; 9]> = f.iter().map(|g| std::array::from_fn(|n| g[n / 3][n % 3])).collect();
+            f = filter.apply(&flat)?.iter().map(|g| [0, 1, 2].map(|i| [0, 1, 2].map(|j| g[3 * i + j]))).collect();
+        }
+        Ok(self.places.iter().map(|&p| f.get(p as usize).copied().unwrap_or([[f64::NAN; 3]; 3])).collect())
+    }
+}
