@@ -15,19 +15,23 @@ mod kspace;
 mod loading;
 mod noise;
 mod reconstruct;
+mod result;
 mod scan;
 mod signal;
 pub mod unwrap;
 
 #[cfg(test)]
+mod real_tests;
+#[cfg(test)]
 mod scan_tests;
 
 pub use anchor::{Anchor, AnchorReport};
 pub use error::AcquisitionError;
-pub use filter::hamming_filtered;
+pub use filter::{FilteredField, hamming_filtered};
 pub use kspace::{KSpace, Window};
 pub use loading::{LoadProgram, loading_history};
 pub use noise::{NoiseEstimate, NoiseSource};
 pub use reconstruct::{ComponentReport, ReconstructOptions, Reconstruction, StepReport, reconstruct};
+pub use result::{ErrorReport, ScanResult, ScanStep};
 pub use scan::{Scan, ScanOptions, noisy_images, scan};
 pub use signal::{Complex, signal_images};

@@ -100,3 +100,77 @@ fn unwrapping_table() {
         }
     }
 }
+
+/// A shear of eleven turns along each line of voxels, with waves at the ends and two holes without signal: every method
+/// finds the truth in all but a few of the voxels that it keeps, and keeps nearly all with signal.
+#[test]
+fn steep_shear_with_holes_is_unwrapped() {
+    let case = Case { name: "", num_turns: 11.0, noise: 0.1, wave: 3.0, has_holes: true };
+    let (truth, phase, sd) = image(&case, 99);
+    for method in [Method::Margin, Method::SecondDifference, Method::LeastSquares] {
+        let image = WrappedImage { shape: SHAPE, phase: &phase, sd: &sd };
+        let result = unwrap(&image, &UnwrapOptions { method, ..UnwrapOptions::default() });
+        let n = result.num_voxels;
+        assert_eq!(n, result.num_kept + result.num_low_signal + result.num_inconsistent + result.num_unconnected);
+        assert_eq!(result.num_kept, result.phase.iter().filter(|p| p.is_finite()).count());
+        // A voxel of air has any phase; by chance one in some hundred of them agrees with its neighbours, a turn off.
+        assert!(num_wrong(&truth, &result.phase) < 10, "{method:?}");
+        // The holes are 7 % of the image, their rims 3 %.
+        assert!(result.num_kept as f64 > 0.88 * n as f64, "{method:?} {result:?}", result = result.num_kept);
+    }
+}
+
+/// Without noise, a wrapped linear field of any number of turns comes back exactly, up to whole turns.
+#[test]
+fn clean_fields_come_back() {
+    let shape = [7, 9, 5];
+    let truth: Vec<f64> = (0..315).map(|v| 2.9 * (v / 7 % 9) as f64 - 1.3 * (v % 7) as f64 + 0.7 * (v / 63) as f64).collect();
+    let phase: Vec<f64> = truth.iter().map(|t| wrapped(*t)).collect();
+    let sd = vec![0.01; 315];
+    for method in [Method::Margin, Method::SecondDifference, Method::LeastSquares] {
+        let image = WrappedImage { shape, phase: &phase, sd: &sd };
+        let result = unwrap(&image, &UnwrapOptions { method, ..UnwrapOptions::default() });
+        assert_eq!(result.num_kept, 315);
+        let first = result.phase[0] - truth[0];
+        assert!((first / TAU - (first / TAU).round()).abs() < 1e-12);
+        // Rounding of sums of order thirty.
+        assert!(result.phase.iter().zip(&truth).all(|(p, t)| (p - t - first).abs() < 1e-12), "{method:?}");
+    }
+}
+
+/// Two regions without a voxel between them: the smaller one's turns are unknown, so it is left out and counted.
+#[test]
+fn islands_are_left_out() {
+    let shape = [9, 4, 4];
+    let phase: Vec<f64> = (0..144).map(|v| wrapped(0.9 * (v % 9) as f64)).collect();
+    let sd: Vec<f64> = (0..144).map(|v| if v % 9 == 5 { 2.0 } else { 0.05 }).collect();
+    let image = WrappedImage { shape, phase: &phase, sd: &sd };
+    let result = unwrap(&image, &UnwrapOptions::default());
+    assert_eq!((result.num_kept, result.num_low_signal, result.num_unconnected), (80, 16, 48));
+    // Nothing at all: nothing is kept.
+    let none = WrappedImage { shape, phase: &phase, sd: &vec![f64::INFINITY; 144] };
+    assert_eq!(unwrap(&none, &UnwrapOptions::default()).num_kept, 0);
+}
+
+/// A dislocation: the phase winds once around a line, so no unwrapping is right everywhere. The kept voxels still agree with
+/// all their kept neighbours.
+#[test]
+fn dislocations_are_cut_open() {
+    let shape = [16, 16, 3];
+    let phase: Vec<f64> = (0..768)
+        .map(|v| ((v / 16 % 16) as f64 - 7.5).atan2((v % 16) as f64 - 7.5))
+        .collect();
+    for method in [Method::Margin, Method::SecondDifference, Method::LeastSquares] {
+        let image = WrappedImage { shape, phase: &phase, sd: &vec![0.05; 768] };
+        let result = unwrap(&image, &UnwrapOptions { method, ..UnwrapOptions::default() });
+        assert!(result.num_inconsistent >= 3 * 6, "{method:?} {}", result.num_inconsistent);
+        for v in 0..768 {
+            for (stride, n) in [(1, 16), (16, 16), (256, 3)] {
+                if v / stride % n + 1 < n {
+                    let step = result.phase[v + stride] - result.phase[v];
+                    assert!(!(step.abs() > PI * (1.0 + 1e-9)), "{method:?} {step}");
+                }
+            }
+        }
+    }
+}
