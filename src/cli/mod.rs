@@ -6,10 +6,12 @@
 mod design;
 mod error;
 mod evaluate;
+mod import;
 mod input;
 mod interrupt;
 mod output;
 mod progress;
+mod scan;
 mod solve;
 
 use clap::{Args, Parser, Subcommand};
@@ -36,6 +38,10 @@ enum Command {
     Solve(solve::SolveArguments),
     /// What a scan of a specimen would see, and what it would tell about the material.
     Evaluate(evaluate::EvaluateArguments),
+    /// A synthetic MR-u recording of a specimen: phases with noise, unwrapped, and the loading history.
+    Scan(scan::ScanArguments),
+    /// Raw phases, MATLAB files or point clouds as a recording of displacements.
+    Import(import::ImportArguments),
     /// The best specimen under the limits of a study, with the evidence.
     Design(design::DesignArguments),
 }
@@ -88,6 +94,8 @@ pub fn run() -> ExitCode {
     let result = match &arguments.command {
         Command::Solve(a) => solve::run(a),
         Command::Evaluate(a) => evaluate::run(a),
+        Command::Scan(a) => scan::run(a),
+        Command::Import(a) => import::run(a),
         Command::Design(a) => design::run(a),
     };
     match result {
