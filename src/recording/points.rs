@@ -9,6 +9,9 @@ use std::path::Path;
 /// Positions of one grid plane agree to this part of the spacing.
 const PLANE_TOLERANCE: f64 = 0.02;
 
+/// A grid with more voxels per point than this is none: scattered points have planes of their own.
+const SPARSEST: f64 = 20.0;
+
 /// A point with its displacement; lengths in the file's unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DisplacementPoint {
@@ -181,6 +184,10 @@ fn regular_grid<I: Iterator<Item = [f64; 3]>>(points: impl Fn() -> I) -> Result<
             }
         }
         (origin[a], voxel[a], shape[a]) = (low, spacing, count as usize + 1);
+    }
+    let num_points = points().count();
+    if shape.iter().map(|&n| n as f64).product::<f64>() > SPARSEST * num_points as f64 {
+        return Err(fail(format!("{shape:?} planes for {num_points} points")));
     }
     Ok(VoxelGrid::new(origin, voxel, shape)?)
 }

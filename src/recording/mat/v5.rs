@@ -8,6 +8,7 @@ use flate2::read::ZlibDecoder;
 use std::io::{self, Read};
 
 const MI_MATRIX: u32 = 14;
+const MI_UTF8: u32 = 16;
 const MI_COMPRESSED: u32 = 15;
 /// Pieces in which data are read: memory grows with what is there, not with what a tag promises.
 const PIECE: u64 = 1 << 20;
@@ -186,7 +187,11 @@ impl Reader {
             2 => self.structure(count, rest, depth)?,
             4 => {
                 let (kind, text, _) = self.element(rest)?;
-                MatValue::Text(self.numbers(kind, text)?.iter().filter_map(|c| char::from_u32(*c as u32)).collect())
+                MatValue::Text(if kind == MI_UTF8 {
+                    String::from_utf8_lossy(text).into_owned()
+                } else {
+                    self.numbers(kind, text)?.iter().filter_map(|c| char::from_u32(*c as u32)).collect()
+                })
             }
             6..=15 => {
                 let (kind, real, rest) = self.element(rest)?;

@@ -58,7 +58,7 @@ fn text_attribute(attributes: &HashMap<String, AttrValue>, name: &str) -> Option
         AttrValue::String(s) | AttrValue::AsciiString(s) => Some(s.trim_end_matches('\0').to_string()),
         other => {
             let text = format!("{other:?}");
-            ["cell", "struct", "char", "logical", "double", "single"].iter().find(|c| text.contains(**c)).map(|c| c.to_string())
+            text.contains("char").then(|| "char".to_string())
         }
     }
 }
@@ -91,8 +91,23 @@ fn value(dataset: &Dataset, budget: &mut Budget, depth: usize) -> Result<MatValu
         }
         DType::Compound(parts) if parts.len() == 2 => {
             budget.take(count)?;
-            let pairs: Vec<(f64, f64)> = dataset.read_compound().map_err(failed)?;
-            let (values, imaginary) = pairs.into_iter().unzip();
+            let raw = dataset.read_raw().map_err(failed)?;
+            // MATLAB runs on little-endian machines alone; a complex number is two of its reals without a gap.
+            let numbers: Vec<f64> = match (&parts[0].1, &parts[1].1) {
+                (DType::F64, DType::F64) => raw
+                    .chunks_exact(8)
+                    .map(|b| f64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]))
+                    .collect(),
+                (DType::F32, DType::F32) => {
+                    raw.chunks_exact(4).map(|b| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]))).collect()
+                }
+                _ => return Ok(MatValue::Other("a compound that is no complex number")),
+            };
+            if numbers.len() as u64 != 2 * count {
+                return Err(failed(format!("{} reals for {count} complex numbers", numbers.len())));
+            }
+            let values = numbers.iter().step_by(2).copied().collect();
+            let imaginary = numbers.iter().skip(1).step_by(2).copied().collect();
             Ok(MatValue::Numeric { dims, values, imaginary: Some(imaginary) })
         }
         DType::F32
