@@ -22,9 +22,10 @@ fn real_phases_give_the_published_displacements() {
         let reliable = std::fs::File::open(path.join("mask_reliable.nii.gz")).unwrap();
         let reliable = Image::read(reliable, 1 << 20).unwrap().values;
         let published = Recording::read(&path, &ReadLimits::default()).unwrap();
-        for method in [unwrap::Method::Margin, unwrap::Method::SecondDifference, unwrap::Method::LeastSquares] {
+        let methods = [unwrap::Method::Margin, unwrap::Method::SecondDifference, unwrap::Method::LeastSquares];
+        for (method, needs_agreement) in methods.iter().flat_map(|m| [(*m, false), (*m, true)]) {
             let options = ReconstructOptions {
-                unwrap: unwrap::UnwrapOptions { method, ..unwrap::UnwrapOptions::default() },
+                unwrap: unwrap::UnwrapOptions { method, needs_agreement, ..unwrap::UnwrapOptions::default() },
                 ..ReconstructOptions::default()
             };
             let found = reconstruct(&raw, &options).unwrap();
@@ -48,12 +49,13 @@ fn real_phases_give_the_published_displacements() {
                 };
                 let c = &found.steps[0].components[axis];
                 eprintln!(
-                    "{name} {method:?} {}: kept {} of {} (low {}, inconsistent {}, unconnected {}); constant {constant:.4} mm; \
+                    "{name} {method:?} agreement {needs_agreement} {}: kept {} of {} (low {}, disputed {}, inconsistent {}, unconnected {}); constant {constant:.4} mm; \
                      {num_off} voxels a turn off, {num_reliable_off} of them called reliable; the others rms {:.1e} mm; noise {:.4} mm (published {:?})",
                     ["x", "y", "z"][axis],
                     c.num_kept,
                     c.num_voxels,
                     c.num_low_signal,
+                    c.num_disputed,
                     c.num_inconsistent,
                     c.num_unconnected,
                     rms(0.5 * turn),

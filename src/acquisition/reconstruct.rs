@@ -53,6 +53,8 @@ pub struct ComponentReport {
     pub num_kept: usize,
     /// Left out: no value, or noise too high to unwrap.
     pub num_low_signal: usize,
+    /// Left out: two methods find different multiples of 2π.
+    pub num_disputed: usize,
     /// Left out: neighbours disagree about the multiple of 2π.
     pub num_inconsistent: usize,
     /// Left out: not firmly joined to the rest.
@@ -155,6 +157,7 @@ fn one_step(
                 num_voxels,
                 num_kept: unwrapped.num_kept,
                 num_low_signal: unwrapped.num_low_signal + (num_voxels - unwrapped.num_voxels),
+                num_disputed: unwrapped.num_disputed,
                 num_inconsistent: unwrapped.num_inconsistent,
                 num_unconnected: unwrapped.num_unconnected,
                 median_sd_mm: sorted[sorted.len() / 2],

@@ -51,6 +51,9 @@ pub(super) struct ImportArguments {
     /// Unwrapping: margin, second-difference or least-squares.
     #[arg(long, default_value = "margin")]
     method: String,
+    /// Keep voxels even where a second method finds another multiple of 2π.
+    #[arg(long)]
+    no_agreement: bool,
     /// Zero of the phase: whole-turns (phase zero is no displacement), fixed-plate (take off what the fixed plate shows), none.
     #[arg(long, default_value = "whole-turns")]
     anchor: String,
@@ -180,7 +183,7 @@ fn from_raw(a: &ImportArguments, limits: &ReadLimits) -> Result<FromRaw, CliErro
         "none" => Anchor::None,
         other => return Err(option("anchor", other, "whole-turns, fixed-plate or none")),
     };
-    let unwrap = UnwrapOptions { method, ..UnwrapOptions::default() };
+    let unwrap = UnwrapOptions { method, needs_agreement: !a.no_agreement, ..UnwrapOptions::default() };
     let settings = ReconstructOptions { unwrap, anchor, filter: filter(&a.filter)? };
     let found = reconstruct(&raw, &settings).map_err(|e| CliError::Numerics(e.to_string()))?;
     Ok((found.recording, found.sd_mm, found.steps))
@@ -256,8 +259,14 @@ fn summary(result: &ImportResult, folder: Option<&Path>) -> String {
         let Some(report) = &step.reconstruction else { continue };
         for (axis, c) in ["x", "y", "z"].iter().zip(&report.components) {
             text += &format!(
-                "  {axis}: kept {} of {}; low signal {}, inconsistent {}, unconnected {}; sd {:.4} mm",
-                c.num_kept, c.num_voxels, c.num_low_signal, c.num_inconsistent, c.num_unconnected, c.median_sd_mm
+                "  {axis}: kept {} of {}; low signal {}, disputed {}, inconsistent {}, unconnected {}; sd {:.4} mm",
+                c.num_kept,
+                c.num_voxels,
+                c.num_low_signal,
+                c.num_disputed,
+                c.num_inconsistent,
+                c.num_unconnected,
+                c.median_sd_mm
             );
             let show = |u: Option<f64>| u.map_or("not seen".into(), |u| format!("{u:.3} mm"));
             text += &format!(

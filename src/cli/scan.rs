@@ -195,7 +195,7 @@ fn summary(name: &str, result: &ScanResult, folder: Option<&Path>) -> String {
     if let Some(sd) = result.noise_sd_mm {
         text += &format!("noise of the displacements, estimated: {} mm\n", list(sd));
     }
-    text += "\n  drive mm   force N   true N   axis    kept  low signal  inconsistent  unconnected   rms error mm\n";
+    text += "\n  drive mm   force N   true N   axis    kept  low signal  disputed  inconsistent  unconnected   rms error mm\n";
     for step in &result.steps {
         let force = step.force_n.map_or("-".into(), |f| format!("{f:.4}"));
         text += &format!("{:>10.3} {force:>9} {:>8.4}", step.drive_mm, step.true_force_n);
@@ -206,10 +206,11 @@ fn summary(name: &str, result: &ScanResult, folder: Option<&Path>) -> String {
                         text += &" ".repeat(29);
                     }
                     text += &format!(
-                        "   {:<4} {:>7} {:>11} {:>13} {:>12} {:>14.5}{}{}\n",
+                        "   {:<4} {:>7} {:>11} {:>9} {:>13} {:>12} {:>14.5}{}{}\n",
                         ["x", "y", "z"][a],
                         c.num_kept,
                         c.num_low_signal,
+                        c.num_disputed,
                         c.num_inconsistent,
                         c.num_unconnected,
                         e.rms_mm,

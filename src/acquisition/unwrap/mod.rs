@@ -5,7 +5,8 @@
 //! by many turns along a line of voxels is no difficulty as such.
 //!
 //! Whatever the method, a voxel is kept only where its multiple of 2π agrees with all its kept neighbours and where it is
-//! joined to the largest region through differences that the noise cannot have turned ([`UnwrapOptions::min_margin`]).
+//! joined to the largest region through differences that the noise cannot have turned ([`UnwrapOptions::min_margin`]); two
+//! methods of different kind must agree about it ([`UnwrapOptions::needs_agreement`]).
 //! Voxels that are not kept are counted by cause. The multiple of 2π of the whole region stays open.
 
 mod graph;
@@ -44,11 +45,14 @@ pub struct UnwrapOptions {
     pub max_phase_sd: f64,
     /// Regions are joined only through differences at least this many standard deviations away from half a turn.
     pub min_margin: f64,
+    /// A second method of the other kind (least squares beside a quality-guided one, [`Method::Margin`] beside least squares)
+    /// must find the same turns; voxels where it does not are left out.
+    pub needs_agreement: bool,
 }
 
 impl Default for UnwrapOptions {
     fn default() -> Self {
-        UnwrapOptions { method: Method::default(), max_phase_sd: 0.7, min_margin: 2.0 }
+        UnwrapOptions { method: Method::default(), max_phase_sd: 0.7, min_margin: 2.0, needs_agreement: true }
     }
 }
 
@@ -74,6 +78,8 @@ pub struct Unwrapped {
     pub num_kept: usize,
     /// Left out because their noise is too high.
     pub num_low_signal: usize,
+    /// Left out because a second method found another multiple of 2π.
+    pub num_disputed: usize,
     /// Left out because neighbours disagree about the multiple of 2π.
     pub num_inconsistent: usize,
     /// Left out because nothing joins them firmly to the largest region.
@@ -94,12 +100,15 @@ pub fn unwrap(image: &WrappedImage, options: &UnwrapOptions) -> Unwrapped {
     let used: Vec<u32> =
         asked.iter().filter(|&&v| image.sd[v] <= options.max_phase_sd).map(|&v| v as u32).collect();
     let graph = Graph::new(image, &used);
-    let whole = match options.method {
-        Method::Margin => quality::by_margin(&graph),
-        Method::SecondDifference => quality::by_second_difference(&graph),
-        Method::LeastSquares => least_squares::congruent(&graph),
+    let whole = by(options.method, &graph);
+    let is_agreed = if options.needs_agreement {
+        let other = if options.method == Method::LeastSquares { Method::Margin } else { Method::LeastSquares };
+        agreed(&whole, &by(other, &graph))
+    } else {
+        vec![true; used.len()]
     };
-    let kept = reliable::kept(&graph, &whole, options.min_margin);
+    let num_disputed = is_agreed.iter().filter(|a| !**a).count();
+    let kept = reliable::kept(&graph, &whole, is_agreed, options.min_margin);
     let mut phase = vec![f64::NAN; image.phase.len()];
     for (n, &voxel) in used.iter().enumerate() {
         if kept.is_kept[n] {
@@ -111,7 +120,26 @@ pub fn unwrap(image: &WrappedImage, options: &UnwrapOptions) -> Unwrapped {
         num_voxels: asked.len(),
         num_kept: kept.is_kept.iter().filter(|k| **k).count(),
         num_low_signal: asked.len() - used.len(),
+        num_disputed,
         num_inconsistent: kept.num_inconsistent,
         num_unconnected: kept.num_unconnected,
     }
+}
+
+fn by(method: Method, graph: &Graph) -> Vec<f64> {
+    match method {
+        Method::Margin => quality::by_margin(graph),
+        Method::SecondDifference => quality::by_second_difference(graph),
+        Method::LeastSquares => least_squares::congruent(graph),
+    }
+}
+
+/// Where two answers differ by the number of turns by which most voxels do.
+fn agreed(a: &[f64], b: &[f64]) -> Vec<bool> {
+    let turns: Vec<i64> = a.iter().zip(b).map(|(a, b)| ((a - b) / TAU).round() as i64).collect();
+    let mut sorted = turns.clone();
+    sorted.sort_unstable();
+    // The median is the most frequent number where one of them has the majority.
+    let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(0);
+    turns.iter().map(|t| *t == usual).collect()
 }

@@ -43,15 +43,15 @@ impl PartialEq for Candidate {
 
 impl Eq for Candidate {}
 
-/// Leaves out voxels until no two kept neighbours differ by more than half a turn, then keeps the largest region that is
+/// Starting from the voxels of `is_kept`, leaves out voxels until no two kept neighbours differ by more than half a turn, then keeps the largest region that is
 /// joined through differences with at least `min_margin`.
-pub(super) fn kept(graph: &Graph, unwrapped: &[f64], min_margin: f64) -> Kept {
+pub(super) fn kept(graph: &Graph, unwrapped: &[f64], mut is_kept: Vec<bool>, min_margin: f64) -> Kept {
     let n = graph.len();
     let is_bad =
         |a: u32, b: u32| (unwrapped[b as usize] - unwrapped[a as usize]).abs() > PI * (1.0 + 1e-9);
     let mut bad_neighbours: Vec<Vec<u32>> = vec![Vec::new(); n];
     for e in &graph.edges {
-        if is_bad(e.a, e.b) {
+        if is_kept[e.a as usize] && is_kept[e.b as usize] && is_bad(e.a, e.b) {
             bad_neighbours[e.a as usize].push(e.b);
             bad_neighbours[e.b as usize].push(e.a);
         }
@@ -61,7 +61,6 @@ pub(super) fn kept(graph: &Graph, unwrapped: &[f64], min_margin: f64) -> Kept {
         |voxel: u32, num_bad: u32| Candidate { num_bad, variance: graph.variance[voxel as usize], voxel };
     let mut heap: BinaryHeap<Candidate> =
         (0..n as u32).filter(|&v| num_bad[v as usize] > 0).map(|v| candidate(v, num_bad[v as usize])).collect();
-    let mut is_kept = vec![true; n];
     let mut num_inconsistent = 0;
     while let Some(Candidate { num_bad: count, voxel, .. }) = heap.pop() {
         let v = voxel as usize;

@@ -5,6 +5,7 @@
 
 use super::{MAX_DEPTH, MatError, MatValue, product};
 use flate2::read::ZlibDecoder;
+use std::cell::Cell;
 use std::io::{self, Read};
 
 const MI_MATRIX: u32 = 14;
@@ -23,7 +24,13 @@ pub(super) fn read(
         b"MI" => true,
         _ => return Err(MatError::NotMat),
     };
-    let mut reader = Reader { is_big_endian, budget: max_values.saturating_mul(8).saturating_add(1 << 20), limit: max_values };
+    let mut reader = Reader {
+        is_big_endian,
+        // Numbers take at most eight bytes; tags and names come on top.
+        budget: max_values.saturating_mul(8).saturating_add(1 << 20),
+        values_left: Cell::new(max_values),
+        limit: max_values,
+    };
     let mut variables = Vec::new();
     loop {
         let mut tag = [0u8; 8];
@@ -119,6 +126,8 @@ struct Reader {
     is_big_endian: bool,
     /// Bytes that may still be read.
     budget: u64,
+    /// Numbers that arrays may still hold: a byte in the file becomes eight in memory.
+    values_left: Cell<u64>,
     limit: u64,
 }
 
@@ -182,6 +191,11 @@ impl Reader {
         let count = product(&dims).ok_or_else(|| damaged("sizes overflow"))?;
         let (_, name, rest) = self.element(rest)?;
         let name = String::from_utf8_lossy(name).into_owned();
+        let wanted = (count as u64).saturating_mul(1 + u64::from(is_complex));
+        if wanted > self.values_left.get() {
+            return Err(MatError::TooLarge { what: "numbers in variables", found: wanted, limit: self.limit });
+        }
+        self.values_left.set(self.values_left.get() - wanted);
         let value = match class {
             1 => self.cell(dims, count, rest, depth)?,
             2 => self.structure(count, rest, depth)?,
@@ -195,6 +209,9 @@ impl Reader {
             }
             6..=15 => {
                 let (kind, real, rest) = self.element(rest)?;
+                if real.len() as u64 > 8 * wanted {
+                    return Err(damaged(format!("'{name}' has {} bytes, its sizes ask for {count} numbers", real.len())));
+                }
                 let values = self.numbers(kind, real)?;
                 let imaginary = if is_complex {
                     let (kind, imaginary, _) = self.element(rest)?;
