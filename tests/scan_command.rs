@@ -38,7 +38,8 @@ fn raw_scans_are_imported() {
     let pairs = direct_recording.steps[0].displacement.iter().zip(&imported_recording.steps[0].displacement);
     let num_same = pairs.clone().filter(|(a, b)| (a[0] - b[0]).abs() < 1e-5).count();
     // Phases pass through single precision; a voxel at the edge of being kept may be left out by one way alone.
-    assert!(num_same + 5 >= direct_recording.num_voxels() - pairs.filter(|(a, _)| a[0].is_nan()).count());
+    let num_kept = pairs.filter(|(a, _)| a[0].is_finite()).count();
+    assert!(num_same + 5 >= num_kept && num_kept > 0, "{num_same} of {num_kept}");
     for name in ["scan.json", "load.csv", "raw_1.svg"] {
         assert!(Path::new(&raw).join(name).exists(), "{name}");
     }

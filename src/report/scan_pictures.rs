@@ -39,7 +39,7 @@ pub fn displacement_picture(recording: &Recording, step: usize) -> String {
     };
     let mut fields: Vec<VoxelField> = (0..3)
         .map(|a| VoxelField {
-            title: format!("displacement along {}, drive {:.2} mm", AXES[a], step.drive_mm),
+            title: format!("u along {}, drive {:.2} mm", AXES[a], step.drive_mm),
             unit: "mm".into(),
             values: step.displacement.iter().map(|u| u[a]).collect(),
             map: ColorMap::Viridis,
