@@ -3,7 +3,11 @@
 //! Results on stdout (`--json` for machines), progress on stderr, files in a folder. Exit codes: 0 done, 2 bad input,
 //! 3 no solution found, 4 a file cannot be written, 130 stopped by Ctrl-C.
 
+mod curve_input;
+mod curve_tables;
+mod curves;
 mod design;
+mod diagnose;
 mod error;
 mod evaluate;
 mod import;
@@ -13,6 +17,7 @@ mod output;
 mod progress;
 mod scan;
 mod solve;
+mod uniaxial;
 
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -44,6 +49,12 @@ enum Command {
     Import(import::ImportArguments),
     /// The best specimen under the limits of a study, with the evidence.
     Design(design::DesignArguments),
+    /// Where a recording and its model differ, and what physics was left out.
+    Diagnose(diagnose::DiagnoseArguments),
+    /// The traditional route: one uniaxial curve, of a strip or a dumb-bell, fitted with Ogden terms.
+    Uniaxial(uniaxial::UniaxialArguments),
+    /// Ogden terms fitted to curves of several homogeneous tests together.
+    Curves(curves::CurvesArguments),
 }
 
 /// What every command takes.
@@ -97,6 +108,9 @@ pub fn run() -> ExitCode {
         Command::Scan(a) => scan::run(a),
         Command::Import(a) => import::run(a),
         Command::Design(a) => design::run(a),
+        Command::Diagnose(a) => diagnose::run(a),
+        Command::Uniaxial(a) => uniaxial::run(a),
+        Command::Curves(a) => curves::run(a),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
