@@ -15,7 +15,16 @@ fn json(output: &Output) -> serde_json::Value {
 }
 
 const SMALL: [&str; 10] = [
-    "scan", "geometries/two-hole-shear.json", "--drive", "2.5", "--mesh", "search", "--voxel", "1.5,0.4,1.5", "--mm-per-radian", "0.1",
+    "scan",
+    "geometries/two-hole-shear.json",
+    "--drive",
+    "2.5",
+    "--mesh",
+    "search",
+    "--voxel",
+    "1.5,0.4,1.5",
+    "--mm-per-radian",
+    "0.1",
 ];
 
 /// Raw phases written by one command become, by the other, the displacements that the first gives without `--raw`.

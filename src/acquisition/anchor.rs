@@ -78,7 +78,7 @@ fn at_plate(displacement: &[f64], specimen: &Specimen, grid: &VoxelGrid, is_move
     let stride = [1, grid.shape[0], grid.shape[0] * grid.shape[1]][axis];
     let n = grid.shape[axis];
     let mut values = Vec::new();
-    for start in (0..grid.num_voxels()).filter(|v| v / stride % n == 0) {
+    for start in (0..grid.num_voxels()).filter(|v| (v / stride).is_multiple_of(n)) {
         let layers = (0..n).map(|i| if is_moved { n - 1 - i } else { i });
         let mut points = Vec::with_capacity(LAYERS);
         for i in layers {

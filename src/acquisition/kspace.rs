@@ -107,7 +107,8 @@ mod tests {
     fn plane_waves_pass_or_vanish() {
         let shape = [12, 5, 8];
         let window = KSpace { keep: [0.5, 1.0, 1.0], window: Window::Hamming };
-        for (k, weight) in [(0, 1.0), (2, 0.54 + 0.46 * (0.5 * TAU * 2.0 / 3.0).cos()), (3, 0.08), (4, 0.0), (10, 0.31)] {
+        for (k, weight) in [(0, 1.0), (2, 0.54 + 0.46 * (0.5 * TAU * 2.0 / 3.0).cos()), (3, 0.08), (4, 0.0), (10, 0.31)]
+        {
             let phase = |v: usize| TAU * (k * (v % 12)) as f64 / 12.0;
             let mut image: Vec<Complex> = (0..480).map(|v| Complex::from_polar(1.0, phase(v))).collect();
             window.apply(&mut image, shape);

@@ -162,9 +162,7 @@ impl Monotone {
         let h = self.x[i + 1] - self.x[i];
         let t = (x - self.x[i]) / h;
         let (a, b) = (1.0 - t, t);
-        (1.0 + 2.0 * t) * a * a * self.y[i]
-            + t * a * a * h * self.slope[i]
-            + b * b * (3.0 - 2.0 * t) * self.y[i + 1]
+        (1.0 + 2.0 * t) * a * a * self.y[i] + t * a * a * h * self.slope[i] + b * b * (3.0 - 2.0 * t) * self.y[i + 1]
             - b * b * a * h * self.slope[i + 1]
     }
 }

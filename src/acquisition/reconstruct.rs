@@ -166,12 +166,10 @@ fn one_step(
             Ok((u, sd, report))
         })
         .collect::<Result<_, _>>()?;
-    let vectors = |which: fn(&(Vec<f64>, Vec<f64>, ComponentReport)) -> &Vec<f64>| -> Vec<[f64; 3]> {
-        (0..raw.mask.len()).map(|v| [0, 1, 2].map(|a| which(&components[a])[v])).collect()
-    };
-    let displacement = vectors(|c| &c.0);
+    let num_image = raw.mask.len();
+    let displacement: Vec<[f64; 3]> = (0..num_image).map(|v| [0, 1, 2].map(|a| components[a].0[v])).collect();
     let num_complete = displacement.iter().filter(|u| u.iter().all(|x| x.is_finite())).count();
-    let sd = vectors(|c| &c.1);
+    let sd = (0..num_image).map(|v| [0, 1, 2].map(|a| components[a].1[v])).collect();
     let reports = [components[0].2, components[1].2, components[2].2];
     let report = StepReport { drive_mm: step.drive_mm, noise, components: reports, num_complete };
     Ok((displacement, sd, report))

@@ -97,8 +97,7 @@ pub fn scan(
     let mut model = ForwardModel::of_specimen(specimen, mesh)?;
     let path = model.solve_path(material, &specimen.drive_mm, solve, &|| is_cancelled())?;
     let states: Vec<&[[f64; 3]]> = path.iter().map(|state| &state.displacement[..]).collect();
-    let images =
-        signal_images(specimen, model.mesh(), &states, &options.grid, options.mm_per_radian, is_cancelled)?;
+    let images = signal_images(specimen, model.mesh(), &states, &options.grid, options.mm_per_radian, is_cancelled)?;
     let operator = VoxelOperator::new(specimen, model.mesh(), &mask, Sampling::default())?;
     let truth = states.iter().map(|u| operator.average(u)).collect::<Result<Vec<_>, _>>()?;
     let forces_n: Vec<f64> = path.iter().map(|state| state.force_n).collect();

@@ -86,9 +86,8 @@ pub(super) fn run(a: &ScanArguments) -> Result<(), CliError> {
         eprintln!("scanning {} at {} drives", specimen.name, specimen.drive_mm.len());
     }
     let id = format!("{}-seed-{}", a.subject.specimen.file_stem().unwrap_or_default().to_string_lossy(), options.seed);
-    let mut made =
-        scan(&id, &specimen, &material, &mesh, &SolveOptions::default(), &options, &interrupt::is_requested)
-            .map_err(|e| acquisition_error(a, e))?;
+    let mut made = scan(&id, &specimen, &material, &mesh, &SolveOptions::default(), &options, &interrupt::is_requested)
+        .map_err(|e| acquisition_error(a, e))?;
     made.raw.notes = Some(serde_json::json!({
         "synthetic": { "program": format!("lambdak {}", crate::provenance::VERSION), "input_hash": hash, "seed": options.seed },
     }));
@@ -214,7 +213,11 @@ fn summary(name: &str, result: &ScanResult, folder: Option<&Path>) -> String {
                         c.num_inconsistent,
                         c.num_unconnected,
                         e.rms_mm,
-                        if e.num_wrong_turns > 0 { format!("  {} a turn off", e.num_wrong_turns) } else { String::new() },
+                        if e.num_wrong_turns > 0 {
+                            format!("  {} a turn off", e.num_wrong_turns)
+                        } else {
+                            String::new()
+                        },
                         if c.anchor.is_ambiguous { "  whole turns uncertain" } else { "" },
                     );
                 }
@@ -223,7 +226,10 @@ fn summary(name: &str, result: &ScanResult, folder: Option<&Path>) -> String {
         }
     }
     if let Some(folder) = folder {
-        text += &format!("\nrecording: {} (recording.json, images, load.csv, scan.json with the truth, pictures)\n", folder.display());
+        text += &format!(
+            "\nrecording: {} (recording.json, images, load.csv, scan.json with the truth, pictures)\n",
+            folder.display()
+        );
     }
     text
 }

@@ -53,7 +53,9 @@ pub enum ImportError {
         num_steps: usize,
     },
     /// The mask has several regions, or not the one asked for.
-    #[error("the mask has {num_regions} separate regions; choose one, counted along the thickness (--region 1 to {num_regions})")]
+    #[error(
+        "the mask has {num_regions} separate regions; choose one, counted along the thickness (--region 1 to {num_regions})"
+    )]
     Regions {
         /// Large regions.
         num_regions: usize,

@@ -62,7 +62,9 @@ pub fn recording_from_mat(
         (Some(edges), _, _) => edges,
         (None, Some(osc), _) => spacing_from_osc(osc)?.map(|e| e * options.unit_mm),
         (None, None, Some(x)) => spacing_from_positions(x, dims)?.map(|e| e * options.unit_mm),
-        (None, None, None) => return Err(ImportError::Missing { what: "osc or X (the voxel's edges)", found: names() }),
+        (None, None, None) => {
+            return Err(ImportError::Missing { what: "osc or X (the voxel's edges)", found: names() });
+        }
     };
     select_region(&mut mask, dims, options)?;
     // The box around the mask, centred on the frame's origin.
@@ -118,8 +120,7 @@ pub fn recording_from_mat(
         })
         .collect();
     let used = [field_name, "mask", "osc", "X", "prescribedU"];
-    let ignored: Vec<&str> =
-        variables.iter().map(|(n, _)| n.as_str()).filter(|n| !used.contains(n)).collect();
+    let ignored: Vec<&str> = variables.iter().map(|(n, _)| n.as_str()).filter(|n| !used.contains(n)).collect();
     let notes = serde_json::json!({
         "imported": { "field": field_name, "ignored_variables": ignored, "voxel_mm_by_index": edges, "region": options.region,
             "origin": "the mask's box is centred on the specimen" },
@@ -147,10 +148,13 @@ fn steps_of(field: &MatValue) -> Result<Vec<[Array<'_>; 3]>, ImportError> {
             if n == 0 || num_steps == 0 {
                 return Err(layout("it is empty".into()));
             }
-            let array = |s: usize, c: usize| Array { dims: size, values: &values[(3 * s + c) * n..(3 * s + c + 1) * n] };
+            let array =
+                |s: usize, c: usize| Array { dims: size, values: &values[(3 * s + c) * n..(3 * s + c + 1) * n] };
             Ok((0..num_steps).map(|s| [array(s, 0), array(s, 1), array(s, 2)]).collect())
         }
-        _ => Err(layout("it must be a cell per step of three arrays, or an array with the component as fourth index".into())),
+        _ => Err(layout(
+            "it must be a cell per step of three arrays, or an array with the component as fourth index".into(),
+        )),
     }
 }
 
@@ -243,8 +247,7 @@ fn select_region(mask: &mut [bool], dims: [usize; 3], options: &ImportOptions) -
         regions.push((size, sum / f64::from(u32::try_from(size).unwrap_or(u32::MAX))));
     }
     let largest = regions.iter().map(|r| r.0).max().ok_or(ImportError::EmptyMask)?;
-    let mut large: Vec<usize> =
-        (0..regions.len()).filter(|&r| regions[r].0 as f64 >= SPECK * largest as f64).collect();
+    let mut large: Vec<usize> = (0..regions.len()).filter(|&r| regions[r].0 as f64 >= SPECK * largest as f64).collect();
     large.sort_by(|&a, &b| regions[a].1.total_cmp(&regions[b].1));
     let chosen = match options.region {
         None if large.len() == 1 => large[0],

@@ -19,7 +19,8 @@ fn points_on_a_grid_become_voxels() {
                 if (i, j, k) == (3, 4, 2) {
                     continue;
                 }
-                let (x, y, z) = (-11.43 + 2.54 * f64::from(i), -2.8 + 0.8 * f64::from(j), -7.1625 + 4.775 * f64::from(k));
+                let (x, y, z) =
+                    (-11.43 + 2.54 * f64::from(i), -2.8 + 0.8 * f64::from(j), -7.1625 + 4.775 * f64::from(k));
                 lines.push(format!("{x},{y},{z},{},0.5,0.25,0.02", 0.7 * y));
             }
         }
@@ -47,10 +48,12 @@ fn scattered_points_are_averaged() {
     for n in 0..4000u32 {
         let part = |p: u32| (f64::from(n * p % 3989) / 3989.0) - 0.5;
         let (x, y, z) = (25.4 * part(7), 6.4 * part(61), 19.1 * part(389));
-        text += &format!("{x},{y},{z},{},0,0,{}\n", if n % 2 == 0 { 1.0 } else { 4.0 }, if n % 2 == 0 { 2.0 } else { 1.0 });
+        text +=
+            &format!("{x},{y},{z},{},0,0,{}\n", if n % 2 == 0 { 1.0 } else { 4.0 }, if n % 2 == 0 { 2.0 } else { 1.0 });
     }
     let points = read_points(&text, path(), 10_000).unwrap();
-    let read = |voxel| recording_from_points(&[points.clone()], &specimen(), voxel, &ImportOptions::default());
+    let read =
+        |voxel| recording_from_points(std::slice::from_ref(&points), &specimen(), voxel, &ImportOptions::default());
     assert!(matches!(read(None).unwrap_err(), ImportError::NoGrid { .. }));
     let r = read(Some([6.35, 3.2, 9.55])).unwrap();
     assert_eq!(r.num_voxels(), 16);
@@ -78,6 +81,6 @@ fn poor_tables_are_typed_errors() {
     let read = |steps: &[Vec<DisplacementPoint>]| {
         recording_from_points(steps, &specimen(), None, &ImportOptions::default()).unwrap_err()
     };
-    assert!(matches!(read(&[one.clone()]), ImportError::NoGrid { .. }));
+    assert!(matches!(read(std::slice::from_ref(&one)), ImportError::NoGrid { .. }));
     assert!(matches!(read(&[one.clone(), one]), ImportError::Drives { .. }));
 }

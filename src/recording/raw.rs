@@ -58,7 +58,9 @@ impl RawRecording {
         let head = Head::read(path, limits)?;
         let mut steps = Vec::with_capacity(head.json.steps.len());
         if head.json.acquisition.filter != Filter::None {
-            return Err(RecordingError::Json("acquisition.filter: raw phases are not filtered; it must be none".into()));
+            return Err(RecordingError::Json(
+                "acquisition.filter: raw phases are not filtered; it must be none".into(),
+            ));
         }
         for (n, step) in head.json.steps.iter().enumerate() {
             check_step(n, step)?;
@@ -72,7 +74,9 @@ impl RawRecording {
             for (axis, name) in raw.phase.iter().enumerate() {
                 let values = read_scalar(&head.folder, name, &head.grid, limits)?;
                 if let Some(&value) = values.iter().find(|p| p.abs() > std::f64::consts::PI + PHASE_MARGIN) {
-                    return Err(RecordingError::Value { name: name.clone(), value, requirement: "a phase in (−π, π]" });
+                    return Err(RecordingError::Value {
+                        name: name.clone(), value, requirement: "a phase in (−π, π]"
+                    });
                 }
                 phase[axis] = values;
             }

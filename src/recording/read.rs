@@ -264,12 +264,7 @@ pub(super) fn read_scalar(
     Ok(image.values)
 }
 
-fn check_grid(
-    path: &Path,
-    image: &Image,
-    kind: [usize; 2],
-    expected: &VoxelGrid,
-) -> Result<(), RecordingError> {
+fn check_grid(path: &Path, image: &Image, kind: [usize; 2], expected: &VoxelGrid) -> Result<(), RecordingError> {
     let grid = match grid_of(image, kind) {
         Ok(grid) => grid?,
         Err(source) => return Err(RecordingError::Image { path: path.into(), source }),

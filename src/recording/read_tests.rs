@@ -173,7 +173,10 @@ fn images_of_nibabel_are_read() {
 fn raw_recordings_round_trip() {
     let (folder, recording) = written();
     let n = recording.grid.num_voxels();
-    assert!(matches!(RawRecording::read(folder.path(), &ReadLimits::default()), Err(RecordingError::NotRaw { step: 1 })));
+    assert!(matches!(
+        RawRecording::read(folder.path(), &ReadLimits::default()),
+        Err(RecordingError::NotRaw { step: 1 })
+    ));
     let numbers = |f: f64| (0..n).map(|v| f * (v as f64 - 11.0) / 16.0).collect::<Vec<f64>>();
     let raw = RawRecording {
         id: "raw".into(),

@@ -124,12 +124,7 @@ impl Rest<'_> {
 ///
 /// # Errors
 /// [`RecordingError::File`].
-pub fn write_vectors(
-    folder: &Path,
-    name: &str,
-    grid: &VoxelGrid,
-    vectors: &[[f64; 3]],
-) -> Result<(), RecordingError> {
+pub fn write_vectors(folder: &Path, name: &str, grid: &VoxelGrid, vectors: &[[f64; 3]]) -> Result<(), RecordingError> {
     let values = (0..3).flat_map(|c| vectors.iter().map(move |u| u[c])).collect();
     write_image(folder, name, grid, [3, INTENT_DISPLACEMENT as usize], values, Samples::Float32)
 }

@@ -80,14 +80,7 @@ impl VoxelMaps {
         svg.finish(name)
     }
 
-    fn draw_field(
-        &self,
-        svg: &mut Svg,
-        field: &VoxelField,
-        [x0, y0]: [f64; 2],
-        [w, hy, hz]: [f64; 3],
-        kinds: &[bool],
-    ) {
+    fn draw_field(&self, svg: &mut Svg, field: &VoxelField, [x0, y0]: [f64; 2], [w, hy, hz]: [f64; 3], kinds: &[bool]) {
         let title_width = maps_width(kinds, w);
         svg.text([x0 + LEFT, y0 + 16.0], &shortened(&field.title, TITLE, title_width), &TextStyle::title());
         let Some((range, is_clipped)) = color_range(field) else {

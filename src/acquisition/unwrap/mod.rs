@@ -97,8 +97,7 @@ pub fn unwrap(image: &WrappedImage, options: &UnwrapOptions) -> Unwrapped {
     let is_asked = |v: usize| image.phase[v].is_finite() && image.sd[v].is_finite();
     let num_image: usize = image.shape.iter().product();
     let asked: Vec<usize> = (0..num_image).filter(|&v| is_asked(v)).collect();
-    let used: Vec<u32> =
-        asked.iter().filter(|&&v| image.sd[v] <= options.max_phase_sd).map(|&v| v as u32).collect();
+    let used: Vec<u32> = asked.iter().filter(|&&v| image.sd[v] <= options.max_phase_sd).map(|&v| v as u32).collect();
     let graph = Graph::new(image, &used);
     let whole = by(options.method, &graph);
     let is_agreed = if options.needs_agreement {

@@ -47,8 +47,7 @@ impl Eq for Candidate {}
 /// joined through differences with at least `min_margin`.
 pub(super) fn kept(graph: &Graph, unwrapped: &[f64], mut is_kept: Vec<bool>, min_margin: f64) -> Kept {
     let n = graph.len();
-    let is_bad =
-        |a: u32, b: u32| (unwrapped[b as usize] - unwrapped[a as usize]).abs() > PI * (1.0 + 1e-9);
+    let is_bad = |a: u32, b: u32| (unwrapped[b as usize] - unwrapped[a as usize]).abs() > PI * (1.0 + 1e-9);
     let mut bad_neighbours: Vec<Vec<u32>> = vec![Vec::new(); n];
     for e in &graph.edges {
         if is_kept[e.a as usize] && is_kept[e.b as usize] && is_bad(e.a, e.b) {
@@ -57,8 +56,7 @@ pub(super) fn kept(graph: &Graph, unwrapped: &[f64], mut is_kept: Vec<bool>, min
         }
     }
     let mut num_bad: Vec<u32> = bad_neighbours.iter().map(|b| b.len() as u32).collect();
-    let candidate =
-        |voxel: u32, num_bad: u32| Candidate { num_bad, variance: graph.variance[voxel as usize], voxel };
+    let candidate = |voxel: u32, num_bad: u32| Candidate { num_bad, variance: graph.variance[voxel as usize], voxel };
     let mut heap: BinaryHeap<Candidate> =
         (0..n as u32).filter(|&v| num_bad[v as usize] > 0).map(|v| candidate(v, num_bad[v as usize])).collect();
     let mut num_inconsistent = 0;

@@ -37,7 +37,8 @@ fn image(case: &Case, seed: u64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
         let end = (-((0.5 - x.abs()) / 0.12)).exp();
         let value = TAU * case.num_turns * (y + 0.03 * (TAU * y).sin()) + case.wave * end * (TAU * (y + 0.7 * z)).sin();
         // Low signal: a hole of air, and a rim around it.
-        let distance = [[-0.17, 0.0], [0.17, 0.0]].iter().map(|c| (x - c[0]).hypot(1.3 * (z - c[1]))).fold(9.0, f64::min);
+        let distance =
+            [[-0.17, 0.0], [0.17, 0.0]].iter().map(|c| (x - c[0]).hypot(1.3 * (z - c[1]))).fold(9.0, f64::min);
         let magnitude = match case.has_holes {
             true if distance < 0.1 => 1e-3,
             true if distance < 0.14 => 0.4,
@@ -127,7 +128,8 @@ fn steep_shear_with_holes_is_unwrapped() {
 #[test]
 fn clean_fields_come_back() {
     let shape = [7, 9, 5];
-    let truth: Vec<f64> = (0..315).map(|v| 2.9 * (v / 7 % 9) as f64 - 1.3 * (v % 7) as f64 + 0.7 * (v / 63) as f64).collect();
+    let truth: Vec<f64> =
+        (0..315).map(|v| 2.9 * (v / 7 % 9) as f64 - 1.3 * (v % 7) as f64 + 0.7 * (v / 63) as f64).collect();
     let phase: Vec<f64> = truth.iter().map(|t| wrapped(*t)).collect();
     let sd = vec![0.01; 315];
     for method in [Method::Margin, Method::SecondDifference, Method::LeastSquares] {
@@ -160,9 +162,7 @@ fn islands_are_left_out() {
 #[test]
 fn dislocations_are_cut_open() {
     let shape = [16, 16, 3];
-    let phase: Vec<f64> = (0..768)
-        .map(|v| ((v / 16 % 16) as f64 - 7.5).atan2((v % 16) as f64 - 7.5))
-        .collect();
+    let phase: Vec<f64> = (0..768).map(|v| ((v / 16 % 16) as f64 - 7.5).atan2((v % 16) as f64 - 7.5)).collect();
     for method in [Method::Margin, Method::SecondDifference, Method::LeastSquares] {
         let image = WrappedImage { shape, phase: &phase, sd: &vec![0.05; 768] };
         let result = unwrap(&image, &UnwrapOptions { method, ..UnwrapOptions::default() });

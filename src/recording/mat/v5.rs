@@ -210,7 +210,10 @@ impl Reader {
             6..=15 => {
                 let (kind, real, rest) = self.element(rest)?;
                 if real.len() as u64 > 8 * wanted {
-                    return Err(damaged(format!("'{name}' has {} bytes, its sizes ask for {count} numbers", real.len())));
+                    return Err(damaged(format!(
+                        "'{name}' has {} bytes, its sizes ask for {count} numbers",
+                        real.len()
+                    )));
                 }
                 let values = self.numbers(kind, real)?;
                 let imaginary = if is_complex {
