@@ -1,4 +1,4 @@
-//! MATLAB data files: versions 5 to 7.2 ([`v5`]) and 7.3 ([`v73`], which is HDF5).
+//! MATLAB data files: versions 5 to 7.2, and 7.3, which is HDF5.
 //!
 //! Read are numeric, logical and character arrays, cells and structures. The version 5 reader is our own: the crates at hand
 //! read no cells, in which MR-u laboratories keep their fields, or bound no decompression.
