@@ -2,11 +2,12 @@
 //!
 //! The rooms stand on one another in this order; a room uses only those before it:
 //! [`specimen`] → [`mesh`] → [`material`] → [`fem`] → [`kinematics`] → [`homogeneous`] → [`rate`] → [`voxel`] →
-//! [`sensitivity`] → [`calibration`] → [`design`] → [`report`] → [`cli`].
+//! [`sensitivity`] → [`recording`] → [`acquisition`] → [`calibration`] → [`design`] → [`report`] → [`cli`].
 //!
 //! One unit system inside: lengths mm, moduli and stresses kPa, times s. Stress × area is then
 //! kPa·mm² = 10⁻³ N; forces cross every public boundary in N.
 
+pub mod acquisition;
 pub mod calibration;
 pub mod cli;
 pub mod design;

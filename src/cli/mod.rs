@@ -10,10 +10,12 @@ mod design;
 mod diagnose;
 mod error;
 mod evaluate;
+mod import;
 mod input;
 mod interrupt;
 mod output;
 mod progress;
+mod scan;
 mod solve;
 mod uniaxial;
 
@@ -41,6 +43,10 @@ enum Command {
     Solve(solve::SolveArguments),
     /// What a scan of a specimen would see, and what it would tell about the material.
     Evaluate(evaluate::EvaluateArguments),
+    /// A synthetic MR-u recording of a specimen: phases with noise, unwrapped, and the loading history.
+    Scan(scan::ScanArguments),
+    /// Raw phases, MATLAB files or point clouds as a recording of displacements.
+    Import(import::ImportArguments),
     /// The best specimen under the limits of a study, with the evidence.
     Design(design::DesignArguments),
     /// Where a recording and its model differ, and what physics was left out.
@@ -99,6 +105,8 @@ pub fn run() -> ExitCode {
     let result = match &arguments.command {
         Command::Solve(a) => solve::run(a),
         Command::Evaluate(a) => evaluate::run(a),
+        Command::Scan(a) => scan::run(a),
+        Command::Import(a) => import::run(a),
         Command::Design(a) => design::run(a),
         Command::Diagnose(a) => diagnose::run(a),
         Command::Uniaxial(a) => uniaxial::run(a),

@@ -97,4 +97,10 @@ pub enum RecordingError {
         /// Which step, from 1.
         step: usize,
     },
+    /// The recording holds displacements where raw phases were asked for.
+    #[error("step {step} holds displacements, not raw phases")]
+    NotRaw {
+        /// Which step, from 1.
+        step: usize,
+    },
 }

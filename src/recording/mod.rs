@@ -1,15 +1,25 @@
 //! Recordings: a folder with `recording.json`, images and a load curve (see the formats page).
 
 mod error;
+mod import;
+mod lab;
 mod load_curve;
+pub mod mat;
 mod nifti;
+mod points;
+mod raw;
 mod read;
 mod write;
 
 pub use error::RecordingError;
+pub use import::{ImportError, ImportOptions, IndexAxis};
+pub use lab::recording_from_mat;
 pub use load_curve::LoadCurve;
 pub use nifti::{Image, NiftiError, Samples};
+pub use points::{DisplacementPoint, read_points, recording_from_points};
+pub use raw::{RawRecording, RawStep};
 pub use read::ReadLimits;
+pub use write::{write_scalars, write_vectors};
 
 use crate::specimen::Specimen;
 use crate::voxel::VoxelGrid;

@@ -59,7 +59,15 @@ pub(super) struct StepJson {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) displacement: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(super) raw: Option<serde_json::Value>,
+    pub(super) raw: Option<RawJson>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawJson {
+    pub(super) phase: [String; 3],
+    pub(super) magnitude: String,
+    pub(super) mm_per_radian: [f64; 3],
 }
 
 #[derive(Serialize, Deserialize)]
@@ -73,12 +81,65 @@ pub(super) struct AcquisitionJson {
 }
 
 impl Recording {
-    /// Reads the recording in `folder`.
+    /// Reads the recording in `path`: a folder with a `recording.json`, or such a JSON file under another name.
     ///
     /// # Errors
-    /// [`RecordingError`]: a file that is missing, damaged, too large or not of the format.
-    pub fn read(folder: &Path, limits: &ReadLimits) -> Result<Recording, RecordingError> {
-        let text = read_text(&folder.join("recording.json"), limits)?;
+    /// [`RecordingError`]: a file that is missing, damaged, too large or not of the format; [`RecordingError::Raw`] where
+    /// the steps hold wrapped phases (read those as [`super::RawRecording`]).
+    pub fn read(path: &Path, limits: &ReadLimits) -> Result<Recording, RecordingError> {
+        let head = Head::read(path, limits)?;
+        let num_voxels = head.mask.iter().filter(|m| **m).count();
+        let mut steps = Vec::with_capacity(head.json.steps.len());
+        for (n, step) in head.json.steps.iter().enumerate() {
+            check_step(n, step)?;
+            let Some(name) = &step.displacement else {
+                return Err(RecordingError::Raw { step: n + 1 });
+            };
+            let displacement = read_displacement(&head.folder, name, &head.grid, limits)?;
+            let is_measured = |(m, u): (&bool, &[f64; 3])| *m && u.iter().all(|x| x.is_finite());
+            if !head.mask.iter().zip(&displacement).any(is_measured) {
+                return Err(RecordingError::NoDisplacement { step: n + 1, num_voxels });
+            }
+            steps.push(RecordedStep {
+                drive_mm: step.drive_mm,
+                force_n: step.force_n,
+                force_sd_n: step.force_sd_n,
+                window_s: step.window_s,
+                displacement,
+            });
+        }
+        Ok(Recording {
+            id: head.json.id,
+            specimen: head.specimen,
+            grid: head.grid,
+            mask: head.mask,
+            steps,
+            noise_sd_mm: head.json.acquisition.noise_sd_mm,
+            filter: head.json.acquisition.filter,
+            load: head.load,
+            notes: head.json.notes,
+        })
+    }
+}
+
+/// What recordings of both kinds share.
+pub(super) struct Head {
+    pub(super) folder: PathBuf,
+    pub(super) json: RecordingJson,
+    pub(super) specimen: Specimen,
+    pub(super) grid: VoxelGrid,
+    pub(super) mask: Vec<bool>,
+    pub(super) load: Option<LoadCurve>,
+}
+
+impl Head {
+    pub(super) fn read(path: &Path, limits: &ReadLimits) -> Result<Head, RecordingError> {
+        let (folder, file) = if path.is_file() {
+            (path.parent().unwrap_or(Path::new("")).to_path_buf(), path.to_path_buf())
+        } else {
+            (path.to_path_buf(), path.join("recording.json"))
+        };
+        let text = read_text(&file, limits)?;
         let json: RecordingJson = serde_json::from_str(&text).map_err(|e| RecordingError::Json(e.to_string()))?;
         if json.schema != SCHEMA {
             return Err(RecordingError::Json(format!("schema is '{}'; this version reads {SCHEMA}", json.schema)));
@@ -92,32 +153,12 @@ impl Recording {
             });
         }
         let specimen = Specimen::from_json(&json.specimen.to_string())?;
-        let (mask_path, mask_image) = image(folder, &json.mask, limits)?;
+        let (mask_path, mask_image) = image(&folder, &json.mask, limits)?;
         let grid =
             grid_of(&mask_image, [1, 1]).map_err(|source| RecordingError::Image { path: mask_path, source })??;
         let mask: Vec<bool> = mask_image.values.iter().map(|v| *v > 0.5).collect();
-        let num_voxels = mask.iter().filter(|m| **m).count();
-        if num_voxels == 0 {
+        if !mask.contains(&true) {
             return Err(RecordingError::EmptyMask);
-        }
-        let mut steps = Vec::with_capacity(json.steps.len());
-        for (n, step) in json.steps.iter().enumerate() {
-            check_step(n, step)?;
-            let Some(name) = &step.displacement else {
-                return Err(RecordingError::Raw { step: n + 1 });
-            };
-            let displacement = read_displacement(folder, name, &grid, limits)?;
-            let is_measured = |(m, u): (&bool, &[f64; 3])| *m && u.iter().all(|x| x.is_finite());
-            if !mask.iter().zip(&displacement).any(is_measured) {
-                return Err(RecordingError::NoDisplacement { step: n + 1, num_voxels });
-            }
-            steps.push(RecordedStep {
-                drive_mm: step.drive_mm,
-                force_n: step.force_n,
-                force_sd_n: step.force_sd_n,
-                window_s: step.window_s,
-                displacement,
-            });
         }
         if let Some(sd) = json.acquisition.noise_sd_mm {
             for value in sd {
@@ -131,21 +172,11 @@ impl Recording {
                 Some(LoadCurve::from_csv(&read_text(&path, limits)?, &path)?)
             }
         };
-        Ok(Recording {
-            id: json.id,
-            specimen,
-            grid,
-            mask,
-            steps,
-            noise_sd_mm: json.acquisition.noise_sd_mm,
-            filter: json.acquisition.filter,
-            load,
-            notes: json.notes,
-        })
+        Ok(Head { folder, json, specimen, grid, mask, load })
     }
 }
 
-fn check_step(n: usize, step: &StepJson) -> Result<(), RecordingError> {
+pub(super) fn check_step(n: usize, step: &StepJson) -> Result<(), RecordingError> {
     let finite = |name: &str, value: f64| {
         let name = format!("steps[{n}].{name}");
         if value.is_finite() { Ok(()) } else { Err(RecordingError::Value { name, value, requirement: "finite" }) }
@@ -162,7 +193,7 @@ fn check_step(n: usize, step: &StepJson) -> Result<(), RecordingError> {
     Ok(())
 }
 
-fn positive(name: &str, value: f64) -> Result<(), RecordingError> {
+pub(super) fn positive(name: &str, value: f64) -> Result<(), RecordingError> {
     if value > 0.0 && value.is_finite() {
         Ok(())
     } else {
@@ -221,6 +252,35 @@ fn grid_of(image: &Image, [time, components]: [usize; 2]) -> Result<Result<Voxel
     Ok(VoxelGrid::new(origin, edges, [nx, ny, nz]).map_err(RecordingError::from))
 }
 
+/// A scalar image on the mask's grid.
+pub(super) fn read_scalar(
+    folder: &Path,
+    name: &str,
+    expected: &VoxelGrid,
+    limits: &ReadLimits,
+) -> Result<Vec<f64>, RecordingError> {
+    let (path, image) = image(folder, name, limits)?;
+    check_grid(&path, &image, [1, 1], expected)?;
+    Ok(image.values)
+}
+
+fn check_grid(path: &Path, image: &Image, kind: [usize; 2], expected: &VoxelGrid) -> Result<(), RecordingError> {
+    let grid = match grid_of(image, kind) {
+        Ok(grid) => grid?,
+        Err(source) => return Err(RecordingError::Image { path: path.into(), source }),
+    };
+    let is_near = (0..3).all(|a| {
+        let edge = expected.voxel_mm[a];
+        (grid.origin_mm[a] - expected.origin_mm[a]).abs() < GRID_TOLERANCE * edge
+            && (grid.voxel_mm[a] - edge).abs() < GRID_TOLERANCE * edge
+    });
+    if grid.shape != expected.shape || !is_near {
+        let words = |g: &VoxelGrid| format!("{:?} at {:?} mm, voxel {:?} mm", g.shape, g.origin_mm, g.voxel_mm);
+        return Err(RecordingError::Grid { path: path.into(), found: words(&grid), expected: words(expected) });
+    }
+    Ok(())
+}
+
 fn read_displacement(
     folder: &Path,
     name: &str,
@@ -231,20 +291,8 @@ fn read_displacement(
     if image.intent != INTENT_DISPLACEMENT {
         return Err(RecordingError::Image { path, source: NiftiError::Intent { found: image.intent } });
     }
-    let grid = match grid_of(&image, [1, 3]) {
-        Ok(grid) => grid?,
-        Err(source) => return Err(RecordingError::Image { path, source }),
-    };
-    let is_near = (0..3).all(|a| {
-        let edge = expected.voxel_mm[a];
-        (grid.origin_mm[a] - expected.origin_mm[a]).abs() < GRID_TOLERANCE * edge
-            && (grid.voxel_mm[a] - edge).abs() < GRID_TOLERANCE * edge
-    });
-    if grid.shape != expected.shape || !is_near {
-        let words = |g: &VoxelGrid| format!("{:?} at {:?} mm, voxel {:?} mm", g.shape, g.origin_mm, g.voxel_mm);
-        return Err(RecordingError::Grid { path, found: words(&grid), expected: words(expected) });
-    }
-    let n = grid.num_voxels();
+    check_grid(&path, &image, [1, 3], expected)?;
+    let n = expected.num_voxels();
     Ok((0..n).map(|v| [0, 1, 2].map(|c| image.values[v + c * n])).collect())
 }
 

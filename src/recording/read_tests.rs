@@ -1,5 +1,5 @@
 use super::*;
-use crate::recording::Samples;
+use crate::recording::{RawRecording, RawStep, Samples};
 
 fn specimen() -> Specimen {
     Specimen::from_json(include_str!("../../geometries/two-hole-shear.json")).unwrap()
@@ -136,4 +136,119 @@ fn load_curves_are_checked() {
     let curve = LoadCurve::from_csv("time_s,drive_mm,force_n\n0,0,1\n1,0,3\n2,0,9\n", path).unwrap();
     assert_eq!(curve.mean_force_n([0.0, 1.0]), Some(2.0));
     assert_eq!(curve.mean_force_n([5.0, 6.0]), None);
+}
+
+/// Images written by nibabel (see `make.py` beside them): other byte order, kinds of numbers, scaled integers, qform.
+#[test]
+fn images_of_nibabel_are_read() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/import");
+    let image = |name: &str| Image::read(std::fs::File::open(folder.join(name)).unwrap(), 1000).unwrap();
+    for name in ["float64_big.nii", "uint8.nii.gz", "float32_qform.nii.gz", "int16_scaled.nii.gz"] {
+        let found = image(name);
+        assert_eq!(found.shape, [3, 4, 2, 1, 1], "{name}");
+        let affine = [[1.0, 0.0, 0.0, -2.5], [0.0, 0.1875, 0.0, -0.375], [0.0, 0.0, 0.75, 1.5]];
+        for (v, value) in found.values.iter().enumerate() {
+            let (i, j, k) = (v % 3, v / 3 % 4, v / 12);
+            let number = (8 * i + 2 * j + k) as f64;
+            let is_scaled = name.starts_with("int16");
+            // Scaled integers hold 11.5 in 65,536 steps; the others hold small whole numbers exactly.
+            let (exact, tolerance) = if is_scaled { (0.5 * number - 1.0, 2e-4) } else { (number, 1e-12) };
+            assert!((value - exact).abs() < tolerance, "{name} {v} {value}");
+        }
+        for i in 0..3 {
+            for j in 0..4 {
+                // Single precision, through a quaternion for the qform.
+                assert!((found.affine[i][j] - affine[i][j]).abs() < 1e-6, "{name}");
+            }
+        }
+    }
+    let vector = image("displacement.nii.gz");
+    assert_eq!((vector.shape, vector.intent), ([3, 4, 2, 1, 3], 1006));
+    assert!(vector.values[0].is_nan() && vector.values[24].is_nan());
+    assert_eq!((vector.values[1], vector.values[25], vector.values[49]), (8.0, -8.0, 4.0));
+}
+
+/// A raw recording comes back as written; each reader refuses the other's kind.
+#[test]
+fn raw_recordings_round_trip() {
+    let (folder, recording) = written();
+    let n = recording.grid.num_voxels();
+    assert!(matches!(
+        RawRecording::read(folder.path(), &ReadLimits::default()),
+        Err(RecordingError::NotRaw { step: 1 })
+    ));
+    let numbers = |f: f64| (0..n).map(|v| f * (v as f64 - 11.0) / 16.0).collect::<Vec<f64>>();
+    let raw = RawRecording {
+        id: "raw".into(),
+        specimen: recording.specimen.clone(),
+        grid: recording.grid.clone(),
+        mask: recording.mask.clone(),
+        steps: vec![RawStep {
+            drive_mm: 2.5,
+            force_n: None,
+            force_sd_n: None,
+            window_s: None,
+            phase: [numbers(1.0), numbers(-0.5), numbers(0.25)],
+            magnitude: (0..n).map(|v| v as f64).collect(),
+            mm_per_radian: [0.1, 0.2, 0.3],
+        }],
+        noise_sd_mm: None,
+        load: None,
+        notes: Some(serde_json::json!({ "who": "test" })),
+    };
+    let folder = tempfile::tempdir().unwrap();
+    raw.write(folder.path()).unwrap();
+    let again = RawRecording::read(&folder.path().join("recording.json"), &ReadLimits::default()).unwrap();
+    assert_eq!((&again.grid, &again.mask, &again.notes), (&raw.grid, &raw.mask, &raw.notes));
+    // Sixteenths are exact in single precision.
+    assert_eq!(again.steps[0].phase, raw.steps[0].phase);
+    assert_eq!(again.steps[0].magnitude, raw.steps[0].magnitude);
+    assert_eq!(again.steps[0].mm_per_radian, [0.1, 0.2, 0.3]);
+    assert!(matches!(read(folder.path()), Err(RecordingError::Raw { step: 1 })));
+    let mut turned = raw.clone();
+    turned.steps[0].phase[1][3] = 4.0;
+    turned.write(folder.path()).unwrap();
+    assert!(matches!(
+        RawRecording::read(folder.path(), &ReadLimits::default()),
+        Err(RecordingError::Value { requirement: "a phase in (−π, π]", .. })
+    ));
+    let mut scaled = raw;
+    scaled.steps[0].mm_per_radian[2] = 0.0;
+    scaled.write(folder.path()).unwrap();
+    assert!(matches!(RawRecording::read(folder.path(), &ReadLimits::default()), Err(RecordingError::Value { .. })));
+}
+
+/// Units, components and a stream that expands without end are refused with little memory.
+#[test]
+fn wrong_units_shapes_and_endless_streams_are_refused() {
+    use flate2::{Compression, write::GzEncoder};
+    use std::io::Write;
+    let mut plain = Vec::new();
+    let file = std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/import/float64_big.nii")).unwrap();
+    plain.extend_from_slice(&file);
+    plain[123] = 1;
+    assert!(matches!(Image::read(&plain[..], 1000), Err(NiftiError::Units { code: 1 })));
+    // A header that promises 32767³ numbers, followed by 64 MiB of zeros in 64 kB of gzip.
+    let mut huge = file;
+    for at in [42, 44, 46] {
+        huge[at..at + 2].copy_from_slice(&32767i16.to_be_bytes());
+    }
+    let mut bomb = GzEncoder::new(Vec::new(), Compression::best());
+    bomb.write_all(&huge).unwrap();
+    for _ in 0..64 {
+        bomb.write_all(&[0; 1 << 20]).unwrap();
+    }
+    let bomb = bomb.finish().unwrap();
+    let limit = ReadLimits::default().max_values;
+    assert!(matches!(Image::read(&bomb[..], limit), Err(NiftiError::TooLarge { .. })));
+    let (folder, _) = written();
+    let mask = std::fs::read(folder.path().join("mask.nii.gz")).unwrap();
+    let whole = Image::read(&mask[..], 1000).unwrap();
+    let path = folder.path().join("u_1.nii.gz");
+    let scalar = Image { intent: 1006, ..whole };
+    scalar.write_gz(std::fs::File::create(path).unwrap(), Samples::Float32).unwrap();
+    assert!(matches!(
+        read(folder.path()),
+        Err(RecordingError::Image { source: NiftiError::Shape { expected_components: 3, .. }, .. })
+    ));
 }

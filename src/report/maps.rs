@@ -47,6 +47,16 @@ const BETWEEN: f64 = 30.0;
 impl VoxelMaps {
     /// The picture.
     pub fn to_svg(&self) -> String {
+        self.drawn(&[false, true])
+    }
+
+    /// The slices alone: for fields whose mean says nothing, such as wrapped phases.
+    pub fn slices_to_svg(&self) -> String {
+        self.drawn(&[false])
+    }
+
+    /// A column of maps for each entry: the slice (false) or the mean (true).
+    fn drawn(&self, kinds: &[bool]) -> String {
         let name = "Maps of voxel fields";
         let num_voxels: usize = self.shape.iter().product();
         let grid_is_valid = self.voxel_mm.iter().all(|v| v.is_finite() && *v > 0.0)
@@ -58,20 +68,20 @@ impl VoxelMaps {
         let extent = [0, 1, 2].map(|a| self.shape[a] as f64 * self.voxel_mm[a]);
         let scale = (MAP_WIDTH / extent[0]).min(LARGEST_HEIGHT / extent[1].max(extent[2]));
         let [w, hy, hz] = extent.map(|e| e * scale);
-        let block = [LEFT + 2.0 * w + GAP + BAR, TOP + hz + 22.0 + hy + 46.0];
+        let block = [LEFT + maps_width(kinds, w) + BAR, TOP + hz + 22.0 + hy + 46.0];
         let columns = self.fields.len().min(2);
         let rows = self.fields.len().div_ceil(2);
         let width = columns as f64 * (block[0] + BETWEEN) - BETWEEN;
         let mut svg = Svg::new(width.max(300.0), rows as f64 * block[1]);
         for (index, field) in self.fields.iter().enumerate() {
             let corner = [(index % 2) as f64 * (block[0] + BETWEEN), (index / 2) as f64 * block[1]];
-            self.draw_field(&mut svg, field, corner, [w, hy, hz]);
+            self.draw_field(&mut svg, field, corner, [w, hy, hz], kinds);
         }
         svg.finish(name)
     }
 
-    fn draw_field(&self, svg: &mut Svg, field: &VoxelField, [x0, y0]: [f64; 2], [w, hy, hz]: [f64; 3]) {
-        let title_width = 2.0 * w + GAP;
+    fn draw_field(&self, svg: &mut Svg, field: &VoxelField, [x0, y0]: [f64; 2], [w, hy, hz]: [f64; 3], kinds: &[bool]) {
+        let title_width = maps_width(kinds, w);
         svg.text([x0 + LEFT, y0 + 16.0], &shortened(&field.title, TITLE, title_width), &TextStyle::title());
         let Some((range, is_clipped)) = color_range(field) else {
             svg.text([x0 + LEFT, y0 + TOP + 20.0], "no voxel has a value", &TextStyle::note());
@@ -79,7 +89,7 @@ impl VoxelMaps {
         };
         // Vertical direction of the map (2 = z, 1 = y), direction that is cut or averaged, height, top.
         for (vertical, third, height, top) in [(2, 1, hz, y0 + TOP), (1, 2, hy, y0 + TOP + hz + 22.0)] {
-            for (column, is_mean) in [false, true].into_iter().enumerate() {
+            for (column, &is_mean) in kinds.iter().enumerate() {
                 let left = x0 + LEFT + column as f64 * (w + GAP);
                 let values = self.section(field, vertical, third, is_mean);
                 let size = [self.shape[0], self.shape[vertical]];
@@ -113,7 +123,7 @@ impl VoxelMaps {
                 }
             }
         }
-        let bar = [x0 + LEFT + 2.0 * w + GAP + 14.0, y0 + TOP, 11.0, hz + 22.0 + hy];
+        let bar = [x0 + LEFT + maps_width(kinds, w) + 14.0, y0 + TOP, 11.0, hz + 22.0 + hy];
         draw_color_bar(svg, bar, field.map, range, is_clipped, &field.unit);
     }
 
@@ -143,6 +153,11 @@ impl VoxelMaps {
         }
         out
     }
+}
+
+/// Width of the maps of one field beside each other.
+fn maps_width(kinds: &[bool], width: f64) -> f64 {
+    kinds.len() as f64 * (width + GAP) - GAP
 }
 
 /// Ends of the colour scale, and whether values lie beyond them. None without a finite value.

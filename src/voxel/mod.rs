@@ -13,7 +13,7 @@ pub use grid::VoxelGrid;
 pub use histogram::{Histogram2d, HistogramAxis};
 pub use mask::VoxelMask;
 pub use operator::VoxelOperator;
-pub use sampling::Sampling;
+pub use sampling::{MaterialPoints, Sampling};
 
 /// Why a grid, mask or operator was not made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -3,6 +3,7 @@
 use super::mask::clipped;
 use super::section::{Overlap, Section};
 use super::{VoxelError, VoxelGrid};
+use crate::specimen::Specimen;
 
 /// Numbers of sample points per voxel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,6 +78,28 @@ impl Sampling {
         for (_, weight) in points {
             *weight /= total;
         }
+    }
+}
+
+/// Sample points in the material part of a specimen's voxels, for what is not linear in the field.
+pub struct MaterialPoints<'a> {
+    section: Section<'a>,
+    sampling: Sampling,
+}
+
+impl<'a> MaterialPoints<'a> {
+    /// Prepares the points of `specimen`.
+    ///
+    /// # Errors
+    /// [`VoxelError::InvalidSampling`].
+    pub fn new(specimen: &'a Specimen, sampling: Sampling) -> Result<Self, VoxelError> {
+        sampling.check()?;
+        Ok(MaterialPoints { section: Section::new(specimen), sampling })
+    }
+
+    /// Positions (mm) and weights (sum one) in the material part of a voxel, which must hold some material.
+    pub fn of_voxel(&self, grid: &VoxelGrid, voxel: usize, points: &mut Vec<([f64; 3], f64)>) {
+        self.sampling.points(&self.section, grid, voxel, points);
     }
 }
 

@@ -1,0 +1,215 @@
+//! The loading history that goes with a scan: ramps, holds, a load cell that drifts and scatters.
+
+use super::AcquisitionError;
+use crate::recording::LoadCurve;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// Streams of the random generator below this are the images'.
+const STREAM: u64 = 1 << 40;
+
+/// How the actuator moves and the load cell reads.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct LoadProgram {
+    /// Rest before the first ramp, s.
+    pub rest_s: f64,
+    /// Speed of the ramps, mm/s.
+    pub speed_mm_per_s: f64,
+    /// Length of each hold, s.
+    pub hold_s: f64,
+    /// The scan begins this long after the ramp and ends this long before the next, s.
+    pub settle_s: f64,
+    /// Time between readings, s.
+    pub interval_s: f64,
+    /// Standard deviation of the cell's slow drift: one number per hold, N.
+    pub drift_sd_n: f64,
+    /// Standard deviation of a single reading, N.
+    pub reading_sd_n: f64,
+}
+
+impl Default for LoadProgram {
+    fn default() -> Self {
+        LoadProgram {
+            rest_s: 5.0,
+            speed_mm_per_s: 0.5,
+            hold_s: 60.0,
+            settle_s: 8.0,
+            interval_s: 0.5,
+            drift_sd_n: 0.02,
+            reading_sd_n: 0.01,
+        }
+    }
+}
+
+impl LoadProgram {
+    fn check(&self) -> Result<(), AcquisitionError> {
+        let positive = [
+            ("speed_mm_per_s", self.speed_mm_per_s),
+            ("interval_s", self.interval_s),
+            ("the scan's window, hold_s − 2 settle_s", self.hold_s - 2.0 * self.settle_s),
+        ];
+        for (name, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(AcquisitionError::Value { name, value, requirement: "positive and finite" });
+            }
+        }
+        let others = [
+            ("rest_s", self.rest_s),
+            ("settle_s", self.settle_s),
+            ("drift_sd_n", self.drift_sd_n),
+            ("reading_sd_n", self.reading_sd_n),
+        ];
+        for (name, value) in others {
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(AcquisitionError::Value { name, value, requirement: "finite and not negative" });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The readings of a program that holds at `drives_mm` with true forces `forces_n`, and the window of each hold. On the ramps
+/// the force follows a monotone curve through rest and the holds. Times and readings are rounded as a file stores them.
+///
+/// # Errors
+/// [`AcquisitionError::Value`], [`AcquisitionError::Length`].
+pub fn loading_history(
+    drives_mm: &[f64],
+    forces_n: &[f64],
+    program: &LoadProgram,
+    seed: u64,
+) -> Result<(LoadCurve, Vec<[f64; 2]>), AcquisitionError> {
+    program.check()?;
+    if drives_mm.len() != forces_n.len() {
+        let (found, expected) = (forces_n.len(), drives_mm.len());
+        return Err(AcquisitionError::Length { what: "list of forces", found, expected });
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(STREAM);
+    let mut normal = |sd: f64| {
+        let x: f64 = StandardNormal.sample(&mut rng);
+        sd * x
+    };
+    let curve = Monotone::new(drives_mm, forces_n);
+    let mut windows = Vec::with_capacity(drives_mm.len());
+    // Corners of the drive over time, with the cell's drift.
+    let mut corners = vec![[0.0, 0.0, 0.0], [program.rest_s, 0.0, 0.0]];
+    for &drive in drives_mm {
+        let [start, from, _] = corners[corners.len() - 1];
+        let arrival = start + (drive - from).abs() / program.speed_mm_per_s;
+        let drift = normal(program.drift_sd_n);
+        corners.push([arrival, drive, drift]);
+        corners.push([arrival + program.hold_s, drive, drift]);
+        let round = |t: f64| (t / program.interval_s).round() * program.interval_s;
+        windows.push([round(arrival + program.settle_s), round(arrival + program.hold_s - program.settle_s)]);
+    }
+    let end = corners[corners.len() - 1][0];
+    let num_readings = (end / program.interval_s) as usize + 1;
+    let mut load = LoadCurve::default();
+    let mut piece = 0;
+    for n in 0..num_readings {
+        let time = n as f64 * program.interval_s;
+        while piece + 2 < corners.len() && corners[piece + 1][0] <= time {
+            piece += 1;
+        }
+        let ([t0, d0, c0], [t1, d1, c1]) = (corners[piece], corners[piece + 1]);
+        let part = if t1 > t0 { ((time - t0) / (t1 - t0)).clamp(0.0, 1.0) } else { 1.0 };
+        let (drive, drift) = (d0 + part * (d1 - d0), c0 + part * (c1 - c0));
+        let force = curve.at(drive) + drift + normal(program.reading_sd_n);
+        load.time_s.push(time);
+        load.drive_mm.push((1e4 * drive).round() / 1e4);
+        load.force_n.push((1e4 * force).round() / 1e4);
+    }
+    Ok((load, windows))
+}
+
+/// Monotone cubic through the origin and the given points (Fritsch & Carlson 1980).
+struct Monotone {
+    x: Vec<f64>,
+    y: Vec<f64>,
+    slope: Vec<f64>,
+}
+
+impl Monotone {
+    fn new(x: &[f64], y: &[f64]) -> Self {
+        let mut points: Vec<[f64; 2]> = x.iter().zip(y).map(|(x, y)| [*x, *y]).collect();
+        points.push([0.0, 0.0]);
+        points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        points.dedup_by(|a, b| (a[0] - b[0]).abs() < 1e-12);
+        let n = points.len();
+        let secant: Vec<f64> = points.windows(2).map(|p| (p[1][1] - p[0][1]) / (p[1][0] - p[0][0])).collect();
+        let slope = (0..n)
+            .map(|i| match (i.checked_sub(1).map(|j| secant[j]), secant.get(i)) {
+                (Some(a), Some(&b)) if a * b > 0.0 => {
+                    let (h0, h1) = (points[i][0] - points[i - 1][0], points[i + 1][0] - points[i][0]);
+                    3.0 * (h0 + h1) / ((2.0 * h1 + h0) / a + (h1 + 2.0 * h0) / b)
+                }
+                (Some(_), Some(_)) | (None, None) => 0.0,
+                (Some(a), None) => a,
+                (None, Some(&b)) => b,
+            })
+            .collect();
+        let (x, y) = (points.iter().map(|p| p[0]).collect(), points.iter().map(|p| p[1]).collect());
+        Monotone { x, y, slope }
+    }
+
+    fn at(&self, x: f64) -> f64 {
+        if self.x.len() < 2 {
+            return self.y[0];
+        }
+        let i = self.x.partition_point(|a| *a <= x).clamp(1, self.x.len() - 1) - 1;
+        let h = self.x[i + 1] - self.x[i];
+        let t = (x - self.x[i]) / h;
+        let (a, b) = (1.0 - t, t);
+        (1.0 + 2.0 * t) * a * a * self.y[i] + t * a * a * h * self.slope[i] + b * b * (3.0 - 2.0 * t) * self.y[i + 1]
+            - b * b * a * h * self.slope[i + 1]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_lie_in_their_holds() {
+        let program = LoadProgram { drift_sd_n: 0.0, reading_sd_n: 0.0, ..LoadProgram::default() };
+        let (load, windows) = loading_history(&[2.5, 5.0], &[5.0, 11.0], &program, 7).unwrap();
+        for ((window, drive), force) in windows.iter().zip([2.5, 5.0]).zip([5.0, 11.0]) {
+            let held = load.time_s.iter().zip(&load.drive_mm).filter(|(t, _)| (window[0]..=window[1]).contains(*t));
+            assert!(held.clone().count() > 50);
+            // Drives are rounded to 10⁻⁴ mm.
+            held.for_each(|(_, d)| assert!((d - drive).abs() < 1e-4));
+            // Readings are rounded to 10⁻⁴ N.
+            assert!((load.mean_force_n(*window).unwrap() - force).abs() < 1e-4);
+        }
+        assert!(load.drive_mm.windows(2).all(|d| d[1] >= d[0]));
+        // The force rises with the drive: the curve between the holds is monotone (rounding 10⁻⁴).
+        assert!(load.force_n.windows(2).all(|f| f[1] >= f[0] - 1e-4));
+    }
+
+    /// The drift stays within a hold and is what the mean over the window scatters by.
+    #[test]
+    fn drift_dominates_the_mean() {
+        let program = LoadProgram { drift_sd_n: 0.1, reading_sd_n: 0.01, ..LoadProgram::default() };
+        let deviations: Vec<f64> = (0..400)
+            .map(|seed| {
+                let (load, windows) = loading_history(&[5.0], &[10.0], &program, seed).unwrap();
+                load.mean_force_n(windows[0]).unwrap() - 10.0
+            })
+            .collect();
+        let sd = (deviations.iter().map(|d| d * d).sum::<f64>() / 400.0).sqrt();
+        // A standard deviation from 400 draws scatters by 1/√800 = 3.5 %: four of those.
+        assert!((sd / 0.1 - 1.0).abs() < 0.14, "{sd}");
+    }
+
+    #[test]
+    fn bad_programs_are_refused() {
+        let program = LoadProgram { settle_s: 40.0, ..LoadProgram::default() };
+        assert!(matches!(loading_history(&[1.0], &[1.0], &program, 0), Err(AcquisitionError::Value { .. })));
+        assert!(matches!(
+            loading_history(&[1.0], &[], &LoadProgram::default(), 0),
+            Err(AcquisitionError::Length { .. })
+        ));
+    }
+}

@@ -1,0 +1,150 @@
+//! The synthetic scanner.
+
+use super::loading::{LoadProgram, loading_history};
+use super::{AcquisitionError, Complex, KSpace, signal_images};
+use crate::fem::{ForwardModel, SolveOptions};
+use crate::material::Ogden;
+use crate::mesh::MeshOptions;
+use crate::recording::{RawRecording, RawStep};
+use crate::specimen::Specimen;
+use crate::voxel::{Sampling, VoxelGrid, VoxelMask, VoxelOperator};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use serde::Serialize;
+
+/// Settings of a scan.
+#[derive(Clone, Debug, Serialize)]
+pub struct ScanOptions {
+    /// The images' grid. It should reach beyond the specimen: noise is estimated from the empty voxels.
+    pub grid: VoxelGrid,
+    /// Displacement per phase of each direction, mm/rad; one turn of the phase is 2π times this.
+    pub mm_per_radian: [f64; 3],
+    /// Signal-to-noise ratio of each direction's image: magnitude of a full voxel in a uniform field over the standard
+    /// deviation of the noise's real (and imaginary) part, before any k-space window.
+    pub snr: [f64; 3],
+    /// Loss of the edge of k-space, applied to signal and noise.
+    pub kspace: Option<KSpace>,
+    /// The loading history.
+    pub load: LoadProgram,
+    /// Seed of all noise.
+    pub seed: u64,
+}
+
+impl ScanOptions {
+    /// The grid of [`VoxelGrid::covering`], with `margin` more voxels on every side, moved by `offset` (in voxels).
+    ///
+    /// # Errors
+    /// [`AcquisitionError::Voxel`], [`AcquisitionError::Value`] for an offset that is not finite or above one.
+    pub fn grid_around(
+        specimen: &Specimen,
+        voxel_mm: [f64; 3],
+        margin: usize,
+        offset: [f64; 3],
+    ) -> Result<VoxelGrid, AcquisitionError> {
+        for value in offset {
+            if !(value.abs() <= 1.0) {
+                let requirement = "from -1 to 1 voxels";
+                return Err(AcquisitionError::Value { name: "the grid's offset", value, requirement });
+            }
+        }
+        let inner = VoxelGrid::covering(specimen, voxel_mm)?;
+        let origin = [0, 1, 2].map(|a| inner.origin_mm[a] + (offset[a] - margin as f64) * voxel_mm[a]);
+        let shape = inner.shape.map(|n| n.saturating_add(2 * margin));
+        Ok(VoxelGrid::new(origin, voxel_mm, shape)?)
+    }
+
+    fn check(&self) -> Result<(), AcquisitionError> {
+        for value in self.snr {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(AcquisitionError::Value { name: "snr", value, requirement: "positive and finite" });
+            }
+        }
+        self.kspace.map_or(Ok(()), |k| k.check())
+    }
+}
+
+/// A scan and what it was made from.
+#[derive(Clone, Debug)]
+pub struct Scan {
+    /// What the scanner and the load cell give.
+    pub raw: RawRecording,
+    /// The mask: voxels at least half filled.
+    pub mask: VoxelMask,
+    /// Voxel averages of the displacement that was scanned, mm, per drive in the mask's order. Not known in an experiment.
+    pub truth: Vec<Vec<[f64; 3]>>,
+    /// Forces without noise, N.
+    pub forces_n: Vec<f64>,
+    /// Unknowns of the forward solution.
+    pub num_unknowns: usize,
+}
+
+/// Solves `material` at the specimen's drives on a mesh of its own and scans the result.
+///
+/// # Errors
+/// [`AcquisitionError`].
+pub fn scan(
+    id: &str,
+    specimen: &Specimen,
+    material: &Ogden,
+    mesh: &MeshOptions,
+    solve: &SolveOptions,
+    options: &ScanOptions,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
+) -> Result<Scan, AcquisitionError> {
+    options.check()?;
+    let mask = VoxelMask::of_specimen(specimen, options.grid.clone())?;
+    let mut model = ForwardModel::of_specimen(specimen, mesh)?;
+    let path = model.solve_path(material, &specimen.drive_mm, solve, &|| is_cancelled())?;
+    let states: Vec<&[[f64; 3]]> = path.iter().map(|state| &state.displacement[..]).collect();
+    let images = signal_images(specimen, model.mesh(), &states, &options.grid, options.mm_per_radian, is_cancelled)?;
+    let operator = VoxelOperator::new(specimen, model.mesh(), &mask, Sampling::default())?;
+    let truth = states.iter().map(|u| operator.average(u)).collect::<Result<Vec<_>, _>>()?;
+    let forces_n: Vec<f64> = path.iter().map(|state| state.force_n).collect();
+    let (load, windows) = loading_history(&specimen.drive_mm, &forces_n, &options.load, options.seed)?;
+    let mut steps = Vec::with_capacity(images.len());
+    for (n, signal) in images.into_iter().enumerate() {
+        let (phase, magnitude) = noisy_images(signal, options, n as u64);
+        steps.push(RawStep {
+            drive_mm: specimen.drive_mm[n],
+            force_n: load.mean_force_n(windows[n]),
+            force_sd_n: (options.load.drift_sd_n > 0.0).then_some(options.load.drift_sd_n),
+            window_s: Some(windows[n]),
+            phase,
+            magnitude,
+            mm_per_radian: options.mm_per_radian,
+        });
+    }
+    let factor = options.kspace.map_or(1.0, |k| k.noise_factor(options.grid.shape));
+    let raw = RawRecording {
+        id: id.into(),
+        specimen: specimen.clone(),
+        grid: options.grid.clone(),
+        mask: mask.spread(&vec![true; mask.num_voxels()], false),
+        steps,
+        noise_sd_mm: Some([0, 1, 2].map(|a| factor * options.mm_per_radian[a] / options.snr[a])),
+        load: Some(load),
+        notes: None,
+    };
+    Ok(Scan { raw, mask, truth, forces_n, num_unknowns: model.num_unknowns() })
+}
+
+/// Adds noise to the three images of drive `step`, applies the k-space window, and keeps what the format keeps: the wrapped
+/// phase of each direction and the mean of the three magnitudes. The same seed and step give the same numbers.
+pub fn noisy_images(mut signal: [Vec<Complex>; 3], options: &ScanOptions, step: u64) -> ([Vec<f64>; 3], Vec<f64>) {
+    for (axis, image) in signal.iter_mut().enumerate() {
+        let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
+        rng.set_stream(3 * step + axis as u64);
+        let sd = 1.0 / options.snr[axis];
+        for value in image.iter_mut() {
+            let re: f64 = StandardNormal.sample(&mut rng);
+            let im: f64 = StandardNormal.sample(&mut rng);
+            *value += Complex::new(sd * re, sd * im);
+        }
+        if let Some(kspace) = &options.kspace {
+            kspace.apply(image, options.grid.shape);
+        }
+    }
+    let magnitude = (0..signal[0].len()).map(|v| signal.iter().map(|i| i[v].norm()).sum::<f64>() / 3.0).collect();
+    (signal.map(|image| image.iter().map(|c| c.arg()).collect()), magnitude)
+}

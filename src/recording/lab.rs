@@ -1,0 +1,265 @@
+//! Displacement fields as MR-u laboratories keep them in MATLAB files.
+//!
+//! `U_t` is a cell per step of a cell of three arrays (or an array with the component as fourth and the step as fifth index);
+//! `mask` is one in material, zero or NaN elsewhere; `X` holds three arrays of positions, `osc` the voxel's edges along the
+//! array's three indices; `prescribedU` the drives. Which index runs along which axis is the laboratory's choice
+//! ([`ImportOptions::axes`]); component i of the displacement is the one along the array's index i.
+
+use super::import::{ImportError, ImportOptions, finish};
+use super::mat::MatValue;
+use super::{RecordedStep, Recording};
+use crate::specimen::Specimen;
+use crate::voxel::VoxelGrid;
+
+/// Names under which a field is looked for, first first.
+const FIELD_NAMES: [&str; 5] = ["U_t", "uicorr", "ui", "U", "u"];
+/// Regions smaller than this part of the largest are specks.
+const SPECK: f64 = 0.2;
+
+/// An array of a file: sizes and numbers, first index fastest.
+struct Array<'a> {
+    dims: [usize; 3],
+    values: &'a [f64],
+}
+
+/// A recording from the variables of a MATLAB file. Variables that were not used are named in its notes.
+///
+/// # Errors
+/// [`ImportError`].
+pub fn recording_from_mat(
+    variables: &[(String, MatValue)],
+    specimen: &Specimen,
+    options: &ImportOptions,
+) -> Result<Recording, ImportError> {
+    let find = |name: &str| variables.iter().find(|(n, _)| n == name).map(|(_, v)| v);
+    let names = || variables.iter().map(|(n, _)| n.clone()).collect::<Vec<_>>().join(", ");
+    let (field_name, field) = FIELD_NAMES
+        .iter()
+        .find_map(|n| find(n).map(|v| (*n, v)))
+        .ok_or_else(|| ImportError::Missing { what: "U_t", found: names() })?;
+    let steps = steps_of(field)?;
+    let dims = steps[0][0].dims;
+    for array in steps.iter().flatten() {
+        if array.dims != dims {
+            let message = format!("its arrays have sizes {dims:?} and {:?}", array.dims);
+            return Err(ImportError::Layout { name: field_name.into(), message });
+        }
+    }
+    let num_voxels: usize = dims.iter().product();
+    let is_measured = |v: usize| steps.iter().all(|s| s.iter().all(|a| a.values[v].is_finite()));
+    let mut mask: Vec<bool> = match find("mask") {
+        Some(value) => {
+            let array = array_of(value, "mask")?;
+            if array.dims != dims {
+                let message = format!("its sizes {:?} are not the field's {dims:?}", array.dims);
+                return Err(ImportError::Layout { name: "mask".into(), message });
+            }
+            array.values.iter().map(|m| *m > 0.5).collect()
+        }
+        None => (0..num_voxels).map(is_measured).collect(),
+    };
+    let edges = match (options.voxel_mm_by_index, find("osc"), find("X")) {
+        (Some(edges), _, _) => edges,
+        (None, Some(osc), _) => spacing_from_osc(osc)?.map(|e| e * options.unit_mm),
+        (None, None, Some(x)) => spacing_from_positions(x, dims)?.map(|e| e * options.unit_mm),
+        (None, None, None) => {
+            return Err(ImportError::Missing { what: "osc or X (the voxel's edges)", found: names() });
+        }
+    };
+    select_region(&mut mask, dims, options)?;
+    // The box around the mask, centred on the frame's origin.
+    let (mut low, mut high) = (dims, [0; 3]);
+    for v in (0..num_voxels).filter(|&v| mask[v]) {
+        let at = [v % dims[0], v / dims[0] % dims[1], v / (dims[0] * dims[1])];
+        for i in 0..3 {
+            low[i] = low[i].min(at[i]);
+            high[i] = high[i].max(at[i] + 1);
+        }
+    }
+    // Which index runs along which axis.
+    let index_of = [0, 1, 2].map(|axis| options.axes.iter().position(|a| a.axis == axis).unwrap_or(axis));
+    let shape = index_of.map(|i| high[i] - low[i]);
+    let voxel = index_of.map(|i| edges[i].abs());
+    let origin = [0, 1, 2].map(|a| -0.5 * (shape[a] as f64 - 1.0) * voxel[a]);
+    let grid = VoxelGrid::new(origin, voxel, shape)?;
+    let source: Vec<usize> = (0..grid.num_voxels())
+        .map(|v| {
+            let n = grid.indices(v);
+            let mut at = [0; 3];
+            for (axis, &i) in index_of.iter().enumerate() {
+                at[i] = if options.axes[i].is_reversed { high[i] - 1 - n[axis] } else { low[i] + n[axis] };
+            }
+            at[0] + dims[0] * (at[1] + dims[1] * at[2])
+        })
+        .collect();
+    let flags: Vec<bool> = source.iter().map(|&s| mask[s]).collect();
+    let drives = match find("prescribedU").and_then(MatValue::numbers) {
+        _ if options.drive_mm.len() == steps.len() => options.drive_mm.clone(),
+        Some((_, values)) if options.drive_mm.is_empty() && values.len() == steps.len() => {
+            values.iter().map(|d| d * options.unit_mm).collect()
+        }
+        _ if options.drive_mm.is_empty() && specimen.drive_mm.len() == steps.len() => specimen.drive_mm.clone(),
+        _ => return Err(ImportError::Drives { found: options.drive_mm.len(), num_steps: steps.len() }),
+    };
+    let recorded = steps
+        .iter()
+        .zip(&drives)
+        .map(|(arrays, &drive_mm)| {
+            let value = |v: usize, axis: usize| {
+                let i = index_of[axis];
+                let sign = if options.axes[i].is_reversed { -1.0 } else { 1.0 };
+                if flags[v] { sign * arrays[i].values[source[v]] * options.unit_mm } else { f64::NAN }
+            };
+            RecordedStep {
+                drive_mm,
+                force_n: None,
+                force_sd_n: None,
+                window_s: None,
+                displacement: (0..flags.len()).map(|v| [0, 1, 2].map(|a| value(v, a))).collect(),
+            }
+        })
+        .collect();
+    let used = [field_name, "mask", "osc", "X", "prescribedU"];
+    let ignored: Vec<&str> = variables.iter().map(|(n, _)| n.as_str()).filter(|n| !used.contains(n)).collect();
+    let notes = serde_json::json!({
+        "imported": { "field": field_name, "ignored_variables": ignored, "voxel_mm_by_index": edges, "region": options.region,
+            "origin": "the mask's box is centred on the specimen" },
+    });
+    finish(specimen, grid, flags, recorded, options, notes)
+}
+
+/// Arrays of the three components, per step.
+fn steps_of(field: &MatValue) -> Result<Vec<[Array<'_>; 3]>, ImportError> {
+    let layout = |message: String| ImportError::Layout { name: "U_t".into(), message };
+    let triple = |members: &[MatValue]| members.len() == 3 && members.iter().all(|m| m.numbers().is_some());
+    match field {
+        MatValue::Cell { members, .. } if triple(members) => Ok(vec![arrays_of(members)?]),
+        MatValue::Cell { members, .. } if !members.is_empty() => members
+            .iter()
+            .map(|step| match step.members() {
+                Some(inner) if triple(inner) => arrays_of(inner),
+                _ => Err(layout("each step must be a cell of three numeric arrays".into())),
+            })
+            .collect(),
+        MatValue::Numeric { dims, values, .. } if (4..=5).contains(&dims.len()) && dims[3] == 3 => {
+            let size = [dims[0], dims[1], dims[2]];
+            let n: usize = size.iter().product();
+            let num_steps = dims.get(4).copied().unwrap_or(1);
+            if n == 0 || num_steps == 0 {
+                return Err(layout("it is empty".into()));
+            }
+            let array =
+                |s: usize, c: usize| Array { dims: size, values: &values[(3 * s + c) * n..(3 * s + c + 1) * n] };
+            Ok((0..num_steps).map(|s| [array(s, 0), array(s, 1), array(s, 2)]).collect())
+        }
+        _ => Err(layout(
+            "it must be a cell per step of three arrays, or an array with the component as fourth index".into(),
+        )),
+    }
+}
+
+fn arrays_of(members: &[MatValue]) -> Result<[Array<'_>; 3], ImportError> {
+    Ok([array_of(&members[0], "U_t")?, array_of(&members[1], "U_t")?, array_of(&members[2], "U_t")?])
+}
+
+fn array_of<'a>(value: &'a MatValue, name: &str) -> Result<Array<'a>, ImportError> {
+    let layout = |message: String| ImportError::Layout { name: name.into(), message };
+    let Some((dims, values)) = value.numbers() else {
+        return Err(layout("it is not an array of real numbers".into()));
+    };
+    let size = match dims {
+        [a, b, c] => [*a, *b, *c],
+        [a, b] => [*a, *b, 1],
+        _ => return Err(layout(format!("its sizes are {dims:?}; three are needed"))),
+    };
+    if values.is_empty() || values.len() != size.iter().product::<usize>() {
+        return Err(layout("it is empty".into()));
+    }
+    Ok(Array { dims: size, values })
+}
+
+fn spacing_from_osc(value: &MatValue) -> Result<[f64; 3], ImportError> {
+    let layout = |message: String| ImportError::Layout { name: "osc".into(), message };
+    match value.numbers() {
+        Some((_, &[a, b, c])) if [a, b, c].iter().all(|e| e.is_finite() && e.abs() > 0.0) => Ok([a, b, c]),
+        _ => Err(layout("it must hold three spacings that are not zero".into())),
+    }
+}
+
+/// Spacing along each index: whichever of the three position arrays changes along it.
+fn spacing_from_positions(value: &MatValue, dims: [usize; 3]) -> Result<[f64; 3], ImportError> {
+    let layout = |message: String| ImportError::Layout { name: "X".into(), message };
+    let members = value.members().filter(|m| m.len() == 3);
+    let members = members.ok_or_else(|| layout("it must be a cell of three arrays".into()))?;
+    let mut spacing = [0.0f64; 3];
+    for member in members {
+        let array = array_of(member, "X")?;
+        if array.dims != dims {
+            return Err(layout(format!("its sizes {:?} are not the field's {dims:?}", array.dims)));
+        }
+        for (i, stride) in [1, dims[0], dims[0] * dims[1]].into_iter().enumerate() {
+            if dims[i] > 1 {
+                let step = (array.values[(dims[i] - 1) * stride] - array.values[0]) / (dims[i] - 1) as f64;
+                if step.abs() > spacing[i].abs() {
+                    spacing[i] = step;
+                }
+            }
+        }
+    }
+    if spacing.iter().all(|s| s.is_finite() && s.abs() > 0.0) {
+        Ok(spacing)
+    } else {
+        Err(layout(format!("the spacings along its indices are {spacing:?}")))
+    }
+}
+
+/// Keeps one region of the mask: voxels joined by faces. Regions are counted along the array's thickness index.
+fn select_region(mask: &mut [bool], dims: [usize; 3], options: &ImportOptions) -> Result<(), ImportError> {
+    let strides = [1, dims[0], dims[0] * dims[1]];
+    let mut label = vec![0u32; mask.len()];
+    // Size and mean position along the thickness index, per region.
+    let mut regions: Vec<(usize, f64)> = Vec::new();
+    let along = options.axes.iter().position(|a| a.axis == 1).unwrap_or(1);
+    let mut stack = Vec::new();
+    for start in 0..mask.len() {
+        if !mask[start] || label[start] != 0 {
+            continue;
+        }
+        let name = regions.len() as u32 + 1;
+        let (mut size, mut sum) = (0, 0.0);
+        label[start] = name;
+        stack.push(start);
+        while let Some(v) = stack.pop() {
+            size += 1;
+            sum += (v / strides[along] % dims[along]) as f64;
+            for i in 0..3 {
+                let at = v / strides[i] % dims[i];
+                let below = (at > 0).then(|| v - strides[i]);
+                let above = (at + 1 < dims[i]).then(|| v + strides[i]);
+                for to in below.into_iter().chain(above) {
+                    if mask[to] && label[to] == 0 {
+                        label[to] = name;
+                        stack.push(to);
+                    }
+                }
+            }
+        }
+        regions.push((size, sum / f64::from(u32::try_from(size).unwrap_or(u32::MAX))));
+    }
+    let largest = regions.iter().map(|r| r.0).max().ok_or(ImportError::EmptyMask)?;
+    let mut large: Vec<usize> = (0..regions.len()).filter(|&r| regions[r].0 as f64 >= SPECK * largest as f64).collect();
+    large.sort_by(|&a, &b| regions[a].1.total_cmp(&regions[b].1));
+    let chosen = match options.region {
+        None if large.len() == 1 => large[0],
+        Some(n) if (1..=large.len()).contains(&n) => large[n - 1],
+        asked => return Err(ImportError::Regions { num_regions: large.len(), asked }),
+    };
+    for (m, l) in mask.iter_mut().zip(&label) {
+        *m = *l == chosen as u32 + 1;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+#[path = "lab_tests.rs"]
+mod tests;

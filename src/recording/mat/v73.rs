@@ -1,0 +1,134 @@
+//! MAT-files of version 7.3: HDF5, read with the `hdf5-pure` crate. Cells are arrays of references, complex numbers are
+//! compounds, sizes stand in reverse.
+
+use super::{MAX_DEPTH, MatError, MatValue};
+use hdf5_pure::{AttrValue, DType, Dataset, File, Group, Object};
+use std::collections::HashMap;
+use std::path::Path;
+
+pub(super) fn read(path: &Path, max_values: u64) -> Result<Vec<(String, MatValue)>, MatError> {
+    let file = File::open_streaming(path).map_err(failed)?;
+    let mut budget = Budget { left: max_values, limit: max_values };
+    fields(&file.root(), &mut budget, 0)
+}
+
+struct Budget {
+    left: u64,
+    limit: u64,
+}
+
+impl Budget {
+    fn take(&mut self, values: u64) -> Result<(), MatError> {
+        if values > self.left {
+            return Err(MatError::TooLarge { what: "numbers in variables", found: values, limit: self.limit });
+        }
+        self.left -= values;
+        Ok(())
+    }
+}
+
+fn failed(error: impl std::fmt::Display) -> MatError {
+    MatError::Damaged { what: error.to_string() }
+}
+
+fn fields(group: &Group, budget: &mut Budget, depth: usize) -> Result<Vec<(String, MatValue)>, MatError> {
+    if depth > MAX_DEPTH {
+        let (found, limit) = (depth as u64, MAX_DEPTH as u64);
+        return Err(MatError::TooLarge { what: "groups within groups", found, limit });
+    }
+    let mut found = Vec::new();
+    for name in group.datasets().map_err(failed)? {
+        if !name.starts_with('#') {
+            let dataset = group.dataset(&name).map_err(failed)?;
+            found.push((name, value(&dataset, budget, depth)?));
+        }
+    }
+    for name in group.groups().map_err(failed)? {
+        if !name.starts_with('#') {
+            let inner = group.group(&name).map_err(failed)?;
+            found.push((name, MatValue::Struct(fields(&inner, budget, depth + 1)?)));
+        }
+    }
+    found.sort_by(|a, b| a.0.cmp(&b.0));
+    Ok(found)
+}
+
+fn text_attribute(attributes: &HashMap<String, AttrValue>, name: &str) -> Option<String> {
+    match attributes.get(name)? {
+        AttrValue::String(s) | AttrValue::AsciiString(s) => Some(s.trim_end_matches('\0').to_string()),
+        other => {
+            let text = format!("{other:?}");
+            text.contains("char").then(|| "char".to_string())
+        }
+    }
+}
+
+fn value(dataset: &Dataset, budget: &mut Budget, depth: usize) -> Result<MatValue, MatError> {
+    if depth > MAX_DEPTH {
+        let (found, limit) = (depth as u64, MAX_DEPTH as u64);
+        return Err(MatError::TooLarge { what: "cells within cells", found, limit });
+    }
+    let shape = dataset.shape().map_err(failed)?;
+    let count = shape.iter().try_fold(1u64, |p, &d| p.checked_mul(d)).ok_or_else(|| failed("sizes overflow"))?;
+    budget.take(count)?;
+    let attributes = dataset.attrs().map_err(failed)?;
+    let dims: Vec<usize> = shape.iter().rev().map(|&d| d as usize).collect();
+    // An empty array is stored as its sizes.
+    if attributes.contains_key("MATLAB_empty") {
+        return Ok(MatValue::Numeric { dims: vec![0, 0], values: vec![], imaginary: None });
+    }
+    match dataset.dtype().map_err(failed)? {
+        DType::ObjectReference => {
+            let mut members = Vec::new();
+            for object in dataset.dereference().map_err(failed)? {
+                members.push(match object {
+                    Object::Dataset(inner) => value(&inner, budget, depth + 1)?,
+                    Object::Group(inner) => MatValue::Struct(fields(&inner, budget, depth + 1)?),
+                    _ => MatValue::Other("object"),
+                });
+            }
+            Ok(MatValue::Cell { dims, members })
+        }
+        DType::Compound(parts) if parts.len() == 2 => {
+            budget.take(count)?;
+            let raw = dataset.read_raw().map_err(failed)?;
+            // MATLAB runs on little-endian machines alone; a complex number is two of its reals without a gap.
+            let numbers: Vec<f64> = match (&parts[0].1, &parts[1].1) {
+                (DType::F64, DType::F64) => raw
+                    .chunks_exact(8)
+                    .map(|b| f64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]))
+                    .collect(),
+                (DType::F32, DType::F32) => {
+                    raw.chunks_exact(4).map(|b| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]))).collect()
+                }
+                _ => return Ok(MatValue::Other("a compound that is no complex number")),
+            };
+            if numbers.len() as u64 != 2 * count {
+                return Err(failed(format!("{} reals for {count} complex numbers", numbers.len())));
+            }
+            let values = numbers.iter().step_by(2).copied().collect();
+            let imaginary = numbers.iter().skip(1).step_by(2).copied().collect();
+            Ok(MatValue::Numeric { dims, values, imaginary: Some(imaginary) })
+        }
+        DType::F32
+        | DType::F64
+        | DType::I8
+        | DType::I16
+        | DType::I32
+        | DType::I64
+        | DType::U8
+        | DType::U16
+        | DType::U32
+        | DType::U64 => {
+            let values = dataset.read_f64().map_err(failed)?;
+            if values.len() as u64 != count {
+                return Err(failed(format!("{} numbers, the sizes ask for {count}", values.len())));
+            }
+            if text_attribute(&attributes, "MATLAB_class").as_deref() == Some("char") {
+                return Ok(MatValue::Text(values.iter().filter_map(|c| char::from_u32(*c as u32)).collect()));
+            }
+            Ok(MatValue::Numeric { dims, values, imaginary: None })
+        }
+        _ => Ok(MatValue::Other("a type that is not read")),
+    }
+}

@@ -1,0 +1,197 @@
+//! Point clouds as CSV: `x,y,z,ux,uy,uz` with optional `w` (weight) and `sd`, in the specimen's frame; one file per step.
+
+use super::import::{ImportError, ImportOptions, finish};
+use super::{RecordedStep, Recording};
+use crate::specimen::Specimen;
+use crate::voxel::VoxelGrid;
+use std::path::Path;
+
+/// Positions of one grid plane agree to this part of the spacing.
+const PLANE_TOLERANCE: f64 = 0.02;
+
+/// A grid with more voxels per point than this is none: scattered points have planes of their own.
+const SPARSEST: f64 = 20.0;
+
+/// A point with its displacement; lengths in the file's unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DisplacementPoint {
+    /// Reference position.
+    pub position: [f64; 3],
+    /// Displacement; NaN where missing.
+    pub displacement: [f64; 3],
+    /// Weight in a voxel's mean, one where the file has none.
+    pub weight: f64,
+    /// Standard deviation of each component, where the file has one.
+    pub sd: Option<f64>,
+}
+
+/// Reads a table with a header. Column names may carry a unit (`x_mm`, `ux_mm`); their order is free.
+///
+/// # Errors
+/// [`ImportError::Table`].
+pub fn read_points(text: &str, path: &Path, max_points: usize) -> Result<Vec<DisplacementPoint>, ImportError> {
+    let fail = |line: usize, message: String| ImportError::Table { path: path.into(), line, message };
+    let mut lines = text.lines().enumerate();
+    let header = lines.next().map_or("", |(_, l)| l.trim().trim_start_matches('\u{feff}'));
+    let names: Vec<String> = header
+        .split(',')
+        .map(|n| {
+            let name = n.trim().to_lowercase();
+            name.trim_end_matches("_mm").trim_end_matches("_um").trim_end_matches("_m").to_string()
+        })
+        .collect();
+    let column = |name: &str| names.iter().position(|n| n == name);
+    let required = |name: &str| {
+        column(name).ok_or_else(|| fail(1, format!("there is no column {name}; x,y,z,ux,uy,uz are needed")))
+    };
+    let mut columns = [0; 6];
+    for (slot, name) in columns.iter_mut().zip(["x", "y", "z", "ux", "uy", "uz"]) {
+        *slot = required(name)?;
+    }
+    if let Some(unknown) = names.iter().find(|n| !["x", "y", "z", "ux", "uy", "uz", "w", "sd"].contains(&n.as_str())) {
+        return Err(fail(1, format!("column '{unknown}' is not one of x,y,z,ux,uy,uz,w,sd")));
+    }
+    let (weight, sd) = (column("w"), column("sd"));
+    let mut points = Vec::new();
+    for (n, line) in lines {
+        if line.trim().is_empty() {
+            continue;
+        }
+        if points.len() == max_points {
+            return Err(fail(n + 1, format!("more than {max_points} points")));
+        }
+        let fields: Vec<&str> = line.split(',').map(str::trim).collect();
+        let number = |column: usize| -> Result<f64, ImportError> {
+            match fields.get(column) {
+                Some(&("" | "nan" | "NaN")) => Ok(f64::NAN),
+                Some(text) => text.parse().map_err(|_| fail(n + 1, format!("'{text}' is not a number"))),
+                None => Err(fail(n + 1, format!("{} fields where {} are needed", fields.len(), names.len()))),
+            }
+        };
+        let mut values = [0.0; 6];
+        for (value, &column) in values.iter_mut().zip(&columns) {
+            *value = number(column)?;
+        }
+        let [x, y, z, ux, uy, uz] = values;
+        if ![x, y, z].iter().all(|p| p.is_finite()) {
+            return Err(fail(n + 1, "a position is not finite".into()));
+        }
+        let weight = weight.map_or(Ok(1.0), number)?;
+        if !(weight >= 0.0 && weight.is_finite()) {
+            return Err(fail(n + 1, format!("weight {weight} is not a finite number from zero up")));
+        }
+        let sd = sd.map(number).transpose()?;
+        points.push(DisplacementPoint { position: [x, y, z], displacement: [ux, uy, uz], weight, sd });
+    }
+    if points.is_empty() {
+        return Err(fail(1, "there is no point".into()));
+    }
+    Ok(points)
+}
+
+/// A recording from one point cloud per step. Points on a regular grid become its voxels; others are averaged, by weight, in
+/// voxels of `voxel_mm` on the grid that covers the specimen.
+///
+/// # Errors
+/// [`ImportError`].
+pub fn recording_from_points(
+    steps: &[Vec<DisplacementPoint>],
+    specimen: &Specimen,
+    voxel_mm: Option<[f64; 3]>,
+    options: &ImportOptions,
+) -> Result<Recording, ImportError> {
+    let drives = match options.drive_mm.len() {
+        n if n == steps.len() => &options.drive_mm,
+        0 if specimen.drive_mm.len() == steps.len() => &specimen.drive_mm,
+        found => return Err(ImportError::Drives { found, num_steps: steps.len() }),
+    };
+    let all = || steps.iter().flatten().map(|p| p.position.map(|x| x * options.unit_mm));
+    let grid = match voxel_mm {
+        Some(voxel) => VoxelGrid::covering(specimen, voxel)?,
+        None => regular_grid(all)?,
+    };
+    let index = |position: [f64; 3]| -> Option<usize> {
+        let mut n = [0; 3];
+        for a in 0..3 {
+            let at = ((position[a] - grid.origin_mm[a]) / grid.voxel_mm[a]).round();
+            if !(at >= 0.0 && at < grid.shape[a] as f64) {
+                return None;
+            }
+            n[a] = at as usize;
+        }
+        Some(grid.index(n))
+    };
+    let mut mask = vec![false; grid.num_voxels()];
+    let mut recorded = Vec::new();
+    let (mut num_outside, mut variance, mut num_sd) = (0usize, 0.0, 0.0);
+    for (points, &drive_mm) in steps.iter().zip(drives) {
+        let mut sums = vec![[0.0; 4]; grid.num_voxels()];
+        for p in points {
+            let Some(v) = index(p.position.map(|x| x * options.unit_mm)) else {
+                num_outside += 1;
+                continue;
+            };
+            mask[v] = true;
+            if p.displacement.iter().all(|u| u.is_finite()) {
+                for a in 0..3 {
+                    sums[v][a] += p.weight * p.displacement[a] * options.unit_mm;
+                }
+                sums[v][3] += p.weight;
+            }
+            if let Some(sd) = p.sd.filter(|sd| sd.is_finite()) {
+                variance += (sd * options.unit_mm).powi(2);
+                num_sd += 1.0;
+            }
+        }
+        let mean = |s: &[f64; 4]| if s[3] > 0.0 { [s[0] / s[3], s[1] / s[3], s[2] / s[3]] } else { [f64::NAN; 3] };
+        recorded.push(RecordedStep {
+            drive_mm,
+            force_n: None,
+            force_sd_n: None,
+            window_s: None,
+            displacement: sums.iter().map(mean).collect(),
+        });
+    }
+    // A standard deviation of single points is that of a voxel only where each voxel is one point.
+    let from_file = (num_sd > 0.0 && voxel_mm.is_none()).then(|| [f64::sqrt(variance / num_sd); 3]);
+    let options = ImportOptions { noise_sd_mm: options.noise_sd_mm.or(from_file), ..options.clone() };
+    let notes = serde_json::json!({ "imported": { "points_outside_the_grid": num_outside } });
+    finish(specimen, grid, mask, recorded, &options, notes)
+}
+
+/// The grid on which all points lie.
+fn regular_grid<I: Iterator<Item = [f64; 3]>>(points: impl Fn() -> I) -> Result<VoxelGrid, ImportError> {
+    let fail = |message: String| ImportError::NoGrid { message };
+    let (mut origin, mut voxel, mut shape) = ([0.0; 3], [1.0; 3], [1; 3]);
+    for a in 0..3 {
+        let name = ["x", "y", "z"][a];
+        let mut values: Vec<f64> = points().map(|p| p[a]).collect();
+        values.sort_by(f64::total_cmp);
+        let (low, high) = (values[0], values[values.len() - 1]);
+        let gaps = values.windows(2).map(|w| w[1] - w[0]);
+        let largest = gaps.clone().fold(0.0, f64::max);
+        if !(largest > 0.0) {
+            return Err(fail(format!("all points have {name} = {low}")));
+        }
+        // The smallest gap that is not rounding is the spacing; gaps within a plane are below a part of it.
+        let spacing = gaps.filter(|g| *g > PLANE_TOLERANCE * largest).fold(f64::INFINITY, f64::min);
+        let count = ((high - low) / spacing).round();
+        let spacing = (high - low) / count;
+        for value in &values {
+            let at = (value - low) / spacing;
+            if (at - at.round()).abs() > 5.0 * PLANE_TOLERANCE {
+                return Err(fail(format!("{name} = {value} mm lies between planes {spacing} mm apart")));
+            }
+        }
+        (origin[a], voxel[a], shape[a]) = (low, spacing, count as usize + 1);
+    }
+    let num_points = points().count();
+    if shape.iter().map(|&n| n as f64).product::<f64>() > SPARSEST * num_points as f64 {
+        return Err(fail(format!("{shape:?} planes for {num_points} points")));
+    }
+    Ok(VoxelGrid::new(origin, voxel, shape)?)
+}
+
+#[cfg(test)]
+#[path = "points_tests.rs"]
+mod tests;

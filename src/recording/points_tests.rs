@@ -1,0 +1,86 @@
+use super::*;
+
+fn specimen() -> Specimen {
+    let specimen = Specimen::from_json(include_str!("../../geometries/two-hole-shear.json")).unwrap();
+    Specimen { holes: vec![], drive_mm: vec![5.0], ..specimen }
+}
+
+fn path() -> &'static Path {
+    Path::new("points.csv")
+}
+
+/// Points of a grid in any order become its voxels; missing ones leave gaps.
+#[test]
+fn points_on_a_grid_become_voxels() {
+    let mut lines = Vec::new();
+    for k in 0..4 {
+        for j in 0..8 {
+            for i in 0..10 {
+                if (i, j, k) == (3, 4, 2) {
+                    continue;
+                }
+                let (x, y, z) =
+                    (-11.43 + 2.54 * f64::from(i), -2.8 + 0.8 * f64::from(j), -7.1625 + 4.775 * f64::from(k));
+                lines.push(format!("{x},{y},{z},{},0.5,0.25,0.02", 0.7 * y));
+            }
+        }
+    }
+    lines.rotate_left(117);
+    let text = format!("x_mm,y_mm,z_mm,ux_mm,uy_mm,uz_mm,sd\n{}\n", lines.join("\n"));
+    let points = read_points(&text, path(), 1000).unwrap();
+    assert_eq!(points.len(), 319);
+    let r = recording_from_points(&[points], &specimen(), None, &ImportOptions::default()).unwrap();
+    assert_eq!(r.grid.shape, [10, 8, 4]);
+    assert_eq!(r.num_voxels(), 319);
+    // A root mean square of 319 equal numbers.
+    assert!(r.noise_sd_mm.unwrap().iter().all(|sd| (sd - 0.02).abs() < 1e-14));
+    for v in (0..320).filter(|&v| r.mask[v]) {
+        let x = r.grid.center_mm(v);
+        let u = r.steps[0].displacement[v];
+        assert!((u[0] - 0.7 * x[1]).abs() < 1e-12 && u[1] == 0.5 && u[2] == 0.25);
+    }
+}
+
+/// Scattered points are averaged by weight in the voxels asked for, and refused without.
+#[test]
+fn scattered_points_are_averaged() {
+    let mut text = String::from("x,y,z,ux,uy,uz,w\n");
+    for n in 0..4000u32 {
+        let part = |p: u32| (f64::from(n * p % 3989) / 3989.0) - 0.5;
+        let (x, y, z) = (25.4 * part(7), 6.4 * part(61), 19.1 * part(389));
+        text +=
+            &format!("{x},{y},{z},{},0,0,{}\n", if n % 2 == 0 { 1.0 } else { 4.0 }, if n % 2 == 0 { 2.0 } else { 1.0 });
+    }
+    let points = read_points(&text, path(), 10_000).unwrap();
+    let read =
+        |voxel| recording_from_points(std::slice::from_ref(&points), &specimen(), voxel, &ImportOptions::default());
+    assert!(matches!(read(None).unwrap_err(), ImportError::NoGrid { .. }));
+    let r = read(Some([6.35, 3.2, 9.55])).unwrap();
+    assert_eq!(r.num_voxels(), 16);
+    // Half of the points carry 1 with weight two, half 4 with weight one: 2; some 250 points per voxel, spread 1.4: 0.09.
+    assert!(r.steps[0].displacement.iter().all(|u| (u[0] - 2.0).abs() < 0.4));
+}
+
+#[test]
+fn poor_tables_are_typed_errors() {
+    for text in [
+        "",
+        "x,y,z,ux,uy\n",
+        "x,y,z,ux,uy,uz,colour\n1,2,3,4,5,6,7\n",
+        "x,y,z,ux,uy,uz\n",
+        "x,y,z,ux,uy,uz\n1,2,3,4,5\n",
+        "x,y,z,ux,uy,uz\n1,2,3,4,5,six\n",
+        "x,y,z,ux,uy,uz\nnan,2,3,4,5,6\n",
+        "x,y,z,ux,uy,uz,w\n1,2,3,4,5,6,-1\n",
+    ] {
+        assert!(matches!(read_points(text, path(), 10), Err(ImportError::Table { .. })), "{text}");
+    }
+    let many = "x,y,z,ux,uy,uz\n".to_string() + &"1,2,3,4,5,6\n".repeat(11);
+    assert!(matches!(read_points(&many, path(), 10), Err(ImportError::Table { line: 12, .. })));
+    let one = read_points("x,y,z,ux,uy,uz\n1,2,3,4,5,6\n", path(), 10).unwrap();
+    let read = |steps: &[Vec<DisplacementPoint>]| {
+        recording_from_points(steps, &specimen(), None, &ImportOptions::default()).unwrap_err()
+    };
+    assert!(matches!(read(std::slice::from_ref(&one)), ImportError::NoGrid { .. }));
+    assert!(matches!(read(&[one.clone(), one]), ImportError::Drives { .. }));
+}
