@@ -12,6 +12,7 @@ mod load_curve;
 mod load_fit;
 mod model;
 mod prony;
+mod search;
 mod starts;
 mod summary;
 mod verdict;
