@@ -7,6 +7,7 @@ mod curve_input;
 mod curve_tables;
 mod curves;
 mod design;
+mod diagnose;
 mod error;
 mod evaluate;
 mod input;
@@ -42,6 +43,8 @@ enum Command {
     Evaluate(evaluate::EvaluateArguments),
     /// The best specimen under the limits of a study, with the evidence.
     Design(design::DesignArguments),
+    /// Where a recording and its model differ, and what physics was left out.
+    Diagnose(diagnose::DiagnoseArguments),
     /// The traditional route: one uniaxial curve, of a strip or a dumb-bell, fitted with Ogden terms.
     Uniaxial(uniaxial::UniaxialArguments),
     /// Ogden terms fitted to curves of several homogeneous tests together.
@@ -97,6 +100,7 @@ pub fn run() -> ExitCode {
         Command::Solve(a) => solve::run(a),
         Command::Evaluate(a) => evaluate::run(a),
         Command::Design(a) => design::run(a),
+        Command::Diagnose(a) => diagnose::run(a),
         Command::Uniaxial(a) => uniaxial::run(a),
         Command::Curves(a) => curves::run(a),
     };

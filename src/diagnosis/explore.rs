@@ -80,7 +80,10 @@ fn explore() {
                 s[0].values[n] += t * p.scale;
                 scene_of(&s)
             };
-            directions.push(lab.derivative(&best.material, &best.prediction, &path, 0.02).unwrap());
+            let path: &dyn Fn(f64) -> super::scene::Scene = &path;
+            directions.extend(
+                lab.derivatives(&best.material, &Default::default(), &best.prediction, false, &[path], 0.02).unwrap(),
+            );
         }
         let s = test.test(&directions);
         rows.push((

@@ -195,6 +195,10 @@ pub fn inclusion_map(
 
 /// Smallest number of connected voxels that make a jump.
 const MIN_JUMP_VOXELS: usize = 12;
+/// Smallest jump, in standard deviations of the noise: a smaller one cannot be told from its edge.
+const MIN_JUMP_SD: f64 = 7.0;
+/// Largest mean residual beside a jump, relative to the jump.
+const MAX_BESIDE: f64 = 0.25;
 /// A voxel belongs to a jump where its residual exceeds this many standard deviations of the noise.
 const JUMP_SD: f64 = 5.0;
 
@@ -227,6 +231,7 @@ pub fn jumps(observed: &Observed, residual: &Trace) -> Vec<Wrap> {
                 }
                 is_seen[start as usize] = true;
                 let mut members = vec![start];
+                let mut outside = Vec::new();
                 let mut next = 0;
                 while next < members.len() {
                     let voxel = mask.voxels[members[next] as usize] as usize;
@@ -239,7 +244,12 @@ pub fn jumps(observed: &Observed, residual: &Trace) -> Vec<Wrap> {
                                 continue;
                             }
                             let neighbour = place[if forward { voxel + strides[axis] } else { voxel - strides[axis] }];
-                            if neighbour != u32::MAX && !is_seen[neighbour as usize] && sign(neighbour) == s {
+                            if neighbour == u32::MAX {
+                                continue;
+                            }
+                            if sign(neighbour) != s {
+                                outside.push(field[neighbour as usize][component]);
+                            } else if !is_seen[neighbour as usize] {
                                 is_seen[neighbour as usize] = true;
                                 members.push(neighbour);
                             }
@@ -253,8 +263,12 @@ pub fn jumps(observed: &Observed, residual: &Trace) -> Vec<Wrap> {
                 values.sort_by(f64::total_cmp);
                 let size_mm = values[values.len() / 2];
                 let spread = (values.iter().map(|x| (x - size_mm).powi(2)).sum::<f64>() / values.len() as f64).sqrt();
-                // A jump is one number: what varies inside is noise.
-                if spread > 1.6 * observed.noise_sd_mm[component] {
+                // A jump is one number, what varies inside is noise; and it ends at once: beside it nothing is left. What fades
+                // out over several voxels is no jump.
+                let noise = observed.noise_sd_mm[component];
+                let beside = outside.iter().sum::<f64>() / outside.len().max(1) as f64;
+                let is_sharp = !outside.is_empty() && beside.abs() < MAX_BESIDE * size_mm.abs();
+                if spread > 1.6 * noise || size_mm.abs() < MIN_JUMP_SD * noise || !is_sharp {
                     continue;
                 }
                 let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
