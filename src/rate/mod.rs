@@ -24,7 +24,7 @@ pub use analysis::{
 };
 pub use force_history::{
     FittedRelaxation, ForceHistory, ForceHistoryError, ForceHistoryFit, ForceHistoryOptions, ForceHistorySequence,
-    fit_force_history,
+    ShearLayer, fit_force_history,
 };
 pub use load_curve::{LoadCurve, LoadCurveError};
 pub use prony::{HistoryError, PronyTerm, RelaxedHistory, relax};
