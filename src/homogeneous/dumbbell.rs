@@ -20,8 +20,6 @@ const BULK_RATIO: f64 = 1000.0;
 const HALF_GAUGE_MM: f64 = 3.0;
 /// Displacements at which the finite elements are solved.
 const NUM_DRIVES: usize = 8;
-/// Rounds after which the stretches move only part of the way: two fits of different numbers of terms could take turns.
-const FREE_ROUNDS: usize = 4;
 
 /// Settings of [`fit_dumbbell`].
 #[derive(Clone, Debug)]
@@ -190,9 +188,6 @@ pub fn fit_dumbbell(
                 bulk_kpa,
             });
         }
-        let part = if round < FREE_ROUNDS { 1.0 } else { 0.5 };
-        for (s, n) in stretch.iter_mut().zip(&next) {
-            *s += part * (n - *s);
-        }
+        stretch = next;
     }
 }
