@@ -69,7 +69,7 @@ pub(super) fn run(a: &UniaxialArguments) -> Result<(), CliError> {
                     if neo_hookean { ", neo-Hookean term held" } else { "" }
                 );
             }
-            let options = DumbbellOptions { mesh, fit: a.fit.options(neo_hookean), max_rounds: 12, tolerance: 1e-4 };
+            let options = DumbbellOptions { mesh, fit: a.fit.options(neo_hookean), max_rounds: 16, tolerance: 1e-3 };
             let found = fit_dumbbell(&specimen, &csv.drive, &csv.stress, &options, &interrupt::is_requested)
                 .map_err(|e| dumbbell_error(&a.curve, e))?;
             sequences.push(found.sequence.clone());

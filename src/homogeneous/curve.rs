@@ -106,7 +106,7 @@ impl Curve {
                 }
             };
             for value in numbers {
-                if !(value >= 1.0 / LARGEST_STRETCH && value <= LARGEST_STRETCH) {
+                if !(1.0 / LARGEST_STRETCH..=LARGEST_STRETCH).contains(&value) {
                     return Err(CurveError::Value { name: name(), index, what: "stretch", value, requirement });
                 }
             }

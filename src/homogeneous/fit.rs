@@ -187,8 +187,8 @@ fn check(curves: &[Curve], options: &CurveFitOptions, num_terms: usize) -> Resul
     let gap = options.min_alpha_gap;
     setting("min_alpha_gap", gap, gap > 0.0 && gap <= 10.0, "it must be above 0 and at most 10")?;
     let [low, high] = options.alpha_range;
-    setting("alpha_range", low, low >= -40.0 && low < 2.0, "its lower end lies from -40 to 2")?;
-    setting("alpha_range", high, high <= 40.0 && high > 2.0, "its upper end lies from 2 to 40")?;
+    setting("alpha_range", low, (-40.0..2.0).contains(&low), "its lower end lies from -40 to 2")?;
+    setting("alpha_range", high, high > 2.0 && high <= 40.0, "its upper end lies from 2 to 40")?;
     if let Some(bulk) = options.bulk_kpa {
         setting("bulk_kpa", bulk, bulk > 0.0 && bulk.is_finite(), "it must be positive")?;
     }

@@ -13,12 +13,12 @@ pub struct Limit {
 }
 
 impl Limit {
-    /// x[index] ≤ bound.
+    /// `x[index]` ≤ bound.
     pub fn at_most(index: usize, bound: f64) -> Limit {
         Limit { coefficients: vec![(index, 1.0)], bound }
     }
 
-    /// x[index] ≥ bound.
+    /// `x[index]` ≥ bound.
     pub fn at_least(index: usize, bound: f64) -> Limit {
         Limit { coefficients: vec![(index, -1.0)], bound: -bound }
     }
@@ -68,7 +68,7 @@ pub struct Minimum {
 /// What a limit may be missed by and still count as reached.
 const REACHED: f64 = 1e-9;
 
-/// Minimises Σ r(x)² from `start`, which must keep the limits; no step changes x[i] by more than `largest_step[i]`.
+/// Minimises Σ r(x)² from `start`, which must keep the limits; no step changes `x[i]` by more than `largest_step[i]`.
 /// `evaluate` returns `None` where the model has no value; such trials are shortened. `None` if the start has no value.
 pub fn minimise(
     start: &[f64],

@@ -26,10 +26,9 @@ impl Channels {
     /// The nominal stress as the only channel (Fung's quasi-linear model).
     pub(crate) fn nominal(mut self) -> Channels {
         let [a, b] = self.weight;
-        let sum = |s: [f64; 2]| [a * s[0] + b * s[1], 0.0];
-        self.stress = sum(self.stress);
+        self.stress = [a * self.stress[0] + b * self.stress[1], 0.0];
         for term in &mut self.by_term {
-            *term = term.map(sum);
+            *term = term.map(|s| [a * s[0] + b * s[1], 0.0]);
         }
         self.weight = [1.0, 0.0];
         self
@@ -55,6 +54,9 @@ fn energy_sum(alpha: f64, e: [f64; 3]) -> (f64, f64) {
     })
 }
 
+/// From Kirchhoff stresses to the two channels.
+type Pick = Box<dyn Fn([f64; 3]) -> [f64; 2]>;
+
 /// The channels of an incompressible state.
 pub(crate) fn channels(terms: &[ShearTerm], deformation: &Deformation) -> Channels {
     let e = deformation.log_stretches();
@@ -74,7 +76,7 @@ pub(crate) fn channels(terms: &[ShearTerm], deformation: &Deformation) -> Channe
         }
         (value, slope)
     };
-    let (weight, pick): ([f64; 2], Box<dyn Fn([f64; 3]) -> [f64; 2]>) = match *deformation {
+    let (weight, pick): ([f64; 2], Pick) = match *deformation {
         Deformation::SimpleShear { shear } => {
             // Material axis of the first stretch λ: (1, λ)/√(1 + λ²).
             let l = e[0].exp();

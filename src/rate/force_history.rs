@@ -1,12 +1,14 @@
 //! Relaxation found in a force history of one specimen whose elastic force over drive is known from a table (finite
 //! elements, say): F(t) = s (F∞(d(t)) + Σ gᵢ ∫ e^{−(t−s)/τᵢ} dF∞) + offset.
 
+use super::channels::channels;
 use super::prony::{HistoryError, PronyTerm, check_times, memory};
 use super::starts::{PronyStart, prony_starts};
-use crate::homogeneous::{ForceTable, TableError};
 use crate::homogeneous::{
-    Interval, LeastSquaresOptions, Limit, Selection, compare, covariance, independent_count, minimise, t_quantile,
+    Deformation, Interval, LeastSquaresOptions, Limit, Selection, ShearTerm, compare, covariance, independent_count,
+    minimise, t_quantile,
 };
+use crate::homogeneous::{ForceTable, TableError};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -28,8 +30,19 @@ pub struct ForceHistory {
     pub force_sd_n: Option<f64>,
 }
 
+/// A layer sheared between plates, for what relaxes in it. Simo's model convolves the isochoric second Piola–Kirchhoff
+/// stress, not the force; from an amount of shear of one half on the two differ. The force's memory is then
+/// s (∫ dS_xy + γ ∫ dS_yy) with γ = drive / gap, S of the homogeneous layer and s = F∞ / P_xy.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShearLayer {
+    /// Distance of the plates, mm.
+    pub gap_mm: f64,
+    /// The material's terms.
+    pub terms: Vec<ShearTerm>,
+}
+
 /// Settings of [`fit_force_history`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ForceHistoryOptions {
     /// Fits with 0 to this many relaxations, at most 4.
     pub max_terms: usize,
@@ -37,11 +50,16 @@ pub struct ForceHistoryOptions {
     pub is_scale_free: bool,
     /// Whether a constant offset of the load cell is free or 0.
     pub is_offset_free: bool,
+    /// Relaxation by Simo's model of a sheared layer; without it the force itself relaxes.
+    pub layer: Option<ShearLayer>,
+    /// Samples at smaller |drive| are left out of the fit (their history counts), mm. In a specimen with holes the state near
+    /// zero drive after a large one is not homogeneous, and the force there is all memory.
+    pub min_drive_mm: f64,
 }
 
 impl Default for ForceHistoryOptions {
     fn default() -> Self {
-        ForceHistoryOptions { max_terms: 3, is_scale_free: true, is_offset_free: true }
+        ForceHistoryOptions { max_terms: 3, is_scale_free: true, is_offset_free: true, layer: None, min_drive_mm: 0.0 }
     }
 }
 
@@ -129,24 +147,93 @@ impl ForceHistorySequence {
     }
 }
 
-/// Residual (model − data) in N and Jacobian with respect to (s, offset, g₁, ln τ₁, …).
-fn evaluate(time_s: &[f64], elastic: &[f64], force: &[f64], x: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
-    let (n, num_terms) = (time_s.len(), (x.len() - 2) / 2);
-    let mut jacobian = DMatrix::zeros(n, x.len());
-    let mut relaxed = DVector::from_row_slice(elastic);
-    for k in 0..num_terms {
-        let (g, tau) = (x[2 + 2 * k], x[3 + 2 * k].exp());
-        let (values, slopes) = memory(time_s, elastic, tau);
-        for i in 0..n {
-            relaxed[i] += g * values[i];
-            jacobian[(i, 2 + 2 * k)] = x[0] * values[i];
-            jacobian[(i, 3 + 2 * k)] = x[0] * g * tau * slopes[i];
-        }
+/// A history ready to be fitted.
+struct Elastic<'a> {
+    history: &'a ForceHistory,
+    /// F∞, N.
+    force: Vec<f64>,
+    /// What relaxes, with its weight in the force: memory = Σ weight · memory of values.
+    channels: Vec<(Vec<f64>, Vec<f64>)>,
+    /// 1 for samples that are fitted, else 0.
+    used: Vec<f64>,
+}
+
+impl<'a> Elastic<'a> {
+    fn new(
+        history: &'a ForceHistory,
+        table: &ForceTable,
+        options: &ForceHistoryOptions,
+    ) -> Result<Elastic<'a>, ForceHistoryError> {
+        let force = table.forces(&history.drive_mm)?;
+        let channels = match &options.layer {
+            None => vec![(vec![1.0; force.len()], force.clone())],
+            Some(layer) => {
+                let mut lists = vec![(Vec::new(), Vec::new()), (Vec::new(), Vec::new())];
+                for (&drive, f) in history.drive_mm.iter().zip(&force) {
+                    let shear = drive / layer.gap_mm;
+                    let c = channels(&layer.terms, &Deformation::SimpleShear { shear });
+                    let stress = c.stress[0] + shear * c.stress[1];
+                    // At rest both vanish; their slopes' ratio is the limit.
+                    let modulus = 0.5 * layer.terms.iter().map(|t| t.modulus_kpa).sum::<f64>();
+                    let scale = if shear.abs() > 1e-4 { f / stress } else { table.at(0.0)?.1 * layer.gap_mm / modulus };
+                    for k in 0..2 {
+                        lists[k].0.push(scale * c.weight[k]);
+                        lists[k].1.push(c.stress[k]);
+                    }
+                }
+                lists
+            }
+        };
+        let used = history.drive_mm.iter().map(|d| f64::from(u8::from(d.abs() >= options.min_drive_mm))).collect();
+        Ok(Elastic { history, force, channels, used })
     }
-    jacobian.column_mut(0).copy_from(&relaxed);
-    jacobian.column_mut(1).fill(1.0);
-    let residual = DVector::from_fn(n, |i, _| x[0] * relaxed[i] + x[1] - force[i]);
-    (residual, jacobian)
+
+    /// The force's memory for one τ, and its derivative with respect to τ.
+    fn memory(&self, tau_s: f64) -> (Vec<f64>, Vec<f64>) {
+        let n = self.force.len();
+        let (mut values, mut slopes) = (vec![0.0; n], vec![0.0; n]);
+        for (weight, list) in &self.channels {
+            let (v, s) = memory(&self.history.time_s, list, tau_s);
+            for i in 0..n {
+                values[i] += weight[i] * v[i];
+                slopes[i] += weight[i] * s[i];
+            }
+        }
+        (values, slopes)
+    }
+
+    /// The model's force at every sample, N.
+    fn model(&self, x: &[f64]) -> Vec<f64> {
+        let mut relaxed = self.force.clone();
+        for term in x[2..].chunks(2) {
+            for (value, m) in relaxed.iter_mut().zip(self.memory(term[1].exp()).0) {
+                *value += term[0] * m;
+            }
+        }
+        relaxed.iter().map(|r| x[0] * r + x[1]).collect()
+    }
+
+    /// Residual (model − data) in N and Jacobian with respect to (s, offset, g₁, ln τ₁, …); zero at samples left out.
+    fn evaluate(&self, x: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
+        let (n, num_terms) = (self.force.len(), (x.len() - 2) / 2);
+        let mut jacobian = DMatrix::zeros(n, x.len());
+        let mut relaxed = DVector::from_row_slice(&self.force);
+        for k in 0..num_terms {
+            let (g, tau) = (x[2 + 2 * k], x[3 + 2 * k].exp());
+            let (values, slopes) = self.memory(tau);
+            for i in 0..n {
+                relaxed[i] += g * values[i];
+                jacobian[(i, 2 + 2 * k)] = x[0] * values[i] * self.used[i];
+                jacobian[(i, 3 + 2 * k)] = x[0] * g * tau * slopes[i] * self.used[i];
+            }
+        }
+        for i in 0..n {
+            jacobian[(i, 0)] = relaxed[i] * self.used[i];
+            jacobian[(i, 1)] = self.used[i];
+        }
+        let residual = DVector::from_fn(n, |i, _| (x[0] * relaxed[i] + x[1] - self.history.force_n[i]) * self.used[i]);
+        (residual, jacobian)
+    }
 }
 
 /// Fits 0 to `options.max_terms` relaxations to a force history whose elastic force is `table` at the drive.
@@ -175,15 +262,21 @@ pub fn fit_force_history(
         let requirement = "a standard deviation must be positive";
         return Err(ForceHistoryError::Setting { name: "force_sd_n", value: sd, requirement });
     }
-    let elastic = table.forces(&history.drive_mm)?;
-    let n = elastic.len();
-    let ends = elastic.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(*v), b.max(*v)]);
+    if let Some(layer) = &options.layer
+        && !(layer.gap_mm > 0.0 && layer.terms.iter().map(|t| t.modulus_kpa).sum::<f64>() > 0.0)
+    {
+        let (value, requirement) = (layer.gap_mm, "a layer needs a positive gap and terms of positive modulus");
+        return Err(ForceHistoryError::Setting { name: "layer", value, requirement });
+    }
+    let elastic = Elastic::new(history, table, options)?;
+    let n = elastic.used.iter().filter(|u| **u > 0.5).count();
+    let ends = elastic.force.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(*v), b.max(*v)]);
     if n < 2 * options.max_terms + 4 || !(ends[1] - ends[0] > 0.0) {
         return Err(ForceHistoryError::NoInformation { samples: n, range_n: ends[1] - ends[0] });
     }
     let mut found = Vec::new();
     for num_terms in 0..=options.max_terms {
-        if let Some(fit) = fit_with(history, &elastic, num_terms, options) {
+        if let Some(fit) = fit_with(&elastic, num_terms, options) {
             found.push((num_terms, fit));
         } else {
             break;
@@ -191,7 +284,7 @@ pub fn fit_force_history(
     }
     let base = usize::from(options.is_scale_free) + usize::from(options.is_offset_free);
     let least = (base + 2 * options.max_terms + 2) as f64;
-    let independent = found.last().map_or(n as f64, |(_, f)| independent_count(&[f.0.as_slice()], least));
+    let independent = found.last().map_or(n as f64, |(_, f)| independent_count(&[&kept(&f.0, &elastic.used)], least));
     let models: Vec<(String, usize, f64)> = found
         .iter()
         .map(|(k, f)| {
@@ -204,32 +297,39 @@ pub fn fit_force_history(
         })
         .collect();
     let selection = compare(&models, n, independent);
-    let fits = found.into_iter().map(|(_, (r, j, x))| describe(history, options, &r, &j, &x)).collect();
+    let fits = found.into_iter().map(|(_, (r, j, x))| describe(&elastic, options, &r, &j, &x)).collect();
     Ok(ForceHistorySequence { fits, selection })
 }
 
 type Raw = (DVector<f64>, DMatrix<f64>, Vec<f64>);
 
-fn fit_with(history: &ForceHistory, elastic: &[f64], num_terms: usize, options: &ForceHistoryOptions) -> Option<Raw> {
-    let n = elastic.len();
-    let force = DVector::from_row_slice(&history.force_n);
+/// The values of the samples that are fitted.
+fn kept(values: &DVector<f64>, used: &[f64]) -> Vec<f64> {
+    values.iter().zip(used).filter(|(_, u)| **u > 0.5).map(|(v, _)| *v).collect()
+}
+
+fn fit_with(elastic: &Elastic, num_terms: usize, options: &ForceHistoryOptions) -> Option<Raw> {
+    let (n, time_s) = (elastic.force.len(), &elastic.history.time_s);
+    let used = DVector::from_row_slice(&elastic.used);
+    let force = DVector::from_row_slice(&elastic.history.force_n).component_mul(&used);
+    let own = DVector::from_row_slice(&elastic.force).component_mul(&used);
     // Free columns of the linear start: the elastic force and a constant.
     let mut free = Vec::new();
     let mut fixed = DVector::zeros(n);
     if options.is_scale_free {
-        free.push(DVector::from_row_slice(elastic));
+        free.push(own);
     } else {
-        fixed = DVector::from_row_slice(elastic);
+        fixed = own;
     }
     if options.is_offset_free {
-        free.push(DVector::from_element(n, 1.0));
+        free.push(used.clone());
     }
     let data = &force - &fixed;
-    let column = |tau: f64| DVector::from_vec(memory(&history.time_s, elastic, tau).0);
+    let column = |tau: f64| DVector::from_vec(elastic.memory(tau).0).component_mul(&used);
     let starts = if num_terms == 0 {
         vec![PronyStart::default()]
     } else {
-        prony_starts(&history.time_s, num_terms, &free, &column, &data, 4)
+        prony_starts(time_s, num_terms, &free, &column, &data, 4)
     };
     let mut best: Option<crate::homogeneous::Minimum> = None;
     for start in starts {
@@ -242,7 +342,7 @@ fn fit_with(history: &ForceHistory, elastic: &[f64], num_terms: usize, options: 
         for &(strength, tau) in &start.terms {
             x.extend([(strength / scale).clamp(1e-4, 0.5 * MAX_STRENGTH), tau.ln()]);
         }
-        let limits = limits_of(num_terms, 2, &history.time_s);
+        let limits = limits_of(num_terms, 2, time_s);
         let mut steps = vec![scale.abs().max(1.0), force.amax().max(1e-12)];
         if !options.is_scale_free {
             steps[0] = 0.0;
@@ -255,7 +355,7 @@ fn fit_with(history: &ForceHistory, elastic: &[f64], num_terms: usize, options: 
         }
         let settings = LeastSquaresOptions { max_evaluations: 200, tolerance: 1e-10 };
         let found = minimise(&x, &limits, &steps, &settings, &mut |x| {
-            let (r, mut j) = evaluate(&history.time_s, elastic, &history.force_n, x);
+            let (r, mut j) = elastic.evaluate(x);
             for (c, is_free) in [(0, options.is_scale_free), (1, options.is_offset_free)] {
                 if !is_free {
                     j.column_mut(c).fill(0.0);
@@ -290,17 +390,19 @@ pub(crate) fn limits_of(num_terms: usize, first: usize, time_s: &[f64]) -> Vec<L
 }
 
 fn describe(
-    history: &ForceHistory,
+    elastic: &Elastic,
     options: &ForceHistoryOptions,
     residual: &DVector<f64>,
     jacobian: &DMatrix<f64>,
     x: &[f64],
 ) -> ForceHistoryFit {
-    let n = residual.len() as f64;
+    let history = elastic.history;
+    let fitted = kept(residual, &elastic.used);
+    let n = fitted.len() as f64;
     let num_terms = (x.len() - 2) / 2;
     let num_free = usize::from(options.is_scale_free) + usize::from(options.is_offset_free) + 2 * num_terms;
     let left = (n - num_free as f64).max(1.0);
-    let independent = independent_count(&[residual.as_slice()], num_free as f64 + 2.0);
+    let independent = independent_count(&[&fitted], num_free as f64 + 2.0);
     let estimated = residual.norm_squared() / left * (n / independent);
     let variance = history.force_sd_n.map_or(estimated, |sd| estimated.max(sd * sd));
     let (matrix, is_determined) = covariance(jacobian, variance, 1e-6);
@@ -325,7 +427,7 @@ fn describe(
         offset_n: linear(1),
         rms_error_n: (residual.norm_squared() / n).sqrt(),
         chi2_per_datum: history.force_sd_n.map(|sd| residual.norm_squared() / (sd * sd * left)),
-        force_n: residual.iter().zip(&history.force_n).map(|(r, f)| r + f).collect(),
+        force_n: elastic.model(x),
     }
 }
 

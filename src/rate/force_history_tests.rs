@@ -59,9 +59,11 @@ const TRUTH: [PronyTerm; 2] = [PronyTerm { strength: 0.25, time_s: 8.0 }, PronyT
 #[test]
 fn the_jacobian_passes_the_taylor_test() {
     let h = history(&TRUTH, 0.0, 0);
-    let elastic = table().forces(&h.drive_mm).unwrap();
+    let layer = ShearLayer { gap_mm: 6.4, terms: vec![ShearTerm { modulus_kpa: 30.0, alpha: 2.2 }] };
+    let options = ForceHistoryOptions { layer: Some(layer), min_drive_mm: 0.1, ..ForceHistoryOptions::default() };
+    let elastic = Elastic::new(&h, &table(), &options).unwrap();
     let x = [1.1, 0.02, 0.25, 8f64.ln(), 0.15, 60f64.ln()];
-    let (r, j) = evaluate(&h.time_s, &elastic, &h.force_n, &x);
+    let (r, j) = elastic.evaluate(&x);
     for i in 0..6 {
         let remainder = |step: f64| {
             let mut moved = x;
@@ -69,7 +71,7 @@ fn the_jacobian_passes_the_taylor_test() {
             let mut all = moved.to_vec();
             // A second unknown moves along, so that mixed terms count.
             all[0] += step;
-            let found = evaluate(&h.time_s, &elastic, &h.force_n, &all).0;
+            let found = elastic.evaluate(&all).0;
             (found - &r - step * (j.column(i) + j.column(0))).amax()
         };
         let (coarse, fine) = (remainder(1e-2), remainder(1e-3));

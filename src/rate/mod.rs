@@ -12,6 +12,7 @@ mod load_curve;
 mod load_fit;
 mod model;
 mod prony;
+mod search;
 mod starts;
 mod summary;
 mod verdict;
@@ -23,7 +24,7 @@ pub use analysis::{
 };
 pub use force_history::{
     FittedRelaxation, ForceHistory, ForceHistoryError, ForceHistoryFit, ForceHistoryOptions, ForceHistorySequence,
-    fit_force_history,
+    ShearLayer, fit_force_history,
 };
 pub use load_curve::{LoadCurve, LoadCurveError};
 pub use prony::{HistoryError, PronyTerm, RelaxedHistory, relax};
