@@ -21,5 +21,7 @@ pub mod rate;
 pub mod recording;
 pub mod report;
 pub mod sensitivity;
+pub mod slurm;
 pub mod specimen;
+pub mod sweep;
 pub mod voxel;

@@ -41,6 +41,12 @@ pub enum CliError {
     /// The computation did not succeed.
     #[error("{0}")]
     Numerics(String),
+    /// Results of a sweep cannot be read, kept or put together.
+    #[error(transparent)]
+    Store(#[from] crate::sweep::StoreError),
+    /// The cluster did not do it.
+    #[error("{0}")]
+    Cluster(String),
     /// Ctrl-C.
     #[error("stopped; {0}")]
     Interrupted(String),
@@ -51,8 +57,9 @@ impl CliError {
     pub fn exit_code(&self) -> u8 {
         match self {
             CliError::Read { .. } | CliError::Input { .. } | CliError::Option { .. } => 2,
-            CliError::Numerics(_) => 3,
-            CliError::Write { .. } => 4,
+            CliError::Numerics(_) | CliError::Cluster(_) => 3,
+            CliError::Write { .. } | CliError::Store(crate::sweep::StoreError::Write { .. }) => 4,
+            CliError::Store(_) => 2,
             CliError::Interrupted(_) => 130,
         }
     }

@@ -10,7 +10,10 @@ mod input;
 mod interrupt;
 mod output;
 mod progress;
+mod slurm;
 mod solve;
+mod sweep;
+mod task_bar;
 
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -38,6 +41,8 @@ enum Command {
     Evaluate(evaluate::EvaluateArguments),
     /// The best specimen under the limits of a study, with the evidence.
     Design(design::DesignArguments),
+    /// Many designs evaluated: a table of what each would tell, on one machine or a cluster.
+    Sweep(Box<sweep::SweepArguments>),
 }
 
 /// What every command takes.
@@ -89,6 +94,7 @@ pub fn run() -> ExitCode {
         Command::Solve(a) => solve::run(a),
         Command::Evaluate(a) => evaluate::run(a),
         Command::Design(a) => design::run(a),
+        Command::Sweep(a) => sweep::run(a),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
