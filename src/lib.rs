@@ -9,6 +9,7 @@
 
 pub mod calibration;
 pub mod cli;
+pub mod compare;
 pub mod design;
 pub mod diagnosis;
 pub mod fem;

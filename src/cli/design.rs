@@ -2,10 +2,12 @@
 
 use super::error::CliError;
 use super::progress::Bar;
-use super::{Common, input, interrupt, output};
+use super::slurm::SlurmArguments;
+use super::{Common, design_slurm, input, interrupt, output};
 use crate::calibration::{CalibrationError, ParameterSpread, VerifyOptions, verify};
 use crate::design::{
-    Checkpoint, DesignEntry, DesignResult, MaterialVerification, SearchError, Study, search, study_hash,
+    Checkpoint, DesignEntry, DesignResult, MaterialVerification, SearchError, Study, VerificationSettings, search,
+    study_hash,
 };
 use crate::fem::ForwardModel;
 use crate::mesh::MeshOptions;
@@ -30,6 +32,8 @@ pub(super) struct DesignArguments {
     #[arg(long)]
     restart: bool,
     #[command(flatten)]
+    slurm: SlurmArguments,
+    #[command(flatten)]
     common: Common,
 }
 
@@ -42,16 +46,28 @@ pub(super) fn run(a: &DesignArguments) -> Result<(), CliError> {
     if a.no_verify {
         study.verification.is_on = false;
     }
+    if a.slurm.slurm {
+        let (folder, seed) = design_slurm::search_on_cluster(&a.slurm, &study, &a.study, &a.common)?;
+        study.seed = seed;
+        return run_search(&study, Some(&folder), false, a.common.json);
+    }
     let folder = output::folder(a.common.out.as_deref(), a.common.json, &a.study);
-    let checkpoint = match &folder {
+    run_search(&study, folder.as_deref(), a.restart, a.common.json)
+}
+
+/// Searches, verifies and writes; takes up a checkpoint in `folder`.
+fn run_search(study: &Study, folder: Option<&Path>, is_restart: bool, is_json: bool) -> Result<(), CliError> {
+    let checkpoint = match folder {
         None => Checkpoint::in_memory(),
         Some(folder) => {
-            std::fs::create_dir_all(folder).map_err(|source| CliError::Write { path: folder.clone(), source })?;
+            std::fs::create_dir_all(folder).map_err(|source| CliError::Write { path: folder.into(), source })?;
             let path = folder.join("checkpoint.jsonl");
-            if a.restart && path.exists() {
+            if is_restart && path.exists() {
                 std::fs::remove_file(&path).map_err(|source| CliError::Write { path: path.clone(), source })?;
             }
-            Checkpoint::open(&path, &study_hash(&study))
+            // The search does not depend on the verification: a search without it can be verified later.
+            let searched = Study { verification: VerificationSettings::default(), ..study.clone() };
+            Checkpoint::open(&path, &study_hash(&searched))
                 .map_err(|e| CliError::Input { path, message: e.to_string() })?
         }
     };
@@ -59,27 +75,27 @@ pub(super) fn run(a: &DesignArguments) -> Result<(), CliError> {
         eprintln!("resuming: {} evaluations taken from the checkpoint", checkpoint.num_resumed());
     }
     let bar = Bar::new();
-    let found = search(&study, &checkpoint, &|p| bar.show(p), &interrupt::is_requested).map_err(|e| {
+    let found = search(study, &checkpoint, &|p| bar.show(p), &interrupt::is_requested).map_err(|e| {
         bar.clear();
-        search_error(e, folder.as_deref())
+        search_error(e, folder)
     })?;
-    let Some(mut result) = DesignResult::new(&study, &found) else {
+    let Some(mut result) = DesignResult::new(study, &found) else {
         return Err(CliError::Numerics("nothing was confirmed".into()));
     };
     if study.verification.is_on {
-        let verified = verify_both(&study, &result, &bar)?;
+        let verified = verify_both(study, &result, &bar)?;
         result.add_verification(verified);
     }
     bar.clear();
     if let Some(message) = checkpoint.write_failure() {
         eprintln!("lambdak: the checkpoint could not be written to the end ({message}); the result is complete");
     }
-    if let Some(folder) = &folder {
+    if let Some(folder) = folder {
         output::write_file(folder, "design.json", output::to_json(&result)?.as_bytes())?;
-        write_report(&study, &result, folder)?;
+        write_report(study, &result, folder)?;
         output::write_file(folder, "best-specimen.json", best_specimen(&result).to_json().as_bytes())?;
     }
-    output::print(&if a.common.json { output::to_json(&result)? } else { summary(&result, folder.as_deref()) })
+    output::print(&if is_json { output::to_json(&result)? } else { summary(&result, folder) })
 }
 
 /// The page, and what the mould maker needs.

@@ -1,9 +1,11 @@
 //! The command. Nothing is computed here: arguments become one validated request, the library works, results are printed.
 //!
-//! Results on stdout (`--json` for machines), progress on stderr, files in a folder. Exit codes: 0 done, 2 bad input,
-//! 3 no solution found, 4 a file cannot be written, 130 stopped by Ctrl-C.
+//! Results on stdout (`--json` for machines), progress on stderr, files in a folder. Exit codes: 0 done, 1 worse
+//! (`compare`), 2 bad input, 3 no solution found, 4 a file cannot be written, 130 stopped by Ctrl-C.
 
+mod compare;
 mod design;
+mod design_slurm;
 mod error;
 mod evaluate;
 mod input;
@@ -26,7 +28,7 @@ pub use error::CliError;
 #[command(
     name = "lambdak",
     version,
-    after_help = "Exit codes: 0 done, 2 bad input, 3 no solution found, 4 a file cannot be written, 130 stopped by Ctrl-C."
+    after_help = "Exit codes: 0 done, 1 worse (compare), 2 bad input, 3 no solution found, 4 a file cannot be written, 130 stopped by Ctrl-C."
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -40,9 +42,11 @@ enum Command {
     /// What a scan of a specimen would see, and what it would tell about the material.
     Evaluate(evaluate::EvaluateArguments),
     /// The best specimen under the limits of a study, with the evidence.
-    Design(design::DesignArguments),
+    Design(Box<design::DesignArguments>),
     /// Many designs evaluated: a table of what each would tell, on one machine or a cluster.
     Sweep(Box<sweep::SweepArguments>),
+    /// Whether a result is the same as, better or worse than another one.
+    Compare(compare::CompareArguments),
 }
 
 /// What every command takes.
@@ -95,6 +99,7 @@ pub fn run() -> ExitCode {
         Command::Evaluate(a) => evaluate::run(a),
         Command::Design(a) => design::run(a),
         Command::Sweep(a) => sweep::run(a),
+        Command::Compare(a) => compare::run(a),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
