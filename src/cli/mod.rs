@@ -4,8 +4,12 @@
 //! (`compare`), 2 bad input, 3 no solution found, 4 a file cannot be written, 130 stopped by Ctrl-C.
 
 mod compare;
+mod curve_input;
+mod curve_tables;
+mod curves;
 mod design;
 mod design_slurm;
+mod diagnose;
 mod error;
 mod evaluate;
 mod input;
@@ -16,6 +20,7 @@ mod slurm;
 mod solve;
 mod sweep;
 mod task_bar;
+mod uniaxial;
 
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -47,6 +52,12 @@ enum Command {
     Sweep(Box<sweep::SweepArguments>),
     /// Whether a result is the same as, better or worse than another one.
     Compare(compare::CompareArguments),
+    /// Where a recording and its model differ, and what physics was left out.
+    Diagnose(diagnose::DiagnoseArguments),
+    /// The traditional route: one uniaxial curve, of a strip or a dumb-bell, fitted with Ogden terms.
+    Uniaxial(uniaxial::UniaxialArguments),
+    /// Ogden terms fitted to curves of several homogeneous tests together.
+    Curves(curves::CurvesArguments),
 }
 
 /// What every command takes.
@@ -100,6 +111,9 @@ pub fn run() -> ExitCode {
         Command::Design(a) => design::run(a),
         Command::Sweep(a) => sweep::run(a),
         Command::Compare(a) => compare::run(a),
+        Command::Diagnose(a) => diagnose::run(a),
+        Command::Uniaxial(a) => uniaxial::run(a),
+        Command::Curves(a) => curves::run(a),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

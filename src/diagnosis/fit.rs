@@ -66,8 +66,8 @@ impl Fitted {
 
     /// Standard deviations of cause `index`'s parameters.
     pub fn sd_of(&self, index: usize) -> &[f64] {
-        let first = self.material.parameters().len()
-            + self.causes[..index].iter().map(|c| c.values.len()).sum::<usize>();
+        let first =
+            self.material.parameters().len() + self.causes[..index].iter().map(|c| c.values.len()).sum::<usize>();
         &self.sd[first..first + self.causes[index].values.len()]
     }
 
@@ -176,8 +176,7 @@ pub fn fit(
         let trial = laboratory.predict(&next_material, &scene_of(&next_causes), is_cancelled);
         let better = match trial {
             Ok(next) => {
-                let next_deviance =
-                    deviance_of(metric, measured, &next, &next_material, &next_causes, settings);
+                let next_deviance = deviance_of(metric, measured, &next, &next_material, &next_causes, settings);
                 (next_deviance < deviance).then_some((next, next_deviance))
             }
             Err(_) if !is_cancelled() => None,
@@ -309,7 +308,9 @@ fn standard_deviations(matrix: &DMatrix<f64>, material: &Ogden, causes: &[Suppos
     scales
         .enumerate()
         .map(|(i, scale)| {
-            covariance.as_ref().map_or(f64::INFINITY, |c| if c[(i, i)] > 0.0 { scale * c[(i, i)].sqrt() } else { f64::INFINITY })
+            covariance
+                .as_ref()
+                .map_or(f64::INFINITY, |c| if c[(i, i)] > 0.0 { scale * c[(i, i)].sqrt() } else { f64::INFINITY })
         })
         .collect()
 }

@@ -79,10 +79,8 @@ impl ScoreMap {
     fn best_block(&self, is_allowed: impl Fn(f64) -> bool) -> Option<Block> {
         let counts = self.division.counts;
         let mut best: Option<Block> = None;
-        let ranges: Vec<Vec<[usize; 2]>> = counts
-            .iter()
-            .map(|&n| (0..n).flat_map(|a| (a..n).map(move |b| [a, b])).collect())
-            .collect();
+        let ranges: Vec<Vec<[usize; 2]>> =
+            counts.iter().map(|&n| (0..n).flat_map(|a| (a..n).map(move |b| [a, b])).collect()).collect();
         for &x in &ranges[0] {
             for &y in &ranges[1] {
                 for &z in &ranges[2] {
@@ -132,9 +130,8 @@ pub fn debond_map(
         TestKind::Uniaxial => ([1, FACE_PARTS[1], FACE_PARTS[1]], 0, [1, 2]),
     };
     let division = Division::of(&specimen, counts);
-    let directions = laboratory.bond_derivatives(material, prediction, is_moved_face, division.num_parts(), &|x| {
-        division.part_of(x)
-    })?;
+    let directions = laboratory
+        .bond_derivatives(material, prediction, is_moved_face, division.num_parts(), &|x| division.part_of(x))?;
     let map = ScoreMap::new(division, test, &directions);
     let found = map.best_block(|compliance| compliance > 0.0).map(|block| {
         let side = if is_moved_face { 1.0 } else { -1.0 };
@@ -146,7 +143,10 @@ pub fn debond_map(
                 let [low, high] = division.edges(a, block.ranges[a][0], block.ranges[a][1]);
                 let half = division.half_mm[a];
                 // An edge on the face's own boundary is put past it.
-                [if low <= -half + 1e-9 { -half - 0.4 } else { low }, if high >= half - 1e-9 { half + 0.4 } else { high }]
+                [
+                    if low <= -half + 1e-9 { -half - 0.4 } else { low },
+                    if high >= half - 1e-9 { half + 0.4 } else { high },
+                ]
             }),
             half_mm: axes.map(|a| division.half_mm[a]),
         };
@@ -195,6 +195,10 @@ pub fn inclusion_map(
 
 /// Smallest number of connected voxels that make a jump.
 const MIN_JUMP_VOXELS: usize = 12;
+/// Smallest jump, in standard deviations of the noise: a smaller one cannot be told from its edge.
+const MIN_JUMP_SD: f64 = 7.0;
+/// Largest mean residual beside a jump, relative to the jump.
+const MAX_BESIDE: f64 = 0.25;
 /// A voxel belongs to a jump where its residual exceeds this many standard deviations of the noise.
 const JUMP_SD: f64 = 5.0;
 
@@ -211,7 +215,13 @@ pub fn jumps(observed: &Observed, residual: &Trace) -> Vec<Wrap> {
             let limit = JUMP_SD * observed.noise_sd_mm[component];
             let sign = |v: u32| {
                 let r = field[v as usize][component];
-                if r > limit { 1i8 } else if r < -limit { -1 } else { 0 }
+                if r > limit {
+                    1i8
+                } else if r < -limit {
+                    -1
+                } else {
+                    0
+                }
             };
             let mut is_seen = vec![false; mask.num_voxels()];
             for start in 0..mask.num_voxels() as u32 {
@@ -221,6 +231,7 @@ pub fn jumps(observed: &Observed, residual: &Trace) -> Vec<Wrap> {
                 }
                 is_seen[start as usize] = true;
                 let mut members = vec![start];
+                let mut outside = Vec::new();
                 let mut next = 0;
                 while next < members.len() {
                     let voxel = mask.voxels[members[next] as usize] as usize;
@@ -232,9 +243,13 @@ pub fn jumps(observed: &Observed, residual: &Trace) -> Vec<Wrap> {
                             if !is_inside {
                                 continue;
                             }
-                            let neighbour =
-                                place[if forward { voxel + strides[axis] } else { voxel - strides[axis] }];
-                            if neighbour != u32::MAX && !is_seen[neighbour as usize] && sign(neighbour) == s {
+                            let neighbour = place[if forward { voxel + strides[axis] } else { voxel - strides[axis] }];
+                            if neighbour == u32::MAX {
+                                continue;
+                            }
+                            if sign(neighbour) != s {
+                                outside.push(field[neighbour as usize][component]);
+                            } else if !is_seen[neighbour as usize] {
                                 is_seen[neighbour as usize] = true;
                                 members.push(neighbour);
                             }
@@ -248,8 +263,12 @@ pub fn jumps(observed: &Observed, residual: &Trace) -> Vec<Wrap> {
                 values.sort_by(f64::total_cmp);
                 let size_mm = values[values.len() / 2];
                 let spread = (values.iter().map(|x| (x - size_mm).powi(2)).sum::<f64>() / values.len() as f64).sqrt();
-                // A jump is one number: what varies inside is noise.
-                if spread > 1.6 * observed.noise_sd_mm[component] {
+                // A jump is one number, what varies inside is noise; and it ends at once: beside it nothing is left. What fades
+                // out over several voxels is no jump.
+                let noise = observed.noise_sd_mm[component];
+                let beside = outside.iter().sum::<f64>() / outside.len().max(1) as f64;
+                let is_sharp = !outside.is_empty() && beside.abs() < MAX_BESIDE * size_mm.abs();
+                if spread > 1.6 * noise || size_mm.abs() < MIN_JUMP_SD * noise || !is_sharp {
                     continue;
                 }
                 let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);

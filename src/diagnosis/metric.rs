@@ -96,16 +96,8 @@ impl Metric {
             .collect();
         let precision = observed.noise_sd_mm.map(|sd| 1.0 / (sd * sd * observed.noise_correlation()));
         let (force_precision, has_force) = force_precision(observed);
-        let mut metric = Metric {
-            precision,
-            is_used,
-            boxes,
-            num_boxes,
-            scale,
-            capacitance: Vec::new(),
-            force_precision,
-            has_force,
-        };
+        let mut metric =
+            Metric { precision, is_used, boxes, num_boxes, scale, capacitance: Vec::new(), force_precision, has_force };
         metric.capacitance = metric.capacitances(&variance);
         metric
     }

@@ -42,8 +42,7 @@ impl<'a> ScoreTest<'a> {
     pub fn prepare(&self, directions: &[Trace]) -> Prepared {
         let weighed: Vec<Weighed> = directions.iter().map(|t| self.metric.weigh(t)).collect();
         let m = weighed.len();
-        let cross =
-            DMatrix::from_fn(self.nuisance.len(), m, |i, j| self.metric.inner(&self.nuisance[i], &weighed[j]));
+        let cross = DMatrix::from_fn(self.nuisance.len(), m, |i, j| self.metric.inner(&self.nuisance[i], &weighed[j]));
         let projected = &self.inverse * &cross;
         let mut gram = DMatrix::zeros(m, m);
         for i in 0..m {
@@ -86,7 +85,8 @@ impl Prepared {
         let scale = DVector::from_fn(n, |i, _| 1.0 / self.gram[(i, i)].max(1e-30).sqrt());
         let scaled = DMatrix::from_fn(n, n, |i, j| self.gram[(i, j)] * scale[i] * scale[j]);
         let right = self.gradient.component_mul(&scale);
-        let solution = scaled.pseudo_inverse(1e-8).map(|inverse| inverse * &right).unwrap_or_else(|_| DVector::zeros(n));
+        let solution =
+            scaled.pseudo_inverse(1e-8).map(|inverse| inverse * &right).unwrap_or_else(|_| DVector::zeros(n));
         (right.dot(&solution), solution.component_mul(&scale).iter().copied().collect())
     }
 

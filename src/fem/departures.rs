@@ -313,11 +313,7 @@ impl ForwardModel {
         let positions = self.mesh.nodes.clone();
         let mut residual = vec![[0.0; 3]; positions.len()];
         self.assemble_residual_at(material, &positions, &equilibrium.displacement, None, &mut residual).map_err(
-            |cause| SolveError::Diverged {
-                reached_mm: equilibrium.drive_mm,
-                asked_mm: equilibrium.drive_mm,
-                cause,
-            },
+            |cause| SolveError::Diverged { reached_mm: equilibrium.drive_mm, asked_mm: equilibrium.drive_mm, cause },
         )?;
         Ok(residual
             .iter()

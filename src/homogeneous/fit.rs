@@ -27,6 +27,8 @@ pub struct CurveFitOptions {
     pub min_alpha_gap: f64,
     /// Range of the exponents.
     pub alpha_range: [f64; 2],
+    /// States beyond the data in which a material with negative products μα must be stable too: those that will be predicted.
+    pub also_stable_at: Vec<Deformation>,
     /// Starts that are refined per number of terms.
     pub num_starts: usize,
 }
@@ -39,6 +41,7 @@ impl Default for CurveFitOptions {
             bulk_kpa: None,
             min_alpha_gap: 1.0,
             alpha_range: [-20.0, 20.0],
+            also_stable_at: Vec::new(),
             num_starts: 6,
         }
     }
@@ -203,7 +206,8 @@ fn check(curves: &[Curve], options: &CurveFitOptions, num_terms: usize) -> Resul
 /// [`CurveFitError`].
 pub fn fit_terms(curves: &[Curve], num_terms: usize, options: &CurveFitOptions) -> Result<TermFit, CurveFitError> {
     check(curves, options, num_terms)?;
-    let states: Vec<Deformation> = curves.iter().flat_map(|c| c.states.iter().copied()).collect();
+    let mut states: Vec<Deformation> = curves.iter().flat_map(|c| c.states.iter().copied()).collect();
+    states.extend(&options.also_stable_at);
     let mut best: Option<TermFit> = None;
     for start in starts(curves, num_terms, options) {
         let Some(found) = refine(curves, &start, options) else { continue };

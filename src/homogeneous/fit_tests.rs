@@ -60,21 +60,19 @@ fn a_stable_negative_term_is_found() {
     assert!(fit.sum_of_squares < 1e-8, "{} {:?}", fit.sum_of_squares, fit.terms);
 }
 
-/// 200 draws of a two-term material with 1 % noise: the 95 % intervals hold the truth in 90 to 99 % of them (binomial 95 % ±
-/// 3 %), and BIC takes two terms in at least 95 %.
+/// 500 draws of a two-term material with 1 % noise: the 95 % intervals hold the truth in 90 to 99 % of them (binomial 95 % ± 3 %), and BIC takes two terms in at least 95 %.
 #[test]
 fn intervals_cover_and_terms_are_counted() {
     let truth = [term(4.0, 6.0), term(25.0, 1.5)];
     let values = [4.0 / 6.0, 6.0, 25.0 / 1.5, 1.5];
     let mut inside = [0; 5];
-    let (mut chosen, draws) = (0, 200);
+    let (mut chosen, draws) = (0, 500);
     for seed in 0..draws {
         let data = curves(&truth, None, 0.01, seed);
         let options = CurveFitOptions { num_starts: 2, ..CurveFitOptions::default() };
         let sequence = fit_curves(&data, &options).unwrap();
         chosen += usize::from(sequence.chosen().num_terms == 2);
         let fit = &sequence.fits[1];
-        println!("Z {:?}", fit.parameters.iter().zip(values).map(|(p, v)| ((p.value - v) / p.sd.unwrap(), p.sd.unwrap() / v)).collect::<Vec<_>>());
         for (i, p) in fit.parameters.iter().enumerate() {
             let [low, high] = p.interval_95.unwrap();
             inside[i] += usize::from(low <= values[i] && values[i] <= high);
@@ -83,8 +81,8 @@ fn intervals_cover_and_terms_are_counted() {
         inside[4] += usize::from(low <= 14.5 && 14.5 <= high);
     }
     println!("inside {inside:?} of {draws}, two terms chosen {chosen}");
-    assert!(inside.iter().all(|&n| (180..=198).contains(&n)), "{inside:?}");
-    assert!(chosen >= 190, "{chosen}");
+    assert!(inside.iter().all(|&n| (450..=495).contains(&n)), "{inside:?}");
+    assert!(chosen >= 475, "{chosen}");
 }
 
 /// The neo-Hookean family holds α = 2 and recovers the rest.

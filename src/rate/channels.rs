@@ -22,6 +22,20 @@ pub(crate) struct Channels {
     pub(crate) energy_by_term: Vec<[f64; 2]>,
 }
 
+impl Channels {
+    /// The nominal stress as the only channel (Fung's quasi-linear model).
+    pub(crate) fn nominal(mut self) -> Channels {
+        let [a, b] = self.weight;
+        let sum = |s: [f64; 2]| [a * s[0] + b * s[1], 0.0];
+        self.stress = sum(self.stress);
+        for term in &mut self.by_term {
+            *term = term.map(sum);
+        }
+        self.weight = [1.0, 0.0];
+        self
+    }
+}
+
 /// Σⱼ (e^{αeⱼ} − 1)/α² for Σ e = 0, and its derivative with respect to α.
 fn energy_sum(alpha: f64, e: [f64; 3]) -> (f64, f64) {
     let largest = e.iter().fold(0.0f64, |a, b| a.max(b.abs()));
@@ -111,8 +125,7 @@ mod tests {
     /// Σ w S is the elastic nominal stress, with the same derivatives: rounding only.
     #[test]
     fn weighted_channels_are_the_nominal_stress() {
-        let terms =
-            [ShearTerm { modulus_kpa: 30.0, alpha: 1.9 }, ShearTerm { modulus_kpa: 4.0, alpha: -3.0 }];
+        let terms = [ShearTerm { modulus_kpa: 30.0, alpha: 1.9 }, ShearTerm { modulus_kpa: 4.0, alpha: -3.0 }];
         for test in TESTS {
             for step in [-0.4, -0.001, 0.0, 0.3, 1.5] {
                 let state = test.at(test.rest() + step);

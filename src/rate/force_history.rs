@@ -3,7 +3,7 @@
 
 use super::prony::{HistoryError, PronyTerm, check_times, memory};
 use super::starts::{PronyStart, prony_starts};
-use super::table::{ForceTable, TableError};
+use crate::homogeneous::{ForceTable, TableError};
 use crate::homogeneous::{
     Interval, LeastSquaresOptions, Limit, Selection, compare, covariance, independent_count, minimise, t_quantile,
 };
@@ -108,10 +108,7 @@ pub struct ForceHistoryFit {
 impl ForceHistoryFit {
     /// The relaxations as Prony terms.
     pub fn terms(&self) -> Vec<PronyTerm> {
-        self.relaxations
-            .iter()
-            .map(|r| PronyTerm { strength: r.strength.value, time_s: r.time_s.value })
-            .collect()
+        self.relaxations.iter().map(|r| PronyTerm { strength: r.strength.value, time_s: r.time_s.value }).collect()
     }
 }
 
@@ -213,12 +210,7 @@ pub fn fit_force_history(
 
 type Raw = (DVector<f64>, DMatrix<f64>, Vec<f64>);
 
-fn fit_with(
-    history: &ForceHistory,
-    elastic: &[f64],
-    num_terms: usize,
-    options: &ForceHistoryOptions,
-) -> Option<Raw> {
+fn fit_with(history: &ForceHistory, elastic: &[f64], num_terms: usize, options: &ForceHistoryOptions) -> Option<Raw> {
     let n = elastic.len();
     let force = DVector::from_row_slice(&history.force_n);
     // Free columns of the linear start: the elastic force and a constant.

@@ -7,8 +7,21 @@ use rand_distr::StandardNormal;
 
 /// A stepped history like a scan's: precondition, three holds.
 fn drives() -> (Vec<f64>, Vec<f64>) {
-    let corners = [(0.0, 0.0), (5.0, 0.0), (12.0, 3.5), (18.0, 3.5), (25.0, 0.0), (55.0, 0.0), (60.0, 2.5), (120.0, 2.5),
-        (125.0, 5.0), (185.0, 5.0), (189.0, 7.0), (250.0, 7.0), (264.0, 0.0)];
+    let corners = [
+        (0.0, 0.0),
+        (5.0, 0.0),
+        (12.0, 3.5),
+        (18.0, 3.5),
+        (25.0, 0.0),
+        (55.0, 0.0),
+        (60.0, 2.5),
+        (120.0, 2.5),
+        (125.0, 5.0),
+        (185.0, 5.0),
+        (189.0, 7.0),
+        (250.0, 7.0),
+        (264.0, 0.0),
+    ];
     let times: Vec<f64> = (0..=528).map(|i| 0.5 * f64::from(i)).collect();
     let drive = times
         .iter()
@@ -40,8 +53,7 @@ fn history(terms: &[PronyTerm], noise: f64, seed: u64) -> ForceHistory {
     ForceHistory { time_s, drive_mm, force_n, force_sd_n: None }
 }
 
-const TRUTH: [PronyTerm; 2] =
-    [PronyTerm { strength: 0.25, time_s: 8.0 }, PronyTerm { strength: 0.15, time_s: 60.0 }];
+const TRUTH: [PronyTerm; 2] = [PronyTerm { strength: 0.25, time_s: 8.0 }, PronyTerm { strength: 0.15, time_s: 60.0 }];
 
 /// Taylor remainders of the Jacobian in all unknowns, second order.
 #[test]

@@ -3,7 +3,9 @@
 //!
 //! * Softening (Ogden and Roxburgh 1999, doi 10.1098/rspa.1999.0431): the elastic stress is multiplied by
 //!   η = 1 − ρ erf((W_max − W)/(m + β W_max)), ρ = 1/r in [0, 1); ρ = 0 is no softening.
-//! * Relaxation acts on the softened isochoric stress: P = Σ_c w_c (S_c + Σ gᵢ ∫ e^{−(t−s)/τᵢ} dS_c).
+//! * Relaxation acts on the softened isochoric stress: P = Σ_c w_c (S_c + Σ gᵢ ∫ e^{−(t−s)/τᵢ} dS_c). Simo's model takes for S
+//!   the second Piola–Kirchhoff stress; in large shear its components nearly cancel, and so do not when they lag. Fung's
+//!   quasi-linear model takes the nominal stress itself. The two agree for small strains; the data choose.
 //! * Barrelling: below λ = 1 the stress is multiplied by 1 + b λ⁻³, b = 2 S² times the degree of bonding, S the shape
 //!   factor (Gent and Lindley 1959: 1 + 2 S² for bonded discs; S grows as λ^(−3/2) at constant volume).
 //! * Load cell: measured = gain · (P + friction · direction) + offset; gains are relative to the first curve's.
@@ -17,6 +19,8 @@ use crate::homogeneous::{Deformation, HomogeneousTest, ShearTerm, erf};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Physics {
     pub(crate) num_relaxations: usize,
+    /// Whether relaxation acts on the nominal stress instead of the isochoric second Piola–Kirchhoff stress.
+    pub(crate) is_nominal: bool,
     pub(crate) has_softening: bool,
     pub(crate) has_barrelling: bool,
     pub(crate) has_friction: bool,
@@ -128,7 +132,10 @@ pub(crate) fn model(layout: &Layout, x: &[f64], curve: &Prepared) -> Modelled {
     let mut weight = Vec::with_capacity(n);
     let (mut largest, mut largest_by) = (0.0, vec![0.0; 2 * num_terms]);
     for i in 0..n {
-        let c = channels(&terms, &curve.states[i]);
+        let mut c = channels(&terms, &curve.states[i]);
+        if physics.is_nominal {
+            c = c.nominal();
+        }
         weight.push(c.weight);
         let energy_by: Vec<f64> = c.energy_by_term.iter().flatten().copied().collect();
         if c.energy > largest {

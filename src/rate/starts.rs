@@ -36,8 +36,7 @@ pub(crate) fn prony_starts(
 ) -> Vec<PronyStart> {
     let [shortest, longest] = time_range(time_s);
     let (low, high) = (shortest.ln(), (2.0 * longest).ln());
-    let times: Vec<f64> =
-        (0..GRID).map(|i| (low + (high - low) * i as f64 / (GRID - 1) as f64).exp()).collect();
+    let times: Vec<f64> = (0..GRID).map(|i| (low + (high - low) * i as f64 / (GRID - 1) as f64).exp()).collect();
     let mut columns: Vec<DVector<f64>> = free.to_vec();
     columns.extend(times.iter().map(|&t| memory(t)));
     let norm: Vec<f64> = columns.iter().map(|c| c.norm().max(1e-300)).collect();
@@ -65,9 +64,7 @@ pub(crate) fn prony_starts(
             }
         };
         let gain: f64 = used.iter().zip(solution.iter()).map(|(&u, s)| s * right[u]).sum();
-        let value = |column: usize| {
-            used.iter().position(|&u| u == column).map_or(0.0, |a| solution[a] / norm[column])
-        };
+        let value = |column: usize| used.iter().position(|&u| u == column).map_or(0.0, |a| solution[a] / norm[column]);
         found.push(PronyStart {
             free: (0..free.len()).map(value).collect(),
             terms: set.iter().map(|&i| (value(free.len() + i), times[i])).collect(),
@@ -79,9 +76,8 @@ pub(crate) fn prony_starts(
     let step = (high - low) / (GRID - 1) as f64;
     let mut kept: Vec<PronyStart> = Vec::new();
     for start in found {
-        let is_near = |k: &PronyStart| {
-            k.terms.iter().zip(&start.terms).all(|(a, b)| (a.1.ln() - b.1.ln()).abs() < 1.5 * step)
-        };
+        let is_near =
+            |k: &PronyStart| k.terms.iter().zip(&start.terms).all(|(a, b)| (a.1.ln() - b.1.ln()).abs() < 1.5 * step);
         if !kept.iter().any(is_near) {
             kept.push(start);
         }

@@ -113,6 +113,8 @@ pub fn registry(specimen: &Specimen, initial_shear_modulus_kpa: f64) -> Vec<Arc<
     for hole in 0..specimen.holes.len() {
         all.push(Arc::new(hole::HoleError::of(specimen, hole)));
     }
-    all.extend(fibre::directions().into_iter().map(|d| Arc::new(fibre::Fibres::along(d, initial_shear_modulus_kpa)) as _));
+    all.extend(
+        fibre::directions().into_iter().map(|d| Arc::new(fibre::Fibres::along(d, initial_shear_modulus_kpa)) as _),
+    );
     all
 }
