@@ -60,7 +60,8 @@ fn killed_resumed_sharded_and_undisturbed_runs_agree() {
     for (index, out) in [(1, &a), (2, &b), (4, &b)] {
         assert_success(&sweep(&study, out, &["--shard", &format!("{index}/4")]));
     }
-    let merge = || lambdak().args(["sweep", "merge"]).args([&a, &b]).arg("--out").arg(&merged).output().expect("it runs");
+    let merge =
+        || lambdak().args(["sweep", "merge"]).args([&a, &b]).arg("--out").arg(&merged).output().expect("it runs");
     let incomplete = merge();
     let message = String::from_utf8_lossy(&incomplete.stderr).into_owned();
     assert_eq!(incomplete.status.code(), Some(2), "{message}");
@@ -108,7 +109,8 @@ fn a_full_disk_loses_nothing() {
     let small = folder.path().join("small");
     std::fs::create_dir(&small).expect("writable");
     let mount = |options: &str| {
-        let run = std::process::Command::new("mount").args(["-t", "tmpfs", "-o", options, "tmpfs"]).arg(&small).output();
+        let run =
+            std::process::Command::new("mount").args(["-t", "tmpfs", "-o", options, "tmpfs"]).arg(&small).output();
         run.is_ok_and(|o| o.status.success())
     };
     if !mount("size=24k") {

@@ -40,8 +40,7 @@ pub(super) fn run(a: &CompareArguments) -> Result<(), CliError> {
     if !(a.rel_tol >= 0.0 && a.rel_tol.is_finite()) {
         return Err(CliError::Option { option: "rel-tol", message: format!("{} is not a number from 0", a.rel_tol) });
     }
-    let options =
-        CompareOptions { relative_tolerance: a.rel_tol, is_strict: a.strict, across_inputs: a.across_inputs };
+    let options = CompareOptions { relative_tolerance: a.rel_tol, is_strict: a.strict, across_inputs: a.across_inputs };
     let mut comparisons: Vec<Comparison> = Vec::new();
     for pair in pairs(&a.base, &a.current)? {
         let (base, current) = (read(&pair.base)?, read(&pair.current)?);

@@ -38,8 +38,7 @@ pub(super) fn search_on_cluster(
         "seed=$(({} + $2 - 1)); exec \"$0\" design \"$1/study.json\" --seed \"$seed\" --no-verify --threads {threads} --out \"$1/seed-$seed\"",
         study.seed
     );
-    let command =
-        vec!["bash".into(), "-c".into(), inner, program, path_text(&folder)?, "{task}".into()];
+    let command = vec!["bash".into(), "-c".into(), inner, program, path_text(&folder)?, "{task}".into()];
     let seed_of = |task: usize| study.seed.wrapping_add(task as u64 - 1);
     let progress_of = |task: usize| -> Result<TaskProgress, String> {
         let done = found(study, &folder, seed_of(task)).map_err(|e| e.to_string())?.is_some();

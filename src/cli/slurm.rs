@@ -70,30 +70,31 @@ pub(super) fn run_array(
             others: a.slurm_option.clone(),
         },
     };
-    let settings = FollowSettings {
-        poll: Duration::from_secs_f64(a.poll),
-        max_restarts: a.restarts,
-        cancel_jobs: a.cancel,
-    };
+    let settings =
+        FollowSettings { poll: Duration::from_secs_f64(a.poll), max_restarts: a.restarts, cancel_jobs: a.cancel };
     let say = |event: &Following| match event {
         Following::Submitted { job, tasks } => eprintln!("submitted job {job}: {} array tasks", tasks.len()),
         Following::Rejoined { tasks } => eprintln!("following {tasks} array tasks submitted before"),
-        Following::Requeued { job, task, state } => eprintln!("array task {task} of job {job} was lost ({state}); requeued"),
+        Following::Requeued { job, task, state } => {
+            eprintln!("array task {task} of job {job} was lost ({state}); requeued")
+        }
         Following::Progress(p) => on_progress(*p),
     };
     let tasks: Vec<usize> = (1..=a.tasks).collect();
-    follow(&job, &tasks, &settings, progress_of, &say, &interrupt::is_requested, &std::thread::sleep).map_err(|e| match e {
-        SlurmError::Interrupted { message } => CliError::Interrupted(message),
-        SlurmError::Write { path, source } => CliError::Write { path, source },
-        SlurmError::BadValue { .. } => CliError::Option { option: "slurm", message: e.to_string() },
-        other => CliError::Cluster(other.to_string()),
+    follow(&job, &tasks, &settings, progress_of, &say, &interrupt::is_requested, &std::thread::sleep).map_err(|e| {
+        match e {
+            SlurmError::Interrupted { message } => CliError::Interrupted(message),
+            SlurmError::Write { path, source } => CliError::Write { path, source },
+            SlurmError::BadValue { .. } => CliError::Option { option: "slurm", message: e.to_string() },
+            other => CliError::Cluster(other.to_string()),
+        }
     })
 }
 
 /// This program, for the nodes.
 pub(super) fn own_program() -> Result<String, CliError> {
-    let path: PathBuf = std::env::current_exe()
-        .map_err(|e| CliError::Cluster(format!("the path of this program is unknown: {e}")))?;
+    let path: PathBuf =
+        std::env::current_exe().map_err(|e| CliError::Cluster(format!("the path of this program is unknown: {e}")))?;
     path_text(&path)
 }
 

@@ -143,8 +143,7 @@ fn run_here(study: &SweepStudy, folder: &Path, shard: Shard) -> Result<(), CliEr
 
 /// One shard per array task; each writes its own file.
 fn run_on_cluster(a: &SweepArguments, study: &SweepStudy, folder: &Path) -> Result<(), CliError> {
-    let absolute =
-        std::fs::canonicalize(folder).map_err(|source| CliError::Read { path: folder.into(), source })?;
+    let absolute = std::fs::canonicalize(folder).map_err(|source| CliError::Read { path: folder.into(), source })?;
     let count = a.slurm.tasks;
     let threads = a.common.threads.unwrap_or(1);
     let command = vec![
@@ -165,9 +164,8 @@ fn run_on_cluster(a: &SweepArguments, study: &SweepStudy, folder: &Path) -> Resu
         let shard = Shard { index, count };
         let path = shard_path(&absolute, shard);
         let own = if path.exists() { Some(read_shard(&path, &hash).map_err(|e| e.to_string())?) } else { None };
-        let is_there = |t: &usize| {
-            before.outcomes.contains_key(t) || own.as_ref().is_some_and(|c| c.outcomes.contains_key(t))
-        };
+        let is_there =
+            |t: &usize| before.outcomes.contains_key(t) || own.as_ref().is_some_and(|c| c.outcomes.contains_key(t));
         let done = shard.tasks(num_tasks).filter(is_there).count();
         Ok(TaskProgress { done, total: shard.tasks(num_tasks).count() })
     };

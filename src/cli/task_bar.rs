@@ -51,7 +51,11 @@ impl TaskBar {
                 eprintln!("resuming: {resumed} of {total} results are there");
             }
             *last = Some(twentieth);
-            eprintln!("{done} of {total} done, {} elapsed{}{message}", words(elapsed), if message.is_empty() { "" } else { ", " });
+            eprintln!(
+                "{done} of {total} done, {} elapsed{}{message}",
+                words(elapsed),
+                if message.is_empty() { "" } else { ", " }
+            );
         }
     }
 

@@ -43,8 +43,7 @@ pub fn to_text(comparisons: &[Comparison]) -> String {
         }
         for l in c.differences.iter().take(MAX_LINES) {
             let (base, current) = (number(l.base), number(l.current));
-            text +=
-                &format!("  {:<62} {base:>13} {current:>13} {:>11}  {}\n", l.figure, percent(l), word(l.judgement));
+            text += &format!("  {:<62} {base:>13} {current:>13} {:>11}  {}\n", l.figure, percent(l), word(l.judgement));
         }
         if c.differences.len() > MAX_LINES {
             text += &format!("  and {} more (--json lists all)\n", c.differences.len() - MAX_LINES);
@@ -55,7 +54,9 @@ pub fn to_text(comparisons: &[Comparison]) -> String {
 
 /// A summary for a pull request.
 pub fn to_markdown(comparisons: &[Comparison]) -> String {
-    let mut text = String::from("## Comparison of results\n\n| result | same | better | changed | worse |\n|---|--:|--:|--:|--:|\n");
+    let mut text = String::from(
+        "## Comparison of results\n\n| result | same | better | changed | worse |\n|---|--:|--:|--:|--:|\n",
+    );
     for c in comparisons {
         let name = escape_markdown(&c.name);
         text += &format!("| {name} | {} | {} | {} | {} |\n", c.num_same, c.num_better, c.num_changed, c.num_worse);
@@ -127,7 +128,8 @@ mod tests {
     use crate::compare::{Direction, Figure};
 
     fn comparison(is_worse: bool) -> Comparison {
-        let figure = Figure { name: "a < b & \"c\" | d".into(), value: Some(2.0), direction: Direction::LargerIsBetter };
+        let figure =
+            Figure { name: "a < b & \"c\" | d".into(), value: Some(2.0), direction: Direction::LargerIsBetter };
         let line = Line::new(&figure, Some(if is_worse { 1.0 } else { 3.0 }), 1e-6);
         Comparison {
             name: "two <holes>".into(),

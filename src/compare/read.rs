@@ -131,10 +131,8 @@ fn of_design(d: &DesignResult) -> Subject {
             direction: Direction::Neutral,
         },
     ];
-    let mut conditions = vec![
-        ("objective".into(), format!("{:?}", d.objective)),
-        ("base specimen".into(), d.base.specimen.to_json()),
-    ];
+    let mut conditions =
+        vec![("objective".into(), format!("{:?}", d.objective)), ("base specimen".into(), d.base.specimen.to_json())];
     for (label, entry) in [("base", &d.base), ("best", &d.best)] {
         for m in &entry.by_material {
             let prefix = format!("{label}, material \"{}\": ", m.material);
@@ -215,11 +213,5 @@ fn of_sweep(s: &SweepResult) -> Subject {
             figures.push(Figure { name: format!("{at}: {column}"), value, direction });
         }
     }
-    Subject {
-        schema: s.schema.clone(),
-        conditions,
-        inputs: Vec::new(),
-        figures,
-        version: s.version.clone(),
-    }
+    Subject { schema: s.schema.clone(), conditions, inputs: Vec::new(), figures, version: s.version.clone() }
 }

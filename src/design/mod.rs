@@ -29,8 +29,8 @@ pub use response::{
 pub use result::{DesignEntry, DesignResult, MaterialVerification, Verification};
 pub use search::{Candidate, Found, Progress, ProgressSink, SearchError, base_at_drive, search, study_hash};
 pub use space::{Orbit, Structure, Subspace, Variable, subspaces};
-pub(crate) use study::{Inline, resolve};
 pub use study::{
     Budget, Combine, CountRange, MaterialPrior, Objective, ObjectiveKind, Range, Study, StudyError, Vary,
     VerificationSettings,
 };
+pub(crate) use study::{Inline, resolve};

@@ -103,7 +103,10 @@ mod tests {
 
     #[test]
     fn lines_are_drawn_and_thinned() {
-        let axis = |label: &str, n: u32, f: fn(u32) -> f64| ParallelAxis { label: label.into(), values: (0..n).map(f).collect() };
+        let axis = |label: &str, n: u32, f: fn(u32) -> f64| ParallelAxis {
+            label: label.into(),
+            values: (0..n).map(f).collect(),
+        };
         for n in [1, 30, 2500] {
             let plot = ParallelPlot {
                 title: "Designs & responses".into(),

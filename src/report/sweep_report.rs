@@ -103,8 +103,10 @@ fn section(page: &mut Report, result: &SweepResult, material: &str, names: &[Str
         responses.push((label(&column), selection.numbers(&column)));
     }
     for (response_label, response) in responses {
-        let effects =
-            variables.iter().map(|(label, values)| MainEffect { label: label.clone(), values: values.clone() }).collect();
+        let effects = variables
+            .iter()
+            .map(|(label, values)| MainEffect { label: label.clone(), values: values.clone() })
+            .collect();
         let title = format!("Main effects on {}", response_label.split(" / ").next().unwrap_or_default());
         page.figure(
             &MainEffectsPlot { title, response_label, response, effects }.to_svg(),

@@ -147,7 +147,9 @@ mod tests {
     #[test]
     fn the_script_asks_for_what_was_asked() {
         let script = job(&["/bin/it", "--shard", "{task}/4"]).script(&[1, 2, 4]).expect("plain values");
-        for line in ["#SBATCH --array=1-2,4", "#SBATCH --time=01:00:00", "#SBATCH --cpus-per-task=2", "#SBATCH --requeue"] {
+        for line in
+            ["#SBATCH --array=1-2,4", "#SBATCH --time=01:00:00", "#SBATCH --cpus-per-task=2", "#SBATCH --requeue"]
+        {
             assert!(script.lines().any(|l| l == line), "{line} in\n{script}");
         }
         assert!(!script.contains("--partition"));

@@ -23,8 +23,8 @@ impl TaskState {
     fn of(name: &str) -> TaskState {
         // sacct writes "CANCELLED by 0", squeue "CANCELLED".
         match name.split_whitespace().next().unwrap_or_default() {
-            "PENDING" | "RUNNING" | "CONFIGURING" | "COMPLETING" | "SUSPENDED" | "REQUEUED" | "RESIZING" | "SIGNALING"
-            | "STAGE_OUT" | "STOPPED" | "RESV_DEL_HOLD" => TaskState::Active,
+            "PENDING" | "RUNNING" | "CONFIGURING" | "COMPLETING" | "SUSPENDED" | "REQUEUED" | "RESIZING"
+            | "SIGNALING" | "STAGE_OUT" | "STOPPED" | "RESV_DEL_HOLD" => TaskState::Active,
             "REQUEUE_HOLD" | "REQUEUE_FED" | "SPECIAL_EXIT" => TaskState::Held,
             "CANCELLED" => TaskState::Cancelled,
             other => TaskState::Ended(other.into()),
@@ -49,7 +49,10 @@ impl Scheduler {
         if !job.is_empty() && job.chars().all(|c| c.is_ascii_digit()) {
             return Ok(job);
         }
-        Err(SlurmError::Refused { command: "sbatch", message: format!("it printed '{}' instead of a job number", out.trim()) })
+        Err(SlurmError::Refused {
+            command: "sbatch",
+            message: format!("it printed '{}' instead of a job number", out.trim()),
+        })
     }
 
     /// State of each task of a job that the controller or the accounting still knows; `None` where the controller does not
@@ -68,7 +71,9 @@ impl Scheduler {
                 Ok(Some(states))
             }
             // The controller forgets a job some minutes after its end.
-            Err(SlurmError::Refused { message, .. }) if message.contains("Invalid job id") => Ok(Some(self.accounted(job))),
+            Err(SlurmError::Refused { message, .. }) if message.contains("Invalid job id") => {
+                Ok(Some(self.accounted(job)))
+            }
             Err(SlurmError::Refused { .. }) => Ok(None),
             Err(error) => Err(error),
         }
@@ -139,7 +144,8 @@ mod tests {
 
     #[test]
     fn states_are_read() {
-        let states = parse("1|RUNNING\n2|NODE_FAIL\n3|CANCELLED by 0\nN/A|PENDING\n4|REQUEUE_HOLD\n1|FAILED\n\n5|COMPLETED");
+        let states =
+            parse("1|RUNNING\n2|NODE_FAIL\n3|CANCELLED by 0\nN/A|PENDING\n4|REQUEUE_HOLD\n1|FAILED\n\n5|COMPLETED");
         assert_eq!(states[&1], TaskState::Active);
         assert_eq!(states[&2], TaskState::Ended("NODE_FAIL".into()));
         assert_eq!(states[&3], TaskState::Cancelled);

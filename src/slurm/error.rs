@@ -45,7 +45,9 @@ pub enum SlurmError {
         message: String,
     },
     /// Someone cancelled a task.
-    #[error("array task {task} of job {job} was cancelled; what was computed is kept, run the same command again to go on")]
+    #[error(
+        "array task {task} of job {job} was cancelled; what was computed is kept, run the same command again to go on"
+    )]
     Cancelled {
         /// The job.
         job: String,

@@ -248,16 +248,12 @@ fn all_states(
     Ok(Some(states))
 }
 
-fn interrupted(
-    scheduler: &Scheduler,
-    jobs: &Jobs,
-    open: &BTreeMap<usize, Watched>,
-    cancel_jobs: bool,
-) -> SlurmError {
+fn interrupted(scheduler: &Scheduler, jobs: &Jobs, open: &BTreeMap<usize, Watched>, cancel_jobs: bool) -> SlurmError {
     let numbers: std::collections::BTreeSet<&String> = open.keys().filter_map(|t| jobs.job_of_task.get(t)).collect();
     let list = numbers.iter().map(|n| n.as_str()).collect::<Vec<_>>().join(" ");
     if !cancel_jobs {
-        let message = format!("job {list} works on; run the same command again to follow it, or end it with: scancel {list}");
+        let message =
+            format!("job {list} works on; run the same command again to follow it, or end it with: scancel {list}");
         return SlurmError::Interrupted { message };
     }
     for number in numbers {

@@ -24,6 +24,6 @@ pub use run::{RunOptions, SweepProgress, SweepRun, run};
 pub use shard::Shard;
 pub use store::{Collected, ShardContents, ShardWriter, collect, read_shard, shard_path};
 pub use study::{MeshFidelity, MeshName, NamedMaterial, SampleRange, Sampling, SweepStudy, SweepVariable};
-pub use table::{Cells, TableColumn, SweepTable};
+pub use table::{Cells, SweepTable, TableColumn};
 pub use target::Target;
 pub use task::{Figures, Outcome, Task};

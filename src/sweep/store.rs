@@ -228,8 +228,12 @@ impl ShardWriter {
         lock(&file, &path)?;
         let contents = read_shard(&path, study_hash)?;
         file.set_len(contents.good_bytes).map_err(fail)?;
-        let mut writer =
-            ShardWriter { file, path: path.clone(), good_bytes: contents.good_bytes, num_results: contents.outcomes.len() };
+        let mut writer = ShardWriter {
+            file,
+            path: path.clone(),
+            good_bytes: contents.good_bytes,
+            num_results: contents.outcomes.len(),
+        };
         if contents.good_bytes == 0 {
             let (schema, version) = ("sweep-shard/1".into(), VERSION.into());
             writer.append_line(&Header { schema, study_hash: study_hash.into(), version, shard, num_tasks })?;

@@ -314,9 +314,8 @@ impl SweepStudy {
                 return Err(SweepStudyError::MissingUnit { variable, target, suffix });
             }
         }
-        let missing = |sampling, needed| {
-            Err(SweepStudyError::MissingValues { variable: v.name.clone(), sampling, needed })
-        };
+        let missing =
+            |sampling, needed| Err(SweepStudyError::MissingValues { variable: v.name.clone(), sampling, needed });
         if let Some(values) = &v.values {
             finite(|| format!("values of '{}'", v.name), values)?;
         }
@@ -368,7 +367,6 @@ impl SweepVariable {
             (None, None) => f64::NAN,
         }
     }
-
 }
 
 fn finite(field: impl Fn() -> String, values: &[f64]) -> Result<(), SweepStudyError> {

@@ -227,9 +227,8 @@ fn of_parameter(parameter: Parameter, rows: &[Row], columns: &mut Vec<TableColum
     let name = parameter.name();
     if parameter != Parameter::Kappa {
         let unit = sensitivity_unit(parameter);
-        let find = |r: &Row| {
-            r.step.and_then(|s| s.1.integrated_sensitivity.iter().find(|i| i.parameter == name).cloned())
-        };
+        let find =
+            |r: &Row| r.step.and_then(|s| s.1.integrated_sensitivity.iter().find(|i| i.parameter == name).cloned());
         columns.push(numbers(format!("sensitivity_sum_{name}{unit}"), rows, |r| find(r).map(|i| i.sum)));
         columns.push(numbers(format!("sensitivity_mean_per_voxel_{name}{unit}"), rows, |r| {
             find(r).map(|i| i.mean_per_voxel)

@@ -2,12 +2,12 @@
 
 use super::points::points;
 use super::study::SweepStudy;
+use crate::fem::SolveError;
 use crate::material::Ogden;
 use crate::sensitivity::{
     DriveSelection, EvaluationError, EvaluationOptions, EvaluationStep, PromisedSd, ScanSettings, evaluate,
 };
 use crate::specimen::Specimen;
-use crate::fem::SolveError;
 use serde::{Deserialize, Serialize};
 
 /// One task of a sweep.
@@ -93,10 +93,8 @@ impl Task {
         if let Err(e) = material.validate() {
             return Some(failed("material", &e));
         }
-        let options = EvaluationOptions {
-            mesh: study.mesh.options(&specimen),
-            ..EvaluationOptions::standard(&specimen)
-        };
+        let options =
+            EvaluationOptions { mesh: study.mesh.options(&specimen), ..EvaluationOptions::standard(&specimen) };
         let drives = DriveSelection::DriveMm(specimen.drive_mm.clone());
         let evaluation = match evaluate(&specimen, &material, &scan, &drives, &options, is_cancelled) {
             Ok((evaluation, _)) => evaluation,
@@ -112,7 +110,8 @@ impl Task {
             input_hash: evaluation.input_hash,
         }));
         // JSON has no NaN: what would not come back as it was is no result.
-        let returns = serde_json::to_string(&outcome).is_ok_and(|t| serde_json::from_str(&t).is_ok_and(|o: Outcome| o == outcome));
+        let returns = serde_json::to_string(&outcome)
+            .is_ok_and(|t| serde_json::from_str(&t).is_ok_and(|o: Outcome| o == outcome));
         Some(if returns { outcome } else { failed("not_finite", &"a figure of the evaluation is not finite") })
     }
 }
