@@ -20,7 +20,7 @@ mod task;
 pub use error::{StoreError, SweepError, SweepStudyError};
 pub use parquet::to_parquet;
 pub use result::{SweepCell, SweepResult};
-pub use run::{RunOptions, SweepProgress, SweepRun, run};
+pub use run::{Observe, RunOptions, SweepProgress, SweepRun, run};
 pub use shard::Shard;
 pub use store::{Collected, ShardContents, ShardWriter, collect, read_shard, shard_path};
 pub use study::{MeshFidelity, MeshName, NamedMaterial, SampleRange, Sampling, SweepStudy, SweepVariable};

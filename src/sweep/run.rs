@@ -22,6 +22,9 @@ pub struct SweepProgress {
     pub total: usize,
 }
 
+/// Called around an evaluation with its task; returns what is kept of it.
+pub type Observe<'a> = &'a (dyn Fn(&Task, &dyn Fn() -> Option<Outcome>) -> Option<Outcome> + Sync);
+
 /// Who listens to a run.
 pub struct RunOptions<'a> {
     /// Which tasks.
@@ -29,7 +32,7 @@ pub struct RunOptions<'a> {
     /// Receives progress: once at the start, then after every task, from several threads.
     pub progress: &'a (dyn Fn(&SweepProgress) + Sync),
     /// Called around every evaluation with its task; returns what is kept of it. For timings, which are no result.
-    pub observe: &'a (dyn Fn(&Task, &dyn Fn() -> Option<Outcome>) -> Option<Outcome> + Sync),
+    pub observe: Observe<'a>,
     /// Whether to stop.
     pub is_cancelled: &'a (dyn Fn() -> bool + Sync),
 }
