@@ -10,6 +10,7 @@
 pub mod acquisition;
 pub mod calibration;
 pub mod cli;
+pub mod compare;
 pub mod design;
 pub mod diagnosis;
 pub mod fem;
@@ -22,5 +23,7 @@ pub mod rate;
 pub mod recording;
 pub mod report;
 pub mod sensitivity;
+pub mod slurm;
 pub mod specimen;
+pub mod sweep;
 pub mod voxel;

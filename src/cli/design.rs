@@ -2,11 +2,12 @@
 
 use super::error::CliError;
 use super::progress::Bar;
-use super::{Common, input, interrupt, output};
+use super::slurm::SlurmArguments;
+use super::{Common, design_slurm, input, interrupt, output};
 use crate::calibration::{ParameterSpread, VerifyOptions, verify_in_full};
 use crate::design::{
-    Checkpoint, DesignEntry, DesignResult, MaterialVerification, Progress, SearchError, Study, Unfinished, search,
-    study_hash,
+    Checkpoint, DesignEntry, DesignResult, MaterialVerification, Progress, SearchError, Study, Unfinished,
+    VerificationSettings, search, study_hash,
 };
 use crate::fem::ForwardModel;
 use crate::material::Ogden;
@@ -37,6 +38,8 @@ pub(super) struct DesignArguments {
     #[arg(long, value_name = "MINUTES")]
     time_limit: Option<f64>,
     #[command(flatten)]
+    slurm: SlurmArguments,
+    #[command(flatten)]
     common: Common,
 }
 
@@ -55,16 +58,28 @@ pub(super) fn run(a: &DesignArguments) -> Result<(), CliError> {
     if a.no_verify {
         study.verification.is_on = false;
     }
+    if a.slurm.slurm {
+        let (folder, seed) = design_slurm::search_on_cluster(&a.slurm, &study, &a.study, &a.common)?;
+        study.seed = seed;
+        return run_search(&study, Some(&folder), false, a);
+    }
     let folder = output::folder(a.common.out.as_deref(), a.common.json, &a.study);
-    let checkpoint = match &folder {
+    run_search(&study, folder.as_deref(), a.restart, a)
+}
+
+/// Searches, verifies and writes; takes up a checkpoint in `folder`.
+fn run_search(study: &Study, folder: Option<&Path>, is_restart: bool, a: &DesignArguments) -> Result<(), CliError> {
+    let checkpoint = match folder {
         None => Checkpoint::in_memory(),
         Some(folder) => {
-            std::fs::create_dir_all(folder).map_err(|source| CliError::Write { path: folder.clone(), source })?;
+            std::fs::create_dir_all(folder).map_err(|source| CliError::Write { path: folder.into(), source })?;
             let path = folder.join("checkpoint.jsonl");
-            if a.restart && path.exists() {
+            if is_restart && path.exists() {
                 std::fs::remove_file(&path).map_err(|source| CliError::Write { path: path.clone(), source })?;
             }
-            Checkpoint::open(&path, &study_hash(&study))
+            // The search does not depend on the verification: a search without it can be verified later.
+            let searched = Study { verification: VerificationSettings::default(), ..study.clone() };
+            Checkpoint::open(&path, &study_hash(&searched))
                 .map_err(|e| CliError::Input { path, message: e.to_string() })?
         }
     };
@@ -75,26 +90,26 @@ pub(super) fn run(a: &DesignArguments) -> Result<(), CliError> {
     let limit = time_limit(a.time_limit)?;
     let is_stopped = || interrupt::is_requested() || limit.is_some_and(|limit| started.elapsed() >= limit);
     let bar = Bar::new();
-    let found = match search(&study, &checkpoint, &|p| bar.show(p), &is_stopped) {
+    let found = match search(study, &checkpoint, &|p| bar.show(p), &is_stopped) {
         Ok(found) => found,
         Err(SearchError::Stopped { unfinished }) => {
             bar.clear();
-            return Err(stop(&unfinished, folder.as_deref()));
+            return Err(stop(&unfinished, folder));
         }
         Err(other) => {
             bar.clear();
             return Err(CliError::Numerics(other.to_string()));
         }
     };
-    let Some(mut result) = DesignResult::new(&study, &found) else {
+    let Some(mut result) = DesignResult::new(study, &found) else {
         return Err(CliError::Numerics("nothing was confirmed".into()));
     };
     if study.verification.is_on {
-        match verify_both(&study, &result, &checkpoint, &bar, &is_stopped)? {
+        match verify_both(study, &result, &checkpoint, &bar, &is_stopped)? {
             Some(verified) => result.add_verification(verified),
             None => {
                 bar.clear();
-                return Err(stop(&found.unfinished(&study, "verify"), folder.as_deref()));
+                return Err(stop(&found.unfinished(study, "verify"), folder));
             }
         }
     }
@@ -102,16 +117,16 @@ pub(super) fn run(a: &DesignArguments) -> Result<(), CliError> {
     if let Some(message) = checkpoint.write_failure() {
         eprintln!("lambdak: the checkpoint could not be written to the end ({message}); the result is complete");
     }
-    if let Some(folder) = &folder {
+    if let Some(folder) = folder {
         output::write_file(folder, "design.json", output::to_json(&result)?.as_bytes())?;
-        write_report(&study, &result, folder)?;
+        write_report(study, &result, folder)?;
         output::write_file(folder, "best-specimen.json", best_specimen(&result).to_json().as_bytes())?;
         for name in UNFINISHED {
             // What a stopped run left is out of date now; it may not be there.
             let _ = std::fs::remove_file(folder.join(name));
         }
     }
-    output::print(&if a.common.json { output::to_json(&result)? } else { summary(&result, folder.as_deref()) })
+    output::print(&if a.common.json { output::to_json(&result)? } else { summary(&result, folder) })
 }
 
 /// The option as a duration.

@@ -41,18 +41,32 @@ pub enum CliError {
     /// The computation did not succeed.
     #[error("{0}")]
     Numerics(String),
+    /// Results of a sweep cannot be read, kept or put together.
+    #[error(transparent)]
+    Store(#[from] crate::sweep::StoreError),
+    /// Results cannot be compared.
+    #[error(transparent)]
+    Compare(#[from] crate::compare::CompareError),
+    /// The compared result is worse.
+    #[error("{0}")]
+    Worse(String),
+    /// The cluster did not do it.
+    #[error("{0}")]
+    Cluster(String),
     /// Ctrl-C.
     #[error("stopped; {0}")]
     Interrupted(String),
 }
 
 impl CliError {
-    /// 2 for bad input, 3 for a computation that did not succeed, 4 for a file that cannot be written, 130 after Ctrl-C.
+    /// 1 for a compared result that is worse, 2 for bad input, 3 for a computation that did not succeed, 4 for a file that cannot be written, 130 after Ctrl-C.
     pub fn exit_code(&self) -> u8 {
         match self {
             CliError::Read { .. } | CliError::Input { .. } | CliError::Option { .. } => 2,
-            CliError::Numerics(_) => 3,
-            CliError::Write { .. } => 4,
+            CliError::Numerics(_) | CliError::Cluster(_) => 3,
+            CliError::Write { .. } | CliError::Store(crate::sweep::StoreError::Write { .. }) => 4,
+            CliError::Store(_) | CliError::Compare(_) => 2,
+            CliError::Worse(_) => 1,
             CliError::Interrupted(_) => 130,
         }
     }

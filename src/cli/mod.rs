@@ -1,12 +1,14 @@
 //! The command. Nothing is computed here: arguments become one validated request, the library works, results are printed.
 //!
-//! Results on stdout (`--json` for machines), progress on stderr, files in a folder. Exit codes: 0 done, 2 bad input,
-//! 3 no solution found, 4 a file cannot be written, 130 stopped by Ctrl-C.
+//! Results on stdout (`--json` for machines), progress on stderr, files in a folder. Exit codes: 0 done, 1 worse
+//! (`compare`), 2 bad input, 3 no solution found, 4 a file cannot be written, 130 stopped by Ctrl-C.
 
+mod compare;
 mod curve_input;
 mod curve_tables;
 mod curves;
 mod design;
+mod design_slurm;
 mod diagnose;
 mod error;
 mod evaluate;
@@ -16,7 +18,10 @@ mod interrupt;
 mod output;
 mod progress;
 mod scan;
+mod slurm;
 mod solve;
+mod sweep;
+mod task_bar;
 mod uniaxial;
 
 use clap::{Args, Parser, Subcommand};
@@ -30,7 +35,7 @@ pub use error::CliError;
 #[command(
     name = "lambdak",
     version,
-    after_help = "Exit codes: 0 done, 2 bad input, 3 no solution found, 4 a file cannot be written, 130 stopped by Ctrl-C."
+    after_help = "Exit codes: 0 done, 1 worse (compare), 2 bad input, 3 no solution found, 4 a file cannot be written, 130 stopped by Ctrl-C."
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -48,7 +53,11 @@ enum Command {
     /// Raw phases, MATLAB files or point clouds as a recording of displacements.
     Import(import::ImportArguments),
     /// The best specimen under the limits of a study, with the evidence.
-    Design(design::DesignArguments),
+    Design(Box<design::DesignArguments>),
+    /// Many designs evaluated: a table of what each would tell, on one machine or a cluster.
+    Sweep(Box<sweep::SweepArguments>),
+    /// Whether a result is the same as, better or worse than another one.
+    Compare(compare::CompareArguments),
     /// Where a recording and its model differ, and what physics was left out.
     Diagnose(diagnose::DiagnoseArguments),
     /// The traditional route: one uniaxial curve, of a strip or a dumb-bell, fitted with Ogden terms.
@@ -108,6 +117,8 @@ pub fn run() -> ExitCode {
         Command::Scan(a) => scan::run(a),
         Command::Import(a) => import::run(a),
         Command::Design(a) => design::run(a),
+        Command::Sweep(a) => sweep::run(a),
+        Command::Compare(a) => compare::run(a),
         Command::Diagnose(a) => diagnose::run(a),
         Command::Uniaxial(a) => uniaxial::run(a),
         Command::Curves(a) => curves::run(a),

@@ -37,4 +37,5 @@ pub use search::{Found, Progress, ProgressSink, SearchError, base_at_drive, sear
 pub use space::{Orbit, Structure, Subspace, Variable, subspaces};
 pub use state::Candidate;
 pub use study::{Budget, CountRange, MaterialPrior, Range, Study, StudyError, Vary, VerificationSettings};
+pub(crate) use study::{Inline, resolve};
 pub use unfinished::Unfinished;

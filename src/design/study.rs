@@ -71,7 +71,7 @@ fn default_seed() -> u64 {
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(untagged)]
-enum Inline<T> {
+pub(crate) enum Inline<T> {
     File(PathBuf),
     Value(T),
 }
@@ -333,7 +333,8 @@ fn range(field: &'static str, value: f64, low: f64, high: f64, allowed: &'static
     if value >= low && value <= high { Ok(()) } else { Err(StudyError::OutOfRange { field, value, allowed }) }
 }
 
-fn resolve<T, E: std::fmt::Display>(
+/// The value, or what the file named beside the study holds.
+pub(crate) fn resolve<T, E: std::fmt::Display>(
     inline: Inline<T>,
     folder: &Path,
     parse: impl Fn(&str) -> Result<T, E>,

@@ -14,6 +14,8 @@
 //! | spread found beside spread promised | [`SpreadPlot`] |
 //! | correlation of the parameters | [`CorrelationPlot`] |
 //! | the deformed specimen | [`DeformedShape`] |
+//! | every design of a sweep across its variables | [`ParallelPlot`] |
+//! | what each variable of a sweep does | [`MainEffectsPlot`] |
 //! | how far each limit is | [`LimitsPlot`] |
 //! | two rankings of the same designs | [`RankingPlot`] |
 //! | measured curves with their fits and residuals | [`CurvesPlot`] |
@@ -38,8 +40,10 @@ mod html;
 mod html_parts;
 mod labels;
 mod limits;
+mod main_effects;
 mod maps;
 mod number;
+mod parallel;
 mod pareto;
 mod ranking;
 mod scan_pictures;
@@ -48,6 +52,7 @@ mod specimen_pictures;
 mod spread;
 mod surface;
 mod svg;
+mod sweep_report;
 mod text;
 mod vtu;
 mod vtu_cells;
@@ -70,8 +75,10 @@ pub use history::{HistoryPlot, HistoryPoint};
 pub use html::{Report, ReportHeader};
 pub use html_parts::{Align, CalloutKind, Column, Table};
 pub use limits::{LimitBar, LimitsPlot};
+pub use main_effects::{MainEffect, MainEffectsPlot};
 pub use maps::{VoxelField, VoxelMaps};
 pub use number::{significant, symbol_of_parameter};
+pub use parallel::{ParallelAxis, ParallelPlot};
 pub use pareto::{ParetoPlot, ParetoPoint, PointKind};
 pub use ranking::{RankedItem, RankingPlot};
 pub use scan_pictures::{displacement_picture, raw_picture};
@@ -79,4 +86,5 @@ pub use shape::{DeformedShape, ShapeQuad};
 pub use specimen_pictures::{bar_pictures, deformed_picture, histogram_picture, map_pictures, vtu_of};
 pub use spread::{SpreadPlot, SpreadRow};
 pub use surface::{nodal_values, surface_quads};
+pub use sweep_report::sweep_report;
 pub use vtu::{Vtu, element_means};

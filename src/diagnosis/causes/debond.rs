@@ -5,8 +5,9 @@ use crate::diagnosis::scene::Scene;
 use crate::fem::Field;
 use crate::specimen::Specimen;
 
-/// Width of the edge of a debonded patch, mm: the spacing of nodes on the face.
-const EDGE_MM: f64 = 0.6;
+/// Width of the edge of a debonded patch, mm: a third of the spacing of nodes on the face, so that the bond changes smoothly as
+/// the edge passes from node to node.
+const EDGE_MM: f64 = 0.35;
 /// How loose the inside of the patch is: free but for 1/1000 of the sample's own stiffness, which keeps the patch in place.
 const LOOSE: f64 = 0.999;
 
@@ -80,7 +81,7 @@ impl Cause for Debond {
                     inside = inside.min(edges[a][1] - p);
                 }
             }
-            let s = 1.0 / (1.0 + (-(inside / (0.25 * EDGE_MM))).clamp(-60.0, 60.0).exp());
+            let s = 1.0 / (1.0 + (-(inside / EDGE_MM)).clamp(-60.0, 60.0).exp());
             // Loose to one half at the edge; below a thousandth it is firm.
             if s < 1e-3 { 0.0 } else { LOOSE * s }
         });

@@ -1,0 +1,217 @@
+//! Reads a result and takes out its figures and what makes it comparable.
+
+use super::error::CompareError;
+use super::figure::{Direction, Figure};
+use crate::design::DesignResult;
+use crate::sensitivity::Evaluation;
+use crate::sweep::{SweepCell, SweepResult};
+use serde_json::Value;
+use std::path::Path;
+
+/// Largest result that is read.
+const MAX_BYTES: u64 = 1 << 30;
+
+/// A result, ready to be compared.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Subject {
+    /// `evaluation/1`, `sweep/1` or `design/1`.
+    pub schema: String,
+    /// What must agree: name and value, in the order in which differences are told.
+    pub conditions: Vec<(String, String)>,
+    /// What must agree as well unless different inputs are wanted: the specimen and the mesh of it.
+    pub inputs: Vec<(String, String)>,
+    /// The figures.
+    pub figures: Vec<Figure>,
+    /// Version of the program.
+    pub version: String,
+}
+
+/// Reads `evaluation/1`, `sweep/1` or `design/1`.
+///
+/// # Errors
+/// [`CompareError::Read`], [`CompareError::NotAResult`].
+pub fn read(path: &Path) -> Result<Subject, CompareError> {
+    let fail = |e: std::io::Error| CompareError::Read { path: path.into(), message: e.to_string() };
+    let not = |message: String| CompareError::NotAResult { path: path.into(), message };
+    let size = std::fs::metadata(path).map_err(fail)?.len();
+    if size > MAX_BYTES {
+        return Err(not(format!("{size} bytes (limit: {MAX_BYTES})")));
+    }
+    let text = std::fs::read_to_string(path).map_err(fail)?;
+    let value: Value = serde_json::from_str(&text).map_err(|e| not(e.to_string()))?;
+    let Some(schema) = value.get("schema").and_then(Value::as_str) else {
+        return Err(not("it has no schema".into()));
+    };
+    let subject = match schema {
+        "evaluation/1" => serde_json::from_str(&text).map(|e: Evaluation| of_evaluation(&e)),
+        "design/1" => serde_json::from_str(&text).map(|d: DesignResult| of_design(&d)),
+        "sweep/1" => serde_json::from_str(&text).map(|s: SweepResult| of_sweep(&s)),
+        other => return Err(not(format!("its schema is '{other}'; known: evaluation/1, sweep/1, design/1"))),
+    };
+    subject.map_err(|e| not(format!("{schema} of another version: {e}")))
+}
+
+fn conditions_of(e: &Evaluation) -> Vec<(String, String)> {
+    let scan = &e.scan;
+    let parameters: Vec<&str> = e.promised_sd.iter().map(|p| p.parameter.as_str()).collect();
+    [
+        ("voxel size in mm", format!("{:?}", scan.voxel_mm)),
+        ("noise of the displacement in mm", format!("{:?}", scan.noise_sd_mm)),
+        ("noise of the force in N", format!("{}", scan.force_sd_n)),
+        ("weight of partly filled voxels", format!("{:?}", scan.partial_voxels)),
+        ("normalisation of the sensitivities", e.notes.integrated_sensitivity.clone()),
+        ("meaning of the promised standard deviations", e.notes.promised_sd.clone()),
+        ("parameters of the material", parameters.join(", ")),
+        ("number of drives", e.steps.len().to_string()),
+    ]
+    .map(|(name, value)| (name.to_string(), value))
+    .into()
+}
+
+fn inputs_of(e: &Evaluation) -> Vec<(String, String)> {
+    let s = &e.statistics;
+    let drives: Vec<String> = e.steps.iter().map(|s| s.drive_mm.to_string()).collect();
+    let voxels: Vec<String> = e.steps.iter().map(|s| s.num_voxels.to_string()).collect();
+    let mesh = format!("{} elements, {} nodes, {} unknowns", s.num_elements, s.num_nodes, s.num_unknowns);
+    vec![
+        ("drives in mm".into(), drives.join(", ")),
+        ("mesh".into(), mesh),
+        ("number of voxels".into(), voxels.join(", ")),
+        ("inputs (specimen, material, drives or settings): their hash".into(), e.input_hash.clone()),
+    ]
+}
+
+fn of_evaluation(e: &Evaluation) -> Subject {
+    let mut figures = Vec::new();
+    figures_of("", e, &mut figures);
+    Subject {
+        schema: e.schema.clone(),
+        conditions: conditions_of(e),
+        inputs: inputs_of(e),
+        figures,
+        version: e.version.clone(),
+    }
+}
+
+/// Figures of an evaluation, each name begun with `prefix`. Steps are numbered: their drives are among the inputs.
+fn figures_of(prefix: &str, e: &Evaluation, figures: &mut Vec<Figure>) {
+    let mut add = |name: String, value: Option<f64>, direction| {
+        figures.push(Figure { name: format!("{prefix}{name}"), value, direction });
+    };
+    for (index, step) in e.steps.iter().enumerate() {
+        let at = format!("step {}", index + 1);
+        add(format!("{at}: force in N"), Some(step.force_n), Direction::Neutral);
+        add(format!("{at}: median stretch"), Some(step.median_stretch), Direction::Neutral);
+        for s in &step.integrated_sensitivity {
+            let p = &s.parameter;
+            let of = |what: &str| format!("{at}: integrated sensitivity to {p}, {what}");
+            add(of("sum"), Some(s.sum), Direction::LargerIsBetter);
+            add(of("mean per voxel"), Some(s.mean_per_voxel), Direction::LargerIsBetter);
+            add(of("volume integral"), Some(s.volume_integral), Direction::LargerIsBetter);
+        }
+        for p in &step.promised_sd {
+            add(format!("{at}: promised sd of {}", p.parameter), p.value, Direction::SmallerIsBetter);
+        }
+    }
+    for p in &e.promised_sd {
+        add(format!("all drives: promised sd of {}", p.parameter), p.value, Direction::SmallerIsBetter);
+    }
+}
+
+fn of_design(d: &DesignResult) -> Subject {
+    let mut figures = vec![
+        Figure {
+            name: "objective of the best design".into(),
+            value: Some(d.best.objective),
+            direction: Direction::LargerIsBetter,
+        },
+        Figure {
+            name: "designs confirmed within the limits".into(),
+            value: Some(d.ranked.iter().filter(|r| r.is_within_limits).count() as f64),
+            direction: Direction::Neutral,
+        },
+    ];
+    let mut conditions =
+        vec![("objective".into(), format!("{:?}", d.objective)), ("base specimen".into(), d.base.specimen.to_json())];
+    for (label, entry) in [("base", &d.base), ("best", &d.best)] {
+        for m in &entry.by_material {
+            let prefix = format!("{label}, material \"{}\": ", m.material);
+            figures_of(&prefix, &m.evaluation, &mut figures);
+            let named = conditions_of(&m.evaluation).into_iter().map(|(name, v)| (format!("{prefix}{name}"), v));
+            conditions.extend(named);
+        }
+    }
+    // The mesh and voxels of the best design follow from it; those of the base must be the same.
+    for m in &d.base.by_material {
+        let named = inputs_of(&m.evaluation).into_iter();
+        conditions.extend(named.map(|(name, v)| (format!("base, material \"{}\": {name}", m.material), v)));
+    }
+    let spread = |label: &str, list: &[crate::calibration::ParameterSpread], figures: &mut Vec<Figure>| {
+        figures.extend(list.iter().map(|p| Figure {
+            name: format!("verification of the {label}: sd found of {}", p.parameter),
+            value: Some(p.found_sd),
+            direction: Direction::SmallerIsBetter,
+        }));
+    };
+    spread("best", &d.verification.best, &mut figures);
+    spread("base", &d.verification.base, &mut figures);
+    Subject { schema: d.schema.clone(), conditions, inputs: Vec::new(), figures, version: d.version.clone() }
+}
+
+/// Direction of a column of a sweep's table; none where it is no figure.
+fn direction_of(column: &str) -> Option<Direction> {
+    if column.starts_with("sensitivity_") {
+        return Some(Direction::LargerIsBetter);
+    }
+    if column.starts_with("promised_sd_") {
+        return Some(Direction::SmallerIsBetter);
+    }
+    ["force_n", "median_stretch"].contains(&column).then_some(Direction::Neutral)
+}
+
+fn of_sweep(s: &SweepResult) -> Subject {
+    let study = &s.study;
+    let text = |value: &Value| value.to_string();
+    let json = |value: serde_json::Result<Value>| value.as_ref().map_or_else(|_| String::new(), text);
+    let conditions = vec![
+        ("base specimen".into(), json(serde_json::to_value(&study.base))),
+        ("scan".into(), json(serde_json::to_value(study.scan))),
+        ("materials".into(), json(serde_json::to_value(&study.materials))),
+        ("variables".into(), json(serde_json::to_value(&study.variables))),
+        ("sampling".into(), format!("{} (seed {})", json(serde_json::to_value(&study.sampling)), study.seed)),
+        ("mesh".into(), json(serde_json::to_value(study.mesh))),
+        ("columns".into(), s.columns.join(", ")),
+    ];
+    let index_of = |name: &str| s.columns.iter().position(|c| c == name);
+    let cell = |row: &[SweepCell], name: &str| -> String {
+        match index_of(name).and_then(|i| row.get(i)) {
+            Some(SweepCell::Integer(v)) => v.to_string(),
+            Some(SweepCell::Text(v)) => v.clone(),
+            _ => "-".into(),
+        }
+    };
+    let mut figures = Vec::new();
+    for row in &s.rows {
+        let task = cell(row, "task");
+        let is_done = cell(row, "status") == "done";
+        // A task that fails now is worse than any number.
+        if ["0", "-"].contains(&cell(row, "step").as_str()) {
+            figures.push(Figure {
+                name: format!("task {task}: done"),
+                value: is_done.then_some(1.0),
+                direction: Direction::LargerIsBetter,
+            });
+        }
+        let at = format!("task {task}, step {}", cell(row, "step"));
+        for (column, value) in s.columns.iter().zip(row) {
+            let (Some(direction), true) = (direction_of(column), is_done) else { continue };
+            let value = match value {
+                SweepCell::Number(v) => Some(*v),
+                SweepCell::Integer(v) => Some(*v as f64),
+                _ => None,
+            };
+            figures.push(Figure { name: format!("{at}: {column}"), value, direction });
+        }
+    }
+    Subject { schema: s.schema.clone(), conditions, inputs: Vec::new(), figures, version: s.version.clone() }
+}

@@ -1,0 +1,121 @@
+//! What a variable sets: one number of the specimen, the material or the scan, by name.
+
+use super::error::SweepStudyError;
+use crate::material::Ogden;
+use crate::sensitivity::ScanSettings;
+use crate::specimen::Specimen;
+
+/// A place that a variable's value goes to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Target {
+    place: Place,
+    /// The value is negated: holes that move apart.
+    is_negated: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Place {
+    /// The only drive of the specimen.
+    Drive,
+    Length,
+    Thickness,
+    Width,
+    HoleX(usize),
+    HoleOther(usize),
+    HoleDiameter(usize),
+    Bulk,
+    Mu(usize),
+    Alpha(usize),
+    Voxel(usize),
+    Noise(usize),
+    ForceSd,
+}
+
+impl Target {
+    /// Reads `drive_mm`, `block.length_mm`, `block.thickness_mm`, `block.width_mm`, `holes[i].x_mm`, `holes[i].other_mm`
+    /// (z of a hole along the thickness, y of one along the width), `holes[i].diameter_mm`, `material.bulk_kpa`,
+    /// `material.mu_1_kpa`, `material.alpha_1`, `scan.voxel_mm[c]`, `scan.noise_sd_mm[c]` or `scan.force_sd_n`; indices of
+    /// holes and components from 0, of Ogden terms from 1. A leading `-` sets the negated value.
+    ///
+    /// # Errors
+    /// [`SweepStudyError::UnknownTarget`].
+    pub fn parse(variable: &str, text: &str) -> Result<Target, SweepStudyError> {
+        let (is_negated, name) = text.strip_prefix('-').map_or((false, text), |rest| (true, rest));
+        let unknown = || SweepStudyError::UnknownTarget { variable: variable.into(), target: text.into() };
+        let place = match name {
+            "drive_mm" => Place::Drive,
+            "block.length_mm" => Place::Length,
+            "block.thickness_mm" => Place::Thickness,
+            "block.width_mm" => Place::Width,
+            "material.bulk_kpa" => Place::Bulk,
+            "scan.force_sd_n" => Place::ForceSd,
+            other => Self::indexed(other).ok_or_else(unknown)?,
+        };
+        Ok(Target { place, is_negated })
+    }
+
+    fn indexed(name: &str) -> Option<Place> {
+        if let Some(rest) = name.strip_prefix("holes[") {
+            let (index, field) = rest.split_once("].")?;
+            let index = index.parse().ok()?;
+            return match field {
+                "x_mm" => Some(Place::HoleX(index)),
+                "other_mm" => Some(Place::HoleOther(index)),
+                "diameter_mm" => Some(Place::HoleDiameter(index)),
+                _ => None,
+            };
+        }
+        let component = |prefix: &str| -> Option<usize> {
+            let index = name.strip_prefix(prefix)?.strip_suffix(']')?.parse().ok()?;
+            (index < 3).then_some(index)
+        };
+        if let Some(c) = component("scan.voxel_mm[") {
+            return Some(Place::Voxel(c));
+        }
+        if let Some(c) = component("scan.noise_sd_mm[") {
+            return Some(Place::Noise(c));
+        }
+        let term = |text: &str| -> Option<usize> { text.parse::<usize>().ok()?.checked_sub(1) };
+        if let Some(number) = name.strip_prefix("material.mu_") {
+            return Some(Place::Mu(term(number.strip_suffix("_kpa")?)?));
+        }
+        Some(Place::Alpha(term(name.strip_prefix("material.alpha_")?)?))
+    }
+
+    /// Unit suffix that the variable's name must end in, so that its column says its unit; none for a pure number.
+    pub fn unit_suffix(&self) -> &'static str {
+        match self.place {
+            Place::Bulk | Place::Mu(_) => "_kpa",
+            Place::Alpha(_) => "",
+            Place::ForceSd => "_n",
+            _ => "_mm",
+        }
+    }
+
+    /// Sets `value`; false where there is no such hole or term.
+    pub fn set(&self, value: f64, specimen: &mut Specimen, material: &mut Ogden, scan: &mut ScanSettings) -> bool {
+        let value = if self.is_negated { -value } else { value };
+        let slot = match self.place {
+            Place::Drive => {
+                specimen.drive_mm = vec![value];
+                return true;
+            }
+            Place::Length => Some(&mut specimen.block.length_mm),
+            Place::Thickness => Some(&mut specimen.block.thickness_mm),
+            Place::Width => Some(&mut specimen.block.width_mm),
+            Place::HoleX(i) => specimen.holes.get_mut(i).map(|h| &mut h.center_mm[0]),
+            Place::HoleOther(i) => specimen.holes.get_mut(i).map(|h| &mut h.center_mm[1]),
+            Place::HoleDiameter(i) => specimen.holes.get_mut(i).map(|h| &mut h.diameter_mm),
+            Place::Bulk => Some(&mut material.bulk_kpa),
+            Place::Mu(i) => material.terms.get_mut(i).map(|t| &mut t.mu_kpa),
+            Place::Alpha(i) => material.terms.get_mut(i).map(|t| &mut t.alpha),
+            Place::Voxel(c) => scan.voxel_mm.get_mut(c),
+            Place::Noise(c) => scan.noise_sd_mm.get_mut(c),
+            Place::ForceSd => Some(&mut scan.force_sd_n),
+        };
+        slot.is_some_and(|slot| {
+            *slot = value;
+            true
+        })
+    }
+}
