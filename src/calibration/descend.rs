@@ -13,6 +13,9 @@ pub(super) struct Descent {
     /// One per recording, of the estimate.
     pub(super) predictions: Vec<Prediction>,
     pub(super) system: NormalSystem,
+    pub(super) is_converged: bool,
+    /// Why the last trial had no equilibrium, where it had none.
+    pub(super) failure: Option<SolveError>,
     pub(super) iterations: usize,
     /// Distance from the optimum of the linear model, in standard deviations.
     pub(super) distance: f64,
@@ -23,10 +26,29 @@ pub(super) struct Descent {
     pub(super) work: Work,
 }
 
-/// Descends to the optimum. `predict` solves a material near given predictions, `evaluate` compares with the data.
+impl Descent {
+    /// The descent, if it reached the optimum.
+    ///
+    /// # Errors
+    /// [`CalibrationError::NotConverged`], [`CalibrationError::NoEquilibrium`].
+    pub(super) fn converged(self, options: &FitOptions) -> Result<Descent, CalibrationError> {
+        let iterations = self.iterations;
+        match self.failure {
+            _ if self.is_converged => Ok(self),
+            Some(source) => Err(CalibrationError::NoEquilibrium { iterations, source }),
+            None => {
+                let (distance, limit) = (self.distance, options.tolerance);
+                Err(CalibrationError::NotConverged { iterations, distance, limit })
+            }
+        }
+    }
+}
+
+/// Descends until the optimum is reached or the iterations run out. `predict` solves a material near given predictions,
+/// `evaluate` compares with the data.
 ///
 /// # Errors
-/// [`CalibrationError::NotConverged`], [`CalibrationError::NoEquilibrium`], and those of the calls.
+/// Those of the calls; a trial without an equilibrium is no error.
 pub(super) fn descend(
     constraints: &Constraints,
     options: &FitOptions,
@@ -43,16 +65,19 @@ pub(super) fn descend(
     let mut iterations = 0;
     loop {
         let full = constraints.step(&system, 0.0, false)?;
-        if full.distance < options.tolerance {
+        let is_converged = full.distance < options.tolerance;
+        if is_converged || iterations >= options.max_iterations {
             let (distance, reached) = (full.distance, full.reached);
-            return Ok(Descent { predictions, system, iterations, distance, reached, history, work });
-        }
-        if iterations >= options.max_iterations {
-            return Err(match failure {
-                Some(source) => CalibrationError::NoEquilibrium { iterations, source },
-                None => {
-                    CalibrationError::NotConverged { iterations, distance: full.distance, limit: options.tolerance }
-                }
+            return Ok(Descent {
+                predictions,
+                system,
+                is_converged,
+                failure,
+                iterations,
+                distance,
+                reached,
+                history,
+                work,
             });
         }
         iterations += 1;

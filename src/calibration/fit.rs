@@ -177,7 +177,7 @@ impl FitStart {
         let system = |p: &[Prediction]| NormalSystem::new(p, &targets, options.bulk, options.held);
         let start = vec![self.prediction.clone()];
         let Descent { mut predictions, system, iterations, distance, reached, .. } =
-            descend(&self.constraints, options, start, &mut predict, &system)?;
+            descend(&self.constraints, options, start, &mut predict, &system)?.converged(options)?;
         let num_data = targets[0].expectation().1;
         let held = options.held.count() + usize::from(options.bulk == Bulk::Held);
         let fitted = system.parameters.len() - held;

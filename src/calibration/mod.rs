@@ -1,15 +1,23 @@
 //! Calibration: from a scan's displacements and forces to the material's parameters, and the proof that a design's promise
 //! is kept.
 
+mod calibrate;
+mod contours;
 mod descend;
 mod error;
 mod fit;
 mod noise;
 mod observed;
+mod problem;
+mod profile;
+mod result;
+mod stability;
+mod starts;
 mod step;
 mod synthetic;
 mod system;
 mod target;
+mod terms;
 #[cfg(test)]
 mod test_problem;
 mod verify;
@@ -17,6 +25,13 @@ mod verify;
 pub use error::CalibrationError;
 pub use fit::{Bulk, Fit, FitOptions, FitStart, Held, fit};
 pub use noise::estimate_noise_sd_mm;
+pub use calibrate::{Calibration, CalibrateOptions, Estimate, MeshComparison, TermCount, calibrate};
+pub use result::{CalibrationResult, DiscretisationResult, ObjectiveResult, ParameterResult, RatioResult, StepResult, ValueWithInterval, rms_misfit_mm};
+pub use contours::{Contour, ContourOptions, contours};
+pub use profile::{Profile, bulk_lower_bound_kpa, profile};
+pub use terms::{DECREMENT_THRESHOLD, F_TEST_LEVEL, Rule, TermRow, TermSelection};
+pub use problem::{CalibrationProblem, RecordingFit};
+pub use stability::{least_relative_stiffness, smallest_stiffness_kpa};
 pub use observed::{Observed, ObservedForce, ObservedStep, View};
 pub use system::Work;
 pub use target::{Objective, PAPER_BETA};

@@ -230,6 +230,16 @@ impl NormalSystem {
     }
 }
 
+/// Gauss–Newton matrix and half the negative gradient in the parameters' own units, for parameters that may be zero.
+pub(super) fn raw_sums(predictions: &[Prediction], targets: &[Target]) -> (DMatrix<f64>, DVector<f64>) {
+    let n = predictions.first().map_or(0, |p| p.material.parameters().len());
+    let mut sums = Sums { matrix: DMatrix::zeros(n, n), gradient: DVector::zeros(n), ..Sums::default() };
+    for (prediction, target) in predictions.iter().zip(targets) {
+        sums.add(prediction, target);
+    }
+    (sums.matrix, sums.gradient)
+}
+
 /// Sums over all data, in the parameters' units.
 #[derive(Default)]
 struct Sums {

@@ -3,6 +3,7 @@
 //! Results on stdout (`--json` for machines), progress on stderr, files in a folder. Exit codes: 0 done, 2 bad input,
 //! 3 no solution found, 4 a file cannot be written, 130 stopped by Ctrl-C.
 
+mod calibrate;
 mod design;
 mod error;
 mod evaluate;
@@ -36,6 +37,8 @@ enum Command {
     Solve(solve::SolveArguments),
     /// What a scan of a specimen would see, and what it would tell about the material.
     Evaluate(evaluate::EvaluateArguments),
+    /// The material, from recordings of a specimen, with its uncertainty.
+    Calibrate(calibrate::CalibrateArguments),
     /// The best specimen under the limits of a study, with the evidence.
     Design(design::DesignArguments),
 }
@@ -88,6 +91,7 @@ pub fn run() -> ExitCode {
     let result = match &arguments.command {
         Command::Solve(a) => solve::run(a),
         Command::Evaluate(a) => evaluate::run(a),
+        Command::Calibrate(a) => calibrate::run(a),
         Command::Design(a) => design::run(a),
     };
     match result {
