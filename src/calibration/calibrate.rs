@@ -9,7 +9,7 @@ use super::error::CalibrationError;
 use super::fit::FitOptions;
 use super::observed::Observed;
 use super::problem::{CalibrationProblem, RecordingFit};
-use super::profile::{Profile, bulk_lower_bound_kpa, profile};
+use super::profile::{Profile, TWO_SIDED_95, bulk_lower_bound_kpa, profile};
 use super::stability::least_relative_stiffness;
 use super::starts::{first_starts, further_starts};
 use super::system::Work;
@@ -91,6 +91,8 @@ pub struct Estimate {
     pub sd: Option<f64>,
     /// What the mesh may have shifted it by, to either side.
     pub mesh_error: f64,
+    /// What the structured part of the misfit may have shifted it by, at most.
+    pub possible_shift: f64,
     /// 95 % interval; a side that the data leave open is none.
     pub interval_95: [Option<f64>; 2],
     /// Whether the standard deviation is below half of the value.
@@ -251,7 +253,9 @@ pub fn calibrate(
         let (value, sd) = fit.initial_shear_modulus();
         let shear = |m: &Ogden| 0.5 * m.terms.iter().map(|t| t.mu_kpa * t.alpha).sum::<f64>();
         let error = mesh_error(&shear);
-        (value, sd.map(|sd| [-1.0, 1.0].map(|s| value + s * half_width(sd, error))))
+        // The shift of a sum of parameters is bounded by its own standard deviation likewise.
+        let shift = sd.unwrap_or(0.0) / fit.misfit_factor.sqrt() * fit.structured_misfit;
+        (value, sd.map(|sd| [-1.0, 1.0].map(|s| value + s * half_width(sd, error, shift))))
     });
     let mut profiles = Vec::new();
     if options.has_profiles {
@@ -279,19 +283,20 @@ pub fn calibrate(
     })
 }
 
-fn half_width(sd: f64, mesh_error: f64) -> f64 {
-    // Noise scatters, the mesh shifts: both add up in full only in the worst case, so in squares.
-    super::profile::TWO_SIDED_95 * sd.hypot(mesh_error / super::profile::TWO_SIDED_95)
+/// Noise scatters, mesh and misfit shift: all add up in full only in the worst case, so in squares.
+fn half_width(sd: f64, mesh_error: f64, possible_shift: f64) -> f64 {
+    (TWO_SIDED_95 * sd).hypot(mesh_error).hypot(possible_shift)
 }
 
 fn estimate(fit: &RecordingFit, parameter: Parameter, value: f64, mesh_error: f64) -> Estimate {
     let sd = fit.sd(parameter);
-    let interval_95 = match sd {
-        Some(sd) => [-1.0, 1.0].map(|s| Some(value + s * half_width(sd, mesh_error))),
+    let possible_shift = fit.possible_shift(parameter).unwrap_or(0.0);
+    let is_identifiable = sd.is_some_and(|sd| sd < IDENTIFIABILITY_LIMIT * value.abs());
+    let interval_95 = match sd.filter(|_| is_identifiable) {
+        Some(sd) => [-1.0, 1.0].map(|s| Some(value + s * half_width(sd, mesh_error, possible_shift))),
         None => [None; 2],
     };
-    let is_identifiable = sd.is_some_and(|sd| sd < IDENTIFIABILITY_LIMIT * value.abs());
-    Estimate { parameter, value, sd, mesh_error, interval_95, is_identifiable }
+    Estimate { parameter, value, sd, mesh_error, possible_shift, interval_95, is_identifiable }
 }
 
 /// The same material with its exponents falling.
@@ -346,7 +351,10 @@ impl Run<'_> {
                         found.push(fit);
                     }
                 }
-                Err(e) if e.is_of_the_data() => failure = Some(e),
+                Err(e) if e.is_of_the_data() => {
+                    (self.on_stage)(&format!("  {} terms: {e}", start.terms.len()));
+                    failure = Some(e);
+                }
                 Err(e) => return Err(e),
             }
         }
@@ -404,8 +412,8 @@ impl Run<'_> {
         }
         if fit.misfit_factor > 1.0 {
             self.notes.push(format!(
-                "the misfit is {:.2} times that of the noise: the model leaves something out, and the intervals are \
-                 widened by the root of that factor",
+                "the misfit is {:.3} times that of the noise: model or data leave something out. The intervals hold what an \
+                 error of the size of that misfit could shift each parameter by at most",
                 fit.misfit_factor
             ));
         }

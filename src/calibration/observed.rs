@@ -98,6 +98,20 @@ impl Observed {
         })
     }
 
+    /// Takes as missing what lies within `margin_mm` of the ends x = ±length/2 of a sheared block. The bonded edges end there:
+    /// strains are singular, so meshes and glue lines differ most. Returns how many voxels are left.
+    pub fn leave_out_ends(&mut self, margin_mm: f64) -> usize {
+        let limit = 0.5 * self.specimen.block.length_mm - margin_mm;
+        let is_left: Vec<bool> =
+            self.mask.voxels.iter().map(|&v| self.mask.grid.center_mm(v as usize)[0].abs() <= limit).collect();
+        for step in &mut self.steps {
+            for (u, _) in step.displacement.iter_mut().zip(&is_left).filter(|(_, is_left)| !**is_left) {
+                *u = [f64::NAN; 3];
+            }
+        }
+        is_left.iter().filter(|is_left| **is_left).count()
+    }
+
     /// How many neighbouring values carry the same noise: 1 without a filter, 8 for `hamming2` (the sum of the noise's
     /// correlations with all neighbours, (½ + 1 + ½)³). For fields smoother than the filter, a sum of n values knows as much
     /// as n / this independent ones.

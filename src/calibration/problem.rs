@@ -41,6 +41,10 @@ pub struct RecordingFit {
     pub chi2_per_datum: f64,
     /// What the covariance is to be multiplied with because the misfit is more than noise; 1 where it is not.
     pub misfit_factor: f64,
+    /// √(objective − its expectation) where the misfit is more than noise, else zero: the size of the structured misfit in
+    /// units of the noise. An error of that size and of the shape of a parameter's sensitivity would shift the parameter by
+    /// this times its standard deviation (Cauchy–Schwarz).
+    pub structured_misfit: f64,
     /// Numbers compared.
     pub num_data: usize,
     /// The paper's ℓ_u, mean over drives.
@@ -73,6 +77,13 @@ impl RecordingFit {
             return None;
         }
         Some(self.covariance.sd(index)? * self.misfit_factor.sqrt())
+    }
+
+    /// The largest shift of a parameter that a structured error as large as the structured misfit could make.
+    pub fn possible_shift(&self, parameter: Parameter) -> Option<f64> {
+        let index = self.information.index_of(parameter).ok()?;
+        let plain = self.information.covariance().sd(index).filter(|_| !self.held.contains(index))?;
+        Some(plain * self.structured_misfit)
     }
 
     /// ½ Σ μᵢαᵢ, kPa, and its standard deviation by the delta method.
@@ -183,6 +194,19 @@ impl<'a> CalibrationProblem<'a> {
         Ok(fit)
     }
 
+    /// Forces (N) that `material` needs, per recording and drive.
+    ///
+    /// # Errors
+    /// [`CalibrationError::Solve`].
+    pub fn force_at(
+        &mut self,
+        material: &Ogden,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Vec<Vec<f64>>, CalibrationError> {
+        let found = self.predict(material, None, &SolveOptions::default(), is_cancelled)?;
+        Ok(found.iter().map(|p| p.states.iter().map(|s| s.force_n).collect()).collect())
+    }
+
     /// The isochoric principal stretches that a fit's voxels visit, all recordings and drives together.
     ///
     /// # Errors
@@ -253,6 +277,7 @@ fn finished(
             (chi2, sum_of_expectations(&weighted))
         }
     };
+    let (objective_value, own_expectation) = (system.chi2, sum_of_expectations(targets).0);
     let prior = f64::from(u8::from(matches!(options.bulk, Bulk::LogPrior { .. })));
     let (expected, num_data) = expected;
     let chi2_per_datum = chi2 / (expected + prior - absorbed).max(1.0);
@@ -271,6 +296,7 @@ fn finished(
         chi2,
         chi2_per_datum,
         misfit_factor: if is_noise { 1.0 } else { chi2_per_datum },
+        structured_misfit: if is_noise { 0.0 } else { (objective_value - own_expectation).max(0.0).sqrt() },
         num_data,
         loss_u: system.loss_u,
         loss_f: (num_forces > 0).then_some(system.loss_f),

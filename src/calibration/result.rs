@@ -74,6 +74,8 @@ pub struct ParameterResult {
     pub interval_95: [Option<f64>; 2],
     /// What the mesh may have shifted it by.
     pub mesh_error: f64,
+    /// What the structured part of the misfit may have shifted it by, at most; zero where the misfit is that of the noise.
+    pub possible_shift: f64,
     /// Whether the standard deviation is below half of the value.
     pub identifiable: bool,
 }
@@ -175,6 +177,7 @@ impl CalibrationResult {
                 sd: e.sd.filter(|_| e.is_identifiable),
                 interval_95: e.interval_95,
                 mesh_error: e.mesh_error,
+                possible_shift: e.possible_shift,
                 identifiable: e.is_identifiable,
             })
             .collect();

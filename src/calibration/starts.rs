@@ -13,6 +13,8 @@ use nalgebra::DVector;
 const REFERENCE_SHEAR_KPA: f64 = 10.0;
 /// κ over the shear modulus at the start.
 const START_BULK_RATIO: f64 = 100.0;
+/// A term of this part of the shear modulus is not there yet; its derivatives exist.
+const NO_MODULUS: f64 = 1e-9;
 /// Exponents of one-term starts.
 const FIRST_EXPONENTS: [f64; 3] = [2.0, 6.0, -3.0];
 /// Exponents that a further term is tried with.
@@ -82,7 +84,7 @@ pub(super) fn further_starts(
     let mut candidates: Vec<(f64, Ogden)> = Vec::new();
     for chunk in exponents.chunks(num_at_once) {
         let mut wide = old.clone();
-        wide.terms.extend(chunk.iter().map(|&alpha| OgdenTerm { mu_kpa: 0.0, alpha }));
+        wide.terms.extend(chunk.iter().map(|&alpha| OgdenTerm { mu_kpa: NO_MODULUS * shear, alpha }));
         let predictions = problem.predict(&wide, Some(&fit.predictions), &options.solve, is_cancelled)?;
         let (matrix, gradient) = raw_sums(&predictions, &problem.targets()?);
         let free: Vec<usize> = (0..num_old).filter(|&i| !fit.held.contains(i)).collect();

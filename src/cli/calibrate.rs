@@ -58,6 +58,9 @@ pub(super) struct CalibrateArguments {
     /// Starts tried for every number of terms.
     #[arg(long, default_value_t = 3)]
     starts: usize,
+    /// Leave out voxels nearer than this to the ends of a sheared block, mm.
+    #[arg(long, default_value_t = 0.0)]
+    end_margin: f64,
     /// Profile likelihoods of all parameters.
     #[arg(long)]
     profile: bool,
@@ -94,7 +97,11 @@ pub(super) fn run(a: &CalibrateArguments) -> Result<(), CliError> {
     for path in &a.recordings {
         let fail = |message: String| CliError::Input { path: path.clone(), message };
         let recording = Recording::read(path, &ReadLimits::default()).map_err(|e| fail(e.to_string()))?;
-        observed.push(Observed::new(&recording, FORCE_SD_N).map_err(|e| fail(e.to_string()))?);
+        let mut prepared = Observed::new(&recording, FORCE_SD_N).map_err(|e| fail(e.to_string()))?;
+        if a.end_margin > 0.0 && prepared.leave_out_ends(a.end_margin) == 0 {
+            return Err(CliError::Option { option: "end-margin", message: format!("{} mm leaves no voxel", a.end_margin) });
+        }
+        observed.push(prepared);
         names.push(recording.id.clone());
     }
     let options = CalibrateOptions {
@@ -179,13 +186,13 @@ fn summary(result: &CalibrationResult) -> String {
         "  BIC takes {}, the F-test {}, the decrement {}; taken: {} ({})\n",
         s.by_bic, s.by_f_test, s.by_decrement, s.chosen, s.decided_by
     );
-    text += "\nparameter            value           sd      95 % interval              mesh\n";
+    text += "\nparameter            value           sd      95 % interval              mesh    misfit\n";
     let end = |v: Option<f64>| v.map_or("open".to_string(), |v| format!("{v:.5}"));
     for p in &result.parameters {
         let interval = format!("{} to {}", end(p.interval_95[0]), end(p.interval_95[1]));
         text += &match (p.value, p.sd) {
             (Some(value), Some(sd)) => {
-                format!("  {:<10} {value:>13.5} {sd:>12.5}      {interval:<25} {:>8.5}\n", p.name, p.mesh_error)
+                format!("  {:<10} {value:>13.5} {sd:>12.5}      {interval:<25} {:>8.5} {:>8.5}\n", p.name, p.mesh_error, p.possible_shift)
             }
             _ => format!("  {:<10} not identifiable               {interval}\n", p.name),
         };
