@@ -148,30 +148,8 @@ pub fn calibrate(
     let coarse_factor = options.mesh_factor * if options.has_mesh_allowance { MESH_RATIO } else { 1.0 };
     let mut problem = CalibrationProblem::new(observed, &|s| mesh(s, coarse_factor), options.objective)?;
     let has_force = problem.has_force();
-    // Without a force all moduli share a factor: μ₁ stays where it is.
-    let fit_options = if has_force { options.fit } else { FitOptions { held: options.fit.held.with(1), ..options.fit } };
-    let mut run = Run { options, fit_options, on_stage, is_cancelled, work: Work::default(), notes: Vec::new() };
-    let (mut rows, mut fits) = (Vec::new(), Vec::new());
-    let most = match options.terms {
-        TermCount::Auto { max } => max,
-        TermCount::Fixed(n) => n,
-    }
-    .clamp(1, MAX_TERMS - 1);
-    while rows.len() < most {
-        on_stage(&format!("{} term{}", rows.len() + 1, if rows.is_empty() { "" } else { "s" }));
-        let starts = match fits.last() {
-            None => first_starts(observed),
-            Some(last) => further_starts(&mut problem, last, &fit_options, options.num_starts, is_cancelled)?,
-        };
-        let Some((row, fit)) = run.best_of(&mut problem, &starts)? else { break };
-        rows.push(row);
-        fits.push(fit);
-        compare(&mut rows, fits[0].num_data);
-        let is_auto = matches!(options.terms, TermCount::Auto { .. });
-        if is_auto && rows.len() > 1 && !is_kept(&rows[rows.len() - 1], options.rule, options.decrement_threshold) {
-            break;
-        }
-    }
+    let mut run = Run::new(options, has_force, on_stage, is_cancelled);
+    let (rows, fits) = run.select(&mut problem)?;
     let rule = |rule| choose(&rows, rule, options.decrement_threshold);
     let mut selection = TermSelection {
         by_bic: rule(Rule::Bic),
@@ -300,14 +278,14 @@ fn estimate(fit: &RecordingFit, parameter: Parameter, value: f64, mesh_error: f6
 }
 
 /// The same material with its exponents falling.
-fn falling(material: &Ogden) -> Ogden {
+pub(super) fn falling(material: &Ogden) -> Ogden {
     let mut sorted = material.clone();
     sorted.terms.sort_by(|a, b| b.alpha.total_cmp(&a.alpha));
     sorted
 }
 
 /// What the stages share.
-struct Run<'a> {
+pub(super) struct Run<'a> {
     options: &'a CalibrateOptions,
     fit_options: FitOptions,
     on_stage: &'a dyn Fn(&str),
@@ -316,7 +294,49 @@ struct Run<'a> {
     notes: Vec<String>,
 }
 
-impl Run<'_> {
+impl<'a> Run<'a> {
+    pub(super) fn new(
+        options: &'a CalibrateOptions,
+        has_force: bool,
+        on_stage: &'a dyn Fn(&str),
+        is_cancelled: &'a dyn Fn() -> bool,
+    ) -> Run<'a> {
+        // Without a force all moduli share a factor: μ₁ stays where it is.
+        let held = if has_force { options.fit.held } else { options.fit.held.with(1) };
+        let fit_options = FitOptions { held, ..options.fit };
+        Run { options, fit_options, on_stage, is_cancelled, work: Work::default(), notes: Vec::new() }
+    }
+
+    /// The best fit of each number of terms, up to the first that the deciding rule does not keep.
+    pub(super) fn select(
+        &mut self,
+        problem: &mut CalibrationProblem,
+    ) -> Result<(Vec<TermRow>, Vec<RecordingFit>), CalibrationError> {
+        let (mut rows, mut fits): (Vec<TermRow>, Vec<RecordingFit>) = (Vec::new(), Vec::new());
+        let (most, is_auto) = match self.options.terms {
+            TermCount::Auto { max } => (max, true),
+            TermCount::Fixed(n) => (n, false),
+        };
+        while rows.len() < most.clamp(1, MAX_TERMS - 1) {
+            (self.on_stage)(&format!("{} term{}", rows.len() + 1, if rows.is_empty() { "" } else { "s" }));
+            let starts = match fits.last() {
+                None => first_starts(problem.observed()),
+                Some(last) => {
+                    further_starts(problem, last, &self.fit_options, self.options.num_starts, self.is_cancelled)?
+                }
+            };
+            let Some((row, fit)) = self.best_of(problem, &starts)? else { break };
+            rows.push(row);
+            fits.push(fit);
+            compare(&mut rows, fits[0].num_data);
+            let is_last_kept = is_kept(&rows[rows.len() - 1], self.options.rule, self.options.decrement_threshold);
+            if is_auto && rows.len() > 1 && !is_last_kept {
+                break;
+            }
+        }
+        Ok((rows, fits))
+    }
+
     fn fit(
         &mut self,
         problem: &mut CalibrationProblem,

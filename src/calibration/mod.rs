@@ -1,6 +1,7 @@
 //! Calibration: from a scan's displacements and forces to the material's parameters, and the proof that a design's promise
 //! is kept.
 
+mod adjoint;
 mod calibrate;
 mod contours;
 mod descend;
@@ -12,6 +13,8 @@ mod problem;
 mod profile;
 mod result;
 mod stability;
+mod stand_ins;
+mod study;
 mod starts;
 mod step;
 mod synthetic;
@@ -29,6 +32,8 @@ pub use calibrate::{Calibration, CalibrateOptions, Estimate, MeshComparison, Ter
 pub use result::{CalibrationResult, DiscretisationResult, ObjectiveResult, ParameterResult, RatioResult, StepResult, ValueWithInterval, rms_misfit_mm};
 pub use contours::{Contour, ContourOptions, contours};
 pub use profile::{Profile, bulk_lower_bound_kpa, profile};
+pub use stand_ins::{STAND_IN_DRIVES_MM, StandIn, StandInOptions, stand_ins};
+pub use study::{Study, StudyCase, StudyRow, study};
 pub use terms::{DECREMENT_THRESHOLD, F_TEST_LEVEL, Rule, TermRow, TermSelection};
 pub use problem::{CalibrationProblem, RecordingFit};
 pub use stability::{least_relative_stiffness, smallest_stiffness_kpa};

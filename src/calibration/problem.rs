@@ -130,6 +130,22 @@ impl<'a> CalibrationProblem<'a> {
         Ok(problem)
     }
 
+    /// The same models for other data of the same specimens, voxels and filter: draws of noise.
+    ///
+    /// # Errors
+    /// [`CalibrationError::DataLength`] where the voxels are others.
+    pub fn with_data<'b>(self, observed: &'b [Observed]) -> Result<CalibrationProblem<'b>, CalibrationError> {
+        let length = |what, found: usize, expected: usize| {
+            if found == expected { Ok(()) } else { Err(CalibrationError::DataLength { what, found, expected }) }
+        };
+        length("list of recordings", observed.len(), self.observed.len())?;
+        for (new, old) in observed.iter().zip(self.observed) {
+            length("list of compared voxels", new.mask.num_voxels(), old.mask.num_voxels())?;
+        }
+        let CalibrationProblem { models, views, objective, .. } = self;
+        Ok(CalibrationProblem { observed, models, views, objective })
+    }
+
     /// The recordings.
     pub fn observed(&self) -> &'a [Observed] {
         self.observed
@@ -143,6 +159,10 @@ impl<'a> CalibrationProblem<'a> {
     /// Free displacement unknowns of each model.
     pub fn num_unknowns(&self) -> Vec<usize> {
         self.models.iter().map(ForwardModel::num_unknowns).collect()
+    }
+
+    pub(super) fn objective(&self) -> Objective {
+        self.objective
     }
 
     pub(super) fn parts(&mut self) -> (&'a [Observed], &mut [ForwardModel], &[View]) {
@@ -192,6 +212,20 @@ impl<'a> CalibrationProblem<'a> {
         let mut fit = finished(descent, &targets, observed, views, options, *objective)?;
         fit.work = work;
         Ok(fit)
+    }
+
+    /// `material` as if it had been fitted: its losses and predictions. Nothing moves.
+    ///
+    /// # Errors
+    /// [`CalibrationError`].
+    pub fn at(
+        &mut self,
+        material: &Ogden,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<RecordingFit, CalibrationError> {
+        // A huge tolerance: converged where it stands.
+        let options = FitOptions { tolerance: f64::MAX, ..FitOptions::default() };
+        self.fit(material, None, &options, is_cancelled)
     }
 
     /// Forces (N) that `material` needs, per recording and drive.

@@ -9,6 +9,7 @@ use crate::calibration::{
 use crate::mesh::MeshOptions;
 use crate::provenance::input_hash;
 use crate::recording::{ReadLimits, Recording};
+use crate::report::calibration_report;
 use crate::specimen::Specimen;
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
@@ -148,7 +149,11 @@ fn write_files(
 ) -> Result<(), CliError> {
     output::write_file(folder, "calibration.json", output::to_json(result)?.as_bytes())?;
     output::write_file(folder, "material.json", result.material.to_json().as_bytes())?;
-    let _ = (found, observed);
+    let (pictures, report) = calibration_report(found, result, observed);
+    for (name, svg) in pictures {
+        output::write_file(folder, &format!("{name}.svg"), svg.as_bytes())?;
+    }
+    output::write_file(folder, "report.html", report.to_html().as_bytes())?;
     Ok(())
 }
 

@@ -10,6 +10,7 @@ mod evaluate;
 mod input;
 mod interrupt;
 mod output;
+mod paper_tables;
 mod progress;
 mod solve;
 
@@ -39,6 +40,8 @@ enum Command {
     Evaluate(evaluate::EvaluateArguments),
     /// The material, from recordings of a specimen, with its uncertainty.
     Calibrate(calibrate::CalibrateArguments),
+    /// Tables like the paper's on synthetic stand-ins of its experiments.
+    PaperTables(paper_tables::PaperTablesArguments),
     /// The best specimen under the limits of a study, with the evidence.
     Design(design::DesignArguments),
 }
@@ -92,6 +95,7 @@ pub fn run() -> ExitCode {
         Command::Solve(a) => solve::run(a),
         Command::Evaluate(a) => evaluate::run(a),
         Command::Calibrate(a) => calibrate::run(a),
+        Command::PaperTables(a) => paper_tables::run(a),
         Command::Design(a) => design::run(a),
     };
     match result {

@@ -15,6 +15,8 @@
 //! | correlation of the parameters | [`CorrelationPlot`] |
 //! | the deformed specimen | [`DeformedShape`] |
 //! | how far each limit is | [`LimitsPlot`] |
+//! | curves and histograms of residuals | [`LinePlot`] |
+//! | losses over two parameters | [`ContourPlot`] |
 //! | two rankings of the same designs | [`RankingPlot`] |
 //!
 //! Files: [`Vtu`] for ParaView, [`Report`] for the browser.
@@ -22,7 +24,9 @@
 mod axis;
 mod bars;
 mod base64;
+mod calibration_report;
 mod color;
+mod contour_map;
 mod correlation;
 mod density;
 mod design_report;
@@ -33,6 +37,7 @@ mod html;
 mod html_parts;
 mod labels;
 mod limits;
+mod lines;
 mod maps;
 mod number;
 mod pareto;
@@ -52,7 +57,9 @@ mod gallery_tests;
 mod test_xml;
 
 pub use bars::{BarGroup, GroupedBars};
+pub use calibration_report::{calibration_report, contour_panels};
 pub use color::ColorMap;
+pub use contour_map::{ContourPanel, ContourPlot};
 pub use correlation::CorrelationPlot;
 pub use density::{DensityPanel, DensityPlot};
 pub use design_report::{DesignPictures, design_report};
@@ -61,6 +68,7 @@ pub use history::{HistoryPlot, HistoryPoint};
 pub use html::{Report, ReportHeader};
 pub use html_parts::{Align, CalloutKind, Column, Table};
 pub use limits::{LimitBar, LimitsPlot};
+pub use lines::{Line, LinePlot, residual_histogram};
 pub use maps::{VoxelField, VoxelMaps};
 pub use number::{significant, symbol_of_parameter};
 pub use pareto::{ParetoPlot, ParetoPoint, PointKind};
