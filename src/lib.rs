@@ -10,11 +10,14 @@
 pub mod calibration;
 pub mod cli;
 pub mod design;
+pub mod diagnosis;
 pub mod fem;
+pub mod homogeneous;
 pub mod kinematics;
 pub mod material;
 pub mod mesh;
 pub mod provenance;
+pub mod rate;
 pub mod recording;
 pub mod report;
 pub mod sensitivity;

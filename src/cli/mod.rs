@@ -5,6 +5,7 @@
 
 mod calibrate;
 mod design;
+mod diagnose;
 mod error;
 mod evaluate;
 mod input;
@@ -44,6 +45,8 @@ enum Command {
     PaperTables(paper_tables::PaperTablesArguments),
     /// The best specimen under the limits of a study, with the evidence.
     Design(design::DesignArguments),
+    /// Where a recording and its model differ, and what physics was left out.
+    Diagnose(diagnose::DiagnoseArguments),
 }
 
 /// What every command takes.
@@ -97,6 +100,7 @@ pub fn run() -> ExitCode {
         Command::Calibrate(a) => calibrate::run(a),
         Command::PaperTables(a) => paper_tables::run(a),
         Command::Design(a) => design::run(a),
+        Command::Diagnose(a) => diagnose::run(a),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
