@@ -57,6 +57,9 @@ pub struct CalibrateOptions {
     pub has_mesh_allowance: bool,
     /// Starts of every number of terms.
     pub num_starts: usize,
+    /// A further term is not fitted where the linear model promises less than this decrease of the objective. Zero fits
+    /// every term, to show what it does.
+    pub least_promise: f64,
     /// Profile likelihoods of all parameters.
     pub has_profiles: bool,
     /// Contours around the estimate.
@@ -74,6 +77,7 @@ impl Default for CalibrateOptions {
             mesh_factor: 1.0,
             has_mesh_allowance: true,
             num_starts: 3,
+            least_promise: 0.0,
             has_profiles: false,
             contours: None,
         }
@@ -167,7 +171,10 @@ pub fn calibrate(
             TermCount::Fixed(n) => n.min(rows.len()),
             TermCount::Auto { .. } => rule(options.rule),
         },
-        needed_chi2_decrease: fits.first().filter(|_| options.rule == Rule::Bic).map(|f| 2.0 * (f.num_data as f64).ln()),
+        needed_chi2_decrease: fits
+            .first()
+            .filter(|_| options.rule == Rule::Bic)
+            .map(|f| 2.0 * (f.num_data as f64).ln()),
         rows,
     };
     let Some(mut coarse) = fits.get(selection.chosen.saturating_sub(1)).cloned() else {
@@ -323,6 +330,10 @@ impl<'a> Run<'a> {
                 None => first_starts(problem.observed()),
                 Some(last) => {
                     further_starts(problem, last, &self.fit_options, self.options.num_starts, self.is_cancelled)?
+                        .into_iter()
+                        .filter(|(promise, _)| *promise >= self.options.least_promise)
+                        .map(|(_, start)| start)
+                        .collect()
                 }
             };
             let Some((row, fit)) = self.best_of(problem, &starts)? else { break };
@@ -427,7 +438,8 @@ impl<'a> Run<'a> {
     fn remark(&mut self, observed: &[Observed], fit: &RecordingFit, has_force: bool) {
         if !has_force {
             self.notes.push(
-                "no force was recorded: displacements determine exponents and ratios of moduli only; μ₁ was assumed".into(),
+                "no force was recorded: displacements determine exponents and ratios of moduli only; μ₁ was assumed"
+                    .into(),
             );
         }
         if fit.misfit_factor > 1.0 {

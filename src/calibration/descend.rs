@@ -83,7 +83,11 @@ pub(super) fn descend(
         iterations += 1;
         let step = constraints.step(&system, damping, true)?;
         let Some(present) = predictions.first() else {
-            return Err(CalibrationError::NotConverged { iterations, distance: full.distance, limit: options.tolerance });
+            return Err(CalibrationError::NotConverged {
+                iterations,
+                distance: full.distance,
+                limit: options.tolerance,
+            });
         };
         let trial = system.moved(&present.material, &step.change);
         match predict(&trial, &predictions) {

@@ -7,8 +7,8 @@
 //! The fit has converged when the optimum of the linear model at the present parameters is nearer than a fraction of a
 //! standard deviation, in every combination of parameters. A small step alone proves nothing: damping makes steps small.
 
-use super::error::CalibrationError;
 use super::descend::{Descent, descend};
+use super::error::CalibrationError;
 use super::step::Constraints;
 use super::synthetic::Measurement;
 use super::system::{NormalSystem, Prediction};

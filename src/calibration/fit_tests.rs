@@ -30,7 +30,8 @@ fn gradient_of_the_misfit() {
     let at = ogden(260.0, &[[19.0, 1.7]]);
     for bulk in [Bulk::Free, Bulk::LogPrior { center_kpa: 150.0, log_sd: 0.1 }] {
         let mut system = |m: &Ogden| {
-            let p = Prediction::new(&mut model, &operator, &data.drives_mm, m, None, &tight().solve, &|| false).unwrap();
+            let p =
+                Prediction::new(&mut model, &operator, &data.drives_mm, m, None, &tight().solve, &|| false).unwrap();
             NormalSystem::new(&[p], &[Target::of_measurement(&data, &scan())], bulk, Held::default()).unwrap()
         };
         let base = system(&at);

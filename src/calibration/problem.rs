@@ -218,11 +218,7 @@ impl<'a> CalibrationProblem<'a> {
     ///
     /// # Errors
     /// [`CalibrationError`].
-    pub fn at(
-        &mut self,
-        material: &Ogden,
-        is_cancelled: &dyn Fn() -> bool,
-    ) -> Result<RecordingFit, CalibrationError> {
+    pub fn at(&mut self, material: &Ogden, is_cancelled: &dyn Fn() -> bool) -> Result<RecordingFit, CalibrationError> {
         // A huge tolerance: converged where it stands.
         let options = FitOptions { tolerance: f64::MAX, ..FitOptions::default() };
         self.fit(material, None, &options, is_cancelled)

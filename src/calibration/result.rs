@@ -221,10 +221,10 @@ impl CalibrationResult {
             correlation: fit.covariance.correlation_matrix(),
             ratios: if calibration.has_force { Vec::new() } else { ratios(calibration) },
             term_selection: calibration.selection.clone(),
-            discretisation: calibration.meshes.as_ref().map(|m| DiscretisationResult {
-                num_unknowns: m.num_unknowns,
-                coarse_material: m.coarse.clone(),
-            }),
+            discretisation: calibration
+                .meshes
+                .as_ref()
+                .map(|m| DiscretisationResult { num_unknowns: m.num_unknowns, coarse_material: m.coarse.clone() }),
             steps,
             profiles: calibration.profiles.clone(),
             contours: calibration.contours.clone(),

@@ -11,8 +11,8 @@ const PARTS: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 
 /// Smallest eigenvalue of the form at isochoric principal stretches, kPa.
 pub fn smallest_stiffness_kpa(material: &Ogden, stretches: [f64; 3]) -> f64 {
-    let h = stretches
-        .map(|s| material.terms.iter().map(|t| t.mu_kpa * t.alpha * (t.alpha * s.ln()).exp()).sum::<f64>());
+    let h =
+        stretches.map(|s| material.terms.iter().map(|t| t.mu_kpa * t.alpha * (t.alpha * s.ln()).exp()).sum::<f64>());
     // On the plane Σ e = 0: trace ⅔ Σh, determinant ⅓ (h₁h₂ + h₂h₃ + h₃h₁).
     let half_trace = (h[0] + h[1] + h[2]) / 3.0;
     let determinant = (h[0] * h[1] + h[1] * h[2] + h[2] * h[0]) / 3.0;

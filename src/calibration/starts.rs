@@ -58,7 +58,7 @@ pub(super) fn first_starts(observed: &[Observed]) -> Vec<Ogden> {
 }
 
 /// `fit` with one term more, in the order of the decrease of the objective that the new term promises: for each exponent the
-/// new μ that the linear model likes best, all old parameters moving along. At most `count`.
+/// new μ that the linear model likes best, all old parameters moving along. At most `count`, each with the decrease promised.
 ///
 /// # Errors
 /// [`CalibrationError`].
@@ -68,15 +68,13 @@ pub(super) fn further_starts(
     options: &FitOptions,
     count: usize,
     is_cancelled: &dyn Fn() -> bool,
-) -> Result<Vec<Ogden>, CalibrationError> {
+) -> Result<Vec<(f64, Ogden)>, CalibrationError> {
     let old = &fit.material;
     let num_old = 2 * old.terms.len() + 1;
     let shear = 0.5 * old.terms.iter().map(|t| t.mu_kpa * t.alpha).sum::<f64>();
     let gap = 1.1 * options.min_alpha_gap;
-    let exponents: Vec<f64> = NEXT_EXPONENTS
-        .into_iter()
-        .filter(|a| old.terms.iter().all(|t| (t.alpha - a).abs() > gap))
-        .collect();
+    let exponents: Vec<f64> =
+        NEXT_EXPONENTS.into_iter().filter(|a| old.terms.iter().all(|t| (t.alpha - a).abs() > gap)).collect();
     let num_at_once = MAX_TERMS.saturating_sub(old.terms.len());
     if num_at_once == 0 {
         return Ok(Vec::new());
@@ -95,7 +93,8 @@ pub(super) fn further_starts(
         let Some(factor) = scaled.cholesky() else { continue };
         for (n, &alpha) in chunk.iter().enumerate() {
             let at = num_old + 2 * n;
-            let coupling = DVector::from_iterator(free.len(), free.iter().zip(&root).map(|(&i, r)| matrix[(i, at)] / r));
+            let coupling =
+                DVector::from_iterator(free.len(), free.iter().zip(&root).map(|(&i, r)| matrix[(i, at)] / r));
             let rest = DVector::from_iterator(free.len(), free.iter().zip(&root).map(|(&i, r)| gradient[i] / r));
             let solved = factor.solve(&coupling);
             let slope = gradient[at] - solved.dot(&rest);
@@ -117,11 +116,11 @@ pub(super) fn further_starts(
     }
     candidates.sort_by(|a, b| b.0.total_cmp(&a.0));
     // Neighbouring exponents lead to the same optimum: spread the starts.
-    let mut chosen: Vec<Ogden> = Vec::new();
-    for (_, start) in candidates {
+    let mut chosen: Vec<(f64, Ogden)> = Vec::new();
+    for (gain, start) in candidates {
         let alpha = |m: &Ogden| m.terms.last().map_or(0.0, |t| t.alpha);
-        if chosen.len() < count && chosen.iter().all(|c| (alpha(c) - alpha(&start)).abs() > 3.0) {
-            chosen.push(start);
+        if chosen.len() < count && chosen.iter().all(|(_, c)| (alpha(c) - alpha(&start)).abs() > 3.0) {
+            chosen.push((gain, start));
         }
     }
     Ok(chosen)

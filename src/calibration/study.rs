@@ -19,6 +19,7 @@ use crate::recording::Filter;
 use crate::sensitivity::ScanSettings;
 use crate::specimen::Specimen;
 use rayon::prelude::*;
+use std::fmt;
 
 /// A truth and how it is scanned.
 #[derive(Clone, Debug)]
@@ -83,6 +84,45 @@ pub struct Study {
     pub chi2_per_datum: f64,
     /// Standard deviation of χ² per datum over the draws.
     pub chi2_sd: f64,
+}
+
+impl fmt::Display for Study {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{} of {} draws fitted, chi2 per datum {:.4} ± {:.4}",
+            self.num_fitted, self.num_draws, self.chi2_per_datum, self.chi2_sd
+        )?;
+        writeln!(
+            f,
+            "  parameter      truth  mesh shift  mean shift    found sd   promised sd  ratio  coverage of 95 % intervals"
+        )?;
+        for r in &self.rows {
+            writeln!(
+                f,
+                "  {:<8} {:>11.4} {:>+11.4} {:>+11.4} {:>11.4} {:>13.4}  {:.3}  {:.1} %",
+                r.parameter,
+                r.truth,
+                r.mesh_shift,
+                r.mean_shift,
+                r.found_sd,
+                r.promised_sd,
+                r.found_sd / r.promised_sd,
+                100.0 * r.coverage
+            )?;
+        }
+        let [bic, f_test, decrement] = &self.num_by_rule;
+        writeln!(f, "  draws with 1, 2, … terms: BIC {bic:?}, F-test {f_test:?}, decrement {decrement:?}")?;
+        if let (Some(expected), Some(probability)) = (self.expected_decrease, self.detection_probability) {
+            writeln!(
+                f,
+                "  the last term lowers chi2 by {expected:.1} (BIC asks for {:.1}): found in {:.1} % of draws by theory",
+                self.needed_decrease,
+                100.0 * probability
+            )?;
+        }
+        Ok(())
+    }
 }
 
 struct Draw {

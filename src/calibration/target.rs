@@ -150,17 +150,24 @@ impl<'a> Target<'a> {
     pub(super) fn add_score(&self, prediction: &Prediction, score: &mut DMatrix<f64>) -> Result<(), CalibrationError> {
         let n = score.nrows();
         for (step, (fields, forces)) in self.steps.iter().zip(prediction.derivatives()) {
-            let weighted: Vec<Vec<[f64; 3]>> = fields
-                .iter()
-                .map(|field| {
-                    field
-                        .iter()
-                        .zip(&step.weights)
-                        // Missing voxels have no weight; what stands there must not enter a product.
-                        .map(|(s, w)| if *w > 0.0 { [0, 1, 2].map(|c| w * step.component_weights[c] * s[c]) } else { [0.0; 3] })
-                        .collect()
-                })
-                .collect();
+            let weighted: Vec<Vec<[f64; 3]>> =
+                fields
+                    .iter()
+                    .map(|field| {
+                        field
+                            .iter()
+                            .zip(&step.weights)
+                            // Missing voxels have no weight; what stands there must not enter a product.
+                            .map(|(s, w)| {
+                                if *w > 0.0 {
+                                    [0, 1, 2].map(|c| w * step.component_weights[c] * s[c])
+                                } else {
+                                    [0.0; 3]
+                                }
+                            })
+                            .collect()
+                    })
+                    .collect();
             let (weighted, spread, share) = match self.view {
                 // Acquired noise is √8 that of a mean of eight.
                 Some(view) => {

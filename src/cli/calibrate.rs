@@ -100,7 +100,10 @@ pub(super) fn run(a: &CalibrateArguments) -> Result<(), CliError> {
         let recording = Recording::read(path, &ReadLimits::default()).map_err(|e| fail(e.to_string()))?;
         let mut prepared = Observed::new(&recording, FORCE_SD_N).map_err(|e| fail(e.to_string()))?;
         if a.end_margin > 0.0 && prepared.leave_out_ends(a.end_margin) == 0 {
-            return Err(CliError::Option { option: "end-margin", message: format!("{} mm leaves no voxel", a.end_margin) });
+            return Err(CliError::Option {
+                option: "end-margin",
+                message: format!("{} mm leaves no voxel", a.end_margin),
+            });
         }
         observed.push(prepared);
         names.push(recording.id.clone());
@@ -128,7 +131,8 @@ pub(super) fn run(a: &CalibrateArguments) -> Result<(), CliError> {
         }
     };
     let mesh = |s: &Specimen, factor: f64| MeshOptions::scaled(s, factor);
-    let found = calibrate(&observed, &mesh, &options, &on_stage, &interrupt::is_requested).map_err(calibration_error)?;
+    let found =
+        calibrate(&observed, &mesh, &options, &on_stage, &interrupt::is_requested).map_err(calibration_error)?;
     let hash = input_hash(&serde_json::json!({
         "recordings": observed.iter().map(|o| (&o.specimen, &o.noise_sd_mm, o.mask.num_voxels())).collect::<Vec<_>>(),
         "names": names,
@@ -167,7 +171,8 @@ fn calibration_error(error: CalibrationError) -> CliError {
 /// The result as text.
 fn summary(result: &CalibrationResult) -> String {
     let mut text = format!("{}\n\nnumber of terms\n", result.recordings.join(", "));
-    text += "  terms        chi2  chi2/datum   loss x 1000   mu (kPa)   F        p(F)      BIC change  decrement x 1000\n";
+    text +=
+        "  terms        chi2  chi2/datum   loss x 1000   mu (kPa)   F        p(F)      BIC change  decrement x 1000\n";
     for r in &result.term_selection.rows {
         let number = |v: Option<f64>, decimals: usize| v.map_or("-".to_string(), |v| format!("{v:.decimals$}"));
         text += &format!(
@@ -197,7 +202,10 @@ fn summary(result: &CalibrationResult) -> String {
         let interval = format!("{} to {}", end(p.interval_95[0]), end(p.interval_95[1]));
         text += &match (p.value, p.sd) {
             (Some(value), Some(sd)) => {
-                format!("  {:<10} {value:>13.5} {sd:>12.5}      {interval:<25} {:>8.5} {:>8.5}\n", p.name, p.mesh_error, p.possible_shift)
+                format!(
+                    "  {:<10} {value:>13.5} {sd:>12.5}      {interval:<25} {:>8.5} {:>8.5}\n",
+                    p.name, p.mesh_error, p.possible_shift
+                )
             }
             _ => format!("  {:<10} not identifiable               {interval}\n", p.name),
         };

@@ -4,7 +4,7 @@ use super::error::CliError;
 use super::{Common, input, interrupt, output};
 use crate::calibration::{Objective, PAPER_BETA, StandIn, StandInOptions, stand_ins};
 use crate::recording::Filter;
-use crate::report::{contour_panels, ContourPlot};
+use crate::report::{ContourPlot, contour_panels};
 use crate::sensitivity::{PartialVoxels, ScanSettings};
 use crate::specimen::Specimen;
 use clap::Args;
@@ -84,8 +84,7 @@ fn tables(all: &[StandIn]) -> String {
     );
     for s in all {
         for row in &s.calibration.selection.rows {
-            let terms: Vec<String> =
-                row.values[1..].chunks(2).map(|t| format!("({:.3}, {:.2})", t[0], t[1])).collect();
+            let terms: Vec<String> = row.values[1..].chunks(2).map(|t| format!("({:.3}, {:.2})", t[0], t[1])).collect();
             text += &format!(
                 "  {:<6} {:<7} {:<12.0} {:<8.3} {:<51} {:<10.4} {}\n",
                 s.drive_mm,

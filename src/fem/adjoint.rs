@@ -26,11 +26,8 @@ impl ForwardModel {
         by_force: f64,
     ) -> Result<Vec<f64>, SolveError> {
         self.ensure_tangent(material, equilibrium)?;
-        let diverged = |cause| SolveError::Diverged {
-            reached_mm: equilibrium.drive_mm,
-            asked_mm: equilibrium.drive_mm,
-            cause,
-        };
+        let diverged =
+            |cause| SolveError::Diverged { reached_mm: equilibrium.drive_mm, asked_mm: equilibrium.drive_mm, cause };
         let positions = self.mesh.nodes.clone();
         let driven = self.driven_elements.clone();
         let force_factor = by_force * self.multiplicity * 1e-3;

@@ -1,8 +1,8 @@
 //! The page of a calibration: what was found, how sure, and where model and data differ.
 
 use super::{
-    CalloutKind, Column, ColorMap, ContourPanel, ContourPlot, CorrelationPlot, Line, LinePlot, Report, ReportHeader, Table,
-    VoxelField, VoxelMaps, residual_histogram, significant, symbol_of_parameter,
+    CalloutKind, ColorMap, Column, ContourPanel, ContourPlot, CorrelationPlot, Line, LinePlot, Report, ReportHeader,
+    Table, VoxelField, VoxelMaps, residual_histogram, significant, symbol_of_parameter,
 };
 use crate::calibration::{Calibration, CalibrationResult, Contour, Observed};
 
@@ -29,9 +29,8 @@ pub fn calibration_report(
     report.section("Estimate");
     report.table(&parameters(result));
     if let Some(shear) = &result.initial_shear_modulus_kpa {
-        let interval = shear.interval_95.map_or("open".into(), |[a, b]| {
-            format!("{} to {}", significant(a, 4), significant(b, 4))
-        });
+        let interval =
+            shear.interval_95.map_or("open".into(), |[a, b]| format!("{} to {}", significant(a, 4), significant(b, 4)));
         report.paragraph(&format!(
             "Initial shear modulus ½ Σ μα = {} kPa, 95 % interval {interval}.",
             significant(shear.value, 4)
@@ -93,10 +92,16 @@ pub fn calibration_report(
             .profiles
             .iter()
             .map(|p| {
-                let middle = p.values.iter().zip(&p.chi2_increase).min_by(|a, b| a.1.total_cmp(b.1)).map_or(1.0, |m| *m.0);
+                let middle =
+                    p.values.iter().zip(&p.chi2_increase).min_by(|a, b| a.1.total_cmp(b.1)).map_or(1.0, |m| *m.0);
                 Line {
                     name: symbol_of_parameter(&p.parameter),
-                    points: p.values.iter().zip(&p.chi2_increase).map(|(v, d)| [100.0 * (v / middle - 1.0), *d]).collect(),
+                    points: p
+                        .values
+                        .iter()
+                        .zip(&p.chi2_increase)
+                        .map(|(v, d)| [100.0 * (v / middle - 1.0), *d])
+                        .collect(),
                     has_marks: true,
                 }
             })
@@ -154,7 +159,8 @@ fn parameters(result: &CalibrationResult) -> Table {
         ],
         rows,
         emphasised_rows: vec![],
-        note: "The interval adds noise, the mesh's error and the largest shift that a structured misfit could hide.".into(),
+        note: "The interval adds noise, the mesh's error and the largest shift that a structured misfit could hide."
+            .into(),
     }
 }
 
@@ -215,7 +221,10 @@ fn residual_maps(found: &Calibration, recording: &Observed, index: usize, step: 
     let mut fields = Vec::new();
     for (c, name) in ["x", "y", "z"].iter().enumerate() {
         let from = |u: &dyn Fn(usize) -> f64| {
-            (0..model.len()).map(u).filter(|v| v.is_finite()).fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)])
+            (0..model.len())
+                .map(u)
+                .filter(|v| v.is_finite())
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)])
         };
         if c == 0 {
             let range = Some(from(&|v| model[v][c]));

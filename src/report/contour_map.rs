@@ -75,7 +75,8 @@ impl ContourPanel {
         let (i, j) = ((s as usize).min(n - 2), (t as usize).min(m - 2));
         let (a, b) = (s - i as f64, t - j as f64);
         let log = |i: usize, j: usize| self.values[i + n * j].log10();
-        (1.0 - a) * ((1.0 - b) * log(i, j) + b * log(i, j + 1)) + a * ((1.0 - b) * log(i + 1, j) + b * log(i + 1, j + 1))
+        (1.0 - a) * ((1.0 - b) * log(i, j) + b * log(i, j + 1))
+            + a * ((1.0 - b) * log(i + 1, j) + b * log(i + 1, j + 1))
     }
 
     fn draw(&self, svg: &mut Svg, [x0, y0]: [f64; 2]) {
@@ -88,8 +89,7 @@ impl ContourPanel {
         };
         svg.text([area[0], y0 + 22.0], &shortened(&self.title, TITLE, SIZE + 70.0), &TextStyle::title());
         let place = |i: usize, count: usize| (i as f64 + 0.5) / CELLS as f64 * (count - 1) as f64;
-        let grid: Vec<f64> =
-            (0..CELLS * CELLS).map(|c| self.at([place(c % CELLS, n), place(c / CELLS, m)])).collect();
+        let grid: Vec<f64> = (0..CELLS * CELLS).map(|c| self.at([place(c % CELLS, n), place(c / CELLS, m)])).collect();
         let finite = || grid.iter().copied().filter(|v| v.is_finite());
         let low = self.smallest().map_or(0.0, f64::log10);
         let high = finite().fold(low, f64::max);
@@ -109,7 +109,14 @@ impl ContourPanel {
         }
         frame.draw_bottom(svg, &self.x_label, 4);
         frame.draw_left(svg, &self.y_label, 5, 48.0);
-        draw_color_bar(svg, [area[0] + SIZE + 14.0, area[1], 10.0, SIZE], ColorMap::Viridis, range, [false; 2], "log₁₀");
+        draw_color_bar(
+            svg,
+            [area[0] + SIZE + 14.0, area[1], 10.0, SIZE],
+            ColorMap::Viridis,
+            range,
+            [false; 2],
+            "log₁₀",
+        );
     }
 
     /// The line where log₁₀ of the quantity is `level`: marching squares on the interpolated cells.
@@ -117,7 +124,8 @@ impl ContourPanel {
         let (n, m) = (self.x.len(), self.y.len());
         let part = |i: usize| i as f64 / CELLS as f64;
         let value = |i: usize, j: usize| self.at([part(i) * (n - 1) as f64, part(j) * (m - 1) as f64]) - level;
-        let corners: Vec<f64> = (0..(CELLS + 1) * (CELLS + 1)).map(|c| value(c % (CELLS + 1), c / (CELLS + 1))).collect();
+        let corners: Vec<f64> =
+            (0..(CELLS + 1) * (CELLS + 1)).map(|c| value(c % (CELLS + 1), c / (CELLS + 1))).collect();
         for j in 0..CELLS {
             for i in 0..CELLS {
                 let places = [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]];

@@ -37,8 +37,7 @@ const AREA: [f64; 4] = [70.0, 54.0, 400.0, 230.0];
 impl LinePlot {
     /// The picture.
     pub fn to_svg(&self) -> String {
-        let usable =
-            |p: &&[f64; 2]| p.iter().all(|v| v.is_finite()) && (!self.is_log || p[1] > 0.0);
+        let usable = |p: &&[f64; 2]| p.iter().all(|v| v.is_finite()) && (!self.is_log || p[1] > 0.0);
         let points = || self.lines.iter().flat_map(|l| &l.points).filter(usable);
         let horizontal = Axis::covering(points().map(|p| p[0]), false, 0.02);
         let zero = (!self.is_log && points().all(|p| p[1] >= 0.0)).then_some(0.0);
