@@ -7,11 +7,13 @@
 //! The fit has converged when the optimum of the linear model at the present parameters is nearer than a fraction of a
 //! standard deviation, in every combination of parameters. A small step alone proves nothing: damping makes steps small.
 
+use super::descend::{Descent, descend};
 use super::error::CalibrationError;
 use super::step::Constraints;
 use super::synthetic::Measurement;
 use super::system::{NormalSystem, Prediction};
-use crate::fem::{Equilibrium, ForwardModel, SolveError, SolveOptions};
+use super::target::Target;
+use crate::fem::{Equilibrium, ForwardModel, SolveOptions};
 use crate::material::{Ogden, Parameter};
 use crate::sensitivity::{FisherInformation, ScanSettings};
 use crate::voxel::VoxelOperator;
@@ -33,6 +35,27 @@ pub enum Bulk {
     Held,
 }
 
+/// Parameters that a fit leaves as they are, by their place in κ, μ₁, α₁, μ₂, …
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Held(u32);
+
+impl Held {
+    /// Also the parameter at `index`; none beyond the 31st.
+    pub fn with(self, index: usize) -> Held {
+        Held(self.0 | 1u32.checked_shl(index as u32).unwrap_or(0))
+    }
+
+    /// Whether the parameter at `index` is held.
+    pub fn contains(self, index: usize) -> bool {
+        self.0 & 1u32.checked_shl(index as u32).unwrap_or(0) != 0
+    }
+
+    /// How many are held.
+    pub fn count(self) -> usize {
+        self.0.count_ones() as usize
+    }
+}
+
 /// Settings of [`fit`].
 #[derive(Clone, Copy, Debug)]
 pub struct FitOptions {
@@ -45,6 +68,8 @@ pub struct FitOptions {
     pub min_alpha_gap: f64,
     /// κ.
     pub bulk: Bulk,
+    /// Further parameters that stay as in the start.
+    pub held: Held,
     /// The equilibria.
     pub solve: SolveOptions,
 }
@@ -56,6 +81,7 @@ impl Default for FitOptions {
             tolerance: 0.02,
             min_alpha_gap: 1.0,
             bulk: Bulk::Free,
+            held: Held::default(),
             solve: SolveOptions::default(),
         }
     }
@@ -118,7 +144,7 @@ impl FitStart {
     ) -> Result<FitStart, CalibrationError> {
         check_options(options)?;
         let constraints = Constraints::new(material, options)?;
-        let prediction = Prediction::new(model, operator, drives_mm, material, None, options, is_cancelled)?;
+        let prediction = Prediction::new(model, operator, drives_mm, material, None, &options.solve, is_cancelled)?;
         Ok(FitStart { constraints, prediction, options: *options })
     }
 
@@ -142,63 +168,34 @@ impl FitStart {
     ) -> Result<Fit, CalibrationError> {
         let options = &self.options;
         data.check(operator.num_voxels(), self.prediction.states.len())?;
-        let mut prediction = self.prediction.clone();
-        let mut system = NormalSystem::new(&prediction, scan, data, options.bulk)?;
-        let mut damping = 0.0;
-        let mut failure = None;
-        let mut iterations = 0;
-        loop {
-            let full = self.constraints.step(&system, 0.0, false)?;
-            if full.distance < options.tolerance {
-                let fitted = system.parameters.len() - usize::from(options.bulk == Bulk::Held);
-                let prior = usize::from(matches!(options.bulk, Bulk::LogPrior { .. }));
-                let freedom = (system.num_data + prior).saturating_sub(fitted).max(1);
-                return Ok(Fit {
-                    material: prediction.material,
-                    information: system.information,
-                    chi2_per_datum: system.chi2 / freedom as f64,
-                    loss_u: system.loss_u,
-                    loss_f: system.loss_f,
-                    iterations,
-                    distance: full.distance,
-                    reached_limits: full.reached,
-                    states: prediction.states,
-                    is_bulk_held: options.bulk == Bulk::Held,
-                });
-            }
-            if iterations >= options.max_iterations {
-                return Err(match failure {
-                    Some(source) => CalibrationError::NoEquilibrium { iterations, source },
-                    None => {
-                        CalibrationError::NotConverged { iterations, distance: full.distance, limit: options.tolerance }
-                    }
-                });
-            }
-            iterations += 1;
-            let step = self.constraints.step(&system, damping, true)?;
-            let trial = system.moved(&prediction.material, &step.change);
-            let near = Some(&prediction.states[..]);
-            match Prediction::new(model, operator, &data.drives_mm, &trial, near, options, is_cancelled) {
-                Ok(next) => {
-                    failure = None;
-                    let next_system = NormalSystem::new(&next, scan, data, options.bulk)?;
-                    // Equal up to the equilibria's accuracy counts: near the optimum nothing is gained any more.
-                    if next_system.chi2 <= system.chi2 * (1.0 + 1e-9) {
-                        prediction = next;
-                        system = next_system;
-                        damping = if damping > 1e-6 { damping * 0.1 } else { 0.0 };
-                    } else {
-                        damping = (damping * 10.0).max(1e-3);
-                    }
-                }
-                Err(CalibrationError::Solve(cause @ SolveError::Cancelled { .. })) => return Err(cause.into()),
-                Err(CalibrationError::Solve(cause)) => {
-                    failure = Some(cause);
-                    damping = (damping * 10.0).max(1e-3);
-                }
-                Err(other) => return Err(other),
-            }
-        }
+        let targets = [Target::of_measurement(data, scan)];
+        let mut predict = |material: &Ogden, near: &[Prediction]| {
+            let near = near.first().map(|p| &p.states[..]);
+            let solve = &options.solve;
+            Ok(vec![Prediction::new(model, operator, &data.drives_mm, material, near, solve, is_cancelled)?])
+        };
+        let system = |p: &[Prediction]| NormalSystem::new(p, &targets, options.bulk, options.held);
+        let start = vec![self.prediction.clone()];
+        let Descent { mut predictions, system, iterations, distance, reached, .. } =
+            descend(&self.constraints, options, start, &mut predict, &system)?.converged(options)?;
+        let num_data = targets[0].expectation().1;
+        let held = options.held.count() + usize::from(options.bulk == Bulk::Held);
+        let fitted = system.parameters.len() - held;
+        let prior = usize::from(matches!(options.bulk, Bulk::LogPrior { .. }));
+        let freedom = (num_data + prior).saturating_sub(fitted).max(1);
+        let prediction = predictions.remove(0);
+        Ok(Fit {
+            material: prediction.material,
+            information: system.information,
+            chi2_per_datum: system.chi2 / freedom as f64,
+            loss_u: system.loss_u,
+            loss_f: system.loss_f,
+            iterations,
+            distance,
+            reached_limits: reached,
+            states: prediction.states,
+            is_bulk_held: options.bulk == Bulk::Held,
+        })
     }
 }
 
@@ -220,7 +217,7 @@ pub fn fit(
     start.fit(model, operator, scan, data, is_cancelled)
 }
 
-fn check_options(options: &FitOptions) -> Result<(), CalibrationError> {
+pub(super) fn check_options(options: &FitOptions) -> Result<(), CalibrationError> {
     let positive = |name, value: f64| {
         let requirement = "positive and finite";
         if value > 0.0 && value.is_finite() {

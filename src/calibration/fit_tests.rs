@@ -1,6 +1,7 @@
 use super::super::system::{NormalSystem, Prediction};
 use super::super::test_problem::{ogden, same_mesh, scan, tight, truth};
 use super::*;
+use crate::fem::SolveError;
 use nalgebra::DVector;
 
 /// Without noise and on the mesh that made the data, nothing but rounding is left of the truth.
@@ -29,8 +30,9 @@ fn gradient_of_the_misfit() {
     let at = ogden(260.0, &[[19.0, 1.7]]);
     for bulk in [Bulk::Free, Bulk::LogPrior { center_kpa: 150.0, log_sd: 0.1 }] {
         let mut system = |m: &Ogden| {
-            let p = Prediction::new(&mut model, &operator, &data.drives_mm, m, None, &tight(), &|| false).unwrap();
-            NormalSystem::new(&p, &scan(), &data, bulk).unwrap()
+            let p =
+                Prediction::new(&mut model, &operator, &data.drives_mm, m, None, &tight().solve, &|| false).unwrap();
+            NormalSystem::new(&[p], &[Target::of_measurement(&data, &scan())], bulk, Held::default()).unwrap()
         };
         let base = system(&at);
         for d in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.6, -0.5, 0.7]] {

@@ -98,6 +98,20 @@ impl Observed {
         })
     }
 
+    /// Takes as missing what lies within `margin_mm` of the ends x = ±length/2 of a sheared block. The bonded edges end there:
+    /// strains are singular, so meshes and glue lines differ most. Returns how many voxels are left.
+    pub fn leave_out_ends(&mut self, margin_mm: f64) -> usize {
+        let limit = 0.5 * self.specimen.block.length_mm - margin_mm;
+        let is_left: Vec<bool> =
+            self.mask.voxels.iter().map(|&v| self.mask.grid.center_mm(v as usize)[0].abs() <= limit).collect();
+        for step in &mut self.steps {
+            for (u, _) in step.displacement.iter_mut().zip(&is_left).filter(|(_, is_left)| !**is_left) {
+                *u = [f64::NAN; 3];
+            }
+        }
+        is_left.iter().filter(|is_left| **is_left).count()
+    }
+
     /// How many neighbouring values carry the same noise: 1 without a filter, 8 for `hamming2` (the sum of the noise's
     /// correlations with all neighbours, (½ + 1 + ½)³). For fields smoother than the filter, a sum of n values knows as much
     /// as n / this independent ones.
@@ -153,6 +167,57 @@ impl View {
             None => values,
         };
         Ok(self.places.iter().map(|&p| values.get(p as usize).copied().unwrap_or([f64::NAN; 3])).collect())
+    }
+
+    /// The transpose of [`Self::average`]: from weights of the compared voxels to every node. For adjoint loads.
+    ///
+    /// # Errors
+    /// [`CalibrationError::Voxel`] where `weights` are not of the compared voxels.
+    pub fn average_transposed(&self, weights: &[[f64; 3]]) -> Result<Vec<[f64; 3]>, CalibrationError> {
+        Ok(self.operator.average_transposed(&self.on_acquired(weights)?)?)
+    }
+
+    /// Weights of the compared voxels carried back through the filter to the acquired voxels.
+    ///
+    /// # Errors
+    /// [`CalibrationError::DataLength`].
+    pub fn on_acquired(&self, weights: &[[f64; 3]]) -> Result<Vec<[f64; 3]>, CalibrationError> {
+        if weights.len() != self.places.len() {
+            let (found, expected) = (weights.len(), self.places.len());
+            return Err(CalibrationError::DataLength { what: "list of voxel weights", found, expected });
+        }
+        let num_seen = self.filter.as_ref().map_or(self.operator.num_voxels(), |f| f.mask().num_voxels());
+        let mut seen = vec![[0.0; 3]; num_seen];
+        for (weight, &place) in weights.iter().zip(&self.places) {
+            if let Some(seen) = seen.get_mut(place as usize) {
+                *seen = *weight;
+            }
+        }
+        match &self.filter {
+            Some(filter) => Ok(filter.apply_transposed(&seen)?),
+            None => Ok(seen),
+        }
+    }
+
+    /// How many acquired voxels each compared value is the mean of; one without a filter.
+    pub fn num_averaged(&self) -> Vec<usize> {
+        match &self.filter {
+            Some(filter) => {
+                let counts = filter.num_averaged();
+                self.places.iter().map(|&p| counts.get(p as usize).copied().unwrap_or(1)).collect()
+            }
+            None => vec![1; self.places.len()],
+        }
+    }
+
+    /// Whether the data went through a filter.
+    pub fn is_filtered(&self) -> bool {
+        self.filter.is_some()
+    }
+
+    /// Number of nodes of the mesh.
+    pub fn num_nodes(&self) -> usize {
+        self.operator.num_nodes()
     }
 
     /// Voxel averages of ∂u_i/∂X_j (row i), likewise.

@@ -1,7 +1,7 @@
 //! The constrained quadratic step: minimise ½ sᵀ(H + δ diag H) s − gᵀs subject to linear limits, with Clarabel.
 
 use super::error::CalibrationError;
-use super::fit::{Bulk, FitOptions};
+use super::fit::{Bulk, FitOptions, Held};
 use super::system::NormalSystem;
 use crate::material::{Ogden, Parameter};
 use clarabel::algebra::CscMatrix;
@@ -43,7 +43,7 @@ pub(super) struct Constraints {
     /// Pairs (term of larger exponent, term of next smaller one).
     order: Vec<(usize, usize)>,
     min_gap: f64,
-    is_bulk_held: bool,
+    held: Held,
 }
 
 /// A step and how far it goes.
@@ -77,7 +77,7 @@ impl Constraints {
             smallest: start.parameters().iter().map(|p| SMALLEST_PART * start.value(*p).abs()).collect(),
             order,
             min_gap: options.min_alpha_gap,
-            is_bulk_held: options.bulk == Bulk::Held,
+            held: if options.bulk == Bulk::Held { options.held.with(0) } else { options.held },
         })
     }
 
@@ -128,7 +128,7 @@ impl Constraints {
     /// [`CalibrationError::Subproblem`].
     pub(super) fn step(&self, system: &NormalSystem, damping: f64, is_trusted: bool) -> Result<Step, CalibrationError> {
         let n = system.values.len();
-        let free: Vec<usize> = (0..n).filter(|&i| !(self.is_bulk_held && i == 0)).collect();
+        let free: Vec<usize> = (0..n).filter(|&i| !self.held.contains(i)).collect();
         let m = free.len();
         // Unit diagonal: the two-term matrix has entries over six decades.
         let root: Vec<f64> =
@@ -141,11 +141,15 @@ impl Constraints {
             .into_iter()
             .filter_map(|l| {
                 let mut row = vec![0.0; m];
+                // A held parameter takes no room; a limit on held ones alone is none.
+                let mut is_any = false;
                 for (i, c) in l.coefficients {
-                    let a = free.iter().position(|&f| f == i)?;
-                    row[a] = c / root[a];
+                    if let Some(a) = free.iter().position(|&f| f == i) {
+                        row[a] = c / root[a];
+                        is_any = true;
+                    }
                 }
-                Some((row, l.room, l.name))
+                is_any.then_some((row, l.room, l.name))
             })
             .collect();
         let used = |row: &[f64], x: &DVector<f64>| row.iter().zip(x.iter()).map(|(r, x)| r * x).sum::<f64>();

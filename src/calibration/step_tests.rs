@@ -11,7 +11,6 @@ fn system(material: &Ogden, matrix: DMatrix<f64>, gradient: &[f64]) -> NormalSys
         matrix,
         gradient: DVector::from_column_slice(gradient),
         chi2: 1.0,
-        num_data: 1,
         loss_u: 0.0,
         loss_f: 0.0,
     }

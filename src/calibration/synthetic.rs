@@ -4,9 +4,10 @@ use super::error::CalibrationError;
 use crate::fem::{ForwardModel, SolveOptions};
 use crate::material::Ogden;
 use crate::mesh::MeshOptions;
+use crate::recording::{Filter, RecordedStep, Recording};
 use crate::sensitivity::ScanSettings;
 use crate::specimen::Specimen;
-use crate::voxel::{Sampling, VoxelMask, VoxelOperator};
+use crate::voxel::{HammingFilter, Sampling, VoxelMask, VoxelOperator};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -105,6 +106,51 @@ impl SyntheticScan {
     /// The measurement without noise.
     pub fn noiseless(&self) -> &Measurement {
         &self.truth
+    }
+
+    /// `data` of this scan as a recording of `specimen`, filtered or not. After the filter the noise stated is that of a mean of
+    /// eight.
+    ///
+    /// # Errors
+    /// [`CalibrationError::Voxel`] where the filter has nothing to average.
+    pub fn recording(
+        &self,
+        id: &str,
+        specimen: &Specimen,
+        data: &Measurement,
+        filter: Filter,
+    ) -> Result<Recording, CalibrationError> {
+        let hamming = match filter {
+            Filter::None => None,
+            Filter::Hamming2 => Some(HammingFilter::new(&self.mask)?),
+        };
+        let mask = hamming.as_ref().map_or(&self.mask, |f| f.mask());
+        let mut steps = Vec::with_capacity(data.drives_mm.len());
+        for (d, &drive_mm) in data.drives_mm.iter().enumerate() {
+            let values = match &hamming {
+                None => data.displacements[d].clone(),
+                Some(filter) => filter.apply(&data.displacements[d])?,
+            };
+            steps.push(RecordedStep {
+                drive_mm,
+                force_n: Some(data.forces_n[d]),
+                force_sd_n: Some(self.scan.force_sd_n),
+                window_s: None,
+                displacement: mask.spread(&values, [f64::NAN; 3]),
+            });
+        }
+        let noise = self.scan.noise_sd_mm.map(|sd| if hamming.is_some() { sd / 8f64.sqrt() } else { sd });
+        Ok(Recording {
+            id: id.into(),
+            specimen: specimen.clone(),
+            grid: mask.grid.clone(),
+            mask: mask.spread(&vec![true; mask.num_voxels()], false),
+            steps,
+            noise_sd_mm: Some(noise),
+            filter,
+            load: None,
+            notes: None,
+        })
     }
 
     /// A standard normal number for draw `draw`, independent of the noise of all draws.

@@ -1,20 +1,59 @@
-//! The misfit χ² of a model's prediction and its Gauss–Newton system in scaled parameters.
+//! The misfit of a model's prediction and its Gauss–Newton system in scaled parameters.
 //!
-//! χ² = Σ_drives [ Σ_voxels w Σ_c (u_c − ū_c)²/σ_c² + (F − F_model)²/σ_F² ] + (ln κ − ln κ₀)²/σ_κ² where a prior is set.
+//! The objective is that of [`super::target`], plus (ln κ − ln κ₀)²/σ_κ² where a prior is set.
 //! Scaled parameters: ln κ; every other ξ relative to its present value, ξ (1 + s). With the residuals r and their
 //! derivatives the gradient is g = −½ ∂χ²/∂s and the matrix is H = ½ ∂²χ²/∂s² without the second derivatives of the model.
 
 use super::error::CalibrationError;
-use super::fit::{Bulk, FitOptions};
-use super::synthetic::Measurement;
-use crate::fem::{Equilibrium, ForwardModel};
+use super::fit::{Bulk, Held};
+use super::observed::View;
+use super::target::Target;
+use crate::fem::{Equilibrium, ForwardModel, SolveError, SolveOptions};
 use crate::material::{Ogden, Parameter};
 use crate::sensitivity::{FisherInformation, ScanSettings};
 use crate::voxel::VoxelOperator;
 use nalgebra::{DMatrix, DVector};
 
-/// A held κ counts in the information as known to this relative standard deviation: exact to its square.
+/// A held parameter counts in the information as known to this relative standard deviation: exact to its square.
 const HELD_LOG_SD: f64 = 1e-6;
+
+/// How a scan sees a nodal field.
+pub(super) trait Averages {
+    /// Values in the order of the data.
+    fn averages(&self, field: &[[f64; 3]]) -> Result<Vec<[f64; 3]>, CalibrationError>;
+}
+
+impl Averages for VoxelOperator {
+    fn averages(&self, field: &[[f64; 3]]) -> Result<Vec<[f64; 3]>, CalibrationError> {
+        Ok(self.average(field)?)
+    }
+}
+
+impl Averages for View {
+    fn averages(&self, field: &[[f64; 3]]) -> Result<Vec<[f64; 3]>, CalibrationError> {
+        self.average(field)
+    }
+}
+
+/// What solving took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Work {
+    /// Equilibria found.
+    pub equilibria: usize,
+    /// Newton iterations of them.
+    pub newton_iterations: usize,
+    /// Factorisations, those of the sensitivities included.
+    pub factorisations: usize,
+}
+
+impl Work {
+    pub(super) fn add(&mut self, other: Work) {
+        self.equilibria += other.equilibria;
+        self.newton_iterations += other.newton_iterations;
+        self.factorisations += other.factorisations;
+    }
+}
 
 /// What a material predicts of a measurement, with its derivatives. Does not depend on the data.
 #[derive(Clone, Debug)]
@@ -22,22 +61,24 @@ pub(super) struct Prediction {
     pub(super) material: Ogden,
     pub(super) states: Vec<Equilibrium>,
     /// Voxel displacements per drive, mm.
-    displacements: Vec<Vec<[f64; 3]>>,
+    pub(super) displacements: Vec<Vec<[f64; 3]>>,
     /// ∂ū/∂ξ per drive and parameter, mm per unit.
     sensitivities: Vec<Vec<Vec<[f64; 3]>>>,
     /// ∂F/∂ξ per drive and parameter, N per unit.
     force_sensitivities: Vec<Vec<f64>>,
+    /// What making it took.
+    pub(super) work: Work,
 }
 
 impl Prediction {
     /// Solves at every drive; `near` are equilibria of another material at the same drives.
     pub(super) fn new(
         model: &mut ForwardModel,
-        operator: &VoxelOperator,
+        seen: &dyn Averages,
         drives_mm: &[f64],
         material: &Ogden,
         near: Option<&[Equilibrium]>,
-        options: &FitOptions,
+        solve: &SolveOptions,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Prediction, CalibrationError> {
         let mut prediction = Prediction {
@@ -46,27 +87,40 @@ impl Prediction {
             displacements: Vec::new(),
             sensitivities: Vec::new(),
             force_sensitivities: Vec::new(),
+            work: Work::default(),
         };
+        let [before, _] = model.linear_work();
         for (index, &drive) in drives_mm.iter().enumerate() {
             let start = near.and_then(|n| n.get(index)).or(prediction.states.last());
-            let warm = model.solve(material, drive, start, &options.solve, is_cancelled);
+            let warm = model.solve(material, drive, start, solve, is_cancelled);
+            prediction.work.newton_iterations += model.statistics().newton_iterations;
             let state = match warm {
-                // From rest, unless that is what failed or the caller wants to stop.
-                Err(_) if start.is_some() && !is_cancelled() => {
-                    model.solve(material, drive, None, &options.solve, is_cancelled)?
+                Err(SolveError::Cancelled { reached_mm }) => return Err(SolveError::Cancelled { reached_mm }.into()),
+                // From rest, unless that is what failed.
+                Err(_) if start.is_some() => {
+                    let cold = model.solve(material, drive, None, solve, is_cancelled);
+                    prediction.work.newton_iterations += model.statistics().newton_iterations;
+                    cold?
                 }
                 other => other?,
             };
+            prediction.work.equilibria += 1;
             // At once, while the tangent of this state stands.
             let sensitivities = model.material_sensitivities(material, &state)?;
-            prediction.displacements.push(operator.average(&state.displacement)?);
+            prediction.displacements.push(seen.averages(&state.displacement)?);
             prediction
                 .sensitivities
-                .push(sensitivities.iter().map(|s| operator.average(&s.displacement)).collect::<Result<Vec<_>, _>>()?);
+                .push(sensitivities.iter().map(|s| seen.averages(&s.displacement)).collect::<Result<Vec<_>, _>>()?);
             prediction.force_sensitivities.push(sensitivities.iter().map(|s| s.force_n).collect());
             prediction.states.push(state);
         }
+        prediction.work.factorisations = model.linear_work()[0] - before;
         Ok(prediction)
+    }
+
+    /// Per drive: ∂ū/∂ξ of every parameter, and ∂F/∂ξ.
+    pub(super) fn derivatives(&self) -> impl Iterator<Item = (&Vec<Vec<[f64; 3]>>, &Vec<f64>)> {
+        self.sensitivities.iter().zip(&self.force_sensitivities)
     }
 
     /// Information of all drives with the voxel weights `weights` (one list per drive), and of the prior.
@@ -90,7 +144,7 @@ impl Prediction {
     }
 }
 
-/// χ², its gradient and Gauss–Newton matrix in scaled parameters.
+/// The objective, its gradient and Gauss–Newton matrix in scaled parameters.
 #[derive(Clone, Debug)]
 pub(super) struct NormalSystem {
     pub(super) parameters: Vec<Parameter>,
@@ -100,70 +154,55 @@ pub(super) struct NormalSystem {
     pub(super) matrix: DMatrix<f64>,
     /// g = −½ ∂χ²/∂s.
     pub(super) gradient: DVector<f64>,
+    /// The objective; χ² with the weights of the noise.
     pub(super) chi2: f64,
-    pub(super) num_data: usize,
     /// The paper's ℓ_u, mean over drives.
     pub(super) loss_u: f64,
-    /// The paper's ℓ_F, mean over drives.
+    /// The paper's ℓ_F, mean over drives with a force.
     pub(super) loss_f: f64,
 }
 
 impl NormalSystem {
-    /// Of checked data: see [`Measurement::check`].
+    /// Of one prediction per target, all of one material. The data must have been checked.
     pub(super) fn new(
-        prediction: &Prediction,
-        scan: &ScanSettings,
-        data: &Measurement,
+        predictions: &[Prediction],
+        targets: &[Target],
         bulk: Bulk,
+        held: Held,
     ) -> Result<NormalSystem, CalibrationError> {
-        let parameters = prediction.material.parameters();
+        let Some(first) = predictions.first() else {
+            let name = "the number of recordings";
+            return Err(CalibrationError::InvalidValue { name, value: 0.0, requirement: "positive" });
+        };
+        let material = &first.material;
+        let parameters = material.parameters();
         let n = parameters.len();
-        let values: Vec<f64> = parameters.iter().map(|p| prediction.material.value(*p)).collect();
-        let weights: Vec<Vec<f64>> = (0..data.drives_mm.len()).map(|d| data.weights_of(d)).collect();
-        let information = prediction.information(scan, &weights, bulk)?;
-        let precision = scan.noise_sd_mm.map(|sd| 1.0 / (sd * sd));
-        let force_precision = 1.0 / (scan.force_sd_n * scan.force_sd_n);
-        let mut gradient = DVector::zeros(n);
-        let (mut chi2, mut num_data, mut loss_u, mut loss_f) = (0.0, 0, 0.0, 0.0);
-        for (d, state) in prediction.states.iter().enumerate() {
-            let (mut squares, mut largest, mut num_voxels) = (0.0, 0.0f64, 0usize);
-            for (v, (model, measured)) in prediction.displacements[d].iter().zip(&data.displacements[d]).enumerate() {
-                // Missing voxels have no weight; their NaN must not enter a product.
-                if weights[d][v] <= 0.0 {
-                    continue;
-                }
-                let mut square = 0.0;
-                for c in 0..3 {
-                    let misfit = measured[c] - model[c];
-                    let weight = precision[c] * weights[d][v];
-                    square += misfit * misfit;
-                    chi2 += weight * misfit * misfit;
-                    for (g, s) in gradient.iter_mut().zip(&prediction.sensitivities[d]) {
-                        *g += weight * misfit * s[v][c];
-                    }
-                }
-                squares += square;
-                largest = largest.max(measured.iter().map(|x| x * x).sum());
-                num_voxels += 1;
+        let values: Vec<f64> = parameters.iter().map(|p| material.value(*p)).collect();
+        let mut sums = Sums { matrix: DMatrix::zeros(n, n), gradient: DVector::zeros(n), ..Sums::default() };
+        for (prediction, target) in predictions.iter().zip(targets) {
+            sums.add(prediction, target);
+        }
+        let mut information = FisherInformation::from_matrix(material, sums.matrix.clone())?;
+        match bulk {
+            Bulk::Free => {}
+            Bulk::LogPrior { log_sd, .. } => information.add_log_prior(Parameter::Kappa, log_sd)?,
+            Bulk::Held => information.add_log_prior(Parameter::Kappa, HELD_LOG_SD)?,
+        }
+        for (i, &parameter) in parameters.iter().enumerate() {
+            if held.contains(i) {
+                information.add_log_prior(parameter, HELD_LOG_SD)?;
             }
-            num_data += 3 * num_voxels + 1;
-            loss_u += squares / (num_voxels as f64 * largest);
-            let misfit = data.forces_n[d] - state.force_n;
-            chi2 += force_precision * misfit * misfit;
-            for (g, f) in gradient.iter_mut().zip(&prediction.force_sensitivities[d]) {
-                *g += force_precision * misfit * f;
-            }
-            loss_f += (misfit / data.forces_n[d]).powi(2);
         }
         // dξ = ξ ds, with its sign.
         let matrix = DMatrix::from_fn(n, n, |i, j| information.matrix()[(i, j)] * values[i] * values[j]);
+        let mut gradient = sums.gradient;
         gradient.component_mul_assign(&DVector::from_column_slice(&values));
+        let mut chi2 = sums.chi2;
         if let Bulk::LogPrior { center_kpa, log_sd } = bulk {
             let misfit = (center_kpa / values[0]).ln();
             chi2 += (misfit / log_sd).powi(2);
             gradient[0] += misfit / (log_sd * log_sd);
         }
-        let num_drives = prediction.states.len().max(1) as f64;
         if !chi2.is_finite() {
             return Err(CalibrationError::InvalidValue { name: "chi2", value: chi2, requirement: "finite" });
         }
@@ -174,9 +213,8 @@ impl NormalSystem {
             matrix,
             gradient,
             chi2,
-            num_data,
-            loss_u: loss_u / num_drives,
-            loss_f: loss_f / num_drives,
+            loss_u: sums.loss_u / f64::from(sums.num_drives.max(1)),
+            loss_f: sums.loss_f / f64::from(sums.num_forces.max(1)),
         })
     }
 
@@ -189,5 +227,79 @@ impl NormalSystem {
             next.set(parameter, moved);
         }
         next
+    }
+}
+
+/// Gauss–Newton matrix and half the negative gradient in the parameters' own units, for parameters that may be zero.
+pub(super) fn raw_sums(predictions: &[Prediction], targets: &[Target]) -> (DMatrix<f64>, DVector<f64>) {
+    let n = predictions.first().map_or(0, |p| p.material.parameters().len());
+    let mut sums = Sums { matrix: DMatrix::zeros(n, n), gradient: DVector::zeros(n), ..Sums::default() };
+    for (prediction, target) in predictions.iter().zip(targets) {
+        sums.add(prediction, target);
+    }
+    (sums.matrix, sums.gradient)
+}
+
+/// Sums over all data, in the parameters' units.
+#[derive(Default)]
+struct Sums {
+    matrix: DMatrix<f64>,
+    gradient: DVector<f64>,
+    chi2: f64,
+    loss_u: f64,
+    loss_f: f64,
+    num_drives: u32,
+    num_forces: u32,
+}
+
+impl Sums {
+    fn add(&mut self, prediction: &Prediction, target: &Target) {
+        let n = self.gradient.len();
+        for (d, (step, state)) in target.steps.iter().zip(&prediction.states).enumerate() {
+            let (fields, forces) = (&prediction.sensitivities[d], &prediction.force_sensitivities[d]);
+            let (mut squares, mut largest, mut num_voxels) = (0.0, 0.0f64, 0usize);
+            for (v, (model, measured)) in prediction.displacements[d].iter().zip(step.measured).enumerate() {
+                // Missing voxels have no weight; their NaN must not enter a product.
+                if step.weights[v] <= 0.0 {
+                    continue;
+                }
+                let weights = step.component_weights.map(|p| p * step.weights[v]);
+                let misfit = [0, 1, 2].map(|c| measured[c] - model[c]);
+                for c in 0..3 {
+                    squares += misfit[c] * misfit[c];
+                    self.chi2 += weights[c] * misfit[c] * misfit[c];
+                }
+                for i in 0..n {
+                    let s = &fields[i][v];
+                    let weighted = [0, 1, 2].map(|c| weights[c] * s[c]);
+                    self.gradient[i] += weighted[0] * misfit[0] + weighted[1] * misfit[1] + weighted[2] * misfit[2];
+                    for j in 0..=i {
+                        let t = &fields[j][v];
+                        self.matrix[(i, j)] += weighted[0] * t[0] + weighted[1] * t[1] + weighted[2] * t[2];
+                    }
+                }
+                largest = largest.max(measured.iter().map(|x| x * x).sum());
+                num_voxels += 1;
+            }
+            self.loss_u += squares / (num_voxels as f64 * largest);
+            self.num_drives += 1;
+            if let Some(force) = step.force {
+                let misfit = force.value_n - state.force_n;
+                self.chi2 += force.weight * misfit * misfit;
+                for i in 0..n {
+                    self.gradient[i] += force.weight * misfit * forces[i];
+                    for j in 0..=i {
+                        self.matrix[(i, j)] += force.weight * forces[i] * forces[j];
+                    }
+                }
+                self.loss_f += (misfit / force.value_n).powi(2);
+                self.num_forces += 1;
+            }
+        }
+        for i in 0..n {
+            for j in 0..i {
+                self.matrix[(j, i)] = self.matrix[(i, j)];
+            }
+        }
     }
 }

@@ -191,7 +191,7 @@ fn verify_with(
         other => other,
     };
     // The promise holds at the truth, as an evaluation's does.
-    let at_truth = Prediction::new(model, &operator, &data.drives_mm, truth, None, &fit_options, &stop)?;
+    let at_truth = Prediction::new(model, &operator, &data.drives_mm, truth, None, &fit_options.solve, &stop)?;
     let weights = vec![data.weights.clone(); data.drives_mm.len()];
     let promised = at_truth.information(scan, &weights, centred)?;
     let draws: Vec<u64> = (0..options.draws as u64).collect();

@@ -65,6 +65,25 @@ pub fn mesh_options(text: &str, specimen: &Specimen, use_mirror: bool) -> Result
     Ok(MeshOptions { use_mirror: options.use_mirror && use_mirror, ..options })
 }
 
+/// The same names as a factor on the standard element size.
+///
+/// # Errors
+/// [`CliError::Option`].
+pub fn mesh_factor(text: &str) -> Result<f64, CliError> {
+    match text {
+        "search" => Ok(1.8),
+        "standard" => Ok(1.0),
+        "fine" => Ok(0.6),
+        other => match other.parse::<f64>() {
+            Ok(factor) if (0.2..=5.0).contains(&factor) => Ok(factor),
+            _ => Err(CliError::Option {
+                option: "mesh",
+                message: format!("'{other}' is not search, standard, fine or a size factor from 0.2 to 5"),
+            }),
+        },
+    }
+}
+
 /// Three comma-separated numbers, or one for all three.
 ///
 /// # Errors

@@ -3,6 +3,7 @@
 //! Results on stdout (`--json` for machines), progress on stderr, files in a folder. Exit codes: 0 done, 1 worse
 //! (`compare`), 2 bad input, 3 no solution found, 4 a file cannot be written, 130 stopped by Ctrl-C.
 
+mod calibrate;
 mod compare;
 mod curve_input;
 mod curve_tables;
@@ -16,6 +17,7 @@ mod import;
 mod input;
 mod interrupt;
 mod output;
+mod paper_tables;
 mod progress;
 mod scan;
 mod slurm;
@@ -52,6 +54,10 @@ enum Command {
     Scan(scan::ScanArguments),
     /// Raw phases, MATLAB files or point clouds as a recording of displacements.
     Import(import::ImportArguments),
+    /// The material, from recordings of a specimen, with its uncertainty.
+    Calibrate(calibrate::CalibrateArguments),
+    /// Tables like the paper's on synthetic stand-ins of its experiments.
+    PaperTables(paper_tables::PaperTablesArguments),
     /// The best specimen under the limits of a study, with the evidence.
     Design(Box<design::DesignArguments>),
     /// Many designs evaluated: a table of what each would tell, on one machine or a cluster.
@@ -116,6 +122,8 @@ pub fn run() -> ExitCode {
         Command::Evaluate(a) => evaluate::run(a),
         Command::Scan(a) => scan::run(a),
         Command::Import(a) => import::run(a),
+        Command::Calibrate(a) => calibrate::run(a),
+        Command::PaperTables(a) => paper_tables::run(a),
         Command::Design(a) => design::run(a),
         Command::Sweep(a) => sweep::run(a),
         Command::Compare(a) => compare::run(a),

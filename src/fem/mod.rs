@@ -4,6 +4,7 @@
 //! mixed Newton iterations, sparse Cholesky factors, and derivatives with respect to material, shape and drive from the
 //! factorised tangent.
 
+mod adjoint;
 mod departures;
 mod derivatives;
 mod error;

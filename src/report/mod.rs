@@ -17,6 +17,8 @@
 //! | every design of a sweep across its variables | [`ParallelPlot`] |
 //! | what each variable of a sweep does | [`MainEffectsPlot`] |
 //! | how far each limit is | [`LimitsPlot`] |
+//! | curves and histograms of residuals | [`LinePlot`] |
+//! | losses over two parameters | [`ContourPlot`] |
 //! | two rankings of the same designs | [`RankingPlot`] |
 //! | measured curves with their fits and residuals | [`CurvesPlot`] |
 //!
@@ -25,7 +27,9 @@
 mod axis;
 mod bars;
 mod base64;
+mod calibration_report;
 mod color;
+mod contour_map;
 mod correlation;
 mod curve_pictures;
 mod curves;
@@ -40,6 +44,7 @@ mod html;
 mod html_parts;
 mod labels;
 mod limits;
+mod lines;
 mod main_effects;
 mod maps;
 mod number;
@@ -63,7 +68,9 @@ mod gallery_tests;
 mod test_xml;
 
 pub use bars::{BarGroup, GroupedBars};
+pub use calibration_report::{calibration_report, contour_panels};
 pub use color::ColorMap;
+pub use contour_map::{ContourPanel, ContourPlot};
 pub use correlation::CorrelationPlot;
 pub use curve_pictures::{fit_picture, load_curve_pictures};
 pub use curves::{CurveSeries, CurvesPlot};
@@ -75,6 +82,7 @@ pub use history::{HistoryPlot, HistoryPoint};
 pub use html::{Report, ReportHeader};
 pub use html_parts::{Align, CalloutKind, Column, Table};
 pub use limits::{LimitBar, LimitsPlot};
+pub use lines::{Line, LinePlot, residual_histogram};
 pub use main_effects::{MainEffect, MainEffectsPlot};
 pub use maps::{VoxelField, VoxelMaps};
 pub use number::{significant, symbol_of_parameter};

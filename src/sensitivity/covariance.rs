@@ -89,6 +89,43 @@ impl Covariance {
         Covariance { parameters: information.parameters().to_vec(), scales, relative, is_determined }
     }
 
+    /// The sandwich M⁻¹ B M⁻¹ of an estimate whose weights are not the inverse of the noise's covariance: this covariance is
+    /// M⁻¹, `score` is B, the covariance of the weighted misfit's gradient, in the parameters' units.
+    pub fn with_score(&self, score: &DMatrix<f64>) -> Covariance {
+        let n = self.parameters.len();
+        let relative_score = DMatrix::from_fn(n, n, |i, j| self.scales[i] * score[(i, j)] * self.scales[j]);
+        let relative = &self.relative * relative_score * &self.relative;
+        Covariance { relative: 0.5 * (&relative + relative.transpose()), ..self.clone() }
+    }
+
+    /// Trace of this covariance times `score`: how many parameters' worth of noise an estimate takes up.
+    pub fn absorbed(&self, score: &DMatrix<f64>) -> f64 {
+        let n = self.parameters.len();
+        (0..n)
+            .flat_map(|i| (0..n).map(move |j| (i, j)))
+            .map(|(i, j)| self.relative[(i, j)] * self.scales[i] * self.scales[j] * score[(j, i)])
+            .sum()
+    }
+
+    /// The covariance times `factor`.
+    pub fn scaled(&self, factor: f64) -> Covariance {
+        Covariance { relative: &self.relative * factor, ..self.clone() }
+    }
+
+    /// Standard deviation of Σ gradient_i ξ_i, `gradient` in 1 / the parameters' units; none where a parameter with a
+    /// gradient is undetermined.
+    pub fn sd_along(&self, gradient: &[f64]) -> Option<f64> {
+        let mut variance = 0.0;
+        for (i, a) in gradient.iter().enumerate() {
+            for (j, b) in gradient.iter().enumerate() {
+                if a.abs() > 0.0 && b.abs() > 0.0 {
+                    variance += a * b * self.covariance(i, j)?;
+                }
+            }
+        }
+        Some(variance.max(0.0).sqrt())
+    }
+
     /// Parameters, in the order of indices.
     pub fn parameters(&self) -> &[Parameter] {
         &self.parameters

@@ -154,6 +154,19 @@ impl FisherInformation {
         FisherInformation { parameters, values, matrix: DMatrix::zeros(n, n) }
     }
 
+    /// A matrix computed elsewhere, rows and columns in the order of [`Ogden::parameters`], in the parameters' units.
+    ///
+    /// # Errors
+    /// [`InformationError::LengthMismatch`], [`InformationError::NotFinite`].
+    pub fn from_matrix(material: &Ogden, matrix: DMatrix<f64>) -> Result<Self, InformationError> {
+        let information = Self::none(material);
+        check_length("rows of the matrix", matrix.nrows(), information.parameters.len())?;
+        check_length("columns of the matrix", matrix.ncols(), information.parameters.len())?;
+        let information = FisherInformation { matrix, ..information };
+        information.check_finite()?;
+        Ok(information)
+    }
+
     /// Information of one drive.
     ///
     /// `voxel_sensitivities[i][v]` is ∂ū/∂ξ_i of voxel v (mm per unit of ξ_i) and `force_sensitivities[i]` is ∂F/∂ξ_i (N per

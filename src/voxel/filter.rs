@@ -126,6 +126,32 @@ impl HammingFilter {
             })
             .collect())
     }
+
+    /// The transpose of [`Self::apply`]: Σ_f A_fa w_f for each acquired voxel a. For adjoints and the noise's covariance.
+    ///
+    /// # Errors
+    /// [`VoxelError::LengthMismatch`].
+    pub fn apply_transposed(&self, weights: &[[f64; 3]]) -> Result<Vec<[f64; 3]>, VoxelError> {
+        if weights.len() != self.filtered.num_voxels() {
+            let (found, expected) = (weights.len(), self.filtered.num_voxels());
+            return Err(VoxelError::LengthMismatch { what: "voxel weights", found, expected });
+        }
+        let mut acquired = vec![[0.0; 3]; self.num_sources];
+        for (range, weight) in self.offsets.windows(2).zip(weights) {
+            let sources = &self.sources[range[0] as usize..range[1] as usize];
+            for &source in sources {
+                for n in 0..3 {
+                    acquired[source as usize][n] += weight[n] / sources.len() as f64;
+                }
+            }
+        }
+        Ok(acquired)
+    }
+
+    /// Acquired voxels that each filtered value is the mean of.
+    pub fn num_averaged(&self) -> Vec<usize> {
+        self.offsets.windows(2).map(|range| (range[1] - range[0]) as usize).collect()
+    }
 }
 
 #[cfg(test)]
@@ -154,6 +180,23 @@ mod tests {
                 assert!((filtered[n][1] - (x[0] - 2.0 * x[1] + 0.5 * x[2])).abs() < 1e-13);
             }
         }
+    }
+
+    /// ⟨A u, w⟩ = ⟨u, Aᵀ w⟩.
+    #[test]
+    fn transpose_is_the_transpose() {
+        let acquired = VoxelMask::covering(&two_hole(), PUBLISHED_VOXEL).unwrap();
+        let filter = HammingFilter::new(&acquired).unwrap();
+        let wave = |n: usize, s: f64| [0, 1, 2].map(|c| (s * n as f64 + c as f64).sin());
+        let u: Vec<[f64; 3]> = (0..acquired.num_voxels()).map(|n| wave(n, 0.7)).collect();
+        let w: Vec<[f64; 3]> = (0..filter.mask().num_voxels()).map(|n| wave(n, 1.3)).collect();
+        let dot = |a: &[[f64; 3]], b: &[[f64; 3]]| -> f64 {
+            a.iter().zip(b).map(|(a, b)| a[0] * b[0] + a[1] * b[1] + a[2] * b[2]).sum()
+        };
+        let (left, right) = (dot(&filter.apply(&u).unwrap(), &w), dot(&u, &filter.apply_transposed(&w).unwrap()));
+        // Sums of 6·10⁴ products of order one.
+        assert!((left - right).abs() < 1e-10, "{left} {right}");
+        assert!(filter.num_averaged().iter().all(|n| (4..=8).contains(n)));
     }
 
     /// A filtered recording's grid leads back to the acquired one.

@@ -1,0 +1,138 @@
+//! Profile likelihood: what the objective loses when one parameter is held off its optimum and all others follow.
+
+use super::error::CalibrationError;
+use super::fit::FitOptions;
+use super::problem::{CalibrationProblem, RecordingFit};
+use crate::material::Parameter;
+use serde::{Deserialize, Serialize};
+
+/// Distances from the optimum, in standard deviations.
+const PLACES: [f64; 6] = [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0];
+/// 97.5 % point of the standard normal distribution.
+pub const TWO_SIDED_95: f64 = 1.959_964;
+/// 95 % point: one-sided bounds.
+pub const ONE_SIDED_95: f64 = 1.644_854;
+/// Most halvings of κ on the way to its bound.
+const MAX_HALVINGS: usize = 8;
+
+/// The profile of one parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Profile {
+    /// `kappa`, `mu_1`, …
+    pub parameter: String,
+    /// Values at which it was held; the optimum is in the middle.
+    pub values: Vec<f64>,
+    /// Increase of χ² at each, over the misfit per datum where that is more than noise.
+    pub chi2_increase: Vec<f64>,
+    /// Where the increase passes 1.96²; null on a side that was not reached.
+    pub interval_95: [Option<f64>; 2],
+}
+
+/// Refits with one parameter (`index` in κ, μ₁, α₁, …) held at `value`.
+fn held_at(
+    problem: &mut CalibrationProblem,
+    fit: &RecordingFit,
+    index: usize,
+    value: f64,
+    options: &FitOptions,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<RecordingFit, CalibrationError> {
+    let mut start = fit.material.clone();
+    let parameter = start.parameters()[index];
+    start.set(parameter, value);
+    problem.fit(&start, Some(fit), &FitOptions { held: options.held.with(index), ..*options }, is_cancelled)
+}
+
+/// The increase of the objective in units in which one sandwich standard deviation is one.
+fn increase(fit: &RecordingFit, held: &RecordingFit, index: usize) -> f64 {
+    // Where weights and noise differ the curvature is not the inverse variance.
+    let plain = fit.information.covariance().sd(index).unwrap_or(1.0);
+    let true_sd = fit.covariance.sd(index).unwrap_or(plain);
+    let last = |f: &RecordingFit| f.history.last().copied().unwrap_or(f64::NAN);
+    (last(held) - last(fit)).max(0.0) * (plain / true_sd).powi(2) / fit.misfit_factor
+}
+
+/// Profiles every parameter that was fitted and that the data determine.
+///
+/// # Errors
+/// [`CalibrationError`]; places without an equilibrium are left out.
+pub fn profile(
+    problem: &mut CalibrationProblem,
+    fit: &RecordingFit,
+    options: &FitOptions,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Vec<Profile>, CalibrationError> {
+    let mut profiles = Vec::new();
+    for (index, parameter) in fit.material.parameters().into_iter().enumerate() {
+        let Some(sd) = fit.sd(parameter) else { continue };
+        let optimum = fit.material.value(parameter);
+        // Beyond half of its value a parameter is not told by a parabola; κ has its own bound.
+        if sd > 0.5 * optimum.abs() {
+            continue;
+        }
+        let mut points = vec![(optimum, 0.0)];
+        for place in PLACES {
+            let value = optimum + place * sd;
+            match held_at(problem, fit, index, value, options, is_cancelled) {
+                Ok(held) if held.is_converged => points.push((value, increase(fit, &held, index))),
+                Ok(_) => {}
+                Err(e) if e.is_of_the_data() => {}
+                Err(e) => return Err(e),
+            }
+        }
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // The signed root is nearly straight: interpolate it.
+        let roots: Vec<(f64, f64)> = points.iter().map(|(v, d)| (*v, d.sqrt() * (v - optimum).signum())).collect();
+        let crossing = |level: f64| {
+            roots.windows(2).find_map(|w| {
+                let ((a, ra), (b, rb)) = (w[0], w[1]);
+                ((ra - level) * (rb - level) <= 0.0 && rb > ra).then(|| a + (b - a) * (level - ra) / (rb - ra))
+            })
+        };
+        profiles.push(Profile {
+            parameter: parameter.name(),
+            values: points.iter().map(|p| p.0).collect(),
+            chi2_increase: points.iter().map(|p| p.1).collect(),
+            interval_95: [crossing(-TWO_SIDED_95), crossing(TWO_SIDED_95)],
+        });
+    }
+    Ok(profiles)
+}
+
+/// The κ (kPa) below which the data exclude it at 95 %; none where no κ that the elements bear is excluded.
+///
+/// # Errors
+/// [`CalibrationError`].
+pub fn bulk_lower_bound_kpa(
+    problem: &mut CalibrationProblem,
+    fit: &RecordingFit,
+    options: &FitOptions,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Option<f64>, CalibrationError> {
+    let level = ONE_SIDED_95 * ONE_SIDED_95;
+    let root = |held: &RecordingFit| {
+        let last = |f: &RecordingFit| f.history.last().copied().unwrap_or(f64::NAN);
+        ((last(held) - last(fit)).max(0.0) / fit.misfit_factor / level).sqrt()
+    };
+    let optimum = fit.material.value(Parameter::Kappa);
+    let (mut high, mut root_high) = (optimum.ln(), 0.0);
+    let mut near = fit.clone();
+    for _ in 0..MAX_HALVINGS {
+        let low = high - std::f64::consts::LN_2;
+        let held = match held_at(problem, &near, 0, low.exp(), options, is_cancelled) {
+            Ok(held) if held.is_converged => held,
+            Ok(_) => return Ok(None),
+            Err(e) if e.is_of_the_data() => return Ok(None),
+            Err(e) => return Err(e),
+        };
+        let root_low = root(&held);
+        if root_low >= 1.0 {
+            // The misfit goes as 1/κ − 1/κ₀: straight in 1/κ.
+            let (a, b) = ((-high).exp(), (-low).exp());
+            return Ok(Some(1.0 / (a + (b - a) * (1.0 - root_high) / (root_low - root_high))));
+        }
+        (high, root_high, near) = (low, root_low, held);
+    }
+    Ok(None)
+}

@@ -1,0 +1,127 @@
+//! Where fits start: from a force by hand's formula, and new terms by what they promise to gain.
+
+use super::error::CalibrationError;
+use super::fit::FitOptions;
+use super::observed::Observed;
+use super::problem::{CalibrationProblem, RecordingFit};
+use super::system::raw_sums;
+use crate::material::{MAX_TERMS, Ogden, OgdenTerm};
+use crate::specimen::TestKind;
+use nalgebra::DVector;
+
+/// Shear modulus at the start where no force tells it, kPa. Displacements do not depend on it.
+const REFERENCE_SHEAR_KPA: f64 = 10.0;
+/// κ over the shear modulus at the start.
+const START_BULK_RATIO: f64 = 100.0;
+/// A term of this part of the shear modulus is not there yet; its derivatives exist.
+const NO_MODULUS: f64 = 1e-9;
+/// Exponents of one-term starts.
+const FIRST_EXPONENTS: [f64; 3] = [2.0, 6.0, -3.0];
+/// Exponents that a further term is tried with.
+const NEXT_EXPONENTS: [f64; 15] =
+    [-16.0, -12.0, -9.0, -6.5, -4.5, -3.0, -1.5, 1.0, 2.5, 4.0, 6.0, 8.0, 10.5, 14.0, 18.0];
+/// A further term starts with a part of the shear modulus in this range.
+const FIRST_SHARE: [f64; 2] = [2e-3, 0.3];
+
+/// Shear modulus (kPa) that a homogeneous test of the block's outline would need for the first force: F = G A d / t in shear,
+/// 3 G A d / l in tension.
+fn shear_modulus_kpa(observed: &[Observed]) -> f64 {
+    for recording in observed {
+        let specimen = &recording.specimen;
+        let block = &specimen.block;
+        for step in &recording.steps {
+            let Some(force) = step.force else { continue };
+            let (area, strain) = match specimen.test {
+                TestKind::DoubleLapShear => (block.length_mm * block.width_mm, step.drive_mm / block.thickness_mm),
+                TestKind::Uniaxial => (block.thickness_mm * block.width_mm, 3.0 * step.drive_mm / block.length_mm),
+            };
+            let modulus = 1e3 * force.value_n / (area * strain * f64::from(specimen.samples_in_parallel));
+            if modulus.is_finite() && modulus > 0.0 {
+                return modulus;
+            }
+        }
+    }
+    REFERENCE_SHEAR_KPA
+}
+
+fn ogden(bulk_kpa: f64, terms: Vec<OgdenTerm>) -> Ogden {
+    Ogden { schema: crate::material::SCHEMA.into(), bulk_kpa, terms }
+}
+
+/// Blind one-term starts, the likeliest first.
+pub(super) fn first_starts(observed: &[Observed]) -> Vec<Ogden> {
+    let shear = shear_modulus_kpa(observed);
+    FIRST_EXPONENTS
+        .iter()
+        .map(|&alpha| ogden(START_BULK_RATIO * shear, vec![OgdenTerm { mu_kpa: 2.0 * shear / alpha, alpha }]))
+        .collect()
+}
+
+/// `fit` with one term more, in the order of the decrease of the objective that the new term promises: for each exponent the
+/// new μ that the linear model likes best, all old parameters moving along. At most `count`, each with the decrease promised.
+///
+/// # Errors
+/// [`CalibrationError`].
+pub(super) fn further_starts(
+    problem: &mut CalibrationProblem,
+    fit: &RecordingFit,
+    options: &FitOptions,
+    count: usize,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Vec<(f64, Ogden)>, CalibrationError> {
+    let old = &fit.material;
+    let num_old = 2 * old.terms.len() + 1;
+    let shear = 0.5 * old.terms.iter().map(|t| t.mu_kpa * t.alpha).sum::<f64>();
+    let gap = 1.1 * options.min_alpha_gap;
+    let exponents: Vec<f64> =
+        NEXT_EXPONENTS.into_iter().filter(|a| old.terms.iter().all(|t| (t.alpha - a).abs() > gap)).collect();
+    let num_at_once = MAX_TERMS.saturating_sub(old.terms.len());
+    if num_at_once == 0 {
+        return Ok(Vec::new());
+    }
+    let mut candidates: Vec<(f64, Ogden)> = Vec::new();
+    for chunk in exponents.chunks(num_at_once) {
+        let mut wide = old.clone();
+        wide.terms.extend(chunk.iter().map(|&alpha| OgdenTerm { mu_kpa: NO_MODULUS * shear, alpha }));
+        let predictions = problem.predict(&wide, Some(&fit.predictions), &options.solve, is_cancelled)?;
+        let (matrix, gradient) = raw_sums(&predictions, &problem.targets()?);
+        let free: Vec<usize> = (0..num_old).filter(|&i| !fit.held.contains(i)).collect();
+        let inner = matrix.select_rows(&free).select_columns(&free);
+        // Relative parameters: a unit diagonal, and a ridge for directions without information.
+        let root: Vec<f64> = free.iter().map(|&i| matrix[(i, i)].sqrt().max(f64::MIN_POSITIVE)).collect();
+        let scaled = inner.map_with_location(|a, b, x| x / (root[a] * root[b]) + if a == b { 1e-9 } else { 0.0 });
+        let Some(factor) = scaled.cholesky() else { continue };
+        for (n, &alpha) in chunk.iter().enumerate() {
+            let at = num_old + 2 * n;
+            let coupling =
+                DVector::from_iterator(free.len(), free.iter().zip(&root).map(|(&i, r)| matrix[(i, at)] / r));
+            let rest = DVector::from_iterator(free.len(), free.iter().zip(&root).map(|(&i, r)| gradient[i] / r));
+            let solved = factor.solve(&coupling);
+            let slope = gradient[at] - solved.dot(&rest);
+            let curvature = matrix[(at, at)] - solved.dot(&coupling);
+            if !(curvature > 0.0) {
+                continue;
+            }
+            let best = slope / curvature;
+            let is_stable = best * alpha > 0.0;
+            let gain = if is_stable { slope * slope / curvature } else { 0.0 };
+            let share = (0.5 * best * alpha / shear).abs().clamp(FIRST_SHARE[0], FIRST_SHARE[1]);
+            let mut start = old.clone();
+            for term in &mut start.terms {
+                term.mu_kpa *= 1.0 - share;
+            }
+            start.terms.push(OgdenTerm { mu_kpa: 2.0 * share * shear / alpha, alpha });
+            candidates.push((gain, start));
+        }
+    }
+    candidates.sort_by(|a, b| b.0.total_cmp(&a.0));
+    // Neighbouring exponents lead to the same optimum: spread the starts.
+    let mut chosen: Vec<(f64, Ogden)> = Vec::new();
+    for (gain, start) in candidates {
+        let alpha = |m: &Ogden| m.terms.last().map_or(0.0, |t| t.alpha);
+        if chosen.len() < count && chosen.iter().all(|(_, c)| (alpha(c) - alpha(&start)).abs() > 3.0) {
+            chosen.push((gain, start));
+        }
+    }
+    Ok(chosen)
+}

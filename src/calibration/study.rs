@@ -1,0 +1,293 @@
+//! Calibrations of many noisy scans of one truth: do the intervals cover, is the spread the promised one, is the number of
+//! terms found?
+//!
+//! The truth is solved on another mesh than the one fitted on. What that mesh shifts is told apart from the noise by a fit to
+//! the noiseless scan; coverage is that of the truth plus this shift. Whether a term can be found at all is said by the
+//! increase δ of χ² of the best model with a term less on the noiseless scan: the decrease seen in a draw is then distributed
+//! as noncentral χ² with two degrees of freedom, and BIC asks for 2 ln n.
+
+use super::calibrate::{CalibrateOptions, Run, falling};
+use super::error::CalibrationError;
+use super::observed::Observed;
+use super::problem::{CalibrationProblem, RecordingFit};
+use super::profile::TWO_SIDED_95;
+use super::synthetic::SyntheticScan;
+use super::terms::{Rule, choose};
+use crate::material::Ogden;
+use crate::mesh::MeshOptions;
+use crate::recording::Filter;
+use crate::sensitivity::ScanSettings;
+use crate::specimen::Specimen;
+use rayon::prelude::*;
+use std::fmt;
+
+/// A truth and how it is scanned.
+#[derive(Clone, Debug)]
+pub struct StudyCase {
+    /// With its drives.
+    pub specimen: Specimen,
+    /// What made the data.
+    pub truth: Ogden,
+    /// Voxels and noise.
+    pub scan: ScanSettings,
+    /// Filter of the recordings.
+    pub filter: Filter,
+    /// Mesh of the truth.
+    pub truth_mesh: MeshOptions,
+    /// Mesh of the fits.
+    pub fit_mesh: MeshOptions,
+    /// Draws of noise.
+    pub draws: usize,
+    /// Seed of the noise.
+    pub seed: u64,
+    /// Settings of the fits; profiles, contours and the second mesh are not used.
+    pub options: CalibrateOptions,
+}
+
+/// One parameter over all draws with as many terms as the truth.
+#[derive(Clone, Debug)]
+pub struct StudyRow {
+    /// `kappa`, `mu_1`, …; terms in the order of falling exponents.
+    pub parameter: String,
+    /// What made the data.
+    pub truth: f64,
+    /// Shift by the mesh: the estimate from the noiseless scan minus the truth.
+    pub mesh_shift: f64,
+    /// Mean of the estimates minus the noiseless estimate.
+    pub mean_shift: f64,
+    /// Standard deviation of the estimates.
+    pub found_sd: f64,
+    /// Mean of the standard deviations stated by the fits; NaN where none is.
+    pub promised_sd: f64,
+    /// Part of the draws whose 95 % interval holds the truth plus the mesh's shift; NaN where no interval is stated.
+    pub coverage: f64,
+}
+
+/// All draws.
+#[derive(Clone, Debug)]
+pub struct Study {
+    /// Per parameter.
+    pub rows: Vec<StudyRow>,
+    /// Draws that gave an estimate with as many terms as the truth.
+    pub num_fitted: usize,
+    /// Draws.
+    pub num_draws: usize,
+    /// Draws for which a rule took 1, 2, 3, … terms: BIC, F-test, decrement.
+    pub num_by_rule: [Vec<usize>; 3],
+    /// Expected χ² decrease by the last term of the truth; none for one term.
+    pub expected_decrease: Option<f64>,
+    /// What BIC asks for.
+    pub needed_decrease: f64,
+    /// Probability that BIC keeps the last term of the truth.
+    pub detection_probability: Option<f64>,
+    /// Mean of χ² per datum.
+    pub chi2_per_datum: f64,
+    /// Standard deviation of χ² per datum over the draws.
+    pub chi2_sd: f64,
+}
+
+impl fmt::Display for Study {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{} of {} draws fitted, chi2 per datum {:.4} ± {:.4}",
+            self.num_fitted, self.num_draws, self.chi2_per_datum, self.chi2_sd
+        )?;
+        writeln!(
+            f,
+            "  parameter      truth  mesh shift  mean shift    found sd   promised sd  ratio  coverage of 95 % intervals"
+        )?;
+        for r in &self.rows {
+            writeln!(
+                f,
+                "  {:<8} {:>11.4} {:>+11.4} {:>+11.4} {:>11.4} {:>13.4}  {:.3}  {:.1} %",
+                r.parameter,
+                r.truth,
+                r.mesh_shift,
+                r.mean_shift,
+                r.found_sd,
+                r.promised_sd,
+                r.found_sd / r.promised_sd,
+                100.0 * r.coverage
+            )?;
+        }
+        let [bic, f_test, decrement] = &self.num_by_rule;
+        writeln!(f, "  draws with 1, 2, … terms: BIC {bic:?}, F-test {f_test:?}, decrement {decrement:?}")?;
+        if let (Some(expected), Some(probability)) = (self.expected_decrease, self.detection_probability) {
+            writeln!(
+                f,
+                "  the last term lowers chi2 by {expected:.1} (BIC asks for {:.1}): found in {:.1} % of draws by theory",
+                self.needed_decrease,
+                100.0 * probability
+            )?;
+        }
+        Ok(())
+    }
+}
+
+struct Draw {
+    /// The fit with as many terms as the truth.
+    fit: Option<(Vec<f64>, Vec<Option<f64>>, f64)>,
+    chosen: [usize; 3],
+}
+
+/// Runs the draws in parallel; the result does not depend on the number of threads.
+///
+/// # Errors
+/// [`CalibrationError`] where the truth or the noiseless scan cannot be fitted, or the work was cancelled.
+pub fn study(
+    case: &StudyCase,
+    on_draw: &(dyn Fn() + Sync),
+    is_cancelled: &(dyn Fn() -> bool + Sync),
+) -> Result<Study, CalibrationError> {
+    let stop = || is_cancelled();
+    let solve = &case.options.fit.solve;
+    let synthetic = SyntheticScan::new(&case.specimen, &case.truth, &case.scan, &case.truth_mesh, solve, &stop)?;
+    let observe = |data: &super::Measurement| -> Result<[Observed; 1], CalibrationError> {
+        let recording = synthetic.recording("draw", &case.specimen, data, case.filter)?;
+        Ok([Observed::new(&recording, case.scan.force_sd_n)?])
+    };
+    let truth = falling(&case.truth);
+    let num_terms = truth.terms.len();
+    let clean = observe(synthetic.noiseless())?;
+    let mut problem = CalibrationProblem::new(&clean, &|_| case.fit_mesh, case.options.objective)?;
+    let noiseless = problem.fit(&truth, None, &case.options.fit, &stop)?;
+    let (expected_decrease, needed_decrease) = {
+        let needed = 2.0 * (noiseless.num_data as f64).ln();
+        let silent = |_: &str| {};
+        let fewer = CalibrateOptions { terms: super::TermCount::Fixed(num_terms.saturating_sub(1)), ..case.options };
+        let expected = if num_terms > 1 {
+            let (_, fits) = Run::new(&fewer, true, &silent, &stop).select(&mut problem)?;
+            fits.last().map(|f| (f.chi2 - noiseless.chi2).max(0.0))
+        } else {
+            None
+        };
+        (expected, needed)
+    };
+    let chunk = case.draws.div_ceil(rayon::current_num_threads().max(1)).max(1);
+    let starts: Vec<usize> = (0..case.draws).step_by(chunk).collect();
+    // Models are made one after another: the ordering library shares its random state between threads.
+    let problems: Vec<CalibrationProblem> = starts
+        .iter()
+        .map(|_| CalibrationProblem::new(&clean, &|_| case.fit_mesh, case.options.objective))
+        .collect::<Result<_, _>>()?;
+    let draws: Vec<Vec<Draw>> = problems
+        .into_par_iter()
+        .zip(starts)
+        .map(|(mut problem, first)| {
+            let mut done = Vec::new();
+            for draw in first..(first + chunk).min(case.draws) {
+                let data = observe(&synthetic.draw(case.seed, draw as u64))?;
+                let mut present = problem.with_data(&data)?;
+                done.push(one_draw(&mut present, case, num_terms, &|| is_cancelled())?);
+                problem = present.with_data(&clean)?;
+                on_draw();
+            }
+            Ok(done)
+        })
+        .collect::<Result<_, CalibrationError>>()?;
+    let draws: Vec<Draw> = draws.into_iter().flatten().collect();
+    Ok(summarise(&draws, &truth, &noiseless, expected_decrease, needed_decrease))
+}
+
+fn one_draw(
+    problem: &mut CalibrationProblem,
+    case: &StudyCase,
+    num_terms: usize,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Draw, CalibrationError> {
+    let silent = |_: &str| {};
+    let mut run = Run::new(&case.options, true, &silent, is_cancelled);
+    let (rows, fits) = match run.select(problem) {
+        Err(e) if e.is_of_the_data() => return Ok(Draw { fit: None, chosen: [0; 3] }),
+        other => other?,
+    };
+    let chosen = [Rule::Bic, Rule::FTest, Rule::Decrement].map(|r| choose(&rows, r, case.options.decrement_threshold));
+    let fit = match fits.get(num_terms - 1).filter(|f| f.is_converged) {
+        None => None,
+        Some(fit) => {
+            let sorted = problem.fit(&falling(&fit.material), Some(fit), &case.options.fit, is_cancelled)?;
+            let parameters = sorted.material.parameters();
+            let values = parameters.iter().map(|p| sorted.material.value(*p)).collect();
+            Some((values, parameters.iter().map(|p| sorted.sd(*p)).collect(), sorted.chi2_per_datum))
+        }
+    };
+    Ok(Draw { fit, chosen })
+}
+
+fn summarise(
+    draws: &[Draw],
+    truth: &Ogden,
+    noiseless: &RecordingFit,
+    expected_decrease: Option<f64>,
+    needed_decrease: f64,
+) -> Study {
+    let fitted: Vec<&(Vec<f64>, Vec<Option<f64>>, f64)> = draws.iter().filter_map(|d| d.fit.as_ref()).collect();
+    // 0/0 is the NaN that is meant.
+    let mean = |values: &mut dyn Iterator<Item = f64>| {
+        let (sum, count) = values.fold((0.0, 0.0), |(s, n), x| (s + x, n + 1.0));
+        sum / count
+    };
+    let spread = |values: &[f64]| {
+        let m = mean(&mut values.iter().copied());
+        (values.iter().map(|v| (v - m).powi(2)).sum::<f64>() / (values.len() as f64 - 1.0)).sqrt()
+    };
+    let rows = truth
+        .parameters()
+        .into_iter()
+        .enumerate()
+        .map(|(i, parameter)| {
+            let at = noiseless.material.value(parameter);
+            let values: Vec<f64> = fitted.iter().map(|d| d.0[i]).collect();
+            let stated = || fitted.iter().filter_map(|d| d.1[i].map(|sd| (d.0[i], sd)));
+            StudyRow {
+                parameter: parameter.name(),
+                truth: truth.value(parameter),
+                mesh_shift: at - truth.value(parameter),
+                mean_shift: mean(&mut values.iter().copied()) - at,
+                found_sd: spread(&values),
+                promised_sd: mean(&mut stated().map(|(_, sd)| sd)),
+                coverage: mean(&mut stated().map(|(v, sd)| f64::from(u8::from((v - at).abs() <= TWO_SIDED_95 * sd)))),
+            }
+        })
+        .collect();
+    let most = draws.iter().flat_map(|d| d.chosen).max().unwrap_or(0);
+    let num_by_rule =
+        [0, 1, 2].map(|r| (1..=most).map(|n| draws.iter().filter(|d| d.chosen[r] == n).count()).collect());
+    let chi2: Vec<f64> = fitted.iter().map(|d| d.2).collect();
+    Study {
+        rows,
+        num_fitted: fitted.len(),
+        num_draws: draws.len(),
+        num_by_rule,
+        expected_decrease,
+        needed_decrease,
+        detection_probability: expected_decrease.map(|d| detection_probability(d, needed_decrease)),
+        chi2_per_datum: mean(&mut chi2.iter().copied()),
+        chi2_sd: spread(&chi2),
+    }
+}
+
+/// P(noncentral χ² with two degrees of freedom and noncentrality `expected` > `needed`), by Sankaran's normal approximation.
+fn detection_probability(expected: f64, needed: f64) -> f64 {
+    let (k, l) = (2.0, expected);
+    let h = 1.0 - 2.0 / 3.0 * (k + l) * (k + 3.0 * l) / (k + 2.0 * l).powi(2);
+    let p = (k + 2.0 * l) / (k + l).powi(2);
+    let m = (h - 1.0) * (1.0 - 3.0 * h);
+    let mean = 1.0 + h * p * (h - 1.0 - 0.5 * (2.0 - h) * m * p);
+    let sd = h * (2.0 * p).sqrt() * (1.0 + 0.5 * m * p);
+    1.0 - normal_cdf(((needed / (k + l)).powf(h) - mean) / sd)
+}
+
+/// The standard normal distribution function (Abramowitz and Stegun 26.2.17, 7·10⁻⁸).
+fn normal_cdf(x: f64) -> f64 {
+    let t = 1.0 / (1.0 + 0.231_641_9 * x.abs());
+    let tail = (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt()
+        * t
+        * (0.319_381_530 + t * (-0.356_563_782 + t * (1.781_477_937 + t * (-1.821_255_978 + t * 1.330_274_429))));
+    if x >= 0.0 { 1.0 - tail } else { tail }
+}
+
+#[cfg(test)]
+#[path = "study_tests.rs"]
+mod tests;
