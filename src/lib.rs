@@ -2,7 +2,7 @@
 //!
 //! The rooms stand on one another in this order; a room uses only those before it:
 //! [`specimen`] → [`mesh`] → [`material`] → [`fem`] → [`kinematics`] → [`voxel`] → [`sensitivity`] →
-//! [`calibration`] → [`design`] → [`report`] → [`cli`].
+//! [`calibration`] → [`design`] → [`report`] → [`service`] → [`cli`].
 //!
 //! One unit system inside: lengths mm, moduli and stresses kPa, times s. Stress × area is then
 //! kPa·mm² = 10⁻³ N; forces cross every public boundary in N.
@@ -18,5 +18,6 @@ pub mod provenance;
 pub mod recording;
 pub mod report;
 pub mod sensitivity;
+pub mod service;
 pub mod specimen;
 pub mod voxel;

@@ -10,7 +10,9 @@ mod input;
 mod interrupt;
 mod output;
 mod progress;
+mod serve;
 mod solve;
+mod worker;
 
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -38,6 +40,10 @@ enum Command {
     Evaluate(evaluate::EvaluateArguments),
     /// The best specimen under the limits of a study, with the evidence.
     Design(design::DesignArguments),
+    /// The service: REST, jobs, and a page for planners.
+    Serve(serve::ServeArguments),
+    /// A worker of a service on PostgreSQL.
+    Worker(worker::WorkerArguments),
 }
 
 /// What every command takes.
@@ -84,11 +90,16 @@ pub fn run() -> ExitCode {
             return ExitCode::from(code);
         }
     };
-    interrupt::listen();
+    // The service and its workers end gracefully by signals of their own.
+    if !matches!(arguments.command, Command::Serve(_) | Command::Worker(_)) {
+        interrupt::listen();
+    }
     let result = match &arguments.command {
         Command::Solve(a) => solve::run(a),
         Command::Evaluate(a) => evaluate::run(a),
         Command::Design(a) => design::run(a),
+        Command::Serve(a) => serve::run(a),
+        Command::Worker(a) => worker::run(a),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -101,7 +112,12 @@ pub fn run() -> ExitCode {
 
 /// Starts the thread pool.
 fn start_threads(common: &Common) -> Result<(), CliError> {
-    let Some(n) = common.threads else { return Ok(()) };
+    start_thread_pool(common.threads)
+}
+
+/// Starts the thread pool with this many threads.
+fn start_thread_pool(threads: Option<usize>) -> Result<(), CliError> {
+    let Some(n) = threads else { return Ok(()) };
     if !(1..=1024).contains(&n) {
         return Err(CliError::Option { option: "threads", message: format!("{n} is not from 1 to 1024") });
     }
