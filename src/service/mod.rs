@@ -18,6 +18,7 @@ pub mod kinds;
 mod log;
 mod metrics;
 pub mod problem;
+mod recordings;
 mod routes;
 pub mod runner;
 mod server;

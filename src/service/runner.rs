@@ -128,6 +128,10 @@ fn run_task(store: &Store, settings: &WorkerSettings, signal: &Signal, worker: &
                 let text = serde_json::to_string(&p).unwrap_or_default();
                 *progress.lock().unwrap_or_else(PoisonError::into_inner) = text;
             },
+            recording: &|id: &str| {
+                super::recordings::load(store, id)?
+                    .ok_or_else(|| Problem::new("not-found", "the recording is gone; upload it again"))
+            },
             checkpoint: &path,
         };
         let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| run_kind(store, task, &context)));

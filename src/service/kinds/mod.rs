@@ -1,17 +1,20 @@
 //! Kinds of jobs, one file each: what a request must hold, the library call that answers it, what it leaves behind.
 
 mod designs;
+mod diagnoses;
 mod evaluations;
 mod schemas;
 mod sweeps;
 
 pub use designs::Designs;
+pub use diagnoses::{Diagnoses, DiagnosisRequest};
 pub use evaluations::{EvaluationRequest, Evaluations, mesh_of, plan_evaluation, scan_of};
 pub use schemas::*;
 pub use sweeps::{SweepAxis, SweepRequest, Sweeps};
 
 use super::problem::Problem;
 use super::store::{NewTask, TaskResult};
+use crate::recording::Recording;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use utoipa::ToSchema;
@@ -71,6 +74,8 @@ pub struct RunContext<'a> {
     pub is_cancelled: &'a (dyn Fn() -> bool + Sync),
     /// Takes progress.
     pub progress: &'a (dyn Fn(TaskProgress) + Sync),
+    /// Reads an uploaded recording.
+    pub recording: &'a dyn Fn(&str) -> Result<Recording, Problem>,
     /// A file whose content is kept across attempts.
     pub checkpoint: &'a Path,
 }
@@ -79,6 +84,11 @@ pub struct RunContext<'a> {
 pub trait JobKind: Send + Sync {
     /// Name, as in the address.
     fn name(&self) -> &'static str;
+
+    /// The uploaded recording that a request names; its existence is checked before the job is taken.
+    fn recording<'a>(&self, _body: &'a serde_json::Value) -> Option<&'a str> {
+        None
+    }
 
     /// Validates a request's body and says what there is to run.
     ///
@@ -107,7 +117,7 @@ pub trait JobKind: Send + Sync {
 
 /// The kinds that this program runs.
 pub fn kind_named(name: &str) -> Option<&'static dyn JobKind> {
-    const KINDS: &[&dyn JobKind] = &[&Evaluations, &Designs, &Sweeps];
+    const KINDS: &[&dyn JobKind] = &[&Evaluations, &Designs, &Sweeps, &Diagnoses];
     KINDS.iter().copied().find(|kind| kind.name() == name)
 }
 

@@ -4,6 +4,7 @@ mod assets;
 mod health;
 mod jobs;
 mod quick;
+mod recordings;
 mod results;
 mod submit;
 
@@ -37,6 +38,9 @@ pub fn open_api() -> (Router<App>, String) {
         .routes(routes!(submit::post_evaluation))
         .routes(routes!(submit::post_design))
         .routes(routes!(submit::post_sweep))
+        .routes(routes!(submit::post_diagnosis))
+        .routes(routes!(recordings::list, recordings::upload))
+        .routes(routes!(recordings::get))
         .routes(routes!(jobs::list))
         .routes(routes!(jobs::get))
         .routes(routes!(jobs::cancel))

@@ -2,7 +2,7 @@
 
 use crate::service::access::{Caller, Role, random_hex};
 use crate::service::app::App;
-use crate::service::kinds::{EvaluationRequest, SizeLimits, StudySchema, SweepRequest, kind_named};
+use crate::service::kinds::{DiagnosisRequest, EvaluationRequest, SizeLimits, StudySchema, SweepRequest, kind_named};
 use crate::service::problem::Problem;
 use crate::service::store::{Idempotency, NewJob, Submitted, sha256_hex};
 use crate::service::view::JobView;
@@ -31,7 +31,13 @@ async fn submit(app: App, caller: Caller, headers: HeaderMap, body: Bytes, kind:
     };
     let job_kind = kind_named(kind).ok_or_else(|| Problem::new("internal", "no such kind of job"))?;
     let canonical = value.to_string();
+    let recording = job_kind.recording(&value).map(String::from);
     let plan = app.compute(move || job_kind.plan(&value, &limits)).await?;
+    if let Some(recording) = recording
+        && app.with_store(move |store| store.upload(&recording)).await?.is_none()
+    {
+        return Err(Problem::at("/recording", "there is no such recording; upload it first"));
+    }
     let id = random_hex::<16>().map_err(|e| Problem::new("internal", e.to_string()))?;
     let fingerprint = sha256_hex(format!("{kind}\n{canonical}").as_bytes());
     let idempotency = key.map(|key| Idempotency { key, fingerprint });
@@ -101,3 +107,4 @@ macro_rules! submission {
 submission!(post_evaluation, "/v1/evaluations", "evaluations", EvaluationRequest, "Evaluate a specimen.");
 submission!(post_design, "/v1/designs", "designs", StudySchema, "Search for the best specimen of a study.");
 submission!(post_sweep, "/v1/sweeps", "sweeps", SweepRequest, "Evaluate many specimens.");
+submission!(post_diagnosis, "/v1/diagnoses", "diagnoses", DiagnosisRequest, "Find where a recording and its model differ, and why.");
