@@ -1,8 +1,8 @@
 //! lambdak designs the specimen from which one full-field (MR-u) scan tells the most about a soft material.
 //!
 //! The rooms stand on one another in this order; a room uses only those before it:
-//! [`specimen`] → [`mesh`] → [`material`] → [`fem`] → [`kinematics`] → [`voxel`] → [`sensitivity`] →
-//! [`calibration`] → [`design`] → [`report`] → [`service`] → [`cli`].
+//! [`specimen`] → [`mesh`] → [`material`] → [`fem`] → [`kinematics`] → [`homogeneous`] → [`rate`] → [`voxel`] →
+//! [`sensitivity`] → [`calibration`] → [`design`] → [`report`] → [`service`] → [`cli`].
 //!
 //! One unit system inside: lengths mm, moduli and stresses kPa, times s. Stress × area is then
 //! kPa·mm² = 10⁻³ N; forces cross every public boundary in N.
@@ -10,11 +10,14 @@
 pub mod calibration;
 pub mod cli;
 pub mod design;
+pub mod diagnosis;
 pub mod fem;
+pub mod homogeneous;
 pub mod kinematics;
 pub mod material;
 pub mod mesh;
 pub mod provenance;
+pub mod rate;
 pub mod recording;
 pub mod report;
 pub mod sensitivity;

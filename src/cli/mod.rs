@@ -3,7 +3,11 @@
 //! Results on stdout (`--json` for machines), progress on stderr, files in a folder. Exit codes: 0 done, 2 bad input,
 //! 3 no solution found, 4 a file cannot be written, 130 stopped by Ctrl-C.
 
+mod curve_input;
+mod curve_tables;
+mod curves;
 mod design;
+mod diagnose;
 mod error;
 mod evaluate;
 mod input;
@@ -12,6 +16,7 @@ mod output;
 mod progress;
 mod serve;
 mod solve;
+mod uniaxial;
 mod worker;
 
 use clap::{Args, Parser, Subcommand};
@@ -40,6 +45,12 @@ enum Command {
     Evaluate(evaluate::EvaluateArguments),
     /// The best specimen under the limits of a study, with the evidence.
     Design(design::DesignArguments),
+    /// Where a recording and its model differ, and what physics was left out.
+    Diagnose(diagnose::DiagnoseArguments),
+    /// The traditional route: one uniaxial curve, of a strip or a dumb-bell, fitted with Ogden terms.
+    Uniaxial(uniaxial::UniaxialArguments),
+    /// Ogden terms fitted to curves of several homogeneous tests together.
+    Curves(curves::CurvesArguments),
     /// The service: REST, jobs, and a page for planners.
     Serve(serve::ServeArguments),
     /// A worker of a service on PostgreSQL.
@@ -98,6 +109,9 @@ pub fn run() -> ExitCode {
         Command::Solve(a) => solve::run(a),
         Command::Evaluate(a) => evaluate::run(a),
         Command::Design(a) => design::run(a),
+        Command::Diagnose(a) => diagnose::run(a),
+        Command::Uniaxial(a) => uniaxial::run(a),
+        Command::Curves(a) => curves::run(a),
         Command::Serve(a) => serve::run(a),
         Command::Worker(a) => worker::run(a),
     };

@@ -275,6 +275,53 @@ impl ForwardModel {
         result
     }
 
+    /// Derivative of `equilibrium` as the held nodes move by `rate` (mm per unit of t; other nodes' entries are ignored).
+    ///
+    /// # Errors
+    /// As [`Self::departure_sensitivity`].
+    pub fn imposed_sensitivity(
+        &mut self,
+        material: &Ogden,
+        equilibrium: &Equilibrium,
+        rate: &[[f64; 3]],
+    ) -> Result<DepartureSensitivity, SolveError> {
+        self.ensure_tangent(material, equilibrium)?;
+        let mut imposed = vec![[0.0; 3]; self.mesh.nodes.len()];
+        let mut largest = 1e-12f64;
+        for v in self.held_nodes() {
+            imposed[v] = rate[v];
+            largest = rate[v].iter().fold(largest, |s, x| s.max(x.abs()));
+        }
+        // Differences over a micrometre: elements are some hundred times larger, their vectors smooth.
+        let step = 1e-3 / largest;
+        let present = std::mem::take(&mut self.prepared);
+        let result = self.difference_along(material, equilibrium, [&present, &present], &mut imposed, step, &present);
+        self.prepared = present;
+        result
+    }
+
+    /// Traction (kPa) of the plates on the sample at each node of the bonded faces, zero elsewhere: nodal force / area.
+    ///
+    /// # Errors
+    /// [`SolveError::Diverged`] where the state is not one of this mesh.
+    pub fn plate_tractions(
+        &mut self,
+        material: &Ogden,
+        equilibrium: &Equilibrium,
+    ) -> Result<Vec<[f64; 3]>, SolveError> {
+        let areas = self.mesh.face_areas();
+        let positions = self.mesh.nodes.clone();
+        let mut residual = vec![[0.0; 3]; positions.len()];
+        self.assemble_residual_at(material, &positions, &equilibrium.displacement, None, &mut residual).map_err(
+            |cause| SolveError::Diverged { reached_mm: equilibrium.drive_mm, asked_mm: equilibrium.drive_mm, cause },
+        )?;
+        Ok(residual
+            .iter()
+            .zip(&areas)
+            .map(|(r, area)| if *area > 0.0 { r.map(|f| f / area) } else { [0.0; 3] })
+            .collect())
+    }
+
     /// Mesh nodes that move with a plate.
     fn held_nodes(&self) -> Vec<usize> {
         (0..self.is_held.len()).filter(|&v| self.is_held[v]).collect()

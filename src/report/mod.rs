@@ -16,6 +16,7 @@
 //! | the deformed specimen | [`DeformedShape`] |
 //! | how far each limit is | [`LimitsPlot`] |
 //! | two rankings of the same designs | [`RankingPlot`] |
+//! | measured curves with their fits and residuals | [`CurvesPlot`] |
 //!
 //! Files: [`Vtu`] for ParaView, [`Report`] for the browser.
 
@@ -24,6 +25,8 @@ mod bars;
 mod base64;
 mod color;
 mod correlation;
+mod curve_pictures;
+mod curves;
 mod density;
 mod design_report;
 mod error;
@@ -54,6 +57,8 @@ mod test_xml;
 pub use bars::{BarGroup, GroupedBars};
 pub use color::ColorMap;
 pub use correlation::CorrelationPlot;
+pub use curve_pictures::{fit_picture, load_curve_pictures};
+pub use curves::{CurveSeries, CurvesPlot};
 pub use density::{DensityPanel, DensityPlot};
 pub use design_report::{DesignPictures, design_report};
 pub use error::ReportError;

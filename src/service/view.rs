@@ -104,6 +104,18 @@ impl JobView {
     }
 }
 
+/// An event of a job's stream.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct JobEvent {
+    /// `job`, or `shutdown` when the service ends.
+    pub event: String,
+    /// The job's revision.
+    #[serde(default)]
+    pub id: Option<String>,
+    /// The job, as JSON.
+    pub data: String,
+}
+
 /// A page of jobs, newest first.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct JobList {

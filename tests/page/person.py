@@ -29,7 +29,7 @@ class Page:
     def __init__(self, size):
         self.folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         self.process = subprocess.Popen(
-            [chromium, "--headless", "--no-sandbox", "--disable-gpu-sandbox", "--use-gl=angle", "--use-angle=swiftshader",
+            [chromium, "--headless=new", "--no-sandbox", "--disable-gpu-sandbox", "--use-gl=angle", "--use-angle=swiftshader",
              "--enable-unsafe-swiftshader", "--remote-debugging-port=0", "--remote-allow-origins=*",
              f"--user-data-dir={self.folder.name}", f"--window-size={size[0]},{size[1]}", "about:blank"],
             stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
@@ -121,7 +121,7 @@ try:
     # A hole dragged to the edge breaks a limit at once; the keyboard brings it back.
     x, y = page.js(HOLE % 0)
     width = page.js("document.querySelector('svg.section').getBoundingClientRect().width")
-    page.drag((x, y), (x - 0.14 * width, y))
+    page.drag((x, y), (x - 0.18 * width, y))
     page.until(f"!{CHECK}.includes('Every limit is kept')")
     page.shot("2-broken")
     page.js("document.querySelectorAll('svg.section .hole')[0].focus()")

@@ -39,7 +39,7 @@ export async function planView(content, signal, from) {
       found.errors.map((e) => h("p", { class: "bad" }, e.detail)),
       found.margins.map((m) => h("div", { class: `meter${m.is_satisfied ? "" : " broken"}` },
         h("span", {}, m.name.replaceAll("_", " ").replace(/ mm$/, ", mm")),
-        h("span", {}, `${digits(m.value, 3)} / ${digits(m.limit, 3)}`),
+        h("span", {}, m.name === "symmetry" ? (m.is_satisfied ? "kept" : "broken") : `${digits(m.value, 3)} / ${digits(m.limit, 3)}`),
         h("div", { class: "bar" }, h("i", { width_percent: Math.max(2, Math.min(100, 50 * (1 + m.margin_relative))) })))),
       found.cost && h("p", { class: "quiet" }, `${found.cost.num_voxels.toLocaleString("en")} voxels, ${found.cost.num_elements.toLocaleString("en")} elements, about ${duration(1000 * found.cost.seconds_per_drive)} per drive; ${digits(found.volume_mm3, 4)} mm³ of material.`));
   }

@@ -6,7 +6,7 @@ use crate::service::hub::Watched;
 use crate::service::kinds::kind_named;
 use crate::service::problem::Problem;
 use crate::service::store::JobFilter;
-use crate::service::view::{JobList, JobState, JobView};
+use crate::service::view::{JobEvent, JobList, JobState, JobView};
 use axum::Json;
 use axum::extract::{Extension, Path, Query, State};
 use axum::http::header;
@@ -166,7 +166,7 @@ struct Following {
 /// The job's changes as server-sent events `job`, each a whole job; ends when the job has. Poll `/v1/jobs/{id}` instead
 /// where streams do not pass.
 #[utoipa::path(get, path = "/v1/jobs/{id}/events", params(("id" = String, Path, description = "Identifier")), responses(
-    (status = 200, description = "Events", body = String, content_type = "text/event-stream"),
+    (status = 200, description = "Events", body = JobEvent, content_type = "text/event-stream"),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "jobs")]
 pub(super) async fn events(State(app): State<App>, Path(id): Path<String>) -> Result<Response, Problem> {

@@ -94,7 +94,10 @@ pub(super) async fn artefacts(State(app): State<App>, Path(id): Path<String>) ->
 #[utoipa::path(get, path = "/v1/jobs/{id}/artefacts/{name}", params(
     ("id" = String, Path, description = "Identifier"), ("name" = String, Path, description = "Name in the list"),
 ), responses(
-    (status = 200, description = "The file", body = String, content_type = "application/octet-stream"),
+    (status = 200, description = "The file", content(
+        (String = "image/svg+xml"), (String = "text/html"), (String = "text/csv"), (String = "application/xml"),
+        (String = "image/vnd.dxf"), (Vec<u8> = "model/stl"), (Object = "application/json"),
+    )),
     (status = 304, description = "Unchanged"),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "results")]

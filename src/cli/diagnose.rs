@@ -1,0 +1,113 @@
+//! `lambdak diagnose`.
+
+use super::error::CliError;
+use super::{Common, input, interrupt, output};
+use crate::diagnosis::{Diagnosis, DiagnosisError, DiagnosisOptions, DiagnosisResult, Verdict, diagnose};
+use crate::provenance::input_hash;
+use crate::recording::{ReadLimits, Recording};
+use clap::Args;
+use std::path::PathBuf;
+use std::time::Instant;
+
+#[derive(Args)]
+pub(super) struct DiagnoseArguments {
+    /// Folder of a recording (mru-recording/1).
+    recording: PathBuf,
+    /// The material as believed (ogden/1): its number of terms is the nominal one.
+    #[arg(long)]
+    material: Option<PathBuf>,
+    /// Element size as a factor on the standard one (0.3 to 5).
+    #[arg(long, default_value_t = DiagnosisOptions::default().mesh_factor)]
+    mesh: f64,
+    /// Displacement error that meshes may leave, mm rms at the largest drive [default: a thousandth of it].
+    #[arg(long)]
+    allowance: Option<f64>,
+    /// Most causes.
+    #[arg(long, default_value_t = DiagnosisOptions::default().max_causes)]
+    max_causes: usize,
+    #[command(flatten)]
+    common: Common,
+}
+
+pub(super) fn run(a: &DiagnoseArguments) -> Result<(), CliError> {
+    super::start_threads(&a.common)?;
+    let bad = |message: String| CliError::Input { path: a.recording.clone(), message };
+    let recording = Recording::read(&a.recording, &ReadLimits::default()).map_err(|e| bad(e.to_string()))?;
+    let prior = match &a.material {
+        Some(path) => Some(input::read_material(Some(path))?),
+        None => None,
+    };
+    let options = DiagnosisOptions {
+        mesh_factor: a.mesh,
+        allowance_mm: a.allowance,
+        prior,
+        max_causes: a.max_causes,
+        ..DiagnosisOptions::default()
+    };
+    let begin = Instant::now();
+    let progress = |text: &str| eprintln!("{:7.1} s  {text}", begin.elapsed().as_secs_f64());
+    let found = diagnose(&recording, &options, &progress, &interrupt::is_requested).map_err(|e| match e {
+        DiagnosisError::Solve(e) => super::solve::solve_error(e),
+        DiagnosisError::Setting { .. } => CliError::Option { option: "mesh", message: e.to_string() },
+        other => bad(other.to_string()),
+    })?;
+    let inputs = serde_json::json!({
+        "recording": recording.id,
+        "specimen": recording.specimen,
+        "steps": recording.steps.iter().map(|s| (s.drive_mm, s.force_n)).collect::<Vec<_>>(),
+        "checksum_mm": recording.steps.iter().flat_map(|s| &s.displacement).flatten().filter(|x| x.is_finite()).sum::<f64>(),
+        "mesh": options.mesh_factor,
+        "allowance_mm": options.allowance_mm,
+        "material": options.prior,
+        "max_causes": options.max_causes,
+    });
+    let result = DiagnosisResult::new(&found, &recording.id, input_hash(&inputs));
+    if let Some(folder) = output::folder(a.common.out.as_deref(), a.common.json, &a.recording) {
+        output::write_file(&folder, "diagnosis.json", output::to_json(&result)?.as_bytes())?;
+    }
+    output::print(&if a.common.json { output::to_json(&result)? } else { summary(&result, &found) })
+}
+
+fn summary(r: &DiagnosisResult, d: &Diagnosis) -> String {
+    let verdict = match r.verdict {
+        Verdict::NoMismatch => "no mismatch beyond noise and meshes",
+        Verdict::Explained => "explained",
+        Verdict::ExplainedAmbiguously => "explained, but not by one cause alone",
+        Verdict::Unexplained => "unexplained: something is left that no cause in the registry explains",
+    };
+    let mut text = format!("{}: {verdict}\n", r.recording);
+    for c in &r.causes {
+        text += &format!("\n{} ({:?}): {}\n", c.name, c.category, c.description);
+        for p in &c.parameters {
+            let interval = p.interval_95.map_or("not bounded by the data".into(), |[a, b]| format!("{a:.4} to {b:.4}"));
+            text += &format!("  {:<40} {:>10.4}   {interval}\n", p.name, p.value);
+        }
+        if let Some(l) = &c.location {
+            text += &format!("  at the {}: centre {:.1?} mm, extent {:.1?} mm\n", l.region, l.center_mm, l.extent_mm);
+        }
+        text += &format!("  evidence {:.0}, explains {:.4} mm rms\n", c.evidence, c.effect_rms_mm);
+    }
+    for c in &r.alternatives {
+        text += &format!("\nnot told apart from it: {} ({})\n", c.name, c.description);
+    }
+    text += &format!(
+        "\nchi2 per datum      {:.4} -> {:.4}\nmisfit beyond noise {:.4} -> {:.4} mm rms (allowance {:.4})\nkept back           {:.4} -> {:.4} mm rms\n",
+        r.chi2_per_datum.before,
+        r.chi2_per_datum.after,
+        r.structured_rms_mm.before,
+        r.structured_rms_mm.after,
+        r.allowance_mm,
+        r.kept_back_rms_mm.before,
+        r.kept_back_rms_mm.after
+    );
+    text += "\nmaterial            nominal model -> with the causes\n";
+    for p in d.corrected.material.parameters() {
+        let before = if d.nominal.material.parameters().contains(&p) {
+            format!("{:.3}", d.nominal.material.value(p))
+        } else {
+            "-".into()
+        };
+        text += &format!("  {:<10} {before:>12} -> {:.3}\n", p.name(), d.corrected.material.value(p));
+    }
+    text
+}

@@ -1,0 +1,41 @@
+//! A background phase that has nothing to do with the drive.
+
+use super::{Category, Cause, CauseParameter, Location};
+use crate::diagnosis::scene::Scene;
+use crate::specimen::Specimen;
+
+/// A polynomial of second degree in the position, added to each component at every drive.
+pub struct Background;
+
+const TERMS: [&str; 10] = ["1", "x", "y", "z", "xx", "yy", "zz", "xy", "yz", "zx"];
+
+impl Cause for Background {
+    fn name(&self) -> &'static str {
+        "background"
+    }
+
+    fn category(&self) -> Category {
+        Category::Acquisition
+    }
+
+    fn description(&self) -> String {
+        "a smooth background phase is left in the displacement".into()
+    }
+
+    fn parameters(&self) -> Vec<CauseParameter> {
+        ["u_x", "u_y", "u_z"]
+            .iter()
+            .flat_map(|u| TERMS.map(|t| CauseParameter::new(format!("{u}_{t}_mm"), 0.05, [-5.0, 5.0])))
+            .collect()
+    }
+
+    fn apply(&self, values: &[f64], scene: &mut Scene) {
+        for (n, value) in values.iter().enumerate() {
+            scene.image.background_mm[n / TERMS.len()][n % TERMS.len()] += value;
+        }
+    }
+
+    fn location(&self, _: &[f64], _: &Specimen) -> Option<Location> {
+        None
+    }
+}

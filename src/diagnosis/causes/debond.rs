@@ -1,0 +1,106 @@
+//! A plate lets go of a part of the sample.
+
+use super::{Category, Cause, CauseParameter, Location};
+use crate::diagnosis::scene::Scene;
+use crate::fem::Field;
+use crate::specimen::Specimen;
+
+/// Width of the edge of a debonded patch, mm: the spacing of nodes on the face.
+const EDGE_MM: f64 = 0.6;
+/// How loose the inside of the patch is: free but for 1/1000 of the sample's own stiffness, which keeps the patch in place.
+const LOOSE: f64 = 0.999;
+
+/// A rectangular patch of a bonded face without bond.
+pub struct Debond {
+    /// Whether on the moved face.
+    pub is_moved_face: bool,
+    /// The two axes in the face.
+    pub axes: [usize; 2],
+    /// The axis across the face and where the face lies on it, mm.
+    pub face: (usize, f64),
+    /// Start: low and high edge along the two axes, mm.
+    pub edges_mm: [[f64; 2]; 2],
+    /// Half extents of the face along the two axes, mm.
+    pub half_mm: [f64; 2],
+}
+
+impl Debond {
+    /// Names of the axes.
+    fn axis_name(axis: usize) -> &'static str {
+        ["x", "y", "z"][axis]
+    }
+
+    fn clipped(&self, values: &[f64]) -> [[f64; 2]; 2] {
+        [0, 1].map(|a| [values[2 * a].max(-self.half_mm[a]), values[2 * a + 1].min(self.half_mm[a])])
+    }
+}
+
+impl Cause for Debond {
+    fn name(&self) -> &'static str {
+        "debond"
+    }
+
+    fn category(&self) -> Category {
+        Category::Boundary
+    }
+
+    fn description(&self) -> String {
+        let plate = if self.is_moved_face { "moved" } else { "fixed" };
+        format!("the {plate} plate has let go of a part of the sample")
+    }
+
+    fn parameters(&self) -> Vec<CauseParameter> {
+        let mut all = Vec::new();
+        for (axis, half) in self.axes.iter().zip(self.half_mm) {
+            let name = Self::axis_name(*axis);
+            // An edge past the face's is the face's.
+            let range = [-half - 0.5, half + 0.5];
+            all.push(CauseParameter::new(format!("low_{name}_mm"), 0.5, range));
+            all.push(CauseParameter::new(format!("high_{name}_mm"), 0.5, range));
+        }
+        all
+    }
+
+    fn start(&self) -> Vec<f64> {
+        self.edges_mm.iter().flatten().copied().collect()
+    }
+
+    fn apply(&self, values: &[f64], scene: &mut Scene) {
+        let (axes, half) = (self.axes, self.half_mm);
+        let edges = [[values[0], values[1]], [values[2], values[3]]];
+        let field = Field::new(move |x| {
+            // Distance into the patch from its nearest edge; edges on the face's own boundary do not count.
+            let mut inside = f64::INFINITY;
+            for a in 0..2 {
+                let p = x[axes[a]];
+                if edges[a][0] > -half[a] {
+                    inside = inside.min(p - edges[a][0]);
+                }
+                if edges[a][1] < half[a] {
+                    inside = inside.min(edges[a][1] - p);
+                }
+            }
+            let s = 1.0 / (1.0 + (-(inside / (0.25 * EDGE_MM))).clamp(-60.0, 60.0).exp());
+            // Loose to one half at the edge; below a thousandth it is firm.
+            if s < 1e-3 { 0.0 } else { LOOSE * s }
+        });
+        scene.looseness[usize::from(self.is_moved_face)].push(field);
+    }
+
+    fn location(&self, values: &[f64], _: &Specimen) -> Option<Location> {
+        let edges = self.clipped(values);
+        let (mut center_mm, mut extent_mm) = ([0.0; 3], [0.0; 3]);
+        for a in 0..2 {
+            center_mm[self.axes[a]] = 0.5 * (edges[a][0] + edges[a][1]);
+            extent_mm[self.axes[a]] = (edges[a][1] - edges[a][0]).max(0.0);
+        }
+        center_mm[self.face.0] = self.face.1;
+        let sign = if self.is_moved_face { '+' } else { '-' };
+        let region = format!("patch of the {sign}{} bonded face", Self::axis_name(self.face.0));
+        Some(Location { region, center_mm, extent_mm })
+    }
+
+    fn is_scored(&self) -> bool {
+        false
+    }
+}

@@ -1,0 +1,87 @@
+//! Transverse isotropy: the sample is stiffer along one direction.
+
+use super::{Category, Cause, CauseParameter, Location};
+use crate::diagnosis::scene::Scene;
+use crate::fem::Fibre;
+use crate::specimen::Specimen;
+
+/// Fibres near a direction.
+pub struct Fibres {
+    direction: [f64; 3],
+    /// Two unit vectors across it, along which the direction may turn.
+    across: [[f64; 3]; 2],
+    shear_modulus_kpa: f64,
+}
+
+/// Thirteen directions: axes, face diagonals, space diagonals.
+pub fn directions() -> Vec<[f64; 3]> {
+    let mut all = Vec::new();
+    for x in -1..=1 {
+        for y in -1..=1 {
+            for z in -1..=1 {
+                let is_first = x > 0 || (x == 0 && (y > 0 || (y == 0 && z > 0)));
+                if is_first {
+                    all.push(unit([f64::from(x), f64::from(y), f64::from(z)]));
+                }
+            }
+        }
+    }
+    all
+}
+
+fn unit(a: [f64; 3]) -> [f64; 3] {
+    let n = a.iter().map(|x| x * x).sum::<f64>().sqrt();
+    a.map(|x| x / n)
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+impl Fibres {
+    /// Along `direction`, in a sample of this initial shear modulus.
+    pub fn along(direction: [f64; 3], shear_modulus_kpa: f64) -> Fibres {
+        let smallest = (0..3).min_by(|&a, &b| direction[a].abs().total_cmp(&direction[b].abs())).unwrap_or(0);
+        let mut axis = [0.0; 3];
+        axis[smallest] = 1.0;
+        let first = unit(cross(direction, axis));
+        Fibres { direction, across: [first, cross(direction, first)], shear_modulus_kpa }
+    }
+
+    fn direction(&self, values: &[f64]) -> [f64; 3] {
+        let (a, b) = (values[1].to_radians().tan(), values[2].to_radians().tan());
+        unit([0, 1, 2].map(|i| self.direction[i] + a * self.across[0][i] + b * self.across[1][i]))
+    }
+}
+
+impl Cause for Fibres {
+    fn name(&self) -> &'static str {
+        "fibre"
+    }
+
+    fn category(&self) -> Category {
+        Category::Material
+    }
+
+    fn description(&self) -> String {
+        let [x, y, z] = self.direction;
+        format!("the sample is stiffer along one direction, near ({x:.2}, {y:.2}, {z:.2})")
+    }
+
+    fn parameters(&self) -> Vec<CauseParameter> {
+        vec![
+            CauseParameter::new("modulus_over_shear_modulus", 0.1, [-0.05, 20.0]),
+            CauseParameter::new("turn_1_degrees", 10.0, [-60.0, 60.0]),
+            CauseParameter::new("turn_2_degrees", 10.0, [-60.0, 60.0]),
+        ]
+    }
+
+    fn apply(&self, values: &[f64], scene: &mut Scene) {
+        scene.fibre =
+            Some(Fibre { direction: self.direction(values), modulus_kpa: values[0] * self.shear_modulus_kpa });
+    }
+
+    fn location(&self, _: &[f64], _: &Specimen) -> Option<Location> {
+        None
+    }
+}

@@ -1,0 +1,63 @@
+//! A hole of another size or at another place than drawn.
+
+use super::{Category, Cause, CauseParameter, Location};
+use crate::diagnosis::scene::Scene;
+use crate::specimen::{HoleAxis, Specimen};
+
+/// Diameter and centre of one hole.
+pub struct HoleError {
+    hole: usize,
+    axis: HoleAxis,
+    range_mm: f64,
+}
+
+impl HoleError {
+    /// Of hole `hole`.
+    pub fn of(specimen: &Specimen, hole: usize) -> HoleError {
+        let h = &specimen.holes[hole];
+        HoleError { hole, axis: h.axis, range_mm: 0.3 * h.diameter_mm }
+    }
+}
+
+impl Cause for HoleError {
+    fn name(&self) -> &'static str {
+        "hole"
+    }
+
+    fn category(&self) -> Category {
+        Category::Geometry
+    }
+
+    fn description(&self) -> String {
+        format!("hole {} is not of the drawn size or at the drawn place", self.hole)
+    }
+
+    fn parameters(&self) -> Vec<CauseParameter> {
+        let range = [-self.range_mm, self.range_mm];
+        let across = if self.axis == HoleAxis::Thickness { "z" } else { "y" };
+        vec![
+            CauseParameter::new("diameter_error_mm", 0.1, range),
+            CauseParameter::new("center_error_x_mm", 0.1, range),
+            CauseParameter::new(format!("center_error_{across}_mm"), 0.1, range),
+        ]
+    }
+
+    fn apply(&self, values: &[f64], scene: &mut Scene) {
+        if scene.holes.len() <= self.hole {
+            scene.holes.resize(self.hole + 1, [0.0; 3]);
+        }
+        for n in 0..3 {
+            scene.holes[self.hole][n] += values[n];
+        }
+    }
+
+    fn location(&self, values: &[f64], specimen: &Specimen) -> Option<Location> {
+        let h = specimen.holes.get(self.hole)?;
+        let (d, a, b) = (h.diameter_mm + values[0], h.center_mm[0] + values[1], h.center_mm[1] + values[2]);
+        let (center_mm, extent_mm) = match self.axis {
+            HoleAxis::Thickness => ([a, 0.0, b], [d, specimen.block.thickness_mm, d]),
+            HoleAxis::Width => ([a, b, 0.0], [d, d, specimen.block.width_mm]),
+        };
+        Some(Location { region: format!("hole {}", self.hole), center_mm, extent_mm })
+    }
+}

@@ -1,0 +1,120 @@
+//! The registry of causes: what may make a recording differ from its nominal model.
+//!
+//! Each cause is a small model with parameters that are nominal at zero. Adding one is one file here and one line in
+//! [`registry`].
+
+mod background;
+mod cell;
+mod compliance;
+mod debond;
+mod fibre;
+mod gain;
+mod gradient;
+mod hole;
+mod inclusion;
+mod offaxis;
+mod registration;
+mod swelling;
+mod tilt;
+mod wrap;
+
+pub use debond::Debond;
+pub use inclusion::Inclusion;
+pub use wrap::Wrap;
+
+use super::scene::Scene;
+use crate::specimen::Specimen;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// What kind of thing a cause is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Category {
+    /// The material.
+    Material,
+    /// Plates and bonds.
+    Boundary,
+    /// The sample's shape.
+    Geometry,
+    /// The scan.
+    Acquisition,
+    /// Drive and load cell.
+    Load,
+}
+
+/// A parameter of a cause.
+#[derive(Clone, Debug)]
+pub struct CauseParameter {
+    /// Name with its unit.
+    pub name: String,
+    /// A size at which the effect would be plain; steps and differences are measured in it.
+    pub scale: f64,
+    /// Smallest and largest value.
+    pub range: [f64; 2],
+}
+
+impl CauseParameter {
+    fn new(name: impl Into<String>, scale: f64, range: [f64; 2]) -> CauseParameter {
+        CauseParameter { name: name.into(), scale, range }
+    }
+}
+
+/// Where something is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Location {
+    /// In words.
+    pub region: String,
+    /// Its centre in the undeformed sample, mm.
+    pub center_mm: [f64; 3],
+    /// Its size along x, y, z, mm.
+    pub extent_mm: [f64; 3],
+}
+
+/// A cause: a small model whose parameters are nominal at zero (those that only say where apart).
+pub trait Cause: Send + Sync {
+    /// Its name in results.
+    fn name(&self) -> &'static str;
+    /// Its kind.
+    fn category(&self) -> Category;
+    /// In words, for people.
+    fn description(&self) -> String;
+    /// Its parameters.
+    fn parameters(&self) -> Vec<CauseParameter>;
+    /// Where a fit starts.
+    fn start(&self) -> Vec<f64> {
+        vec![0.0; self.parameters().len()]
+    }
+    /// Changes the scene.
+    fn apply(&self, values: &[f64], scene: &mut Scene);
+    /// Where it is, if it is somewhere.
+    fn location(&self, values: &[f64], specimen: &Specimen) -> Option<Location>;
+    /// Whether its effect at `start` is zero, so that a score test at the nominal fit makes sense.
+    fn is_scored(&self) -> bool {
+        true
+    }
+}
+
+/// Causes that every recording is tested for by score tests. Those with a place to find (debonds, inclusions, jumps) are made
+/// from maps instead.
+pub fn registry(specimen: &Specimen, initial_shear_modulus_kpa: f64) -> Vec<Arc<dyn Cause>> {
+    let mut all: Vec<Arc<dyn Cause>> = vec![
+        Arc::new(gradient::Gradient::of(specimen)),
+        Arc::new(swelling::Swelling),
+        Arc::new(tilt::Tilt::of(specimen)),
+        Arc::new(offaxis::OffAxis::of(specimen)),
+        Arc::new(compliance::Compliance),
+        Arc::new(gain::Gain),
+        Arc::new(background::Background),
+        Arc::new(registration::Registration),
+        Arc::new(cell::CellOffset),
+    ];
+    for hole in 0..specimen.holes.len() {
+        all.push(Arc::new(hole::HoleError::of(specimen, hole)));
+    }
+    all.extend(
+        fibre::directions().into_iter().map(|d| Arc::new(fibre::Fibres::along(d, initial_shear_modulus_kpa)) as _),
+    );
+    all
+}

@@ -1,0 +1,46 @@
+//! The moved plate leaves its axis.
+
+use super::tilt::moved_plate;
+use super::{Category, Cause, CauseParameter, Location};
+use crate::diagnosis::scene::Scene;
+use crate::specimen::Specimen;
+
+/// Translation of the moved plate across the drive, in proportion to it: along y (the gap changes) and z.
+pub struct OffAxis {
+    largest_drive_mm: f64,
+}
+
+impl OffAxis {
+    /// Translations are stated at the specimen's largest drive.
+    pub fn of(specimen: &Specimen) -> OffAxis {
+        OffAxis { largest_drive_mm: specimen.drive_mm.iter().fold(1e-9, |s: f64, d| s.max(d.abs())) }
+    }
+}
+
+impl Cause for OffAxis {
+    fn name(&self) -> &'static str {
+        "offaxis"
+    }
+
+    fn category(&self) -> Category {
+        Category::Boundary
+    }
+
+    fn description(&self) -> String {
+        "the moved plate leaves its axis (the gap changes, or it drifts sideways)".into()
+    }
+
+    fn parameters(&self) -> Vec<CauseParameter> {
+        ["y", "z"].map(|a| CauseParameter::new(format!("{a}_mm_at_full_drive"), 0.1, [-5.0, 5.0])).to_vec()
+    }
+
+    fn apply(&self, values: &[f64], scene: &mut Scene) {
+        for (axis, value) in [1, 2].into_iter().zip(values) {
+            scene.plates[1].translation_per_mm[axis] += value / self.largest_drive_mm;
+        }
+    }
+
+    fn location(&self, _: &[f64], specimen: &Specimen) -> Option<Location> {
+        Some(moved_plate(specimen))
+    }
+}

@@ -1,0 +1,64 @@
+//! The moved plate turns as it moves.
+
+use super::{Category, Cause, CauseParameter, Location};
+use crate::diagnosis::scene::Scene;
+use crate::specimen::{Specimen, TestKind};
+
+/// Rotation of the moved plate about its centre, in proportion to the drive.
+pub struct Tilt {
+    largest_drive_mm: f64,
+}
+
+impl Tilt {
+    /// Angles are stated at the specimen's largest drive.
+    pub fn of(specimen: &Specimen) -> Tilt {
+        Tilt { largest_drive_mm: specimen.drive_mm.iter().fold(1e-9, |s: f64, d| s.max(d.abs())) }
+    }
+}
+
+impl Cause for Tilt {
+    fn name(&self) -> &'static str {
+        "tilt"
+    }
+
+    fn category(&self) -> Category {
+        Category::Boundary
+    }
+
+    fn description(&self) -> String {
+        "the moved plate turns as it moves".into()
+    }
+
+    fn parameters(&self) -> Vec<CauseParameter> {
+        ["x", "y", "z"]
+            .map(|a| CauseParameter::new(format!("degrees_at_full_drive_about_{a}"), 0.5, [-20.0, 20.0]))
+            .to_vec()
+    }
+
+    fn apply(&self, values: &[f64], scene: &mut Scene) {
+        for a in 0..3 {
+            scene.plates[1].rotation_rad_per_mm[a] += values[a].to_radians() / self.largest_drive_mm;
+        }
+    }
+
+    fn location(&self, _: &[f64], specimen: &Specimen) -> Option<Location> {
+        Some(moved_plate(specimen))
+    }
+}
+
+/// The bonded face of the moved plate or grip.
+pub(super) fn moved_plate(specimen: &Specimen) -> Location {
+    let b = specimen.block;
+    match specimen.test {
+        TestKind::DoubleLapShear => Location {
+            region: "moved plate".into(),
+            center_mm: [0.0, 0.5 * b.thickness_mm, 0.0],
+            extent_mm: [b.length_mm, 0.0, b.width_mm],
+        },
+        TestKind::Uniaxial => Location {
+            region: "moved grip".into(),
+            center_mm: [0.5 * b.length_mm, 0.0, 0.0],
+            extent_mm: [0.0, b.thickness_mm, b.width_mm],
+        },
+    }
+}

@@ -1,0 +1,33 @@
+//! Why a recording was not diagnosed.
+
+use crate::calibration::CalibrationError;
+use crate::fem::{PrepareError, SolveError};
+use crate::specimen::SpecimenError;
+
+/// Why a recording was not diagnosed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DiagnosisError {
+    /// The recording cannot be compared with a model.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
+    /// No model of the specimen.
+    #[error(transparent)]
+    Prepare(#[from] PrepareError),
+    /// No equilibrium, or the work was cancelled.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+    /// A supposed specimen cannot exist.
+    #[error("a supposed specimen: {0}")]
+    Specimen(SpecimenError),
+    /// A setting is out of range.
+    #[error("{name} is {value}; it must be {requirement}")]
+    Setting {
+        /// Which one.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it must be.
+        requirement: &'static str,
+    },
+}

@@ -1,0 +1,321 @@
+//! Full, nonlinear fits of a material and causes to a recording.
+
+use super::causes::Cause;
+use super::error::DiagnosisError;
+use super::laboratory::{Laboratory, Prediction};
+use super::metric::Metric;
+use super::scene::Scene;
+use super::trace::Trace;
+use crate::material::{Ogden, Parameter};
+use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
+
+/// A cause with values of its parameters.
+#[derive(Clone)]
+pub struct Supposed {
+    /// The cause.
+    pub cause: Arc<dyn Cause>,
+    /// Its parameters.
+    pub values: Vec<f64>,
+}
+
+/// What is known of κ beforehand: ln κ is Gaussian.
+#[derive(Clone, Copy, Debug)]
+pub struct BulkPrior {
+    /// Centre, kPa.
+    pub center_kpa: f64,
+    /// Standard deviation of ln κ.
+    pub log_sd: f64,
+}
+
+/// Settings of a fit.
+#[derive(Clone, Copy, Debug)]
+pub struct FitSettings {
+    /// Most iterations, rejected ones included.
+    pub max_iterations: usize,
+    /// κ.
+    pub bulk: BulkPrior,
+    /// Converged when the linear model promises to lower the deviance by less than this.
+    pub tolerance: f64,
+}
+
+/// A fitted material with causes.
+#[derive(Clone)]
+pub struct Fitted {
+    /// The material.
+    pub material: Ogden,
+    /// The causes.
+    pub causes: Vec<Supposed>,
+    /// Weighted squares of the misfit (see [`Metric`]), priors included: −2 ln of the likelihood up to a constant.
+    pub deviance: f64,
+    /// Measured minus predicted.
+    pub residual: Trace,
+    /// What is predicted.
+    pub prediction: Prediction,
+    /// Standard deviations: material parameters, then the causes' in order, in their units.
+    pub sd: Vec<f64>,
+    /// Iterations made.
+    pub iterations: usize,
+}
+
+impl Fitted {
+    /// Number of fitted parameters.
+    pub fn num_parameters(&self) -> usize {
+        self.material.parameters().len() + self.causes.iter().map(|c| c.values.len()).sum::<usize>()
+    }
+
+    /// Standard deviations of cause `index`'s parameters.
+    pub fn sd_of(&self, index: usize) -> &[f64] {
+        let first =
+            self.material.parameters().len() + self.causes[..index].iter().map(|c| c.values.len()).sum::<usize>();
+        &self.sd[first..first + self.causes[index].values.len()]
+    }
+
+    /// The scene of the causes.
+    pub fn scene(&self) -> Scene {
+        scene_of(&self.causes)
+    }
+}
+
+/// The scene of some causes.
+pub fn scene_of(causes: &[Supposed]) -> Scene {
+    let mut scene = Scene::default();
+    for c in causes {
+        c.cause.apply(&c.values, &mut scene);
+    }
+    scene
+}
+
+/// Prior of a cause's parameter that says how big, in its scales: wide, there to keep the fit in bounds.
+const PRIOR_SCALES: f64 = 100.0;
+/// Differences for derivatives, in scales.
+pub const STEP: f64 = 0.02;
+/// Largest relative change of a material parameter in one step, and of a cause's in scales.
+const LARGEST_STEP: f64 = 0.4;
+const LARGEST_CAUSE_STEP: f64 = 6.0;
+
+/// Traces of ∂prediction/∂parameter in scaled parameters (ln κ, relative, scales).
+pub fn derivatives(
+    laboratory: &mut Laboratory,
+    material: &Ogden,
+    causes: &[Supposed],
+    prediction: &Prediction,
+) -> Result<Vec<Trace>, DiagnosisError> {
+    let scene = scene_of(causes);
+    let paths = paths_of(causes);
+    let paths: Vec<&dyn Fn(f64) -> Scene> = paths.iter().map(|p| &**p as _).collect();
+    let mut columns = laboratory.derivatives(material, &scene, prediction, true, &paths, STEP)?;
+    for (trace, parameter) in columns.iter_mut().zip(material.parameters()) {
+        *trace = trace.scaled(material.value(parameter));
+    }
+    Ok(columns)
+}
+
+/// A path of scenes.
+pub type Path<'a> = Box<dyn Fn(f64) -> Scene + 'a>;
+
+/// One path per parameter of the causes, in units of its scale.
+pub fn paths_of(causes: &[Supposed]) -> Vec<Path<'_>> {
+    let mut paths: Vec<Path> = Vec::new();
+    for (index, supposed) in causes.iter().enumerate() {
+        for (n, parameter) in supposed.cause.parameters().into_iter().enumerate() {
+            paths.push(Box::new(move |t: f64| {
+                let mut moved = causes.to_vec();
+                moved[index].values[n] += t * parameter.scale;
+                scene_of(&moved)
+            }));
+        }
+    }
+    paths
+}
+
+/// Fits `material` and `causes` from where they are.
+///
+/// # Errors
+/// [`DiagnosisError`]: the start has no equilibrium, or the work was cancelled.
+pub fn fit(
+    laboratory: &mut Laboratory,
+    metric: &Metric,
+    measured: &Trace,
+    material: &Ogden,
+    causes: &[Supposed],
+    settings: &FitSettings,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Fitted, DiagnosisError> {
+    let mut material = material.clone();
+    let mut causes = causes.to_vec();
+    let mut prediction = laboratory.predict(&material, &scene_of(&causes), is_cancelled)?;
+    let mut deviance = deviance_of(metric, measured, &prediction, &material, &causes, settings);
+    let mut damping = 0.0f64;
+    let mut iterations = 0;
+    let mut system: Option<(DMatrix<f64>, DVector<f64>)> = None;
+    loop {
+        let (matrix, gradient) = match &system {
+            Some(kept) => kept.clone(),
+            None => {
+                let columns = derivatives(laboratory, &material, &causes, &prediction)?;
+                let made = normal_system(metric, measured, &prediction, &material, &causes, settings, &columns);
+                system = Some(made.clone());
+                made
+            }
+        };
+        let n = gradient.len();
+        let mut damped = matrix.clone();
+        for i in 0..n {
+            damped[(i, i)] += damping * matrix[(i, i)].max(1e-12);
+        }
+        let step = damped.clone().cholesky().map(|c| c.solve(&gradient)).unwrap_or_else(|| DVector::zeros(n));
+        let promised = 2.0 * gradient.dot(&step) - step.dot(&(&matrix * &step));
+        if promised < settings.tolerance || iterations >= settings.max_iterations {
+            let sd = standard_deviations(&matrix, &material, &causes);
+            let residual = measured.plus(-1.0, &prediction.trace);
+            return Ok(Fitted { material, causes, deviance, residual, prediction, sd, iterations });
+        }
+        iterations += 1;
+        let (next_material, next_causes) = moved(&material, &causes, &step);
+        let trial = laboratory.predict(&next_material, &scene_of(&next_causes), is_cancelled);
+        let better = match trial {
+            Ok(next) => {
+                let next_deviance = deviance_of(metric, measured, &next, &next_material, &next_causes, settings);
+                (next_deviance < deviance).then_some((next, next_deviance))
+            }
+            Err(_) if !is_cancelled() => None,
+            Err(error) => return Err(error),
+        };
+        match better {
+            Some((next, next_deviance)) => {
+                let gained = deviance - next_deviance;
+                (material, causes, prediction, deviance) = (next_material, next_causes, next, next_deviance);
+                system = None;
+                damping = if damping > 1e-3 { damping * 0.1 } else { 0.0 };
+                if gained < 0.2 * settings.tolerance {
+                    damping = 0.0;
+                }
+            }
+            None => {
+                damping = (damping * 10.0).max(1e-2);
+                if damping > 1e6 {
+                    // No direction helps any more.
+                    iterations = settings.max_iterations;
+                }
+            }
+        }
+    }
+}
+
+fn normal_system(
+    metric: &Metric,
+    measured: &Trace,
+    prediction: &Prediction,
+    material: &Ogden,
+    causes: &[Supposed],
+    settings: &FitSettings,
+    columns: &[Trace],
+) -> (DMatrix<f64>, DVector<f64>) {
+    let residual = metric.weigh(&measured.plus(-1.0, &prediction.trace));
+    let weighed: Vec<_> = columns.iter().map(|c| metric.weigh(c)).collect();
+    let n = columns.len();
+    let mut matrix = DMatrix::zeros(n, n);
+    let mut gradient = DVector::zeros(n);
+    for i in 0..n {
+        gradient[i] = metric.inner(&weighed[i], &residual);
+        for j in 0..=i {
+            matrix[(i, j)] = metric.inner(&weighed[i], &weighed[j]);
+            matrix[(j, i)] = matrix[(i, j)];
+        }
+    }
+    let prior = 1.0 / settings.bulk.log_sd.powi(2);
+    matrix[(0, 0)] += prior;
+    gradient[0] += prior * (settings.bulk.center_kpa / material.bulk_kpa).ln();
+    let mut i = material.parameters().len();
+    for supposed in causes {
+        let (parameters, start) = (supposed.cause.parameters(), supposed.cause.start());
+        for n in 0..parameters.len() {
+            let weak = 1.0 / (PRIOR_SCALES * PRIOR_SCALES);
+            matrix[(i, i)] += weak;
+            gradient[i] -= weak * (supposed.values[n] - start[n]) / parameters[n].scale;
+            i += 1;
+        }
+    }
+    (matrix, gradient)
+}
+
+fn deviance_of(
+    metric: &Metric,
+    measured: &Trace,
+    prediction: &Prediction,
+    material: &Ogden,
+    causes: &[Supposed],
+    settings: &FitSettings,
+) -> f64 {
+    let residual = metric.weigh(&measured.plus(-1.0, &prediction.trace));
+    let mut sum = metric.inner(&residual, &residual);
+    sum += ((settings.bulk.center_kpa / material.bulk_kpa).ln() / settings.bulk.log_sd).powi(2);
+    for supposed in causes {
+        let (parameters, start) = (supposed.cause.parameters(), supposed.cause.start());
+        for n in 0..parameters.len() {
+            sum += ((supposed.values[n] - start[n]) / (PRIOR_SCALES * parameters[n].scale)).powi(2);
+        }
+    }
+    sum
+}
+
+/// The material and the causes after a scaled step, shortened to the largest allowed and cut to the ranges.
+fn moved(material: &Ogden, causes: &[Supposed], step: &DVector<f64>) -> (Ogden, Vec<Supposed>) {
+    let parameters = material.parameters();
+    let mut part = 1.0f64;
+    for (i, s) in step.iter().enumerate() {
+        let largest = if i == 0 {
+            1.0
+        } else if i < parameters.len() {
+            LARGEST_STEP
+        } else {
+            LARGEST_CAUSE_STEP
+        };
+        part = part.min(largest / s.abs().max(1e-12));
+    }
+    let mut next = material.clone();
+    for (i, &parameter) in parameters.iter().enumerate() {
+        let value = material.value(parameter);
+        let s = part * step[i];
+        let moved = if parameter == Parameter::Kappa { value * s.exp() } else { value * (1.0 + s) };
+        // Below κ/μ of about five the elements and the theory of a soft solid both end.
+        let floor = if parameter == Parameter::Kappa { 5.0 * shear_modulus(material) } else { f64::NEG_INFINITY };
+        next.set(parameter, moved.max(floor));
+    }
+    let mut i = parameters.len();
+    let causes = causes
+        .iter()
+        .map(|c| {
+            let mut values = c.values.clone();
+            for (value, p) in values.iter_mut().zip(c.cause.parameters()) {
+                *value = (*value + part * step[i] * p.scale).clamp(p.range[0], p.range[1]);
+                i += 1;
+            }
+            Supposed { cause: c.cause.clone(), values }
+        })
+        .collect();
+    (next, causes)
+}
+
+fn standard_deviations(matrix: &DMatrix<f64>, material: &Ogden, causes: &[Supposed]) -> Vec<f64> {
+    let covariance = matrix.clone().try_inverse();
+    let scales = material
+        .parameters()
+        .into_iter()
+        .map(|p| material.value(p).abs())
+        .chain(causes.iter().flat_map(|c| c.cause.parameters()).map(|p| p.scale));
+    scales
+        .enumerate()
+        .map(|(i, scale)| {
+            covariance
+                .as_ref()
+                .map_or(f64::INFINITY, |c| if c[(i, i)] > 0.0 { scale * c[(i, i)].sqrt() } else { f64::INFINITY })
+        })
+        .collect()
+}
+
+/// ½ Σ μᵢαᵢ, kPa.
+pub fn shear_modulus(material: &Ogden) -> f64 {
+    material.terms.iter().map(|t| 0.5 * t.mu_kpa * t.alpha).sum()
+}

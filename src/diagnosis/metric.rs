@@ -1,0 +1,213 @@
+//! What a misfit weighs: noise, and what neither our mesh nor anybody's resolves.
+//!
+//! The covariance of a trace is C = N + B S Bᵀ. N is the scan's noise, independent per voxel and component (inflated by the
+//! filter's correlation). B S Bᵀ is the discretisation allowance: smooth displacement errors in proportion to the drive, as
+//! means over boxes of several sizes, larger at the ends where bonded edges are singular. A misfit thus counts by its pattern
+//! and size: patterns below the allowance are not evidence, however many voxels show them. C⁻¹ is applied by the
+//! Sherman–Morrison–Woodbury formula. (A discrepancy term in the sense of Kennedy and O'Hagan 2001.)
+//!
+//! Forces: the load cell's drift, and an allowance that is common to all drives and a smaller one of each.
+
+use super::trace::Trace;
+use crate::calibration::Observed;
+use crate::specimen::TestKind;
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+/// Numbers of boxes along x, y, z at each level.
+const LEVELS: [[usize; 3]; 3] = [[1, 1, 1], [4, 1, 3], [8, 2, 6]];
+/// The ends within this distance (mm) have a larger allowance.
+const END_MM: f64 = 2.0;
+/// How much larger.
+const END_FACTOR: f64 = 3.0;
+/// Allowance of the force, relative: common to all drives (coarse meshes are too stiff) and of each drive.
+const FORCE_COMMON: f64 = 0.004;
+const FORCE_EACH: f64 = 0.001;
+
+/// The inner product ⟨a, b⟩ = aᵀ C⁻¹ b of traces.
+pub struct Metric {
+    precision: [f64; 3],
+    /// Per step and voxel: whether all of it counts.
+    is_used: Vec<Vec<bool>>,
+    /// Per voxel: its box at each level (indices into one list).
+    boxes: Vec<[u32; LEVELS.len()]>,
+    num_boxes: usize,
+    /// Per step: drive / largest drive.
+    scale: Vec<f64>,
+    capacitance: Vec<Cholesky<f64, Dyn>>,
+    force_precision: DMatrix<f64>,
+    /// Which steps have a force.
+    has_force: Vec<bool>,
+}
+
+/// A trace with what its inner products need.
+pub struct Weighed {
+    pub(super) trace: Trace,
+    moments: [DVector<f64>; 3],
+    solved: [DVector<f64>; 3],
+}
+
+impl Metric {
+    /// For `observed`, with an allowance of `allowance_mm` (rms, at the largest drive) and the voxels for which `is_kept`.
+    pub fn new(observed: &Observed, allowance_mm: f64, is_kept: &dyn Fn(usize) -> bool) -> Metric {
+        let mask = &observed.mask;
+        let b = observed.specimen.block;
+        let half = [0.5 * b.length_mm, 0.5 * b.thickness_mm, 0.5 * b.width_mm];
+        let pull = 0;
+        let end_axis = match observed.specimen.test {
+            TestKind::DoubleLapShear | TestKind::Uniaxial => pull,
+        };
+        let mut first = [0u32; LEVELS.len()];
+        let mut num_boxes = 0;
+        for (level, counts) in LEVELS.iter().enumerate() {
+            first[level] = num_boxes as u32;
+            num_boxes += counts.iter().product::<usize>();
+        }
+        let mut variance = vec![0.0; num_boxes];
+        let share = allowance_mm * allowance_mm / LEVELS.len() as f64;
+        let boxes: Vec<[u32; LEVELS.len()]> = mask
+            .voxels
+            .iter()
+            .map(|&v| {
+                let x = mask.grid.center_mm(v as usize);
+                let mut found = [0; LEVELS.len()];
+                for (level, counts) in LEVELS.iter().enumerate() {
+                    let place = [0, 1, 2].map(|a| {
+                        let t = ((x[a] / half[a] + 1.0) * 0.5 * counts[a] as f64).floor();
+                        (t.max(0.0) as usize).min(counts[a] - 1)
+                    });
+                    found[level] = first[level] + (place[0] + counts[0] * (place[1] + counts[1] * place[2])) as u32;
+                    let is_end = half[end_axis] - x[end_axis].abs() < END_MM && level > 0;
+                    let size = if is_end { share * END_FACTOR * END_FACTOR } else { share };
+                    let kept = &mut variance[found[level] as usize];
+                    *kept = f64::max(*kept, size);
+                }
+                found
+            })
+            .collect();
+        let largest = observed.steps.iter().map(|s| s.drive_mm.abs()).fold(1e-12, f64::max);
+        let scale: Vec<f64> = observed.steps.iter().map(|s| s.drive_mm.abs() / largest).collect();
+        let is_used: Vec<Vec<bool>> = observed
+            .steps
+            .iter()
+            .map(|s| {
+                let finite = |u: &[f64; 3]| u.iter().all(|x| x.is_finite());
+                s.displacement.iter().enumerate().map(|(v, u)| finite(u) && is_kept(v)).collect()
+            })
+            .collect();
+        let precision = observed.noise_sd_mm.map(|sd| 1.0 / (sd * sd * observed.noise_correlation()));
+        let (force_precision, has_force) = force_precision(observed);
+        let mut metric =
+            Metric { precision, is_used, boxes, num_boxes, scale, capacitance: Vec::new(), force_precision, has_force };
+        metric.capacitance = metric.capacitances(&variance);
+        metric
+    }
+
+    /// S⁻¹ + Bᵀ N⁻¹ B per component.
+    fn capacitances(&self, variance: &[f64]) -> Vec<Cholesky<f64, Dyn>> {
+        let n = self.num_boxes;
+        let mut gram = DMatrix::<f64>::zeros(n, n);
+        for (used, scale) in self.is_used.iter().zip(&self.scale) {
+            for (boxes, _) in self.boxes.iter().zip(used).filter(|(_, used)| **used) {
+                for &i in boxes {
+                    for &j in boxes {
+                        gram[(i as usize, j as usize)] += scale * scale;
+                    }
+                }
+            }
+        }
+        self.precision
+            .iter()
+            .map(|precision| {
+                let mut matrix = &gram * *precision;
+                for (i, v) in variance.iter().enumerate() {
+                    // A box without voxels has no moments; any positive number serves.
+                    matrix[(i, i)] += 1.0 / v.max(1e-12);
+                }
+                // The sum of a positive diagonal and a Gram matrix is positive definite.
+                Cholesky::new(matrix.clone()).unwrap_or_else(|| Cholesky::new_unchecked(matrix))
+            })
+            .collect()
+    }
+
+    /// Prepares a trace; NaN entries (voxels that a changed specimen does not fill) count as zero.
+    pub fn weigh(&self, trace: &Trace) -> Weighed {
+        let mut moments = [0, 1, 2].map(|_| DVector::<f64>::zeros(self.num_boxes));
+        for ((field, used), scale) in trace.displacement.iter().zip(&self.is_used).zip(&self.scale) {
+            for ((u, boxes), _) in field.iter().zip(&self.boxes).zip(used).filter(|(_, used)| **used) {
+                for c in 0..3 {
+                    if u[c].is_finite() {
+                        for &i in boxes {
+                            moments[c][i as usize] += scale * self.precision[c] * u[c];
+                        }
+                    }
+                }
+            }
+        }
+        let solved = [0, 1, 2].map(|c| self.capacitance[c].solve(&moments[c]));
+        Weighed { trace: trace.clone(), moments, solved }
+    }
+
+    /// ⟨a, b⟩.
+    pub fn inner(&self, a: &Weighed, b: &Weighed) -> f64 {
+        let mut sum = self.noise_only(&a.trace, &b.trace);
+        for c in 0..3 {
+            sum -= a.moments[c].dot(&b.solved[c]);
+        }
+        let n = self.scale.len();
+        for i in 0..n {
+            for j in 0..n {
+                sum += a.trace.force[i] * self.force_precision[(i, j)] * b.trace.force[j];
+            }
+        }
+        sum
+    }
+
+    /// Σ a b / σ² over displacements alone, without the allowance.
+    pub fn noise_only(&self, a: &Trace, b: &Trace) -> f64 {
+        let mut sum = 0.0;
+        for ((f, g), used) in a.displacement.iter().zip(&b.displacement).zip(&self.is_used) {
+            for ((x, y), _) in f.iter().zip(g).zip(used).filter(|(_, used)| **used) {
+                for c in 0..3 {
+                    let p = x[c] * y[c] * self.precision[c];
+                    if p.is_finite() {
+                        sum += p;
+                    }
+                }
+            }
+        }
+        sum
+    }
+
+    /// Numbers that count: displacement components and forces.
+    pub fn num_data(&self) -> usize {
+        3 * self.is_used.iter().flatten().filter(|u| **u).count() + self.has_force.iter().filter(|f| **f).count()
+    }
+
+    /// Whether a voxel counts at a step.
+    pub fn is_used(&self, step: usize, voxel: usize) -> bool {
+        self.is_used[step][voxel]
+    }
+}
+
+fn force_precision(observed: &Observed) -> (DMatrix<f64>, Vec<bool>) {
+    let n = observed.steps.len();
+    let has_force: Vec<bool> = observed.steps.iter().map(|s| s.force.is_some()).collect();
+    let places: Vec<usize> = (0..n).filter(|i| has_force[*i]).collect();
+    let m = places.len();
+    let value = |k: usize| observed.steps[places[k]].force.map_or(0.0, |f| f.value_n);
+    let sd = |k: usize| observed.steps[places[k]].force.map_or(1.0, |f| f.sd_n);
+    let covariance = DMatrix::from_fn(m, m, |i, j| {
+        let common = FORCE_COMMON * FORCE_COMMON * value(i) * value(j);
+        let each = if i == j { sd(i).powi(2) + (FORCE_EACH * value(i)).powi(2) } else { 0.0 };
+        common + each
+    });
+    let mut precision = DMatrix::zeros(n, n);
+    if let Some(inverse) = covariance.try_inverse() {
+        for i in 0..m {
+            for j in 0..m {
+                precision[(places[i], places[j])] = inverse[(i, j)];
+            }
+        }
+    }
+    (precision, has_force)
+}

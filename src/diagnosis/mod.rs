@@ -1,0 +1,33 @@
+//! Diagnosis: where a recording and its nominal model differ, and what physics was left out.
+//!
+//! * [`diagnose`] fits the nominal model, tests every cause of the registry ([`causes`]) to first order, fits the leading ones
+//!   in full with the material free, adds them one by one, and predicts data that were kept back.
+//! * A misfit counts by its pattern and size: noise and what meshes leave are in its weights.
+
+pub mod causes;
+mod diagnose;
+mod error;
+mod fit;
+mod laboratory;
+mod load_history;
+mod maps;
+mod metric;
+mod result;
+mod scene;
+mod score;
+mod trace;
+
+pub use diagnose::{Diagnosis, DiagnosisOptions, FoundCause, Leftover, Ranked, Verdict, diagnose, scene_of_fit};
+pub use error::DiagnosisError;
+pub use fit::{BulkPrior, FitSettings, Fitted, Supposed, fit, shear_modulus};
+pub use laboratory::{Laboratory, Prediction};
+pub use load_history::{ElasticTable, FittedEffect, LoadEffect, LoadHistoryFit, fit_load_history};
+pub use maps::{Division, ScoreMap};
+pub use metric::Metric;
+pub use result::{BeforeAfter, CauseResult, DiagnosisResult, ParameterResult, RankedResult};
+pub use scene::{ImageChange, Jump, Scene};
+pub use score::{Score, ScoreTest};
+pub use trace::Trace;
+
+#[cfg(test)]
+mod explore;

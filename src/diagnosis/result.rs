@@ -1,0 +1,180 @@
+//! The result of a diagnosis (`diagnosis/1`).
+
+use super::causes::{Category, Location};
+use super::diagnose::{Diagnosis, FoundCause, Verdict};
+use super::fit::Fitted;
+use crate::material::Ogden;
+use serde::{Deserialize, Serialize};
+
+/// A number with its 95 % interval.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ParameterResult {
+    /// Name, with its unit.
+    pub name: String,
+    /// Estimate.
+    pub value: f64,
+    /// 95 % interval; null where the data do not bound it.
+    pub interval_95: Option<[f64; 2]>,
+}
+
+/// A cause in a result.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CauseResult {
+    /// Name.
+    pub name: String,
+    /// Kind.
+    pub category: Category,
+    /// In words.
+    pub description: String,
+    /// Parameters.
+    pub parameters: Vec<ParameterResult>,
+    /// Where; null for what is everywhere.
+    pub location: Option<Location>,
+    /// Fall of the deviance, less ln n per parameter.
+    pub evidence: f64,
+    /// Displacement explained, mm rms.
+    pub effect_rms_mm: f64,
+}
+
+/// A number before and after.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BeforeAfter {
+    /// Nominal model.
+    pub before: f64,
+    /// With the causes.
+    pub after: f64,
+}
+
+/// A cause that was tested.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RankedResult {
+    /// Round of the search, from 1.
+    pub round: usize,
+    /// Name.
+    pub name: String,
+    /// In words.
+    pub description: String,
+    /// Fall of the deviance to first order.
+    pub score: f64,
+    /// Fall in a full fit, less ln n per parameter; null where not fitted.
+    pub fitted: Option<f64>,
+}
+
+/// `diagnosis/1`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DiagnosisResult {
+    /// `diagnosis/1`.
+    pub schema: String,
+    /// The recording.
+    pub recording: String,
+    /// How it ended.
+    pub verdict: Verdict,
+    /// The material with the causes modelled.
+    pub material: Ogden,
+    /// Its parameters.
+    pub material_parameters: Vec<ParameterResult>,
+    /// The material that the nominal model gives.
+    pub nominal_material: Ogden,
+    /// Causes, most telling first.
+    pub causes: Vec<CauseResult>,
+    /// What the data cannot tell apart from the last cause.
+    pub alternatives: Vec<CauseResult>,
+    /// χ² of the displacement per datum.
+    pub chi2_per_datum: BeforeAfter,
+    /// Misfit beyond noise, mm rms.
+    pub structured_rms_mm: BeforeAfter,
+    /// Misfit on data kept back, mm rms, noise included.
+    pub kept_back_rms_mm: BeforeAfter,
+    /// Where most is left.
+    pub left_at: Option<Location>,
+    /// All causes tested.
+    pub ranked: Vec<RankedResult>,
+    /// The discretisation allowance, mm rms at the largest drive.
+    pub allowance_mm: f64,
+    /// Noise per component, mm.
+    pub noise_sd_mm: [f64; 3],
+    /// Whether it was estimated from the recording.
+    pub is_noise_estimated: bool,
+    /// Displacement unknowns of the model.
+    pub num_unknowns: usize,
+    /// Equilibria solved.
+    pub num_solves: usize,
+    /// Program version.
+    pub version: String,
+    /// Hash of the inputs.
+    pub input_hash: String,
+}
+
+impl DiagnosisResult {
+    /// The result of `diagnosis` of recording `id`.
+    pub fn new(diagnosis: &Diagnosis, id: &str, input_hash: String) -> DiagnosisResult {
+        let d = diagnosis;
+        DiagnosisResult {
+            schema: "diagnosis/1".into(),
+            recording: id.into(),
+            verdict: d.verdict,
+            material: d.corrected.material.clone(),
+            material_parameters: material_parameters(&d.corrected),
+            nominal_material: d.nominal.material.clone(),
+            causes: d.causes.iter().map(cause).collect(),
+            alternatives: d.alternatives.iter().map(cause).collect(),
+            chi2_per_datum: BeforeAfter { before: d.left[0].chi2_per_datum, after: d.left[1].chi2_per_datum },
+            structured_rms_mm: BeforeAfter { before: d.left[0].structured_rms_mm, after: d.left[1].structured_rms_mm },
+            kept_back_rms_mm: BeforeAfter { before: d.kept_back_rms_mm[0], after: d.kept_back_rms_mm[1] },
+            left_at: d.left[1].location.clone(),
+            ranked: d
+                .ranked
+                .iter()
+                .map(|r| RankedResult {
+                    round: r.round,
+                    name: r.name.clone(),
+                    description: r.description.clone(),
+                    score: r.score,
+                    fitted: r.fitted,
+                })
+                .collect(),
+            allowance_mm: d.allowance_mm,
+            noise_sd_mm: d.observed.noise_sd_mm,
+            is_noise_estimated: d.observed.is_noise_estimated,
+            num_unknowns: d.num_unknowns,
+            num_solves: d.num_solves,
+            version: crate::provenance::VERSION.into(),
+            input_hash,
+        }
+    }
+}
+
+fn cause(c: &FoundCause) -> CauseResult {
+    CauseResult {
+        name: c.name.into(),
+        category: c.category,
+        description: c.description.clone(),
+        parameters: c.parameters.iter().map(|(name, value, interval)| parameter(name, *value, *interval)).collect(),
+        location: c.location.clone(),
+        evidence: c.evidence,
+        effect_rms_mm: c.effect_rms_mm,
+    }
+}
+
+fn parameter(name: &str, value: f64, interval: [f64; 2]) -> ParameterResult {
+    let is_bounded = interval.iter().all(|x| x.is_finite());
+    ParameterResult { name: name.into(), value, interval_95: is_bounded.then_some(interval) }
+}
+
+fn material_parameters(fitted: &Fitted) -> Vec<ParameterResult> {
+    fitted
+        .material
+        .parameters()
+        .into_iter()
+        .zip(&fitted.sd)
+        .map(|(p, sd)| {
+            let value = fitted.material.value(p);
+            parameter(&p.name(), value, [value - 1.96 * sd, value + 1.96 * sd])
+        })
+        .collect()
+}

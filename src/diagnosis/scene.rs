@@ -1,0 +1,108 @@
+//! A scene: the experiment as it may really have been, the nominal one where nothing is changed.
+
+use crate::fem::{Departures, FIRM_BOND_KPA_PER_MM, Fibre, Field, PlateMotion};
+use crate::specimen::Specimen;
+
+/// What differs from the nominal experiment. Causes change it; the laboratory predicts what would be recorded of it.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// Changes of each hole: diameter, then centre along x and across, mm.
+    pub holes: Vec<[f64; 3]>,
+    /// Factors on the stiffness; they multiply.
+    pub stiffness: Vec<Field>,
+    /// Uniform swelling: logarithm of the volume ratio.
+    pub log_growth: f64,
+    /// Fibres.
+    pub fibre: Option<Fibre>,
+    /// The plates: fixed, moved.
+    pub plates: [PlateMotion; 2],
+    /// Real minus commanded drive per newton of the measured force, mm/N.
+    pub compliance_mm_per_n: f64,
+    /// How loose the bond is on the fixed and the moved face: 0 firm, 1 gone; the loosest counts.
+    pub looseness: [Vec<Field>; 2],
+    /// The image.
+    pub image: ImageChange,
+    /// Added to the load cell's reading, N.
+    pub force_offset_n: f64,
+    /// Added to the load cell's reading, N per N.
+    pub force_gain: f64,
+}
+
+/// How recorded displacements differ from the sample's.
+#[derive(Clone, Debug, Default)]
+pub struct ImageChange {
+    /// Relative error of the encoding along x, y, z.
+    pub gain: [f64; 3],
+    /// Shift of the image, mm.
+    pub shift_mm: [f64; 3],
+    /// Rotation of the image about the origin, rad.
+    pub rotation_rad: [f64; 3],
+    /// Background per component: coefficients (mm) of 1, x, y, z, x², y², z², xy, yz, zx in units of the half extents.
+    pub background_mm: [[f64; 10]; 3],
+    /// Jumps: step, component, voxels (places in the compared mask) and size, mm.
+    pub jumps: Vec<Jump>,
+}
+
+/// Voxels whose phase is off by a multiple of 2π.
+#[derive(Clone, Debug)]
+pub struct Jump {
+    /// Which step.
+    pub step: usize,
+    /// Which component.
+    pub component: usize,
+    /// Places in the compared mask.
+    pub voxels: std::sync::Arc<Vec<u32>>,
+    /// Size, mm.
+    pub size_mm: f64,
+}
+
+impl Scene {
+    /// The departures at a step where `force_n` was measured; `bond_scale_kpa_per_mm` is the stiffness of the sample under
+    /// its bond, against which a bond is loose or firm; the bonded faces lie across `face_axis`.
+    pub fn departures(&self, force_n: f64, bond_scale_kpa_per_mm: f64, face_axis: usize) -> Departures {
+        let product = self.stiffness.clone();
+        let stiffness_factor = (!product.is_empty())
+            .then(|| Field::new(move |x| product.iter().map(|f| f.at(x)).product::<f64>().max(1e-2)));
+        let growth = self.log_growth;
+        let mut moved_plate = self.plates[1];
+        moved_plate.translation_mm[0] += self.compliance_mm_per_n * force_n;
+        let [fixed, moved] = self.looseness.clone();
+        let bond = (!fixed.is_empty() || !moved.is_empty()).then(|| {
+            Field::new(move |x| {
+                let list = if x[face_axis] > 0.0 { &moved } else { &fixed };
+                let loose = list.iter().map(|f| f.at(x)).fold(0.0, f64::max);
+                bond_of(loose, bond_scale_kpa_per_mm)
+            })
+        });
+        Departures {
+            stiffness_factor,
+            log_growth: (growth.abs() > 0.0).then(|| Field::new(move |_| growth)),
+            fibre: self.fibre,
+            fixed_plate: self.plates[0],
+            moved_plate,
+            bond_kpa_per_mm: bond,
+        }
+    }
+
+    /// Whether nodes of the bonded faces must be free: fixed, moved.
+    pub fn releases(&self) -> [bool; 2] {
+        [0, 1].map(|face| !self.looseness[face].is_empty())
+    }
+
+    /// The specimen as made.
+    pub fn specimen(&self, nominal: &Specimen) -> Specimen {
+        let mut made = nominal.clone();
+        for (hole, change) in made.holes.iter_mut().zip(&self.holes) {
+            hole.diameter_mm += change[0];
+            hole.center_mm[0] += change[1];
+            hole.center_mm[1] += change[2];
+        }
+        made
+    }
+}
+
+/// Stiffness (kPa/mm) of a bond that is loose to the part `loose`.
+fn bond_of(loose: f64, scale: f64) -> f64 {
+    let loose = loose.clamp(0.0, 1.0);
+    (scale * (1.0 - loose) / loose.max(1e-9)).min(FIRM_BOND_KPA_PER_MM)
+}

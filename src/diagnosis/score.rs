@@ -1,0 +1,105 @@
+//! Score tests: how much of a misfit a cause would explain, to first order, with the material free.
+
+use super::metric::{Metric, Weighed};
+use super::trace::Trace;
+use nalgebra::{DMatrix, DVector};
+
+/// What a set of directions explains of a residual, beyond what nuisance directions do.
+#[derive(Clone, Debug)]
+pub struct Score {
+    /// Fall of the deviance to first order; χ² with as many degrees of freedom as directions where nothing is there.
+    pub explained: f64,
+    /// Best coefficients of the directions.
+    pub coefficients: Vec<f64>,
+    /// Root mean square of the displacement explained, mm.
+    pub rms_mm: f64,
+}
+
+/// A residual and nuisance directions (the material's), against which directions are tested.
+pub struct ScoreTest<'a> {
+    metric: &'a Metric,
+    residual: Weighed,
+    nuisance: Vec<Weighed>,
+    inverse: DMatrix<f64>,
+    nuisance_residual: DVector<f64>,
+}
+
+impl<'a> ScoreTest<'a> {
+    /// `prior` adds to the diagonal of the nuisance directions' information.
+    pub fn new(metric: &'a Metric, residual: &Trace, nuisance: &[Trace], prior: &[f64]) -> ScoreTest<'a> {
+        let residual = metric.weigh(residual);
+        let nuisance: Vec<Weighed> = nuisance.iter().map(|t| metric.weigh(t)).collect();
+        let n = nuisance.len();
+        let matrix = DMatrix::from_fn(n, n, |i, j| {
+            metric.inner(&nuisance[i], &nuisance[j]) + if i == j { prior.get(i).copied().unwrap_or(0.0) } else { 0.0 }
+        });
+        let inverse = matrix.pseudo_inverse(1e-14).unwrap_or_else(|_| DMatrix::zeros(n, n));
+        let nuisance_residual = DVector::from_fn(n, |i, _| metric.inner(&nuisance[i], &residual));
+        ScoreTest { metric, residual, nuisance, inverse, nuisance_residual }
+    }
+
+    /// Prepares directions: their products with the residual and with each other, the nuisance taken out.
+    pub fn prepare(&self, directions: &[Trace]) -> Prepared {
+        let weighed: Vec<Weighed> = directions.iter().map(|t| self.metric.weigh(t)).collect();
+        let m = weighed.len();
+        let cross = DMatrix::from_fn(self.nuisance.len(), m, |i, j| self.metric.inner(&self.nuisance[i], &weighed[j]));
+        let projected = &self.inverse * &cross;
+        let mut gram = DMatrix::zeros(m, m);
+        for i in 0..m {
+            for j in 0..=i {
+                gram[(i, j)] = self.metric.inner(&weighed[i], &weighed[j]) - cross.column(i).dot(&projected.column(j));
+                gram[(j, i)] = gram[(i, j)];
+            }
+        }
+        let gradient = DVector::from_fn(m, |j, _| {
+            self.metric.inner(&weighed[j], &self.residual) - projected.column(j).dot(&self.nuisance_residual)
+        });
+        Prepared { gram, gradient }
+    }
+
+    /// Tests all of `directions` together.
+    pub fn test(&self, directions: &[Trace]) -> Score {
+        let prepared = self.prepare(directions);
+        let (explained, coefficients) = prepared.solve();
+        let mut sum = directions.first().map(|d| d.scaled(0.0)).unwrap_or_default();
+        for (d, c) in directions.iter().zip(&coefficients) {
+            sum = sum.plus(*c, d);
+        }
+        Score { explained, rms_mm: sum.rms_mm(), coefficients }
+    }
+}
+
+/// Products of directions with a residual and with each other.
+pub struct Prepared {
+    /// ⟨dᵢ, dⱼ⟩ without the nuisance.
+    pub gram: DMatrix<f64>,
+    /// ⟨dᵢ, residual⟩ likewise.
+    pub gradient: DVector<f64>,
+}
+
+impl Prepared {
+    /// Deviance explained by all directions and their coefficients.
+    pub fn solve(&self) -> (f64, Vec<f64>) {
+        let n = self.gradient.len();
+        // Scaled to a unit diagonal, so that directions of different units can be told from dependent ones.
+        let scale = DVector::from_fn(n, |i, _| 1.0 / self.gram[(i, i)].max(1e-30).sqrt());
+        let scaled = DMatrix::from_fn(n, n, |i, j| self.gram[(i, j)] * scale[i] * scale[j]);
+        let right = self.gradient.component_mul(&scale);
+        let solution =
+            scaled.pseudo_inverse(1e-8).map(|inverse| inverse * &right).unwrap_or_else(|_| DVector::zeros(n));
+        (right.dot(&solution), solution.component_mul(&scale).iter().copied().collect())
+    }
+
+    /// Deviance explained by the sum of some directions, and its coefficient.
+    pub fn of_sum(&self, members: &[usize]) -> (f64, f64) {
+        let mut g = 0.0;
+        let mut h = 0.0;
+        for &i in members {
+            g += self.gradient[i];
+            for &j in members {
+                h += self.gram[(i, j)];
+            }
+        }
+        if h > 0.0 { (g * g / h, g / h) } else { (0.0, 0.0) }
+    }
+}

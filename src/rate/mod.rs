@@ -1,0 +1,33 @@
+//! Time-dependent response: relaxation of elastic histories and what explains a load curve.
+//!
+//! * [`relax`]: the Prony convolution of an elastic history, with derivatives.
+//! * [`fit_force_history`]: relaxations in the force history of one specimen whose elastic force is a [`ForceTable`].
+//! * [`analyse_load_curve`]: load curves of homogeneous tests: what an elastic material leaves out, what explains it, and
+//!   whether the explanation predicts what was kept back.
+
+mod analysis;
+mod channels;
+mod force_history;
+mod load_curve;
+mod load_fit;
+mod model;
+mod prony;
+mod starts;
+mod summary;
+mod verdict;
+
+pub use crate::homogeneous::{ForceTable, TableError};
+pub use analysis::{
+    AMBIGUOUS_BIC, EXPLAINED_PART, F_TEST_LEVEL, LoadCurveAnalysisError, LoadCurveOptions, MIN_DELTA_BIC,
+    analyse_load_curve,
+};
+pub use force_history::{
+    FittedRelaxation, ForceHistory, ForceHistoryError, ForceHistoryFit, ForceHistoryOptions, ForceHistorySequence,
+    fit_force_history,
+};
+pub use load_curve::{LoadCurve, LoadCurveError};
+pub use prony::{HistoryError, PronyTerm, RelaxedHistory, relax};
+pub use verdict::{
+    BeforeAfter, CauseParameter, CurveCause, CurveMaterial, CurveTrace, Hypothesis, HypothesisEvidence,
+    LoadCurveVerdict, MatchBeforeAfter, Verdict,
+};

@@ -1,0 +1,102 @@
+//! Pictures of curve fits and of verdicts on load curves.
+
+use super::bars::{BarGroup, GroupedBars};
+use super::curves::{CurveSeries, CurvesPlot};
+use crate::homogeneous::{Curve, CurveFit, Deformation, model_stress};
+use crate::rate::{CurveTrace, LoadCurveVerdict};
+
+/// What a state is drawn at: stretch or amount of shear.
+fn abscissa(state: &Deformation) -> f64 {
+    match *state {
+        Deformation::Uniaxial { stretch } => stretch,
+        Deformation::Biaxial { stretches } => stretches[0],
+        Deformation::SimpleShear { shear } => shear,
+    }
+}
+
+/// Curves with a fit (full line) and other fits (dashed); `is_kept_back` marks curves that were predicted.
+pub fn fit_picture(title: &str, curves: &[(&Curve, bool)], fits: &[&CurveFit]) -> String {
+    let series = curves
+        .iter()
+        .map(|(curve, is_kept_back)| CurveSeries {
+            name: curve.name.clone(),
+            points: curve.states.iter().zip(&curve.nominal_stress_kpa).map(|(s, p)| [abscissa(s), *p]).collect(),
+            models: fits.iter().filter_map(|f| model_stress(&f.terms(), f.bulk_kpa, &curve.states)).collect(),
+            is_predicted: *is_kept_back,
+        })
+        .collect();
+    CurvesPlot {
+        title: title.into(),
+        x_label: "stretch (or amount of shear)".into(),
+        y_label: "nominal stress, kPa".into(),
+        series,
+    }
+    .to_svg()
+}
+
+fn trace_plot(title: &str, traces: &[CurveTrace], over_time: bool) -> String {
+    let series = traces
+        .iter()
+        .filter(|t| !over_time || !t.time_s.is_empty())
+        .map(|t| {
+            let x = if over_time { &t.time_s } else { &t.drive };
+            CurveSeries {
+                name: t.name.clone(),
+                points: x.iter().zip(&t.measured_kpa).map(|(x, y)| [*x, *y]).collect(),
+                models: vec![t.after_kpa.clone(), t.before_kpa.clone()],
+                is_predicted: t.num_fitted == 0,
+            }
+        })
+        .collect();
+    CurvesPlot {
+        title: title.into(),
+        x_label: if over_time { "time, s".into() } else { "stretch (or amount of shear)".into() },
+        y_label: "nominal stress, kPa".into(),
+        series,
+    }
+    .to_svg()
+}
+
+/// The pictures of a verdict on load curves, name and SVG: stress over drive and over time (with the causes full, the
+/// elastic material dashed, residuals beneath), the evidence of the first stage, and the errors before and after.
+pub fn load_curve_pictures(verdict: &LoadCurveVerdict) -> Vec<(String, String)> {
+    let first: Vec<BarGroup> = verdict
+        .hypotheses
+        .iter()
+        .filter(|h| h.stage == 1)
+        .map(|h| BarGroup { label: h.name.clone(), values: vec![h.delta_bic] })
+        .collect();
+    let errors: Vec<BarGroup> = verdict
+        .fitted
+        .iter()
+        .map(|m| (m, ""))
+        .chain(verdict.kept_back.iter().map(|m| (m, " (predicted)")))
+        .map(|(m, suffix)| BarGroup {
+            label: format!("{}{suffix}", m.before.name),
+            values: vec![100.0 * m.before.relative_rms_error, 100.0 * m.after.relative_rms_error],
+        })
+        .collect();
+    let evidence = GroupedBars {
+        title: "Evidence for each hypothesis alone".into(),
+        axis_label: "fall of BIC".into(),
+        series: vec!["with it".into()],
+        groups: first,
+        ..GroupedBars::default()
+    };
+    let errors = GroupedBars {
+        title: "Error of each curve".into(),
+        axis_label: "rms error, % of the curve's rms".into(),
+        series: vec!["elastic".into(), "with the causes".into()],
+        groups: errors,
+        ..GroupedBars::default()
+    };
+    let mut all = vec![
+        ("load-curves".to_string(), trace_plot("Stress over stretch", &verdict.traces, false)),
+        ("load-evidence".to_string(), evidence.to_svg()),
+        ("load-errors".to_string(), errors.to_svg()),
+    ];
+    if verdict.traces.iter().any(|t| !t.time_s.is_empty()) {
+        all.insert(1, ("load-history".to_string(), trace_plot("Stress over time", &verdict.traces, true)));
+    }
+    all
+}

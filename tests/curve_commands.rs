@@ -1,0 +1,78 @@
+//! `lambdak uniaxial` and `lambdak curves` as a user runs them.
+
+use lambdak::homogeneous::{HomogeneousTest, ShearTerm, incompressible_stress};
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn run(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_lambdak")).current_dir(folder).args(arguments).output().unwrap()
+}
+
+/// A curve file of a two-term material with a ripple of 0.2 % in place of noise.
+fn write_curve(folder: &Path, name: &str, test: HomogeneousTest, end: f64) {
+    let terms = [ShearTerm { modulus_kpa: 3.0, alpha: 6.0 }, ShearTerm { modulus_kpa: 28.0, alpha: 1.6 }];
+    let mut text = String::from("stretch,nominal_stress_kpa\n");
+    for i in 1..=40 {
+        let drive = test.rest() + (end - test.rest()) * f64::from(i) / 40.0;
+        let ripple = 1.0 + 0.002 * (7.3 * f64::from(i) * f64::from(i)).sin();
+        text += &format!("{drive},{}\n", ripple * incompressible_stress(&terms, &test.at(drive)));
+    }
+    std::fs::write(folder.join(name), text).unwrap();
+}
+
+#[test]
+fn uniaxial_fits_print_and_write() {
+    let folder = tempfile::tempdir().unwrap();
+    write_curve(folder.path(), "ut.csv", HomogeneousTest::Uniaxial, 2.5);
+    let text = run(folder.path(), &["uniaxial", "ut.csv"]);
+    assert!(text.status.success(), "{}", String::from_utf8_lossy(&text.stderr));
+    let shown = String::from_utf8_lossy(&text.stdout);
+    assert!(shown.contains("free terms") && shown.contains("neo-Hookean") && shown.contains("chosen"), "{shown}");
+    for file in ["uniaxial.json", "fits.svg", "fits-neo-hookean.svg"] {
+        assert!(folder.path().join("results/ut").join(file).is_file(), "{file}");
+    }
+    let json = run(folder.path(), &["uniaxial", "ut.csv", "--json"]);
+    let value: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+    assert_eq!(value["schema"], "uniaxial/1");
+    let modulus = value["initial_shear_modulus_kpa"]["value"].as_f64().unwrap();
+    // ½ (3 + 28) kPa, with a ripple of 0.2 %.
+    assert!((modulus / 15.5 - 1.0).abs() < 0.02, "{modulus}");
+}
+
+#[test]
+fn curves_predict_what_is_kept_back() {
+    let folder = tempfile::tempdir().unwrap();
+    write_curve(folder.path(), "ut.csv", HomogeneousTest::Uniaxial, 2.5);
+    write_curve(folder.path(), "et.csv", HomogeneousTest::Equibiaxial, 1.7);
+    write_curve(folder.path(), "ps.csv", HomogeneousTest::PureShear, 2.2);
+    let arguments =
+        ["curves", "uniaxial=ut.csv", "equibiaxial=et.csv", "pure-shear=ps.csv", "--keep-back", "equibiaxial"];
+    let text = run(folder.path(), &arguments);
+    assert!(text.status.success(), "{}", String::from_utf8_lossy(&text.stderr));
+    assert!(String::from_utf8_lossy(&text.stdout).contains("predicted, kept back: equibiaxial"));
+    assert!(folder.path().join("results/ut/curves.svg").is_file());
+    let json = run(folder.path(), &[&arguments[..], &["--json"]].concat());
+    let value: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+    assert_eq!((value["schema"].as_str(), value["num_terms"].as_u64()), (Some("curves/1"), Some(2)));
+    // The ripple is 0.14 % rms.
+    assert!(value["kept_back"][0]["relative_rms_error"].as_f64().unwrap() < 0.01);
+}
+
+#[test]
+fn bad_input_ends_with_code_two_and_says_why() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("bad.csv"), "a,b\n1,2\n").unwrap();
+    std::fs::write(folder.path().join("unit.csv"), "stretch,p11\n1,0\n1.2,3\n").unwrap();
+    for (arguments, words) in [
+        (vec!["uniaxial", "nowhere.csv"], "cannot read"),
+        (vec!["uniaxial", "bad.csv"], "no column"),
+        (vec!["uniaxial", "unit.csv"], "unit"),
+        (vec!["curves", "twist=bad.csv"], "twist"),
+        (vec!["curves", "unit.csv"], "TEST=FILE"),
+    ] {
+        let out = run(folder.path(), &arguments);
+        assert_eq!(out.status.code(), Some(2), "{arguments:?}");
+        let said = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(said.contains(words), "{arguments:?}: {said}");
+    }
+}
