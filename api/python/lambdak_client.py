@@ -28,12 +28,12 @@ class Client:
     def __init__(self, base, token=None, timeout_s=60):
         self.base, self.token, self.timeout_s = base.rstrip("/"), token, timeout_s
 
-    def request(self, method, path, body=None, headers=None):
+    def request(self, method, path, body=None, headers=None, raw=None):
         """Bytes and headers of an answer; waits and tries again when told to (429, 503)."""
         headers = dict(headers or {})
         if self.token:
             headers["authorization"] = f"Bearer {self.token}"
-        data = None
+        data = raw
         if body is not None:
             data = json.dumps(body).encode()
             headers["content-type"] = "application/json"
@@ -74,6 +74,27 @@ class Client:
 
     def design(self, study):
         return self.submit("designs", study)
+
+    def upload(self, folder):
+        """A recording's folder; returns its identifier."""
+        import io
+        import pathlib
+        import tarfile
+
+        buffer = io.BytesIO()
+        with tarfile.open(fileobj=buffer, mode="w", format=tarfile.USTAR_FORMAT) as archive:
+            for path in sorted(pathlib.Path(folder).iterdir()):
+                if path.is_file() and not path.name.startswith("."):
+                    archive.add(path, arcname=path.name)
+        body, _ = self.request("POST", "/v1/recordings", raw=buffer.getvalue(), headers={"content-type": "application/x-tar"})
+        return json.loads(body)["id"]
+
+    def diagnose(self, recording, material=None, **more):
+        """A diagnosis of an uploaded recording."""
+        body = {"recording": recording, **more}
+        if material is not None:
+            body["material"] = material
+        return self.submit("diagnoses", body)
 
     def check(self, specimen, limits=None, **more):
         body = {"specimen": specimen, **more}

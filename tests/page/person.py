@@ -68,7 +68,7 @@ class Page:
 
     def until(self, expression, limit_s=60):
         end = time.monotonic() + limit_s
-        while not self.js(expression):
+        while not self.js(f"!!({expression})"):
             assert time.monotonic() < end, f"not within {limit_s} s: {expression}\n{self.js('document.body.innerText')}"
             time.sleep(0.2)
 

@@ -58,6 +58,9 @@ export const getBlob = async (path) => (await send(path)).blob();
 export const post = async (path, body, more = {}) =>
   (await send(path, { method: "POST", headers: { "content-type": "application/json", ...more }, body: JSON.stringify(body ?? {}) })).json();
 
+export const upload = async (path, blob) =>
+  (await send(path, { method: "POST", headers: { "content-type": "application/x-tar" }, body: blob })).json();
+
 const hasEnded = (job) => !["queued", "running"].includes(job.state);
 
 /** Follows a job until it ends or `signal` aborts: `show(job)` for every change. */

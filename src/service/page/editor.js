@@ -103,7 +103,7 @@ export function editor(model, change) {
   function table() {
     const holes = model.specimen.holes;
     const number = (hole, name, get, put) => h("input", {
-      type: "number", step: "0.05", value: get(hole), "aria-label": name,
+      type: "number", step: "any", value: get(hole), "aria-label": name,
       onchange: (event) => { const v = Number(event.target.value); if (Number.isFinite(v)) { put(hole, v); edited(); } },
     });
     const other = section(model.specimen).axis === "width" ? "y" : "z";

@@ -56,7 +56,7 @@ export async function jobView(content, id, signal) {
   const show = (job) => {
     const p = job.progress;
     if (p?.best && history.at(-1) !== p.best) history.push(p.best);
-    const share = job.num_tasks > 1 ? [job.num_done, job.num_tasks] : p ? [p.done, p.total] : null;
+    const share = job.num_tasks > 1 ? [job.num_done, job.num_tasks] : p && p.total > 0 ? [p.done, p.total] : null;
     const end = job.finished_ms ?? Date.now();
     fill(head,
       h("div", { class: "row end" },
@@ -69,7 +69,8 @@ export async function jobView(content, id, signal) {
       isOpen(job) && share && h("div", {},
         h("p", { role: "status" }, job.num_tasks > 1 ? `${share[0]} of ${share[1]} tasks` : `${p.stage}: ${share[0]} of ${share[1]}`, p?.best ? `, best gain so far ${digits(p.best)}` : ""),
         h("progress", { max: share[1], value: share[0], "aria-label": "Progress" })),
-      isOpen(job) && !share && h("p", { class: "quiet", role: "status" }, job.state === "queued" ? "Waiting for a free place." : "Starting."),
+      isOpen(job) && !share && p && h("p", { role: "status" }, p.stage),
+      isOpen(job) && !share && !p && h("p", { class: "quiet", role: "status" }, job.state === "queued" ? "Waiting for a free place." : "Starting."),
       history.length > 1 && isOpen(job) && h("p", { class: "quiet" }, `Best gain: ${history.map((v) => digits(v)).join(" → ")}`),
       job.problem && h("div", { role: "alert" }, h("p", { class: "bad" }, `${job.problem.title}. ${job.problem.detail}`)));
     if (job.state === "succeeded" && shown !== job.state) {

@@ -4,6 +4,7 @@ import { getJson } from "./api.js";
 import { fill, h } from "./dom.js";
 import { planView } from "./plan.js";
 import { jobView, jobsView } from "./jobs.js";
+import { recordingsView } from "./recordings.js";
 
 const content = document.getElementById("content");
 let leave = new AbortController();
@@ -19,6 +20,7 @@ async function show() {
   fill(content, h("p", { class: "quiet" }, "Loading …"));
   try {
     if (view === "job" && id) await jobView(content, id, leave.signal);
+    else if (view === "recordings") await recordingsView(content, leave.signal);
     else if (view === "jobs") await jobsView(content, leave.signal);
     else await planView(content, leave.signal, id);
   } catch (error) {

@@ -7,6 +7,12 @@ import { editor, section } from "./editor.js";
 const copy = (value) => structuredClone(value);
 const numberList = (text) => text.split(/[\s,;]+/).filter(Boolean).map(Number);
 
+const LABELS = {
+  min_ligament_hole_hole_mm: "ligament between holes, mm (at least)", min_ligament_hole_edge_mm: "ligament to an edge, mm (at least)",
+  "diameter_mm.min": "diameter, mm (at least)", "diameter_mm.max": "diameter, mm (at most)", min_voxels_across_ligament: "voxels across a ligament (at least)",
+  max_holes: "holes (at most)", max_drive_mm: "drive, mm (at most)",
+};
+
 let kept = null; // What was being planned survives a look at the jobs.
 
 export async function planView(content, signal, from) {
@@ -38,7 +44,7 @@ export async function planView(content, signal, from) {
       h("p", { class: state[0], role: "status" }, state[1]),
       found.errors.map((e) => h("p", { class: "bad" }, e.detail)),
       found.margins.map((m) => h("div", { class: `meter${m.is_satisfied ? "" : " broken"}` },
-        h("span", {}, m.name.replaceAll("_", " ").replace(/ mm$/, ", mm")),
+        h("span", {}, LABELS[m.name] ?? m.name.replaceAll("_", " ")),
         h("span", {}, m.name === "symmetry" ? (m.is_satisfied ? "kept" : "broken") : `${digits(m.value, 3)} / ${digits(m.limit, 3)}`),
         h("div", { class: "bar" }, h("i", { width_percent: Math.max(2, Math.min(100, 50 * (1 + m.margin_relative))) })))),
       found.cost && h("p", { class: "quiet" }, `${found.cost.num_voxels.toLocaleString("en")} voxels, ${found.cost.num_elements.toLocaleString("en")} elements, about ${duration(1000 * found.cost.seconds_per_drive)} per drive; ${digits(found.volume_mm3, 4)} mm³ of material.`));
@@ -87,7 +93,7 @@ export async function planView(content, signal, from) {
 
   const material = h("div", {}, materialFields(model, library));
   const goal = h("div", { class: "fields" },
-    pick("Objective", [["integrated_sensitivity", "integrated sensitivity"], ["d_optimal", "D-optimal"], ["a_optimal", "A-optimal"], ["e_optimal", "E-optimal"], ["worst_relative_sd", "worst relative deviation"]], model.objective.kind, (v) => { model.objective.kind = v; }),
+    pick("Objective", [["integrated_sensitivity", "integrated sensitivity"], ["d_optimal", "D-optimal"], ["a_optimal", "A-optimal"], ["e_optimal", "E-optimal"], ["worst_relative_sd", "worst relative deviation"]], model.objective.kind, (v) => { model.objective.kind = v; }, { class: "wide" }),
     number_("Holes, at least", model.vary.hole_count.min, (v) => { model.vary.hole_count.min = v; }, { step: 1, min: 0, max: 8 }),
     number_("Holes, at most", model.vary.hole_count.max, (v) => { model.vary.hole_count.max = v; }, { step: 1, min: 0, max: 8 }),
     number_("Drive, at least, mm", model.vary.drive_mm.min, (v) => { model.vary.drive_mm.min = v; }),

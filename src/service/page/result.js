@@ -7,7 +7,7 @@ import { view3d } from "./view3d.js";
 export async function resultView(element, job, download) {
   const [result, { artefacts }] = await Promise.all([getJson(`/v1/jobs/${job.id}/result`), getJson(`/v1/jobs/${job.id}/artefacts`)]);
   const files = new Map(artefacts.map((a) => [a.name, a]));
-  const parts = { "evaluation/1": evaluation, "design/1": design, "evaluation-list/1": list }[result.schema]?.(result, files) ?? [h("section", { class: "sheet" }, h("pre", {}, JSON.stringify(result, null, 2).slice(0, 20000)))];
+  const parts = { "evaluation/1": evaluation, "design/1": design, "evaluation-list/1": list, "diagnosis/1": diagnosis }[result.schema]?.(result, files) ?? [h("section", { class: "sheet" }, h("pre", {}, JSON.stringify(result, null, 2).slice(0, 20000)))];
   fill(element, await Promise.all(parts), downloads(job, artefacts, download));
 }
 
@@ -46,7 +46,8 @@ function evaluation(result, files) {
       h("section", { class: "sheet" }, h("h3", {}, "What the scan promises"), promised(result.promised_sd)),
       h("section", { class: "sheet" }, h("h3", {}, `Integrated sensitivity at ${digits(last.drive_mm)} mm`), sensitivities(last))),
     shapes(files, [["surface.json", "Deformed specimen"]]),
-    pictureSheet(files, [["histogram.svg", "Where the voxels lie in (λ, k)"], ["map-stretch-and-mode.svg", "λ and k through the specimen"]]),
+    pictureSheet(files, [["histogram.svg", "Where the voxels lie in (λ, k)"], ["integrated-sensitivity.svg", "Integrated sensitivities of the drives, relative to the first"]]),
+    pictureSheet(files, [["map-stretch-and-mode.svg", "λ and k through the specimen"]]),
     pictureSheet(files, [...files.keys()].filter((n) => /^map-sensitivity/.test(n)).map((n) => [n, `Sensitivity to ${symbol(n.slice(16, -4))}`])),
   ];
 }
@@ -78,6 +79,22 @@ function list(result) {
       return last ? [name, digits(last.drive_mm), digits(last.force_n), digits(last.median_stretch), e.evaluation.promised_sd.filter((p) => p.parameter !== "kappa").map((p) => `${symbol(p.parameter)} ${percent(p.relative_sd)}`).join(", ")]
         : [name, e.problem?.detail ?? "", "", "", ""];
     })))];
+}
+
+const VERDICTS = {
+  no_mismatch: "No mismatch beyond noise and meshes.", explained: "The mismatch is explained.",
+  explained_ambiguously: "Explained, but not by one cause alone: the data cannot tell these apart.", unexplained: "Something is left that no known cause explains.",
+};
+
+function diagnosis(result) {
+  const change = (pair, unit = "") => (pair ? `${digits(pair.before, 3)} → ${digits(pair.after, 3)}${unit}` : "–");
+  return [h("section", { class: "sheet" },
+    bigNumbers([[change(result.chi2_per_datum), "χ² per datum, before and after"], [change(result.kept_back_rms_mm, " mm"), "misfit of data kept back, rms"]]),
+    h("p", {}, VERDICTS[result.verdict] ?? result.verdict)),
+  ...result.causes.map((cause) => h("section", { class: "sheet" },
+    h("h3", {}, `${cause.name} (${cause.category})`), cause.description && h("p", {}, cause.description),
+    table(["Parameter", "Value", "95 % interval"], cause.parameters.map((p) => [p.name, digits(p.value), p.interval_95 ? p.interval_95.map((v) => digits(v)).join(" to ") : "not bounded"])),
+    cause.location && h("p", { class: "quiet" }, `At the ${cause.location.region}: centre ${cause.location.center_mm.map((v) => digits(v, 3)).join(", ")} mm, extent ${cause.location.extent_mm.map((v) => digits(v, 3)).join(", ")} mm.`)))];
 }
 
 async function pictureSheet(files, wanted) {

@@ -83,9 +83,14 @@ class View {
     };
     const at = spread(this.surface.reference_mm);
     this.count = at.length / 3;
-    this.size = Math.max(...at.map(Math.abs)) * 1.25;
+    const moved = spread(this.surface.displacement_mm);
+    // The sphere that holds the specimen at rest and deformed.
+    this.size = 0;
+    for (let i = 0; i < at.length; i += 3) {
+      this.size = Math.max(this.size, Math.hypot(at[i], at[i + 1], at[i + 2]), Math.hypot(at[i] + moved[i], at[i + 1] + moved[i + 1], at[i + 2] + moved[i + 2]));
+    }
     this.put("at", at);
-    this.put("moved", spread(this.surface.displacement_mm));
+    this.put("moved", moved);
   }
 
   put(name, data) {
@@ -120,8 +125,8 @@ class View {
     const [ct, st, cx, sx] = [Math.cos(state.turn), Math.sin(state.turn), Math.cos(state.tilt), Math.sin(state.tilt)];
     const wide = canvas.width / canvas.height;
     const k = state.zoom / this.size;
-    const [fx, fy] = wide > 1 ? [k * Math.min(1, 1.6 / wide), k * Math.min(wide, 1.6)] : [k, k * wide];
-    const z = 0.2 * k;
+    const [fx, fy] = wide > 1 ? [1.15 * k / wide, 1.15 * k] : [k, k * wide];
+    const z = 0.15 * k;
     // Turn about z (the width), tilt about the screen's x; y of the specimen comes forward.
     const rows = [[ct, -st, 0], [st * sx, ct * sx, cx], [st * cx, ct * cx, -sx]];
     const view = new Float32Array([

@@ -24,6 +24,7 @@ const ASSETS: &[(&str, &str, &str)] = &[
     asset!("editor.js", "text/javascript; charset=utf-8"),
     asset!("plan.js", "text/javascript; charset=utf-8"),
     asset!("jobs.js", "text/javascript; charset=utf-8"),
+    asset!("recordings.js", "text/javascript; charset=utf-8"),
     asset!("result.js", "text/javascript; charset=utf-8"),
     asset!("view3d.js", "text/javascript; charset=utf-8"),
     asset!("docs.js", "text/javascript; charset=utf-8"),
