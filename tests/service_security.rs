@@ -88,8 +88,12 @@ fn smuggled_headers_are_refused() {
     let (_folder, service) = service();
     let host = &service.address;
     for head in [
-        format!("POST /v1/evaluations HTTP/1.1\r\nhost: {host}\r\ncontent-length: 5\r\ntransfer-encoding: chunked\r\nconnection: close\r\n\r\n0\r\n\r\n"),
-        format!("POST /v1/evaluations HTTP/1.1\r\nhost: {host}\r\ncontent-length: 5\r\ncontent-length: 6\r\nconnection: close\r\n\r\nabcde"),
+        format!(
+            "POST /v1/evaluations HTTP/1.1\r\nhost: {host}\r\ncontent-length: 5\r\ntransfer-encoding: chunked\r\nconnection: close\r\n\r\n0\r\n\r\n"
+        ),
+        format!(
+            "POST /v1/evaluations HTTP/1.1\r\nhost: {host}\r\ncontent-length: 5\r\ncontent-length: 6\r\nconnection: close\r\n\r\nabcde"
+        ),
         format!("GET /v1/jobs HTTP/1.1\r\nhost: {host}\r\nhost: {host}\r\nconnection: close\r\n\r\n"),
         format!("GET /v1/jobs HTTP/1.1\r\nhost: {host}\r\nbad header: 1\r\nconnection: close\r\n\r\n"),
     ] {

@@ -80,7 +80,8 @@ pub(super) fn run(a: &ServeArguments) -> Result<(), CliError> {
 }
 
 fn make_token(text: &str, path: &std::path::Path) -> Result<(), CliError> {
-    let bad = || CliError::Option { option: "add-token", message: format!("'{text}' is not NAME:ROLE, such as anna:submit") };
+    let bad =
+        || CliError::Option { option: "add-token", message: format!("'{text}' is not NAME:ROLE, such as anna:submit") };
     let (name, role) = text.rsplit_once(':').ok_or_else(bad)?;
     let role = match role {
         "read" => Role::Read,
@@ -88,11 +89,12 @@ fn make_token(text: &str, path: &std::path::Path) -> Result<(), CliError> {
         "admin" => Role::Admin,
         _ => return Err(bad()),
     };
-    let is_plain = (1..=64).contains(&name.len()) && name.bytes().all(|b| b.is_ascii_alphanumeric() || b"-_.@".contains(&b));
+    let is_plain =
+        (1..=64).contains(&name.len()) && name.bytes().all(|b| b.is_ascii_alphanumeric() || b"-_.@".contains(&b));
     if !is_plain {
         return Err(bad());
     }
-    let secret = add_token(path, name, role)
-        .map_err(|e| CliError::Option { option: "tokens", message: e.to_string() })?;
+    let secret =
+        add_token(path, name, role).map_err(|e| CliError::Option { option: "tokens", message: e.to_string() })?;
     super::output::print(&format!("{secret}\n"))
 }

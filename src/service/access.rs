@@ -145,7 +145,8 @@ impl Access {
         // Hashes are compared without a data-dependent end; every token is looked at.
         let mut found = None;
         for token in &self.tokens {
-            let difference = token.sha256.bytes().zip(hash.bytes()).fold(0, |d, (a, b)| d | (a.to_ascii_lowercase() ^ b));
+            let difference =
+                token.sha256.bytes().zip(hash.bytes()).fold(0, |d, (a, b)| d | (a.to_ascii_lowercase() ^ b));
             if difference == 0 {
                 found = Some(token);
             }
@@ -182,11 +183,8 @@ pub fn random_hex<const BYTES: usize>() -> Result<String, TokenError> {
 /// # Errors
 /// [`TokenError`].
 pub fn add_token(path: &Path, name: &str, role: Role) -> Result<String, TokenError> {
-    let mut file = if path.exists() {
-        read_file(path)?
-    } else {
-        TokenFile { schema: "tokens/1".into(), tokens: Vec::new() }
-    };
+    let mut file =
+        if path.exists() { read_file(path)? } else { TokenFile { schema: "tokens/1".into(), tokens: Vec::new() } };
     let secret = format!("lk_{}", random_hex::<32>()?);
     file.tokens.retain(|t| t.name != name);
     file.tokens.push(Token {

@@ -254,10 +254,13 @@ fn finish(
     let seconds = started.elapsed().as_secs_f64();
     app.metrics.count(method.as_str(), route, status, seconds);
     if !path.starts_with("/healthz") && !path.starts_with("/readyz") {
-        log::info("request", &serde_json::json!({
-            "id": id, "method": method.as_str(), "route": route, "path": path, "status": status,
-            "seconds": seconds, "caller": caller,
-        }));
+        log::info(
+            "request",
+            &serde_json::json!({
+                "id": id, "method": method.as_str(), "route": route, "path": path, "status": status,
+                "seconds": seconds, "caller": caller,
+            }),
+        );
     }
     let headers = answer.headers_mut();
     if let Ok(value) = HeaderValue::from_str(id) {
@@ -271,9 +274,9 @@ fn finish(
     ] {
         headers.insert(HeaderName::from_static(name), HeaderValue::from_static(value));
     }
-    headers.entry("content-security-policy").or_insert(HeaderValue::from_static(
-        "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox",
-    ));
+    headers
+        .entry("content-security-policy")
+        .or_insert(HeaderValue::from_static("default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox"));
     headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
     answer
 }

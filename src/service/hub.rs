@@ -64,9 +64,9 @@ pub async fn run(hub: Arc<Hub>, store: Arc<Store>, mut stopping: watch::Receiver
         let found = tokio::task::spawn_blocking(move || match since {
             // Streams read a job once after they subscribe, so changes before the first look are not missed.
             None => from.last_revision().map(|r| (r, Vec::new())),
-            Some(since) => from.jobs_changed_since(since).map(|list| {
-                (list.last().map_or(since, |row| row.revision), list)
-            }),
+            Some(since) => {
+                from.jobs_changed_since(since).map(|list| (list.last().map_or(since, |row| row.revision), list))
+            }
         })
         .await;
         match found {

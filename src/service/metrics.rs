@@ -55,7 +55,12 @@ impl Metrics {
             let _ = writeln!(text, "{name} {value}");
         };
         let int = |a: &AtomicU64| a.load(Ordering::Relaxed) as f64;
-        single("lambdak_requests_in_flight", "gauge", "Requests in work.", self.in_flight.load(Ordering::Relaxed) as f64);
+        single(
+            "lambdak_requests_in_flight",
+            "gauge",
+            "Requests in work.",
+            self.in_flight.load(Ordering::Relaxed) as f64,
+        );
         single("lambdak_streams", "gauge", "Open event streams.", self.streams.load(Ordering::Relaxed) as f64);
         single("lambdak_turned_away_total", "counter", "Requests refused as too many.", int(&self.turned_away));
         single("lambdak_tasks_finished_total", "counter", "Tasks finished by this process.", int(&signal.finished));

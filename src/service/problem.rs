@@ -156,7 +156,8 @@ pub fn parse<T: serde::de::DeserializeOwned>(value: &serde_json::Value) -> Resul
 /// A pointer from a message that starts with a field's path, as those of the validators do.
 pub fn pointer_in_message(prefix: &str, message: &str) -> String {
     let first = message.split([' ', ':', ',']).next().unwrap_or_default();
-    let is_path = first.contains('_') || first.contains('[') || first.contains('.') || first == "schema" || first == "name";
+    let is_path =
+        first.contains('_') || first.contains('[') || first.contains('.') || first == "schema" || first == "name";
     if is_path { format!("{prefix}{}", pointer_of(first)) } else { prefix.into() }
 }
 

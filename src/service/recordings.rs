@@ -182,7 +182,13 @@ mod tests {
 
     #[test]
     fn only_plain_files_are_taken() {
-        let tar = [entry("a/", b'5', b""), entry("a/recording.json", b'0', b"{}"), entry("u_1.nii.gz", 0, b"xyz"), vec![0; 1024]].concat();
+        let tar = [
+            entry("a/", b'5', b""),
+            entry("a/recording.json", b'0', b"{}"),
+            entry("u_1.nii.gz", 0, b"xyz"),
+            vec![0; 1024],
+        ]
+        .concat();
         let files = unpack(&tar[..], 1000).unwrap();
         assert_eq!(files.keys().collect::<Vec<_>>(), ["recording.json", "u_1.nii.gz"]);
         assert_eq!(files["u_1.nii.gz"], b"xyz");

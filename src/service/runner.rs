@@ -90,7 +90,10 @@ fn run_slot(store: &Store, settings: &WorkerSettings, signal: &Signal, slot: usi
     let lease_ms = settings.lease.as_millis() as i64;
     let dead = Problem::new(
         "worker-lost",
-        format!("the task lost its worker {} times; it is put aside. Resume the job to try again", super::store::MAX_LOSSES),
+        format!(
+            "the task lost its worker {} times; it is put aside. Resume the job to try again",
+            super::store::MAX_LOSSES
+        ),
     )
     .to_json();
     let mut seen = Instant::now().checked_sub(Duration::from_secs(60)).unwrap_or_else(Instant::now);
@@ -159,11 +162,14 @@ fn run_task(store: &Store, settings: &WorkerSettings, signal: &Signal, worker: &
         }
     };
     let _ = std::fs::remove_file(&path);
-    log::info("task", &serde_json::json!({
-        "job": task.job_id, "task": task.index, "attempt": task.attempt, "worker": worker, "outcome": what,
-        "taken": matches!(stored, Ok(Finished::Taken)), "seconds": elapsed.as_secs_f64(),
-        "storage_error": stored.err().map(|e| e.to_string()),
-    }));
+    log::info(
+        "task",
+        &serde_json::json!({
+            "job": task.job_id, "task": task.index, "attempt": task.attempt, "worker": worker, "outcome": what,
+            "taken": matches!(stored, Ok(Finished::Taken)), "seconds": elapsed.as_secs_f64(),
+            "storage_error": stored.err().map(|e| e.to_string()),
+        }),
+    );
     signal.wake();
 }
 

@@ -52,7 +52,9 @@ pub struct WorkerOptions {
 #[non_exhaustive]
 pub enum ServeError {
     /// The address is not of this machine alone and there are no tokens.
-    #[error("{listen} can be reached from other machines; give --tokens FILE (make one with --add-token NAME:ROLE) or listen on 127.0.0.1")]
+    #[error(
+        "{listen} can be reached from other machines; give --tokens FILE (make one with --add-token NAME:ROLE) or listen on 127.0.0.1"
+    )]
     TokensNeeded {
         /// The address.
         listen: SocketAddr,
@@ -144,7 +146,8 @@ pub fn serve(options: &ServeOptions, on_ready: &dyn Fn(SocketAddr)) -> Result<()
         Some(url) => Store::connect(url)?,
         None => Store::open_folder(&options.data)?,
     });
-    let changed = Problem::new("version-changed", "the program was replaced by another version; resume the job to run it anew");
+    let changed =
+        Problem::new("version-changed", "the program was replaced by another version; resume the job to run it anew");
     store.start_service(&changed.to_json())?;
     let runtime = runtime()?;
     let signal = Arc::new(Signal::default());
@@ -174,7 +177,10 @@ pub fn serve(options: &ServeOptions, on_ready: &dyn Fn(SocketAddr)) -> Result<()
     let result = runtime.block_on(async move {
         let listener = tokio::net::TcpListener::from_std(listener).map_err(fail)?;
         tokio::spawn(hub::run(hub, store, stopping));
-        log::info("listening", &serde_json::json!({ "address": listen.to_string(), "version": crate::provenance::VERSION }));
+        log::info(
+            "listening",
+            &serde_json::json!({ "address": listen.to_string(), "version": crate::provenance::VERSION }),
+        );
         on_ready(listen);
         accept(listener, router(app), head_time, stop).await;
         Ok(())
@@ -242,7 +248,10 @@ pub fn work(options: &WorkerOptions) -> Result<(), ServeError> {
     let signal = Arc::new(Signal::default());
     let scratch = scratch()?;
     let name = format!("worker-{}", random_hex::<4>()?);
-    log::info("worker", &serde_json::json!({ "name": name, "slots": options.slots, "version": crate::provenance::VERSION }));
+    log::info(
+        "worker",
+        &serde_json::json!({ "name": name, "slots": options.slots, "version": crate::provenance::VERSION }),
+    );
     let settings = WorkerSettings { name, slots: options.slots, lease: options.lease, scratch: scratch.clone() };
     let slots = runner::start(&store, &settings, &signal);
     let other = runtime.block_on(async {

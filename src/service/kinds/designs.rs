@@ -3,9 +3,7 @@
 use super::evaluations::add_drawings;
 use super::{JobKind, Plan, RunContext, RunError, SizeLimits, TaskProgress, json_bytes};
 use crate::calibration::{ParameterSpread, VerifyOptions, verify};
-use crate::design::{
-    Checkpoint, DesignResult, MaterialVerification, Progress, SearchError, Study, search, study_hash,
-};
+use crate::design::{Checkpoint, DesignResult, MaterialVerification, Progress, SearchError, Study, search, study_hash};
 use crate::fem::ForwardModel;
 use crate::material::Ogden;
 use crate::mesh::{MeshOptions, mesh_specimen};

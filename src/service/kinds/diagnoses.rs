@@ -60,9 +60,9 @@ impl JobKind for Diagnoses {
     fn plan(&self, body: &serde_json::Value, _limits: &SizeLimits) -> Result<Plan, Problem> {
         let request: DiagnosisRequest = parse(body)?;
         if let Some(material) = &request.material {
-            material.validate().map_err(|e| {
-                Problem::at(pointer_in_message("/material", &e.to_string()), e.to_string())
-            })?;
+            material
+                .validate()
+                .map_err(|e| Problem::at(pointer_in_message("/material", &e.to_string()), e.to_string()))?;
         }
         if let Some(factor) = request.mesh_factor
             && !(0.3..=5.0).contains(&factor)
@@ -94,7 +94,12 @@ impl JobKind for Diagnoses {
         let progress = |text: &str| {
             let done = step.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
             // The number of steps is not known before: the bar stays open-ended.
-            (context.progress)(TaskProgress { stage: text.trim().chars().take(120).collect(), done, total: 0, best: None });
+            (context.progress)(TaskProgress {
+                stage: text.trim().chars().take(120).collect(),
+                done,
+                total: 0,
+                best: None,
+            });
         };
         let cancelled = || (context.is_cancelled)();
         let found = diagnose(&recording, &options, &progress, &cancelled).map_err(|e| {

@@ -97,21 +97,23 @@ pub(super) fn options_of(request: &EvaluationRequest) -> Result<EvaluationOption
 /// # Errors
 /// A [`Problem`] with pointers.
 pub fn plan_evaluation(request: &EvaluationRequest, prefix: &str, limits: &SizeLimits) -> Result<NewTask, Problem> {
-    request.specimen.validate().map_err(|e| {
-        Problem::at(pointer_in_message(&format!("{prefix}/specimen"), &e.to_string()), e.to_string())
-    })?;
-    request.material.validate().map_err(|e| {
-        Problem::at(pointer_in_message(&format!("{prefix}/material"), &e.to_string()), e.to_string())
-    })?;
+    request
+        .specimen
+        .validate()
+        .map_err(|e| Problem::at(pointer_in_message(&format!("{prefix}/specimen"), &e.to_string()), e.to_string()))?;
+    request
+        .material
+        .validate()
+        .map_err(|e| Problem::at(pointer_in_message(&format!("{prefix}/material"), &e.to_string()), e.to_string()))?;
     let mesh = mesh_of(request.mesh.as_deref(), &request.specimen)?;
     let drives = drives_of(request);
     match &drives {
         DriveSelection::DriveMm(list) => {
             let mut with_drives = request.specimen.clone();
             with_drives.drive_mm.clone_from(list);
-            with_drives.validate().map_err(|e| {
-                Problem::at(pointer_in_message(prefix, &e.to_string()), e.to_string())
-            })?;
+            with_drives
+                .validate()
+                .map_err(|e| Problem::at(pointer_in_message(prefix, &e.to_string()), e.to_string()))?;
         }
         DriveSelection::MedianStretch(value) => {
             if request.drive_mm.is_some() {
@@ -129,8 +131,7 @@ pub fn plan_evaluation(request: &EvaluationRequest, prefix: &str, limits: &SizeL
         }
     }
     let scan = scan_of(request.scan);
-    let noise_is_fine =
-        scan.noise_sd_mm.iter().chain([&scan.force_sd_n]).all(|sd| sd.is_finite() && *sd > 1e-100);
+    let noise_is_fine = scan.noise_sd_mm.iter().chain([&scan.force_sd_n]).all(|sd| sd.is_finite() && *sd > 1e-100);
     if !noise_is_fine {
         return Err(Problem::at(format!("{prefix}/scan"), "every standard deviation must be positive and finite"));
     }
@@ -206,7 +207,8 @@ impl JobKind for Evaluations {
         })?;
         progress("pictures", 1);
         let mut artefacts = Vec::new();
-        let mut add = |name: String, media_type: &str, bytes: Vec<u8>| artefacts.push((name, media_type.to_string(), bytes));
+        let mut add =
+            |name: String, media_type: &str, bytes: Vec<u8>| artefacts.push((name, media_type.to_string(), bytes));
         let panels: Vec<_> = maps
             .drives
             .iter()

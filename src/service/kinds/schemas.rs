@@ -213,6 +213,7 @@ mod tests {
             }
         }
         assert!(count >= 4);
-        let _: MaterialSchema = serde_json::from_str(include_str!("../../../geometries/materials/ecoflex-0020.json")).unwrap();
+        let _: MaterialSchema =
+            serde_json::from_str(include_str!("../../../geometries/materials/ecoflex-0020.json")).unwrap();
     }
 }

@@ -60,8 +60,7 @@ struct Entry {
 /// The evaluations of a sweep with the pointers of their requests.
 fn expand(body: &serde_json::Value, limits: &SizeLimits) -> Result<Vec<(String, serde_json::Value)>, Problem> {
     let request: SweepRequest = parse(body)?;
-    let to_value =
-        |e: &EvaluationRequest| serde_json::to_value(e).map_err(|e| Problem::new("internal", e.to_string()));
+    let to_value = |e: &EvaluationRequest| serde_json::to_value(e).map_err(|e| Problem::new("internal", e.to_string()));
     let too_many = |pointer: &str, count: usize| {
         Problem::at(pointer, format!("{count} evaluations; give 1 to {}", limits.max_tasks))
     };
@@ -179,8 +178,7 @@ fn table(entries: &[Entry]) -> String {
         if let Some(problem) = &entry.problem {
             text += &format!("{},\"{name}\",,,,,\"{}\"\n", entry.index, problem.detail.replace('"', "\"\""));
         }
-        let evaluation: Option<Evaluation> =
-            entry.evaluation.as_ref().and_then(|e| Evaluation::deserialize(e).ok());
+        let evaluation: Option<Evaluation> = entry.evaluation.as_ref().and_then(|e| Evaluation::deserialize(e).ok());
         for step in evaluation.iter().flat_map(|e| &e.steps) {
             text += &format!(
                 "{},\"{name}\",{},{},{},{},\n",

@@ -46,7 +46,7 @@ function evaluation(result, files) {
       h("section", { class: "sheet" }, h("h3", {}, "What the scan promises"), promised(result.promised_sd)),
       h("section", { class: "sheet" }, h("h3", {}, `Integrated sensitivity at ${digits(last.drive_mm)} mm`), sensitivities(last))),
     shapes(files, [["surface.json", "Deformed specimen"]]),
-    pictureSheet(files, [["histogram.svg", "Where the voxels lie in (λ, k)"], ["integrated-sensitivity.svg", "Integrated sensitivities of the drives, relative to the first"]]),
+    pictureSheet(files, [["histogram.svg", "Where the voxels lie in (λ, k)"], ["integrated-sensitivity.svg", "Integrated sensitivities, sums over voxels"]]),
     pictureSheet(files, [["map-stretch-and-mode.svg", "λ and k through the specimen"]]),
     pictureSheet(files, [...files.keys()].filter((n) => /^map-sensitivity/.test(n)).map((n) => [n, `Sensitivity to ${symbol(n.slice(16, -4))}`])),
   ];

@@ -48,8 +48,7 @@ fn asset(name: &str, headers: &HeaderMap) -> Response {
     };
     let tag = format!("\"{}\"", &crate::service::store::sha256_hex(text.as_bytes())[..32]);
     let is_known = headers.get(header::IF_NONE_MATCH).is_some_and(|v| v.as_bytes() == tag.as_bytes());
-    let mut answer =
-        if is_known { StatusCode::NOT_MODIFIED.into_response() } else { (*text).into_response() };
+    let mut answer = if is_known { StatusCode::NOT_MODIFIED.into_response() } else { (*text).into_response() };
     let out = answer.headers_mut();
     out.insert(header::CONTENT_TYPE, HeaderValue::from_static(media_type));
     out.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));

@@ -103,12 +103,16 @@ fn seconds(num_elements: usize, num_voxels: usize) -> f64 {
 
 fn check(request: &CheckRequest) -> Result<Checked, Problem> {
     let specimen = &request.specimen;
-    let mut checked =
-        Checked { is_valid: false, errors: Vec::new(), margins: Vec::new(), volume_mm3: None, drawing_svg: None, cost: None };
+    let mut checked = Checked {
+        is_valid: false,
+        errors: Vec::new(),
+        margins: Vec::new(),
+        volume_mm3: None,
+        drawing_svg: None,
+        cost: None,
+    };
     if let Some(limits) = &request.limits {
-        limits
-            .validate()
-            .map_err(|e| Problem::at(pointer_in_message("/limits", &e.to_string()), e.to_string()))?;
+        limits.validate().map_err(|e| Problem::at(pointer_in_message("/limits", &e.to_string()), e.to_string()))?;
     }
     let options: MeshOptions = mesh_of(request.mesh.as_deref(), specimen)?;
     let voxel = request.voxel_mm.unwrap_or([1.0, 0.1875, 0.75]);

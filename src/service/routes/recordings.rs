@@ -105,14 +105,12 @@ pub(super) async fn upload(
     Ok((StatusCode::CREATED, [(header::LOCATION, location)], Json(RecordingView::from(row))).into_response())
 }
 
-
 /// Streams the body into a file without a name, so that memory does not hold it.
 async fn receive(mut body: Body, max: usize) -> Result<std::fs::File, Problem> {
     let failed = |e: std::io::Error| Problem::new("internal", format!("scratch: {e}"));
     let name = crate::service::access::random_hex::<8>().map_err(|e| Problem::new("internal", e.to_string()))?;
     let path = std::env::temp_dir().join(format!("lambdak-upload-{name}"));
-    let mut file =
-        std::fs::OpenOptions::new().read(true).write(true).create_new(true).open(&path).map_err(failed)?;
+    let mut file = std::fs::OpenOptions::new().read(true).write(true).create_new(true).open(&path).map_err(failed)?;
     let _ = std::fs::remove_file(&path);
     let mut length = 0;
     while let Some(frame) = body.frame().await {

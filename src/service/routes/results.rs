@@ -120,7 +120,9 @@ pub(super) async fn artefact(
         // A report is a page of its own: no scripts, nothing from elsewhere.
         answer.headers_mut().insert(
             header::CONTENT_SECURITY_POLICY,
-            HeaderValue::from_static("default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox allow-popups"),
+            HeaderValue::from_static(
+                "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox allow-popups",
+            ),
         );
     }
     Ok(answer)

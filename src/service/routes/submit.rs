@@ -21,7 +21,13 @@ pub(super) fn json_body(headers: &HeaderMap, body: &[u8]) -> Result<serde_json::
     serde_json::from_slice(body).map_err(|e| Problem::new("invalid-json", e.to_string()))
 }
 
-async fn submit(app: App, caller: Caller, headers: HeaderMap, body: Bytes, kind: &'static str) -> Result<Response, Problem> {
+async fn submit(
+    app: App,
+    caller: Caller,
+    headers: HeaderMap,
+    body: Bytes,
+    kind: &'static str,
+) -> Result<Response, Problem> {
     caller.require(Role::Submit)?;
     let value = json_body(&headers, &body)?;
     let key = idempotency_key(&headers)?;
@@ -107,4 +113,10 @@ macro_rules! submission {
 submission!(post_evaluation, "/v1/evaluations", "evaluations", EvaluationRequest, "Evaluate a specimen.");
 submission!(post_design, "/v1/designs", "designs", StudySchema, "Search for the best specimen of a study.");
 submission!(post_sweep, "/v1/sweeps", "sweeps", SweepRequest, "Evaluate many specimens.");
-submission!(post_diagnosis, "/v1/diagnoses", "diagnoses", DiagnosisRequest, "Find where a recording and its model differ, and why.");
+submission!(
+    post_diagnosis,
+    "/v1/diagnoses",
+    "diagnoses",
+    DiagnosisRequest,
+    "Find where a recording and its model differ, and why."
+);

@@ -28,7 +28,9 @@ pub enum StoreError {
         path: std::path::PathBuf,
     },
     /// The database was made by another version of the tables.
-    #[error("the database holds tables of version {found}, this program needs {expected}; use another database or the matching program")]
+    #[error(
+        "the database holds tables of version {found}, this program needs {expected}; use another database or the matching program"
+    )]
     OtherSchema {
         /// Version found.
         found: String,
@@ -36,7 +38,9 @@ pub enum StoreError {
         expected: &'static str,
     },
     /// The service runs another version of the program.
-    #[error("the service runs lambdak {service}, this worker is {worker}; results of two versions are never mixed: install lambdak {service} here")]
+    #[error(
+        "the service runs lambdak {service}, this worker is {worker}; results of two versions are never mixed: install lambdak {service} here"
+    )]
     OtherVersion {
         /// The service's version.
         service: String,
@@ -68,7 +72,11 @@ impl StoreError {
         match self {
             StoreError::Postgres(e) => matches!(
                 e.code(),
-                Some(&SqlState::T_R_DEADLOCK_DETECTED | &SqlState::T_R_SERIALIZATION_FAILURE | &SqlState::UNIQUE_VIOLATION)
+                Some(
+                    &SqlState::T_R_DEADLOCK_DETECTED
+                        | &SqlState::T_R_SERIALIZATION_FAILURE
+                        | &SqlState::UNIQUE_VIOLATION
+                )
             ),
             _ => false,
         }

@@ -232,13 +232,7 @@ impl Store {
                 "SELECT {COLUMNS} FROM jobs WHERE ($1 = '' OR kind = $1) AND ($2 = '' OR state = $2) \
                  AND (created_ms < $3 OR (created_ms = $3 AND id < $4)) ORDER BY created_ms DESC, id DESC LIMIT $5"
             ),
-            &[
-                (&filter.kind).into(),
-                (&filter.state).into(),
-                before_ms.into(),
-                before_id.into(),
-                filter.limit.into(),
-            ],
+            &[(&filter.kind).into(), (&filter.state).into(), before_ms.into(), before_id.into(), filter.limit.into()],
         )?;
         Ok(rows.iter().map(job_of).collect())
     }

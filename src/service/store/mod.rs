@@ -88,9 +88,10 @@ impl Store {
                 inner.execute("SELECT pg_advisory_xact_lock(7153402)", &[])?;
             }
             t.batch(include_str!("schema.sql"))?;
-            t.execute("INSERT INTO meta (key, value) VALUES ('schema', $1) ON CONFLICT DO NOTHING", &[
-                SCHEMA_VERSION.into()
-            ])?;
+            t.execute(
+                "INSERT INTO meta (key, value) VALUES ('schema', $1) ON CONFLICT DO NOTHING",
+                &[SCHEMA_VERSION.into()],
+            )?;
             t.execute("INSERT INTO revisions (id, last) VALUES (1, 0) ON CONFLICT DO NOTHING", &[])?;
             let found = t.query("SELECT value FROM meta WHERE key = 'schema'", &[])?;
             let found = found.first().map(|r| r.text(0)).unwrap_or_default();
@@ -136,9 +137,7 @@ impl Store {
     pub fn check_version(&self) -> Result<(), StoreError> {
         let rows = self.database.read("SELECT value FROM meta WHERE key = 'version'", &[])?;
         match rows.first().map(|r| r.text(0)) {
-            Some(service) if service != VERSION => {
-                Err(StoreError::OtherVersion { service, worker: VERSION.into() })
-            }
+            Some(service) if service != VERSION => Err(StoreError::OtherVersion { service, worker: VERSION.into() }),
             _ => Ok(()),
         }
     }
@@ -160,11 +159,10 @@ impl Store {
 /// Keeps bytes; equal ones once.
 fn put_blob(t: &mut Transaction, bytes: &[u8]) -> Result<String, StoreError> {
     let sha = sha256_hex(bytes);
-    t.execute("INSERT INTO blobs (sha, bytes, num_bytes) VALUES ($1, $2, $3) ON CONFLICT DO NOTHING", &[
-        (&sha).into(),
-        bytes.to_vec().into(),
-        bytes.len().into(),
-    ])?;
+    t.execute(
+        "INSERT INTO blobs (sha, bytes, num_bytes) VALUES ($1, $2, $3) ON CONFLICT DO NOTHING",
+        &[(&sha).into(), bytes.to_vec().into(), bytes.len().into()],
+    )?;
     Ok(sha)
 }
 

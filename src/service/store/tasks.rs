@@ -120,7 +120,13 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn heartbeat(&self, task: &Claimed, worker: &str, lease_ms: i64, progress: &str) -> Result<Finished, StoreError> {
+    pub fn heartbeat(
+        &self,
+        task: &Claimed,
+        worker: &str,
+        lease_ms: i64,
+        progress: &str,
+    ) -> Result<Finished, StoreError> {
         self.database.transact(&|t| {
             let kept = t.execute(
                 "UPDATE tasks SET lease_ms = {now} + $5 WHERE job_id = $1 AND task_index = $2 AND attempt = $3 \
@@ -131,10 +137,10 @@ impl Store {
                 return Ok(Finished::NotOurs);
             }
             if !progress.is_empty() {
-                let changed = t.execute("UPDATE jobs SET progress = $2 WHERE id = $1 AND progress <> $2", &[
-                    (&task.job_id).into(),
-                    progress.into(),
-                ])?;
+                let changed = t.execute(
+                    "UPDATE jobs SET progress = $2 WHERE id = $1 AND progress <> $2",
+                    &[(&task.job_id).into(), progress.into()],
+                )?;
                 if changed > 0 {
                     touch(t, &task.job_id)?;
                 }
@@ -215,10 +221,10 @@ impl Store {
         self.database.transact(&|t| {
             // A worker that is stopping has been cancelled or fenced already: its last lines may still be used where
             // nobody else holds the task.
-            let rows = t.query("SELECT attempt, worker FROM tasks WHERE job_id = $1 AND task_index = $2", &[
-                (&task.job_id).into(),
-                task.index.into(),
-            ])?;
+            let rows = t.query(
+                "SELECT attempt, worker FROM tasks WHERE job_id = $1 AND task_index = $2",
+                &[(&task.job_id).into(), task.index.into()],
+            )?;
             let Some(row) = rows.first() else { return Ok(Finished::NotOurs) };
             if row.int(0) != task.attempt || row.text(1) != worker {
                 return Ok(Finished::NotOurs);
@@ -229,10 +235,10 @@ impl Store {
                 &[(&task.job_id).into(), task.index.into(), bytes.to_vec().into()],
             )?;
             // A task that gets on is not one that ends its workers.
-            t.execute("UPDATE tasks SET losses = 0 WHERE job_id = $1 AND task_index = $2", &[
-                (&task.job_id).into(),
-                task.index.into(),
-            ])?;
+            t.execute(
+                "UPDATE tasks SET losses = 0 WHERE job_id = $1 AND task_index = $2",
+                &[(&task.job_id).into(), task.index.into()],
+            )?;
             Ok(Finished::Taken)
         })
     }
@@ -242,10 +248,10 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn checkpoint(&self, task: &Claimed) -> Result<Option<Vec<u8>>, StoreError> {
-        let rows = self.database.read("SELECT bytes FROM checkpoints WHERE job_id = $1 AND task_index = $2", &[
-            (&task.job_id).into(),
-            task.index.into(),
-        ])?;
+        let rows = self.database.read(
+            "SELECT bytes FROM checkpoints WHERE job_id = $1 AND task_index = $2",
+            &[(&task.job_id).into(), task.index.into()],
+        )?;
         Ok(rows.first().map(|r| r.blob(0)))
     }
 
@@ -320,10 +326,7 @@ pub(super) fn finish_from_known(
     if !with_artefacts {
         known.clear();
     }
-    t.execute(
-        "UPDATE jobs SET started_ms = {now} WHERE id = $1 AND started_ms = 0",
-        &[job.into()],
-    )?;
+    t.execute("UPDATE jobs SET started_ms = {now} WHERE id = $1 AND started_ms = 0", &[job.into()])?;
     complete(t, job, index, false, &row.text(0), &known)?;
     Ok(true)
 }
@@ -373,10 +376,10 @@ fn fail_task(t: &mut Transaction, job: &str, index: i64, problem: &str) -> Resul
         "UPDATE tasks SET state = 'failed', problem = $3, finished_ms = {now} WHERE job_id = $1 AND task_index = $2",
         &[job.into(), index.into(), problem.into()],
     )?;
-    let rows = t.query("SELECT role FROM tasks WHERE job_id = $1 AND task_index <> $2 AND role = 'gather'", &[
-        job.into(),
-        index.into(),
-    ])?;
+    let rows = t.query(
+        "SELECT role FROM tasks WHERE job_id = $1 AND task_index <> $2 AND role = 'gather'",
+        &[job.into(), index.into()],
+    )?;
     if rows.is_empty() {
         t.execute(
             "UPDATE jobs SET state = 'failed', problem = $2, finished_ms = {now} WHERE id = $1 \

@@ -56,12 +56,10 @@ impl Store {
             }
             for (name, bytes) in &upload.files {
                 let sha = put_blob(t, bytes)?;
-                t.execute("INSERT INTO upload_files (upload_id, name, sha, num_bytes) VALUES ($1, $2, $3, $4)", &[
-                    (&upload.id).into(),
-                    name.into(),
-                    sha.into(),
-                    bytes.len().into(),
-                ])?;
+                t.execute(
+                    "INSERT INTO upload_files (upload_id, name, sha, num_bytes) VALUES ($1, $2, $3, $4)",
+                    &[(&upload.id).into(), name.into(), sha.into(), bytes.len().into()],
+                )?;
             }
             Ok(())
         })
@@ -84,10 +82,9 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn upload(&self, id: &str) -> Result<Option<UploadRow>, StoreError> {
-        let rows = self.database.read(
-            "SELECT id, title, manifest, num_bytes, created_ms FROM uploads WHERE id = $1",
-            &[id.into()],
-        )?;
+        let rows = self
+            .database
+            .read("SELECT id, title, manifest, num_bytes, created_ms FROM uploads WHERE id = $1", &[id.into()])?;
         Ok(rows.first().map(upload_of))
     }
 
@@ -115,11 +112,5 @@ impl Store {
 }
 
 fn upload_of(r: &super::Row) -> UploadRow {
-    UploadRow {
-        id: r.text(0),
-        title: r.text(1),
-        manifest: r.text(2),
-        num_bytes: r.int(3),
-        created_ms: r.int(4),
-    }
+    UploadRow { id: r.text(0), title: r.text(1), manifest: r.text(2), num_bytes: r.int(3), created_ms: r.int(4) }
 }
