@@ -3,18 +3,22 @@
 use super::error::CliError;
 use super::progress::Bar;
 use super::{Common, input, interrupt, output};
-use crate::calibration::{CalibrationError, ParameterSpread, VerifyOptions, verify};
+use crate::calibration::{ParameterSpread, VerifyOptions, verify_in_full};
 use crate::design::{
-    Checkpoint, DesignEntry, DesignResult, MaterialVerification, SearchError, Study, search, study_hash,
+    Checkpoint, DesignEntry, DesignResult, MaterialVerification, Progress, SearchError, Study, Unfinished, search,
+    study_hash,
 };
 use crate::fem::ForwardModel;
+use crate::material::Ogden;
 use crate::mesh::MeshOptions;
+use crate::provenance::input_hash;
 use crate::report::{DesignPictures, deformed_picture, design_report, histogram_picture};
 use crate::sensitivity::{DriveSelection, EvaluationOptions, evaluate_model};
 use crate::specimen::{Specimen, to_dxf, to_stl, to_svg};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
 
 #[derive(Args)]
 pub(super) struct DesignArguments {
@@ -29,9 +33,18 @@ pub(super) struct DesignArguments {
     /// Start afresh even where a checkpoint exists.
     #[arg(long)]
     restart: bool,
+    /// Stop after this many minutes, as by Ctrl-C: what was found is written, the same command goes on.
+    #[arg(long, value_name = "MINUTES")]
+    time_limit: Option<f64>,
     #[command(flatten)]
     common: Common,
 }
+
+/// Iterations that a fit of the verification may take.
+const VERIFY_ITERATIONS: usize = 60;
+
+/// Files of a stopped run, beside its checkpoint.
+const UNFINISHED: [&str; 2] = ["unfinished-design.json", "unfinished-best-specimen.json"];
 
 pub(super) fn run(a: &DesignArguments) -> Result<(), CliError> {
     super::start_threads(&a.common)?;
@@ -58,17 +71,32 @@ pub(super) fn run(a: &DesignArguments) -> Result<(), CliError> {
     if checkpoint.num_resumed() > 0 {
         eprintln!("resuming: {} evaluations taken from the checkpoint", checkpoint.num_resumed());
     }
+    let started = std::time::Instant::now();
+    let limit = time_limit(a.time_limit)?;
+    let is_stopped = || interrupt::is_requested() || limit.is_some_and(|limit| started.elapsed() >= limit);
     let bar = Bar::new();
-    let found = search(&study, &checkpoint, &|p| bar.show(p), &interrupt::is_requested).map_err(|e| {
-        bar.clear();
-        search_error(e, folder.as_deref())
-    })?;
+    let found = match search(&study, &checkpoint, &|p| bar.show(p), &is_stopped) {
+        Ok(found) => found,
+        Err(SearchError::Stopped { unfinished }) => {
+            bar.clear();
+            return Err(stop(&unfinished, folder.as_deref()));
+        }
+        Err(other) => {
+            bar.clear();
+            return Err(CliError::Numerics(other.to_string()));
+        }
+    };
     let Some(mut result) = DesignResult::new(&study, &found) else {
         return Err(CliError::Numerics("nothing was confirmed".into()));
     };
     if study.verification.is_on {
-        let verified = verify_both(&study, &result, &bar)?;
-        result.add_verification(verified);
+        match verify_both(&study, &result, &checkpoint, &bar, &is_stopped)? {
+            Some(verified) => result.add_verification(verified),
+            None => {
+                bar.clear();
+                return Err(stop(&found.unfinished(&study, "verify"), folder.as_deref()));
+            }
+        }
     }
     bar.clear();
     if let Some(message) = checkpoint.write_failure() {
@@ -78,8 +106,50 @@ pub(super) fn run(a: &DesignArguments) -> Result<(), CliError> {
         output::write_file(folder, "design.json", output::to_json(&result)?.as_bytes())?;
         write_report(&study, &result, folder)?;
         output::write_file(folder, "best-specimen.json", best_specimen(&result).to_json().as_bytes())?;
+        for name in UNFINISHED {
+            // What a stopped run left is out of date now; it may not be there.
+            let _ = std::fs::remove_file(folder.join(name));
+        }
     }
     output::print(&if a.common.json { output::to_json(&result)? } else { summary(&result, folder.as_deref()) })
+}
+
+/// The option as a duration.
+fn time_limit(minutes: Option<f64>) -> Result<Option<Duration>, CliError> {
+    let Some(minutes) = minutes else { return Ok(None) };
+    if !(minutes > 0.0 && minutes <= 1e6) {
+        let message = format!("{minutes} is not a number of minutes above 0 and at most 1000000");
+        return Err(CliError::Option { option: "time-limit", message });
+    }
+    Ok(Some(Duration::from_secs_f64(60.0 * minutes)))
+}
+
+/// Writes what a stopped run has found, marked as unfinished; the error that ends the run.
+fn stop(unfinished: &Unfinished, folder: Option<&Path>) -> CliError {
+    let Some(folder) = folder else {
+        // Nothing is on disk: the caller of --json gets it all the same.
+        return match output::to_json(unfinished).and_then(|json| output::print(&json)) {
+            Err(error) => error,
+            Ok(()) => CliError::Interrupted(unfinished.summary()),
+        };
+    };
+    let written = output::to_json(unfinished).and_then(|json| {
+        output::write_file(folder, UNFINISHED[0], json.as_bytes())?;
+        if let Some(best) = &unfinished.best {
+            let mut specimen = best.specimen.clone();
+            specimen.name = format!("{} (unfinished search for: {})", specimen.name, unfinished.name);
+            output::write_file(folder, UNFINISHED[1], specimen.to_json().as_bytes())?;
+        }
+        Ok(())
+    });
+    match written {
+        Err(error) => error,
+        Ok(()) => CliError::Interrupted(format!(
+            "{}. What was found is in {}; run the same command again to go on",
+            unfinished.summary(),
+            folder.join(UNFINISHED[0]).display()
+        )),
+    }
 }
 
 /// The page, and what the mould maker needs.
@@ -124,52 +194,61 @@ fn best_specimen(result: &DesignResult) -> Specimen {
     specimen
 }
 
-fn search_error(error: SearchError, folder: Option<&Path>) -> CliError {
-    match error {
-        SearchError::Stopped { .. } => CliError::Interrupted(match folder {
-            Some(folder) => format!("{error}. Run the same command again to go on from {}", folder.display()),
-            None => error.to_string(),
-        }),
-        other => CliError::Numerics(other.to_string()),
-    }
-}
-
-fn verify_both(study: &Study, result: &DesignResult, bar: &Bar) -> Result<Vec<MaterialVerification>, CliError> {
+/// Both specimens with every material, `None` where it was stopped. What is done is kept in the checkpoint.
+fn verify_both(
+    study: &Study,
+    result: &DesignResult,
+    checkpoint: &Checkpoint,
+    bar: &Bar,
+    is_stopped: &(dyn Fn() -> bool + Sync),
+) -> Result<Option<Vec<MaterialVerification>>, CliError> {
     let draws = study.verification.draws;
     let total = 2 * study.materials.len() * draws;
     let done = AtomicUsize::new(0);
-    let of = |specimen: &Specimen, material: &crate::material::Ogden| -> Result<Vec<ParameterSpread>, CliError> {
-        let options = VerifyOptions::new(specimen, draws, study.seed);
+    let mut error = None;
+    let mut of = |specimen: &Specimen, material: &Ogden| -> Option<(Vec<ParameterSpread>, Option<String>)> {
+        let mut options = VerifyOptions::new(specimen, draws, study.seed);
+        // A weakly determined second term makes a long valley: the way along it may take more than the usual iterations.
+        options.fit.max_iterations = VERIFY_ITERATIONS;
+        let before = done.load(Ordering::Relaxed);
         let on_draw = || {
             let count = done.fetch_add(1, Ordering::Relaxed) + 1;
-            bar.show(&crate::design::Progress {
-                stage: "verify",
-                done: count,
-                total,
-                best: Some(result.best.objective),
-            });
+            bar.show(&Progress { stage: "verify", done: count, total, best: Some(result.best.objective) });
         };
-        verify(specimen, material, &study.scan, &options, &on_draw, &interrupt::is_requested).map_err(
-            |e: CalibrationError| {
-                if interrupt::is_requested() {
-                    CliError::Interrupted("the search is kept; run the same command again to verify".into())
-                } else {
-                    CliError::Numerics(format!("verification: {e}"))
+        let key =
+            input_hash(&serde_json::json!({ "specimen": specimen, "material": material, "kind": "verification" }));
+        let verified = checkpoint.get_or(&key, || {
+            match verify_in_full(specimen, material, &study.scan, &options, &on_draw, is_stopped) {
+                Ok(found) => {
+                    let reason = found.fits.iter().find_map(|fit| fit.as_ref().err().map(ToString::to_string));
+                    Some((found.spreads, reason))
                 }
-            },
-        )
+                Err(e) => {
+                    error = Some(e);
+                    None
+                }
+            }
+        });
+        done.store(before + draws, Ordering::Relaxed);
+        verified
     };
-    study
-        .materials
-        .iter()
-        .map(|prior| {
-            Ok(MaterialVerification {
-                material: prior.name.clone(),
-                best: of(&result.best.specimen, &prior.material)?,
-                base: of(&result.base.specimen, &prior.material)?,
-            })
-        })
-        .collect()
+    let mut verified = Vec::new();
+    for prior in &study.materials {
+        let best = of(&result.best.specimen, &prior.material);
+        let base = best.as_ref().and_then(|_| of(&result.base.specimen, &prior.material));
+        match (best, base) {
+            (Some((best, best_failure)), Some((base, base_failure))) => {
+                let material = prior.name.clone();
+                verified.push(MaterialVerification { material, best, base, best_failure, base_failure });
+            }
+            _ if is_stopped() => return Ok(None),
+            _ => {
+                let cause = error.map_or_else(String::new, |e| e.to_string());
+                return Err(CliError::Numerics(format!("verification: {cause}")));
+            }
+        }
+    }
+    Ok(Some(verified))
 }
 
 /// The result as text.
@@ -186,7 +265,7 @@ fn summary(result: &DesignResult, folder: Option<&Path>) -> String {
             e.specimen.drive_mm.last().copied().unwrap_or(0.0),
             e.force_n(),
             e.objective,
-            if e.is_within_limits { e.closest_limit.clone() } else { "breaks a limit or the guard".into() }
+            if e.is_within_limits { e.closest_limit.clone() } else { format!("not kept: {}", e.not_kept()) }
         )
     };
     text += &line("base", &result.base);
@@ -210,16 +289,26 @@ fn summary(result: &DesignResult, folder: Option<&Path>) -> String {
         text += "  specimen   parameter        truth         mean     found sd   promised sd   ratio   draws\n";
         for (label, list) in [("best", &v.best), ("base", &v.base)] {
             for p in list {
-                let (promised, ratio) = match p.promised_sd {
-                    Some(sd) => (format!("{sd:.4}"), format!("{:.2}", p.found_sd / sd)),
-                    None => ("-".into(), "-".into()),
+                let show = |v: Option<f64>, digits: usize| {
+                    v.filter(|v| v.is_finite()).map_or("-".into(), |v| format!("{v:.digits$}"))
                 };
+                let ratio = p.promised_sd.map(|sd| p.found_sd / sd);
                 text += &format!(
-                    "  {:<10} {:<10} {:>11.4} {:>12.4} {:>12.4} {:>13} {:>7} {:>7}\n",
-                    label, p.parameter, p.truth, p.mean, p.found_sd, promised, ratio, p.draws
+                    "  {:<10} {:<10} {:>11.4} {:>12} {:>12} {:>13} {:>7} {:>7}\n",
+                    label,
+                    p.parameter,
+                    p.truth,
+                    show(Some(p.mean), 4),
+                    show(Some(p.found_sd), 4),
+                    show(p.promised_sd, 4),
+                    show(ratio, 2),
+                    p.draws
                 );
             }
         }
+    }
+    for sentence in result.verification_failures() {
+        text += &format!("\n* {sentence}\n");
     }
     if let Some(folder) = folder {
         text += &format!("\nreport: {}\n", folder.join("report.html").display());

@@ -5,6 +5,7 @@ use super::{Common, input, interrupt, output};
 use crate::diagnosis::{Diagnosis, DiagnosisError, DiagnosisOptions, DiagnosisResult, Verdict, diagnose};
 use crate::provenance::input_hash;
 use crate::recording::{ReadLimits, Recording};
+use crate::report::{diagnosis_pictures, diagnosis_report};
 use clap::Args;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -64,6 +65,10 @@ pub(super) fn run(a: &DiagnoseArguments) -> Result<(), CliError> {
     let result = DiagnosisResult::new(&found, &recording.id, input_hash(&inputs));
     if let Some(folder) = output::folder(a.common.out.as_deref(), a.common.json, &a.recording) {
         output::write_file(&folder, "diagnosis.json", output::to_json(&result)?.as_bytes())?;
+        output::write_file(&folder, "report.html", diagnosis_report(&found, &result).to_html().as_bytes())?;
+        for (name, svg) in diagnosis_pictures(&found) {
+            output::write_file(&folder, &format!("{name}.svg"), svg.as_bytes())?;
+        }
     }
     output::print(&if a.common.json { output::to_json(&result)? } else { summary(&result, &found) })
 }

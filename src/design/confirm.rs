@@ -1,8 +1,12 @@
 //! Confirmation: a design at the reported fidelity, standard mesh and the scan's own voxels, for every material.
 
-use super::objective::combine;
-use super::response::{EvaluationFailure, criteria_as_relative_sd, tearing_stretch};
-use super::study::{ObjectiveKind, Study};
+use super::aim::Normalisation;
+use super::objective::{Judged, Reference};
+use super::response::{
+    Evaluated, EvaluationFailure, Evaluator, Response, criteria_as_relative_sd, log_or_undetermined, normalised,
+    sample_materials, tearing_stretch,
+};
+use super::study::Study;
 use crate::fem::ForwardModel;
 use crate::kinematics::principal_stretches;
 use crate::sensitivity::{
@@ -19,16 +23,21 @@ pub struct Confirmed {
     pub specimen: Specimen,
     /// The evaluation with each prior's central values.
     pub by_material: Vec<MaterialEvaluation>,
-    /// Gain over the base specimen, from these evaluations.
+    /// What each material sample of [`sample_materials`] gives, the priors' variants included, in that order.
+    pub responses: Vec<Response>,
+    /// Gain over the base specimen, from these responses.
     pub objective: f64,
     /// Gains that make up the objective.
     pub gains: Vec<Gain>,
-    /// Every limit, closest first.
+    /// Every limit, closest first; force and stretch are the largest over the material samples.
     pub limits: Vec<LimitMargin>,
-    /// Whether all of them, and the guard if the study asks for it, are kept.
+    /// Whether all of them, and the guard if the study asks for it, are kept with every material sample.
     pub is_within_limits: bool,
     /// Volume of material, mm³.
     pub volume_mm3: f64,
+    /// What is to be known about how it came here: a limit that only the fine mesh broke, or a repair.
+    #[serde(default)]
+    pub remark: Option<String>,
 }
 
 /// One prior's evaluation.
@@ -74,6 +83,9 @@ pub struct Gain {
     pub integrated_sensitivity: Option<f64>,
     /// Promised standard deviation of the base / of this design (above 1: better); null where undetermined.
     pub promised_sd: Option<f64>,
+    /// The least such ratio over the prior's central values and its variants.
+    #[serde(default)]
+    pub worst_promised_sd: Option<f64>,
 }
 
 /// Evaluates a design at its last drive.
@@ -85,7 +97,7 @@ pub fn confirm(
     specimen: &Specimen,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Confirmed, EvaluationFailure> {
-    let mut by_material = Vec::new();
+    let mut by_material: Vec<MaterialEvaluation> = Vec::new();
     let options = EvaluationOptions::standard(specimen);
     let mut model = ForwardModel::of_specimen(specimen, &options.mesh)?;
     for prior in &study.materials {
@@ -95,20 +107,50 @@ pub fn confirm(
                 .map_err(failure)?;
         by_material.push(of_material(&model, &prior.name, &prior.material, evaluation, &maps));
     }
+    let responses = responses(study, specimen, &by_material, is_cancelled)?;
+    let largest = |f: fn(&Response) -> f64| responses.iter().map(f).fold(f64::NEG_INFINITY, f64::max).exp();
+    let (force, stretch) = (largest(|r| r.log_force), largest(|r| r.log_stretch));
     let mut limits = study.limits.check_geometry(specimen, study.scan.voxel_mm);
-    let largest = |f: fn(&MaterialEvaluation) -> f64| by_material.iter().map(f).fold(f64::NEG_INFINITY, f64::max);
     let drive = specimen.drive_mm.last().copied().unwrap_or(0.0);
-    limits.extend(study.limits.check_response(drive, largest(|m| m.force_n), largest(|m| m.tearing_stretch)));
+    limits.extend(study.limits.check_response(drive, force, stretch));
     limits.sort_by(|a, b| a.margin_relative.total_cmp(&b.margin_relative));
     Ok(Confirmed {
         specimen: specimen.clone(),
         by_material,
+        responses,
         objective: 1.0,
         gains: Vec::new(),
         is_within_limits: limits.iter().all(|m| m.is_satisfied),
         limits,
         volume_mm3: specimen.volume_mm3(),
+        remark: None,
     })
+}
+
+/// Responses at every material sample. Those at the central values are the evaluations'; a variant's is the centre's plus the
+/// difference that the variant makes on the search's mesh: differences of logarithms at one mesh are far more accurate than
+/// the values, and cost little.
+fn responses(
+    study: &Study,
+    specimen: &Specimen,
+    by_material: &[MaterialEvaluation],
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Vec<Response>, EvaluationFailure> {
+    let samples = sample_materials(&study.materials);
+    let central: Vec<Vec<f64>> = by_material.iter().map(|m| m.response(study).to_vector()).collect();
+    if samples.len() == central.len() {
+        return Ok(central.iter().map(|v| Response::from_vector(v)).collect());
+    }
+    let searched = Evaluator::with_variants(study).evaluate(specimen, None, is_cancelled)?;
+    let coarse: Vec<Vec<f64>> = searched.responses.iter().map(Response::to_vector).collect();
+    let of_sample = |index: usize| {
+        let prior = samples[index].prior;
+        // A prior's central values come first among its samples.
+        let centre = samples.iter().position(|s| s.prior == prior).unwrap_or(index);
+        let moved = central[prior].iter().zip(coarse[index].iter().zip(&coarse[centre]));
+        Response::from_vector(&moved.map(|(value, (variant, centre))| value + variant - centre).collect::<Vec<_>>())
+    };
+    Ok((0..samples.len()).map(of_sample).collect())
 }
 
 fn failure(error: EvaluationError) -> EvaluationFailure {
@@ -142,10 +184,26 @@ fn of_material(
 }
 
 impl MaterialEvaluation {
-    /// 𝒮 (sum over voxels) of a parameter at the drive.
-    pub fn integrated(&self, parameter: &str) -> Option<f64> {
+    /// 𝒮 of a parameter at the drive, in a normalisation.
+    pub fn integrated(&self, parameter: &str, normalisation: Normalisation) -> Option<f64> {
         let step = self.evaluation.steps.last()?;
-        step.integrated_sensitivity.iter().find(|s| s.parameter == parameter).map(|s| s.sum)
+        let of_parameter = step.integrated_sensitivity.iter().find(|s| s.parameter == parameter)?;
+        Some(normalised(of_parameter, normalisation))
+    }
+
+    /// The figures that designs are judged by.
+    fn response(&self, study: &Study) -> Response {
+        let normalisation = study.objective.normalisation;
+        let sensitivities = self.evaluation.steps.last().map_or(&[][..], |step| &step.integrated_sensitivity);
+        let promised = self.evaluation.promised_sd.iter().filter(|p| p.parameter != "kappa");
+        let c = &self.relative_sd_by_criterion;
+        Response {
+            log_integrated: sensitivities.iter().map(|s| normalised(s, normalisation).max(1e-300).ln()).collect(),
+            log_relative_sd: promised.map(|p| log_or_undetermined(p.relative_sd)).collect(),
+            log_criteria: [c.d_optimal, c.a_optimal, c.e_optimal, c.worst_parameter].map(log_or_undetermined),
+            log_force: self.force_n.abs().max(1e-12).ln(),
+            log_stretch: self.tearing_stretch.ln(),
+        }
     }
 
     /// Promised standard deviation of a parameter.
@@ -157,47 +215,45 @@ impl MaterialEvaluation {
 impl Confirmed {
     /// Fills gains, objective and guard by comparison with the base.
     pub fn compare(&mut self, study: &Study, base: &Confirmed) {
+        let samples = sample_materials(&study.materials);
+        let reference = Reference::new(study, &samples, &base.responses);
+        let judged = self.judged(&reference);
+        self.objective = reference.objective(&judged).exp();
+        // The ratio of two equal numbers rounds.
+        self.is_within_limits =
+            self.limits.iter().all(|m| m.is_satisfied) && judged.margins.iter().all(|m| *m >= -1e-9);
         self.gains.clear();
-        let (mut ln_gains, mut weights) = (Vec::new(), Vec::new());
-        let total: f64 = study.materials.iter().map(|p| p.weight).sum();
-        for ((own, of_base), prior) in self.by_material.iter().zip(&base.by_material).zip(&study.materials) {
-            let parameters: Vec<String> =
-                prior.material.parameters().into_iter().map(|p| p.name()).filter(|n| n != "kappa").collect();
-            let start = ln_gains.len();
-            for parameter in &parameters {
+        let normalisation = study.objective.normalisation;
+        for (index, (own, of_base)) in self.by_material.iter().zip(&base.by_material).enumerate() {
+            let parameters = study.materials[index].material.parameters().into_iter().map(|p| p.name());
+            for (entry, parameter) in parameters.filter(|n| n != "kappa").enumerate() {
                 let ratio = |a: Option<f64>, b: Option<f64>| Some(a? / b?);
-                let integrated = ratio(own.integrated(parameter), of_base.integrated(parameter));
-                let promised = ratio(of_base.promised(parameter), own.promised(parameter));
-                if study.objective.kind == ObjectiveKind::IntegratedSensitivity {
-                    ln_gains.push(integrated.map_or(f64::NEG_INFINITY, f64::ln));
-                }
-                if study.objective.guard_promised_sd {
-                    let is_main = own.material == study.materials[0].name;
-                    let is_kept = !is_main || promised.is_none_or(|p| p >= 1.0 - 1e-9);
-                    self.is_within_limits &= is_kept;
-                }
+                let promised_sd = ratio(of_base.promised(&parameter), own.promised(&parameter));
+                let worst = samples
+                    .iter()
+                    .zip(self.responses.iter().zip(&base.responses))
+                    .filter(|(sample, _)| sample.prior == index)
+                    .filter_map(|(_, (own, of_base))| {
+                        Some((of_base.log_relative_sd.get(entry)? - own.log_relative_sd.get(entry)?).exp())
+                    })
+                    .reduce(f64::min);
                 self.gains.push(Gain {
                     material: own.material.clone(),
-                    parameter: parameter.clone(),
-                    integrated_sensitivity: integrated,
-                    promised_sd: promised,
+                    integrated_sensitivity: ratio(
+                        own.integrated(&parameter, normalisation),
+                        of_base.integrated(&parameter, normalisation),
+                    ),
+                    worst_promised_sd: promised_sd.and(worst),
+                    promised_sd,
+                    parameter,
                 });
             }
-            let (a, b) = (&own.relative_sd_by_criterion, &of_base.relative_sd_by_criterion);
-            let criterion = match study.objective.kind {
-                ObjectiveKind::IntegratedSensitivity => None,
-                ObjectiveKind::DOptimal => Some((b.d_optimal, a.d_optimal)),
-                ObjectiveKind::AOptimal => Some((b.a_optimal, a.a_optimal)),
-                ObjectiveKind::EOptimal => Some((b.e_optimal, a.e_optimal)),
-                ObjectiveKind::WorstRelativeSd => Some((b.worst_parameter, a.worst_parameter)),
-            };
-            if let Some((base, own)) = criterion {
-                ln_gains.push(base.zip(own).map_or(f64::NEG_INFINITY, |(b, o)| (b / o).ln()));
-            }
-            let count = ln_gains.len() - start;
-            weights.extend(std::iter::repeat_n(prior.weight / total / count as f64, count));
         }
-        self.objective = combine(study.objective.combine, &ln_gains, &weights).exp();
+    }
+
+    /// Gains and margins, counted from a reference to the base's confirmed responses.
+    pub(super) fn judged(&self, reference: &Reference) -> Judged {
+        reference.judge(&Evaluated { responses: self.responses.clone(), gradients: Vec::new() })
     }
 
     /// The limit with the smallest relative margin.

@@ -1,7 +1,9 @@
 //! What a result says, in plain words: each sentence is computed from the numbers beside it.
 
+use super::aim::Normalisation;
 use super::result::DesignEntry;
 use super::study::Study;
+use crate::sensitivity::IDENTIFIABILITY_LIMIT;
 use serde::{Deserialize, Serialize};
 
 /// How differently integrated sensitivity and Fisher information rank the confirmed designs for one material.
@@ -82,113 +84,293 @@ fn holes(count: usize) -> String {
     }
 }
 
-fn percent(ratio: f64) -> String {
-    format!("{:+.0} %", 100.0 * (ratio - 1.0))
+/// "12 % more" or "8 % less".
+fn more_or_less(ratio: f64) -> String {
+    let percent = 100.0 * (ratio - 1.0);
+    if percent.abs() < 0.5 {
+        "as much".into()
+    } else if percent > 0.0 {
+        format!("{percent:.0} % more")
+    } else {
+        format!("{:.0} % less", -percent)
+    }
 }
 
-/// Sentences for the report.
+/// "mu_1" as it is written in reports: μ₁.
+fn symbol(parameter: &str) -> String {
+    let subscript = |digits: &str| -> String {
+        digits.chars().filter_map(|c| c.to_digit(10)).filter_map(|d| char::from_u32('₀' as u32 + d)).collect()
+    };
+    match parameter.split_once('_') {
+        Some(("mu", index)) => format!("μ{}", subscript(index)),
+        Some(("alpha", index)) => format!("α{}", subscript(index)),
+        _ if parameter == "kappa" => "κ".into(),
+        _ => parameter.into(),
+    }
+}
+
+/// Best and worst of some factors, as "× 1.02 to × 1.10".
+fn factors(values: &[f64]) -> Option<String> {
+    let least = values.iter().copied().reduce(f64::min)?;
+    let most = values.iter().copied().reduce(f64::max)?;
+    Some(if most - least < 5e-4 { format!("×{least:.3}") } else { format!("×{least:.3} to ×{most:.3}") })
+}
+
+/// Sentences for the report: first the winner and its gains, then what holes do for each material, then where the two
+/// measures disagree, then what can and cannot be seen, then what happened at confirmation.
 pub fn findings(
     study: &Study,
     base: &DesignEntry,
     ranked: &[DesignEntry],
     disagreement: &[Disagreement],
 ) -> Vec<String> {
-    let mut said = Vec::new();
-    let Some(best) = ranked.first() else { return said };
-    said.push(format!(
-        "The best specimen within the limits is \"{}\", scanned at {:.2} mm: objective {:.3} times the base specimen's at {:.2} mm.",
+    let Some(best) = ranked.first() else { return Vec::new() };
+    let mut said = vec![winner(base, best)];
+    said.extend(what_size_does(study, base, best));
+    for (index, prior) in study.materials.iter().enumerate() {
+        said.extend(gains_of_material(best, &prior.name));
+        said.extend(what_holes_do(base, ranked, index, &prior.name));
+        said.extend(disagreement.get(index).and_then(|d| where_measures_disagree(d, &prior.name)));
+        said.extend(what_is_seen(base, best, index, &prior.name));
+    }
+    said.extend(at_confirmation(best, ranked));
+    said
+}
+
+fn winner(base: &DesignEntry, best: &DesignEntry) -> String {
+    let drive = |e: &DesignEntry| e.specimen.drive_mm.last().copied().unwrap_or(0.0);
+    if best.specimen.holes == base.specimen.holes
+        && best.specimen.block == base.specimen.block
+        && best.objective < 1.0005
+    {
+        return format!(
+            "No design within the limits beats the base specimen at {:.2} mm. Widen the limits or the ranges, or search longer.",
+            drive(base)
+        );
+    }
+    format!(
+        "The best specimen within the limits is \"{}\", scanned at a drive of {:.2} mm. By the study's objective it is {:.3} times \
+         as good as the base specimen at {:.2} mm. It needs {:.1} N (base: {:.1} N).",
         best.specimen.name,
-        best.specimen.drive_mm.last().copied().unwrap_or(0.0),
+        drive(best),
         best.objective,
-        base.specimen.drive_mm.last().copied().unwrap_or(0.0),
-    ));
-    let weakest = best.gains.iter().filter_map(|g| Some((g, g.promised_sd?))).min_by(|a, b| a.1.total_cmp(&b.1));
-    if let Some((gain, ratio)) = weakest {
+        drive(base),
+        best.force_n(),
+        base.force_n(),
+    )
+}
+
+/// Where blocks may differ: what of the gain is size and what is geometry.
+fn what_size_does(study: &Study, base: &DesignEntry, best: &DesignEntry) -> Option<String> {
+    if best.specimen.block == base.specimen.block {
+        return None;
+    }
+    let ratio = best.volume_mm3 / base.volume_mm3;
+    let sums = best.gains.iter().filter_map(|g| g.integrated_sensitivity);
+    let per_volume: Vec<f64> = match study.objective.normalisation {
+        Normalisation::MeanPerVoxel => sums.collect(),
+        Normalisation::Sum | Normalisation::VolumeIntegral => sums.map(|s| s / ratio).collect(),
+    };
+    // Twice the voxels of the same information halve the variance.
+    let sds: Vec<f64> = best.gains.iter().filter_map(|g| g.promised_sd).map(|s| s / ratio.sqrt()).collect();
+    let (Some(per_volume), Some(sds)) = (factors(&per_volume), factors(&sds)) else { return None };
+    let size = |e: &DesignEntry| {
+        let b = &e.specimen.block;
+        format!("{:.1} × {:.2} × {:.1} mm", b.length_mm, b.thickness_mm, b.width_mm)
+    };
+    Some(format!(
+        "Part of this is size: the block is {} (base: {}) and holds {:.2} times the base's material, which alone makes integrated \
+         sensitivities ×{ratio:.2} and standard deviations ×{:.2} better. Shape and strain make the rest: {per_volume} in the \
+         integrated sensitivities and {sds} in the standard deviations.",
+        size(best),
+        size(base),
+        ratio,
+        ratio.sqrt()
+    ))
+}
+
+/// Both measures of one material, parameter by parameter where they get worse.
+fn gains_of_material(best: &DesignEntry, material: &str) -> Option<String> {
+    let of_material: Vec<_> = best.gains.iter().filter(|g| g.material == material).collect();
+    let sums: Vec<f64> = of_material.iter().filter_map(|g| g.integrated_sensitivity).collect();
+    let sds: Vec<f64> = of_material.iter().filter_map(|g| g.promised_sd).collect();
+    let mut text = format!(
+        "Material \"{material}\": against the base, the best specimen's integrated sensitivities are {}",
+        factors(&sums)?
+    );
+    match factors(&sds) {
+        None => text += "; no standard deviation is determined.",
+        Some(range) => text += &format!("; its promised standard deviations are smaller by {range}."),
+    }
+    let lost: Vec<String> = of_material
+        .iter()
+        .filter_map(|g| Some((g, g.promised_sd?)))
+        .filter(|(_, ratio)| *ratio < 0.9995)
+        .map(|(g, ratio)| {
+            format!("{} is promised {:.1} % less precisely", symbol(&g.parameter), 100.0 * (1.0 / ratio - 1.0))
+        })
+        .collect();
+    if !lost.is_empty() {
+        text += &format!(" A factor below 1 is a loss: {}.", lost.join(", "));
+    }
+    let worst = of_material.iter().filter_map(|g| Some((g, g.worst_promised_sd?))).min_by(|a, b| a.1.total_cmp(&b.1));
+    if let Some((gain, ratio)) = worst
+        && sds.iter().copied().fold(f64::INFINITY, f64::min) - ratio > 5e-4
+    {
+        text += &format!(
+            " If the material is stiffer or softer than assumed, the least factor is ×{ratio:.3} ({}).",
+            symbol(&gain.parameter)
+        );
+    }
+    Some(text)
+}
+
+/// The best of every number of holes, by both measures, against the solid block.
+fn what_holes_do(base: &DesignEntry, ranked: &[DesignEntry], index: usize, material: &str) -> Vec<String> {
+    let mut by_count: std::collections::BTreeMap<usize, (f64, f64)> = std::collections::BTreeMap::new();
+    for entry in ranked {
+        let slot = by_count.entry(entry.specimen.holes.len()).or_insert((0.0, 0.0));
+        slot.0 = slot.0.max(integrated_gain(entry, material));
+        slot.1 = slot.1.max(information_gain(entry, base, index).unwrap_or(0.0));
+    }
+    let Some(&(solid_sum, solid_information)) = by_count.get(&0) else { return Vec::new() };
+    let holed: Vec<_> = by_count.iter().filter(|(count, _)| **count > 0).collect();
+    let mut said = Vec::new();
+    if let Some((count, (sum, _))) = holed.iter().max_by(|a, b| a.1.0.total_cmp(&b.1.0)) {
+        let ratio = sum / solid_sum;
+        let verdict = if ratio > 1.005 {
+            "holes help the integrated sensitivity"
+        } else {
+            "holes do not help the integrated sensitivity"
+        };
+        let reason = if ratio > 1.005 { "" } else { ": a removed voxel is a lost measurement" };
         said.push(format!(
-            "Promised standard deviations, base over best: {ratio:.3} or more for every parameter and material (above 1: better; the least is that of {} with material \"{}\").",
-            gain.parameter, gain.material
+            "Material \"{material}\": {verdict}. The best confirmed specimen with holes ({}) has {} of it than the best solid block{reason}.",
+            holes(**count),
+            more_or_less(ratio).replace("as much", "no more and no less")
         ));
     }
-    // The best of every number of holes, by both measures.
-    for (index, prior) in study.materials.iter().enumerate() {
-        let mut by_count: std::collections::BTreeMap<usize, (f64, f64)> = std::collections::BTreeMap::new();
-        for entry in ranked {
-            let slot = by_count.entry(entry.specimen.holes.len()).or_insert((0.0, 0.0));
-            slot.0 = slot.0.max(integrated_gain(entry, &prior.name));
-            slot.1 = slot.1.max(information_gain(entry, base, index).unwrap_or(0.0));
-        }
-        let Some(&(solid_sum, solid_information)) = by_count.get(&0) else { continue };
-        let holed: Vec<_> = by_count.iter().filter(|(count, _)| **count > 0).collect();
-        let best_sum = holed.iter().max_by(|a, b| a.1.0.total_cmp(&b.1.0));
-        if let Some((count, (sum, _))) = best_sum {
-            let ratio = sum / solid_sum;
-            said.push(if ratio > 1.01 {
-                format!(
-                    "Material \"{}\": holes help the integrated sensitivity; the best found ({}) has {} against the best solid block.",
-                    prior.name, holes(**count), percent(ratio)
-                )
-            } else {
-                format!(
-                    "Material \"{}\": holes do not help the integrated sensitivity; the best specimen with holes ({}) has {} against the best solid block, because a removed voxel is a lost measurement.",
-                    prior.name, holes(**count), percent(ratio)
-                )
-            });
-        }
-        let best_information = holed.iter().max_by(|a, b| a.1.1.total_cmp(&b.1.1));
-        if let Some((count, (_, information))) = best_information {
-            let ratio = information / solid_information;
-            said.push(if ratio > 1.01 {
-                format!(
-                    "Material \"{}\": holes help the Fisher information; the best found ({}) promises a generalised standard deviation {:.2} times smaller than the best solid block's.",
-                    prior.name, holes(**count), ratio
-                )
-            } else {
-                format!(
-                    "Material \"{}\": holes do not help the Fisher information; the best specimen with holes ({}) promises a generalised standard deviation {:.2} times that of the best solid block.",
-                    prior.name, holes(**count), 1.0 / ratio
-                )
-            });
-        }
-        if let Some(d) = disagreement.get(index)
-            && let Some(tau) = d.kendall_tau
-        {
-            let top_sum = d.rank_by_integrated_sensitivity.iter().position(|r| *r == 1);
-            let top_information = d.rank_by_information.iter().position(|r| *r == 1);
-            if let (Some(a), Some(b)) = (top_sum, top_information) {
-                said.push(if a == b {
-                    format!(
-                        "Material \"{}\": both measures put the same design first (rank correlation τ = {tau:.2} over all confirmed designs).",
-                        prior.name
-                    )
-                } else {
-                    format!(
-                        "Material \"{}\": the measures disagree; integrated sensitivity puts design {} first, Fisher information design {} (rank correlation τ = {tau:.2}). Integrated sensitivity counts stress changes that several parameters share; Fisher information counts only what tells them apart and what the displacements and the force can show.",
-                        prior.name, a + 1, b + 1
-                    )
-                });
-            }
-        }
-        for parameter in prior.material.parameters().into_iter().map(|p| p.name()).filter(|n| n != "kappa") {
-            let relative = |e: &DesignEntry| {
-                let list = &e.by_material.get(index)?.evaluation.promised_sd;
-                list.iter().find(|p| p.parameter == parameter)?.relative_sd
-            };
-            match (relative(base), relative(best)) {
-                (b, Some(o)) if b.is_none_or(|b| b > 0.5) && o <= 0.5 => said.push(format!(
-                    "Material \"{}\": {parameter} cannot be seen with the base specimen and can with the best one (relative standard deviation {:.1} %).",
-                    prior.name, 100.0 * o
-                )),
-                (Some(b), Some(o)) if b <= 0.5 && o > 0.5 => said.push(format!(
-                    "Caution. Material \"{}\": {parameter} can be seen with the base specimen (relative standard deviation {:.0} %) and no longer with the best one ({:.0} %). If this material is likely, take a design with holes from the list.",
-                    prior.name, 100.0 * b, 100.0 * o
-                )),
-                (_, Some(o)) if o > 0.5 => said.push(format!(
-                    "Material \"{}\": {parameter} cannot be seen with either specimen (relative standard deviation {:.0} % with the best one).",
-                    prior.name, 100.0 * o
-                )),
-                _ => {}
-            }
+    if let Some((count, (_, information))) = holed.iter().max_by(|a, b| a.1.1.total_cmp(&b.1.1)) {
+        // A standard deviation; smaller is better.
+        let ratio = solid_information / information;
+        said.push(if !ratio.is_finite() {
+            format!("Material \"{material}\": the standard deviations of the confirmed designs are not determined.")
+        } else if ratio < 0.995 {
+            format!(
+                "Material \"{material}\": holes help to tell the parameters apart. The best confirmed specimen with holes ({}) promises a \
+                 generalised standard deviation {:.0} % smaller than the best solid block's.",
+                holes(**count),
+                100.0 * (1.0 - ratio)
+            )
+        } else {
+            format!(
+                "Material \"{material}\": holes do not help to tell the parameters apart. The best confirmed specimen with holes ({}) \
+                 promises a generalised standard deviation {} than the best solid block's.",
+                holes(**count),
+                if ratio < 1.005 { "no smaller".to_string() } else { format!("{:.0} % larger", 100.0 * (ratio - 1.0)) }
+            )
+        });
+    }
+    said
+}
+
+fn where_measures_disagree(d: &Disagreement, material: &str) -> Option<String> {
+    let tau = d.kendall_tau?;
+    let by_sum = d.rank_by_integrated_sensitivity.iter().position(|r| *r == 1)?;
+    let by_information = d.rank_by_information.iter().position(|r| *r == 1)?;
+    Some(if by_sum == by_information {
+        format!(
+            "Material \"{material}\": integrated sensitivity and Fisher information put the same design first (number {}); over all \
+             confirmed designs their rank correlation is τ = {tau:.2} (1: the same order, −1: reversed).",
+            by_sum + 1
+        )
+    } else {
+        format!(
+            "Material \"{material}\": the measures disagree. Integrated sensitivity puts design {} first, Fisher information design {} \
+             (rank correlation τ = {tau:.2}; 1: the same order, −1: reversed). Integrated sensitivity also counts stress changes that \
+             several parameters share; Fisher information counts only what tells them apart and shows in the displacements or the force.",
+            by_sum + 1,
+            by_information + 1
+        )
+    })
+}
+
+/// Parameters that come into sight, go out of sight or stay out of it.
+fn what_is_seen(base: &DesignEntry, best: &DesignEntry, index: usize, material: &str) -> Vec<String> {
+    let Some(of_best) = best.by_material.get(index) else { return Vec::new() };
+    let mut said = Vec::new();
+    for parameter in of_best.evaluation.promised_sd.iter().map(|p| &p.parameter).filter(|n| *n != "kappa") {
+        let relative = |e: &DesignEntry| {
+            let list = &e.by_material.get(index)?.evaluation.promised_sd;
+            list.iter().find(|p| p.parameter == *parameter)?.relative_sd
+        };
+        let name = symbol(parameter);
+        let percent = |sd: Option<f64>| sd.map_or("undetermined".into(), |sd| format!("{:.0} %", 100.0 * sd));
+        let is_seen = |sd: Option<f64>| sd.is_some_and(|sd| sd <= IDENTIFIABILITY_LIMIT);
+        let (of_base, of_best) = (relative(base), relative(best));
+        let limit = 100.0 * IDENTIFIABILITY_LIMIT;
+        match (is_seen(of_base), is_seen(of_best)) {
+            (true, true) => {}
+            (false, true) => said.push(format!(
+                "Material \"{material}\": {name} cannot be seen with the base specimen (relative standard deviation {}, above {limit:.0} %) \
+                 and can with the best one ({}).",
+                percent(of_base),
+                percent(of_best)
+            )),
+            (true, false) => said.push(format!(
+                "Caution. Material \"{material}\": {name} can be seen with the base specimen (relative standard deviation {}) and no longer \
+                 with the best one ({}, above {limit:.0} %). If this material is likely, guard every material or take another design of the list.",
+                percent(of_base),
+                percent(of_best)
+            )),
+            (false, false) => said.push(format!(
+                "Material \"{material}\": {name} cannot be seen with either specimen (relative standard deviation {} with the base, {} with \
+                 the best).",
+                percent(of_base),
+                percent(of_best)
+            )),
         }
     }
     said
+}
+
+/// Limits that only the fine mesh broke, and repairs.
+fn at_confirmation(best: &DesignEntry, ranked: &[DesignEntry]) -> Vec<String> {
+    let mut said = Vec::new();
+    if let Some(remark) = &best.remark {
+        said.push(format!("On the best specimen: {remark}"));
+    }
+    let better = ranked.iter().filter(|e| !e.is_within_limits && e.remark.is_some() && e.objective > best.objective);
+    let count = better.count();
+    if count > 0 {
+        said.push(format!(
+            "{count} design{} with a larger gain kept every limit on the coarse mesh of the search and missed one at confirmation; \
+             see the remarks in the list.",
+            if count == 1 { "" } else { "s" }
+        ));
+    }
+    said
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words() {
+        assert_eq!(symbol("mu_1"), "μ₁");
+        assert_eq!(symbol("alpha_12"), "α₁₂");
+        assert_eq!(symbol("kappa"), "κ");
+        assert_eq!(factors(&[1.1, 0.9]).as_deref(), Some("×0.900 to ×1.100"));
+        assert_eq!(factors(&[1.1]).as_deref(), Some("×1.100"));
+        assert_eq!(factors(&[]), None);
+        assert_eq!(more_or_less(1.12), "12 % more");
+        assert_eq!(more_or_less(0.92), "8 % less");
+        assert_eq!(more_or_less(1.001), "as much");
+    }
+
+    #[test]
+    fn equal_values_rank_by_index() {
+        assert_eq!(ranks(&[1.0, 3.0, 3.0, 2.0]), [4, 1, 2, 3]);
+    }
 }

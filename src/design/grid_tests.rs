@@ -17,8 +17,8 @@ fn two_variables(kind: ObjectiveKind) -> Study {
     study.vary.axes = vec![crate::specimen::HoleAxis::Thickness];
     study.vary.drive_mm = Range { min: 5.0, max: 5.0 };
     (study.vary.length_mm, study.vary.thickness_mm, study.vary.width_mm) = (None, None, None);
-    study.objective = Objective { kind, guard_promised_sd: false, ..study.objective };
-    study.budget = Budget { explore: 16, refine: 2, iterations: 10, confirm: 1 };
+    study.objective = Objective { kind, guard_promised_sd: Guard::None, ..Objective::default() };
+    study.budget = Budget { explore: 16, refine: 2, iterations: 10, confirm: 1, variants_in_search: true };
     study
 }
 
@@ -35,7 +35,7 @@ fn a_grid_finds_nothing_better() {
 
         let evaluator = Evaluator::new(&study);
         let base = evaluator.evaluate(&base_at_drive(&study), None, &|| false).expect("the base evaluates");
-        let reference = Reference::new(&study, evaluator.samples(), &base);
+        let reference = Reference::new(&study, evaluator.samples(), &base.responses);
         let mut designs = Vec::new();
         for space in &subspaces(&study) {
             assert_eq!(space.variables.len(), 3);

@@ -1,21 +1,27 @@
 //! The search for a better specimen.
 
+mod aim;
 mod checkpoint;
 mod confirm;
 mod explore;
+mod finals;
 mod findings;
 #[cfg(test)]
 mod grid_tests;
 mod local;
 mod objective;
+mod problem;
 mod response;
 mod result;
 mod search;
 #[cfg(test)]
 mod search_tests;
 mod space;
+mod state;
 mod study;
+mod unfinished;
 
+pub use aim::{Combine, Guard, Normalisation, Objective, ObjectiveKind};
 pub use checkpoint::{Checkpoint, CheckpointError};
 pub use confirm::{Confirmed, CriterionValues, Gain, MaterialEvaluation, confirm};
 pub use explore::{geometry_margins, is_makeable, sample};
@@ -27,9 +33,8 @@ pub use response::{
     tearing_stretch,
 };
 pub use result::{DesignEntry, DesignResult, MaterialVerification, Verification};
-pub use search::{Candidate, Found, Progress, ProgressSink, SearchError, base_at_drive, search, study_hash};
+pub use search::{Found, Progress, ProgressSink, SearchError, base_at_drive, search, study_hash};
 pub use space::{Orbit, Structure, Subspace, Variable, subspaces};
-pub use study::{
-    Budget, Combine, CountRange, MaterialPrior, Objective, ObjectiveKind, Range, Study, StudyError, Vary,
-    VerificationSettings,
-};
+pub use state::Candidate;
+pub use study::{Budget, CountRange, MaterialPrior, Range, Study, StudyError, Vary, VerificationSettings};
+pub use unfinished::Unfinished;

@@ -1,8 +1,9 @@
 //! From responses to the objective and the response limits, all as logarithms of ratios: 0 is the base specimen, or a limit
 //! just met; larger is better.
 
+use super::aim::{Combine, ObjectiveKind};
 use super::response::{Evaluated, MaterialSample, Response};
-use super::study::{Combine, ObjectiveKind, Study};
+use super::study::Study;
 use crate::specimen::ManufacturingLimits;
 
 /// The base specimen's responses, against which gains are counted.
@@ -10,6 +11,8 @@ pub struct Reference<'a> {
     study: &'a Study,
     samples: &'a [MaterialSample],
     base: Vec<Response>,
+    /// Added to the margins of each prior's limits: what a confirmation has shown the search fidelity to be off by.
+    shifts: Vec<Vec<f64>>,
 }
 
 /// Gains and limits of one design, with gradients where the evaluation has them.
@@ -19,8 +22,10 @@ pub struct Judged {
     pub gains: Vec<f64>,
     /// Weights of the gains; they sum to one.
     pub weights: Vec<f64>,
-    /// Margins that must not be negative: guards, force, stretch.
+    /// Margins that must not be negative, at every material sample: guards, force, stretch.
     pub margins: Vec<f64>,
+    /// The least margin of each limit over a prior's samples: `[prior][limit]`.
+    pub worst_margins: Vec<Vec<f64>>,
     /// `[variable][gain]`, per mm.
     pub gain_gradients: Vec<Vec<f64>>,
     /// `[variable][margin]`, per mm.
@@ -28,18 +33,24 @@ pub struct Judged {
 }
 
 impl<'a> Reference<'a> {
-    /// Counts from `base`, the base specimen's evaluation.
-    pub fn new(study: &'a Study, samples: &'a [MaterialSample], base: &Evaluated) -> Reference<'a> {
-        Reference { study, samples, base: base.responses.clone() }
+    /// Counts from `base`, the base specimen's responses to `samples`.
+    pub fn new(study: &'a Study, samples: &'a [MaterialSample], base: &[Response]) -> Reference<'a> {
+        Reference { study, samples, base: base.to_vec(), shifts: Vec::new() }
+    }
+
+    /// The same with `shifts[prior][limit]` added to the margins.
+    pub fn with_shifts(&self, shifts: Vec<Vec<f64>>) -> Reference<'a> {
+        Reference { study: self.study, samples: self.samples, base: self.base.clone(), shifts }
     }
 
     /// ln gains of one response.
     fn gains(&self, response: &Response, base: &Response) -> Vec<f64> {
         let criterion = |i: usize| vec![base.log_criteria[i] - response.log_criteria[i]];
+        let sensitivity = || response.log_integrated.iter().zip(&base.log_integrated).map(|(a, b)| a - b);
+        let promised = response.log_relative_sd.iter().zip(&base.log_relative_sd).map(|(a, b)| b - a);
         match self.study.objective.kind {
-            ObjectiveKind::IntegratedSensitivity => {
-                response.log_integrated.iter().zip(&base.log_integrated).map(|(a, b)| a - b).collect()
-            }
+            ObjectiveKind::IntegratedSensitivity => sensitivity().collect(),
+            ObjectiveKind::SensitivityAndPromisedSd => sensitivity().chain(promised).collect(),
             ObjectiveKind::DOptimal => criterion(0),
             ObjectiveKind::AOptimal => criterion(1),
             ObjectiveKind::EOptimal => criterion(2),
@@ -47,39 +58,45 @@ impl<'a> Reference<'a> {
         }
     }
 
-    /// `allowances[i]` is the ln of the factor by which the i-th relative standard deviation may exceed the base's.
-    fn margins(&self, response: &Response, base: &Response, allowances: &[f64]) -> Vec<f64> {
+    /// Weights of [`Self::gains`] within a prior; they sum to one.
+    fn weights(&self, prior: usize, count: usize) -> Vec<f64> {
+        let objective = &self.study.objective;
+        if objective.combine != Combine::Weighted {
+            return vec![1.0 / count as f64; count];
+        }
+        let parameters = self.study.materials[prior].material.parameters().into_iter().map(|p| p.name());
+        let of_parameters: Vec<f64> =
+            parameters.filter(|n| n != "kappa").map(|name| objective.weight_of(&name)).collect();
+        let of_gains: Vec<f64> = of_parameters.iter().copied().cycle().take(count).collect();
+        let total: f64 = of_gains.iter().sum();
+        of_gains.into_iter().map(|w| w / total).collect()
+    }
+
+    /// Guards (of a guarded prior one per μᵢ and αᵢ: ln of base over own standard deviation), force, stretch.
+    fn margins(&self, prior: usize, response: &Response, base: &Response) -> Vec<f64> {
         let limits: &ManufacturingLimits = &self.study.limits;
         let mut margins = Vec::new();
-        for ((b, r), allowance) in base.log_relative_sd.iter().zip(&response.log_relative_sd).zip(allowances) {
-            if allowance.is_finite() {
-                margins.push(b + allowance - r);
-            }
+        if self.study.objective.guard_promised_sd.covers(prior) {
+            margins.extend(base.log_relative_sd.iter().zip(&response.log_relative_sd).map(|(b, r)| b - r));
         }
         margins.extend(limits.max_force_n.map(|limit| limit.ln() - response.log_force));
         margins.extend(limits.max_local_stretch.map(|limit| limit.ln() - response.log_stretch));
         margins
     }
 
-    /// The guard: for the first material no standard deviation may grow. +∞ where nothing is asked.
-    fn allowances(&self, prior: usize) -> Vec<f64> {
-        let is_guarded = self.study.objective.guard_promised_sd && prior == 0;
-        let sample = self.samples.iter().position(|s| s.prior == prior);
-        let count = sample.map_or(0, |s| self.base[s].log_relative_sd.len());
-        vec![if is_guarded { 0.0 } else { f64::INFINITY }; count]
-    }
-
     /// Judges an evaluation.
     pub fn judge(&self, evaluated: &Evaluated) -> Judged {
+        let num_variables = evaluated.gradients.first().map_or(0, Vec::len);
         let mut judged = Judged {
             gains: Vec::new(),
             weights: Vec::new(),
             margins: Vec::new(),
-            gain_gradients: Vec::new(),
-            margin_gradients: Vec::new(),
+            worst_margins: Vec::new(),
+            gain_gradients: vec![Vec::new(); num_variables],
+            margin_gradients: vec![Vec::new(); num_variables],
         };
-        let is_averaged = self.study.objective.combine == Combine::GeometricMean;
-        // Each prior's samples are averaged: a design must not bank on one guess of the parameters.
+        // Each prior's gains are averaged over its samples (a design must not bank on one guess of the parameters); limits
+        // must hold at each of them.
         let num_priors = self.study.materials.len();
         for prior in 0..num_priors {
             let of_prior: Vec<usize> = (0..self.samples.len()).filter(|&s| self.samples[s].prior == prior).collect();
@@ -95,32 +112,48 @@ impl<'a> Reference<'a> {
                 }
                 sum
             };
-            let allowances = self.allowances(prior);
             let gains = mean(&|s| self.gains(&evaluated.responses[s], &self.base[s]));
-            let share = if is_averaged { total } else { 1.0 / num_priors as f64 };
-            judged.weights.extend(std::iter::repeat_n(share / gains.len() as f64, gains.len()));
+            let share = if self.study.objective.combine == Combine::Maximin { 1.0 / num_priors as f64 } else { total };
+            judged.weights.extend(self.weights(prior, gains.len()).into_iter().map(|w| share * w));
             judged.gains.extend(gains);
-            judged.margins.extend(mean(&|s| self.margins(&evaluated.responses[s], &self.base[s], &allowances)));
-            if let Some(first) = evaluated.gradients.first() {
-                judged.gain_gradients.resize(first.len(), Vec::new());
-                judged.margin_gradients.resize(first.len(), Vec::new());
-                for v in 0..first.len() {
-                    let zero = |s: usize| Response::from_vector(&vec![0.0; self.base[s].to_vector().len()]);
-                    let slope = |s: usize| Response::from_vector(&evaluated.gradients[s][v]);
-                    judged.gain_gradients[v].extend(mean(&|s| self.gains(&slope(s), &zero(s))));
+            let mut worst: Vec<f64> = Vec::new();
+            for &s in &of_prior {
+                let mut margins = self.margins(prior, &evaluated.responses[s], &self.base[s]);
+                if let Some(shifts) = self.shifts.get(prior) {
+                    margins.iter_mut().zip(shifts).for_each(|(m, shift)| *m += shift);
+                }
+                worst.resize(margins.len(), f64::INFINITY);
+                worst.iter_mut().zip(&margins).for_each(|(w, m)| *w = w.min(*m));
+                judged.margins.extend(margins);
+            }
+            judged.worst_margins.push(worst);
+            for v in 0..num_variables {
+                let zero = |s: usize| Response::from_vector(&vec![0.0; self.base[s].to_vector().len()]);
+                let slope = |s: usize| Response::from_vector(&evaluated.gradients[s][v]);
+                judged.gain_gradients[v].extend(mean(&|s| self.gains(&slope(s), &zero(s))));
+                for &s in &of_prior {
                     // The margins are affine in the responses: their slope is the difference from the constant part.
-                    judged.margin_gradients[v].extend(mean(&|s| {
-                        let constant = self.margins(&zero(s), &zero(s), &allowances);
-                        self.margins(&slope(s), &zero(s), &allowances)
-                            .iter()
-                            .zip(constant)
-                            .map(|(a, b)| a - b)
-                            .collect()
-                    }));
+                    let constant = self.margins(prior, &zero(s), &zero(s));
+                    let moved = self.margins(prior, &slope(s), &zero(s));
+                    judged.margin_gradients[v].extend(moved.iter().zip(constant).map(|(a, b)| a - b));
                 }
             }
         }
         judged
+    }
+
+    /// Name of a limit of [`Judged::worst_margins`].
+    pub fn limit_name(&self, prior: usize, limit: usize) -> String {
+        let name = &self.study.materials[prior].name;
+        let parameters = self.study.materials[prior].material.parameters().into_iter().map(|p| p.name());
+        let mut names: Vec<String> = Vec::new();
+        if self.study.objective.guard_promised_sd.covers(prior) {
+            let guards = parameters.filter(|n| n != "kappa");
+            names.extend(guards.map(|p| format!("the guard on the standard deviation of {p}, material \"{name}\"")));
+        }
+        names.extend(self.study.limits.max_force_n.map(|_| "max_force_n".into()));
+        names.extend(self.study.limits.max_local_stretch.map(|_| "max_local_stretch".into()));
+        names.get(limit).cloned().unwrap_or_default()
     }
 
     /// ln of the objective: the smallest gain or the weighted mean.
@@ -139,6 +172,10 @@ impl<'a> Reference<'a> {
 pub fn combine(how: Combine, gains: &[f64], weights: &[f64]) -> f64 {
     match how {
         Combine::Maximin => gains.iter().copied().fold(f64::INFINITY, f64::min),
-        Combine::GeometricMean => gains.iter().zip(weights).map(|(g, w)| g * w).sum(),
+        Combine::GeometricMean | Combine::Weighted => gains.iter().zip(weights).map(|(g, w)| g * w).sum(),
     }
 }
+
+#[cfg(test)]
+#[path = "objective_tests.rs"]
+mod tests;

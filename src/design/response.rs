@@ -5,6 +5,7 @@
 //! back-solve for the state, one for each material sensitivity, and a central difference of the integrals along the known
 //! direction (X + tV, u + tu′, s + ts′): no solution is differenced.
 
+use super::aim::Normalisation;
 use super::space::{Subspace, Variable};
 use super::study::{MaterialPrior, Study};
 use crate::fem::{Equilibrium, ForwardModel, ParameterSensitivity, PrepareError, SolveError, SolveOptions};
@@ -12,7 +13,8 @@ use crate::kinematics::principal_stretches;
 use crate::material::Ogden;
 use crate::mesh::{MeshOptions, shape_velocity};
 use crate::sensitivity::{
-    Covariance, Criterion, FisherInformation, InformationError, information_over_quadrature, integrate_over_quadrature,
+    Covariance, Criterion, FisherInformation, InformationError, IntegratedSensitivity, information_over_quadrature,
+    integrate_over_quadrature,
 };
 use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
@@ -69,7 +71,7 @@ pub const TEARING_FRACTION: f64 = 0.002;
 /// What a design does with one material.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Response {
-    /// ln 𝒮 of every μᵢ and αᵢ (sum over voxels).
+    /// ln 𝒮 of every μᵢ and αᵢ, in the study's normalisation.
     pub log_integrated: Vec<f64>,
     /// ln of the relative standard deviation of every μᵢ and αᵢ (+∞ replaced by a large number where undetermined).
     pub log_relative_sd: Vec<f64>,
@@ -83,6 +85,23 @@ pub struct Response {
 
 /// ln of a relative standard deviation that stands for "not determined".
 const UNDETERMINED: f64 = 12.0;
+
+/// ln of a relative standard deviation, a large number where it is not determined.
+pub(super) fn log_or_undetermined(value: Option<f64>) -> f64 {
+    match value {
+        Some(v) if v > 0.0 && v.ln() < UNDETERMINED => v.ln(),
+        _ => UNDETERMINED,
+    }
+}
+
+/// 𝒮 in the normalisation asked for.
+pub(super) fn normalised(sensitivity: &IntegratedSensitivity, normalisation: Normalisation) -> f64 {
+    match normalisation {
+        Normalisation::Sum => sensitivity.sum,
+        Normalisation::MeanPerVoxel => sensitivity.mean_per_voxel,
+        Normalisation::VolumeIntegral => sensitivity.volume_integral,
+    }
+}
 
 impl Response {
     /// All numbers in one list, in a fixed order.
@@ -175,8 +194,18 @@ pub struct Evaluator<'a> {
 }
 
 impl<'a> Evaluator<'a> {
-    /// For `study`.
+    /// For `study`: at the priors' central values, and at their variants if its budget says so.
     pub fn new(study: &'a Study) -> Evaluator<'a> {
+        if study.budget.variants_in_search {
+            return Self::with_variants(study);
+        }
+        let central: Vec<MaterialPrior> =
+            study.materials.iter().map(|prior| MaterialPrior { relative_sd: 0.0, ..prior.clone() }).collect();
+        Evaluator { study, samples: sample_materials(&central), coarseness: 1.0 }
+    }
+
+    /// For `study`, always at the variants too.
+    pub fn with_variants(study: &'a Study) -> Evaluator<'a> {
         Evaluator { study, samples: sample_materials(&study.materials), coarseness: 1.0 }
     }
 
@@ -319,14 +348,11 @@ impl<'a> Evaluator<'a> {
             information_over_quadrature(material, model.mesh(), &fields, sensitivities, &scan.noise(), voxel_volume)?;
         let covariance = information.covariance();
         let shear = information.shear_indices();
-        let log_or_large = |value: Option<f64>| match value {
-            Some(v) if v > 0.0 && v.ln() < UNDETERMINED => v.ln(),
-            _ => UNDETERMINED,
-        };
+        let normalisation = self.study.objective.normalisation;
         Ok(Response {
-            log_integrated: integrated.iter().map(|s| s.sum.max(1e-300).ln()).collect(),
-            log_relative_sd: shear.iter().map(|&i| log_or_large(covariance.relative_sd(i))).collect(),
-            log_criteria: criteria_as_relative_sd(&covariance, &shear).map(log_or_large),
+            log_integrated: integrated.iter().map(|s| normalised(s, normalisation).max(1e-300).ln()).collect(),
+            log_relative_sd: shear.iter().map(|&i| log_or_undetermined(covariance.relative_sd(i))).collect(),
+            log_criteria: criteria_as_relative_sd(&covariance, &shear).map(log_or_undetermined),
             log_force: force_n.abs().max(1e-12).ln(),
             log_stretch: tearing_stretch(
                 fields.iter().map(|q| (principal_stretches(&q.deformation_gradient)[0], q.volume_mm3)),

@@ -1,9 +1,10 @@
 //! The result of a design search (`design/1`) and what it says in plain words.
 
+use super::aim::Objective;
 use super::confirm::{Confirmed, MaterialEvaluation};
 use super::findings::{Disagreement, disagreement, findings};
 use super::search::{Found, study_hash};
-use super::study::{Objective, Study};
+use super::study::Study;
 use crate::calibration::ParameterSpread;
 use crate::provenance::VERSION;
 use crate::sensitivity::Evaluation;
@@ -73,6 +74,9 @@ pub struct DesignEntry {
     pub is_within_limits: bool,
     /// Volume of material, mm³.
     pub volume_mm3: f64,
+    /// What is to be known about how it came here: a limit that only the fine mesh broke, or a repair.
+    #[serde(default)]
+    pub remark: Option<String>,
 }
 
 /// Spread found against spread promised.
@@ -95,6 +99,12 @@ pub struct MaterialVerification {
     pub best: Vec<ParameterSpread>,
     /// Of the base specimen.
     pub base: Vec<ParameterSpread>,
+    /// Why the first of the best design's fits that failed did so; null if none failed.
+    #[serde(default)]
+    pub best_failure: Option<String>,
+    /// The same of the base specimen.
+    #[serde(default)]
+    pub base_failure: Option<String>,
 }
 
 impl DesignEntry {
@@ -112,12 +122,19 @@ impl DesignEntry {
             limits: confirmed.limits.clone(),
             is_within_limits: confirmed.is_within_limits,
             volume_mm3: confirmed.volume_mm3,
+            remark: confirmed.remark.clone(),
         })
     }
 
     /// D-optimal figure of the first material: generalised relative standard deviation.
     pub fn information(&self) -> Option<f64> {
         self.by_material.first()?.relative_sd_by_criterion.d_optimal
+    }
+
+    /// Limits that are not kept, in words; guards are meant where every limit is.
+    pub fn not_kept(&self) -> String {
+        let names: Vec<&str> = self.limits.iter().filter(|m| !m.is_satisfied).map(|m| m.name.as_str()).collect();
+        if names.is_empty() { "guard on the promised standard deviations".into() } else { names.join(", ") }
     }
 
     /// Largest force over the materials, N.
@@ -144,7 +161,7 @@ impl DesignResult {
             ranked,
             verification: Verification::default(),
             verification_by_material: Vec::new(),
-            objective: study.objective,
+            objective: study.objective.clone(),
             history: found.history.clone(),
             num_evaluations: found.num_evaluations,
             failures: found.failures.clone(),
@@ -152,6 +169,25 @@ impl DesignResult {
             version: VERSION.into(),
             input_hash: study_hash(study),
         })
+    }
+
+    /// Where fits of the verification failed, in words.
+    pub fn verification_failures(&self) -> Vec<String> {
+        let mut said = Vec::new();
+        for v in &self.verification_by_material {
+            for (label, list, reason) in [("best", &v.best, &v.best_failure), ("base", &v.base, &v.base_failure)] {
+                if let (Some(p), Some(reason)) = (list.first(), reason) {
+                    said.push(format!(
+                        "Caution. Verification, material \"{}\", {label} specimen: {} of {} calibrations failed, the first because: \
+                         {reason}. Its promised standard deviations are not verified by these.",
+                        v.material,
+                        p.failed_draws,
+                        p.draws + p.failed_draws
+                    ));
+                }
+            }
+        }
+        said
     }
 
     /// Adds what the verification found.

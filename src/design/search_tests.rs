@@ -12,7 +12,7 @@ fn small_study() -> Study {
     let mut study = Study::from_json(&text, &folder).expect("the study is valid");
     study.vary.hole_count = CountRange { min: 0, max: 1 };
     study.materials[0].relative_sd = 0.0;
-    study.budget = Budget { explore: 6, refine: 1, iterations: 3, confirm: 2 };
+    study.budget = Budget { explore: 6, refine: 1, iterations: 3, confirm: 2, variants_in_search: true };
     study
 }
 
@@ -115,4 +115,105 @@ fn the_base_has_a_vector() {
             assert!(back[0].holes.iter().any(is_same), "{symmetry:?}: {:?}", back[0].holes);
         }
     }
+}
+
+/// A number in [low, high) from a fixed stream: a linear congruence with the constants of Knuth's MMIX.
+struct Draw(u64);
+
+impl Draw {
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        self.between(0.0, n as f64) as usize
+    }
+}
+
+/// A study with random limits and freedoms.
+fn random_study(draw: &mut Draw) -> Study {
+    use crate::specimen::{DiameterRange, HoleAxis, Symmetry, TestKind};
+    let mut study = small_study();
+    let limits = &mut study.limits;
+    limits.min_ligament_hole_hole_mm = draw.between(0.5, 4.0);
+    limits.min_ligament_hole_edge_mm = draw.between(0.5, 3.0);
+    (limits.diameter_mm, limits.punches_mm) = if draw.below(2) == 0 {
+        let min = draw.between(0.8, 3.0);
+        (Some(DiameterRange { min, max: min + draw.between(0.0, 6.0) }), None)
+    } else {
+        (None, Some((0..=draw.below(4)).map(|_| draw.between(0.8, 7.0)).collect()))
+    };
+    limits.min_voxels_across_ligament = (draw.below(2) == 0).then(|| draw.between(0.5, 5.0));
+    limits.max_force_n = Some(draw.between(1.0, 6.0));
+    limits.max_drive_mm = Some(draw.between(2.0, 12.0));
+    limits.max_local_stretch = Some(draw.between(1.3, 3.0));
+    limits.max_holes = Some(draw.below(4));
+    limits.symmetry =
+        [Symmetry::None, Symmetry::MirrorX, Symmetry::MirrorZ, Symmetry::MirrorXAndZ, Symmetry::Point][draw.below(5)];
+    study.vary.axes = vec![[HoleAxis::Thickness, HoleAxis::Width][draw.below(2)]];
+    study.vary.tests = vec![[TestKind::Uniaxial, TestKind::DoubleLapShear][draw.below(2)]];
+    study.vary.hole_count = CountRange { min: 0, max: 4 };
+    study.vary.drive_mm = Range { min: 1.0, max: draw.between(2.0, 20.0) };
+    study.vary.width_mm = (draw.below(2) == 0).then_some(Range { min: 8.0, max: 14.0 });
+    study.vary.length_mm = (draw.below(2) == 0).then_some(Range { min: 30.0, max: 45.0 });
+    study.seed = draw.below(1000) as u64;
+    study
+}
+
+/// Whatever a study's limits are, no design that is sampled breaks one that geometry alone decides, and no drive lies above
+/// the actuator's.
+#[test]
+fn random_studies_propose_only_what_can_be_made() {
+    let mut draw = Draw(7);
+    let mut num_designs = 0;
+    for _ in 0..200 {
+        let study = random_study(&mut draw);
+        for (stream, space) in subspaces(&study).iter().enumerate() {
+            assert!(space.structure.num_holes() <= study.limits.max_holes.unwrap_or(usize::MAX));
+            for vector in sample(space, &study.limits, study.scan.voxel_mm, 4, study.seed, stream as u64) {
+                let specimen = space.specimen(&vector);
+                let margins = study.limits.check_geometry(&specimen, study.scan.voxel_mm);
+                assert!(margins.iter().all(|m| m.is_satisfied), "{margins:?} {specimen:?}");
+                assert!(specimen.validate().is_ok(), "{specimen:?}");
+                // Scaling to [0, 1] and back rounds.
+                let drive = specimen.drive_mm[0];
+                assert!(drive <= study.limits.max_drive_mm.unwrap_or(f64::INFINITY) * (1.0 + 1e-12), "{drive}");
+                num_designs += 1;
+            }
+        }
+    }
+    assert!(num_designs > 500, "{num_designs} designs are no test");
+}
+
+/// Whole searches on random studies: what is returned as the best keeps every limit, confirmed; or the study is refused as one
+/// without a solution.
+#[test]
+fn random_studies_never_return_what_breaks_a_limit() {
+    let mut draw = Draw(11);
+    let mut num_found = 0;
+    for _ in 0..5 {
+        let mut study = random_study(&mut draw);
+        study.limits.max_holes = Some(draw.below(2));
+        study.vary.tests = vec![crate::specimen::TestKind::Uniaxial];
+        study.budget = Budget { explore: 4, refine: 1, iterations: 3, confirm: 2, variants_in_search: true };
+        match search(&study, &Checkpoint::in_memory(), &quiet, &|| false) {
+            Ok(found) => {
+                num_found += 1;
+                for confirmed in found.ranked.iter().filter(|c| c.is_within_limits) {
+                    let specimen = &confirmed.specimen;
+                    let mut margins = study.limits.check_geometry(specimen, study.scan.voxel_mm);
+                    let of =
+                        |f: fn(&MaterialEvaluation) -> f64| confirmed.by_material.iter().map(f).fold(0.0, f64::max);
+                    let (force, stretch) = (of(|m| m.force_n), of(|m| m.tearing_stretch));
+                    margins.extend(study.limits.check_response(specimen.drive_mm[0], force, stretch));
+                    assert!(margins.iter().all(|m| m.is_satisfied), "{margins:?} {specimen:?}");
+                }
+                assert!(found.ranked[0].is_within_limits);
+            }
+            Err(SearchError::NothingFeasible { .. }) => {}
+            Err(other) => panic!("{other}"),
+        }
+    }
+    assert!(num_found > 0, "no study had a solution");
 }

@@ -26,6 +26,8 @@ pub struct Structure {
     /// Orbits, sorted.
     pub orbits: Vec<Orbit>,
     mirrors: [bool; 2],
+    /// Whether holes come in pairs through the centre of the section; then no mirror acts.
+    is_point_symmetric: bool,
 }
 
 /// One component of the continuous vector.
@@ -68,8 +70,22 @@ impl Structure {
     }
 
     fn images(&self, orbit: Orbit) -> usize {
-        let double = |mirror: bool, on: bool| if mirror && !on { 2 } else { 1 };
-        double(self.mirrors[0], orbit.on_x) * double(self.mirrors[1], orbit.on_other)
+        self.image_signs(orbit).len()
+    }
+
+    /// Signs of the images of an orbit, its own first.
+    fn image_signs(&self, orbit: Orbit) -> Vec<[f64; 2]> {
+        if self.is_point_symmetric {
+            return if orbit.on_x { vec![[1.0; 2]] } else { vec![[1.0; 2], [-1.0; 2]] };
+        }
+        let signs = |mirror: bool, on: bool| if mirror && !on { vec![1.0, -1.0] } else { vec![1.0] };
+        let mut all = Vec::new();
+        for sx in signs(self.mirrors[0], orbit.on_x) {
+            for so in signs(self.mirrors[1], orbit.on_other) {
+                all.push([sx, so]);
+            }
+        }
+        all
     }
 }
 
@@ -86,11 +102,16 @@ pub fn subspaces(study: &Study) -> Vec<Subspace> {
         let mut has_solid = false;
         for &axis in &axes {
             let mirrors = mirrors_of(study.limits.symmetry, axis);
-            let kinds = orbit_kinds(mirrors);
+            let is_point_symmetric = study.limits.symmetry == Symmetry::Point;
+            let kinds = if is_point_symmetric {
+                [false, true].map(|is_central| Orbit { on_x: is_central, on_other: is_central }).to_vec()
+            } else {
+                orbit_kinds(mirrors)
+            };
             let mut stack = vec![Vec::new()];
             let mut lists: Vec<Vec<Orbit>> = Vec::new();
             while let Some(list) = stack.pop() {
-                let structure = Structure { test, axis, orbits: list.clone(), mirrors };
+                let structure = Structure { test, axis, orbits: list.clone(), mirrors, is_point_symmetric };
                 if structure.num_holes() > max_holes {
                     continue;
                 }
@@ -111,7 +132,7 @@ pub fn subspaces(study: &Study) -> Vec<Subspace> {
                 if orbits.is_empty() && std::mem::replace(&mut has_solid, true) {
                     continue;
                 }
-                all.push(Subspace::new(study, Structure { test, axis, orbits, mirrors }));
+                all.push(Subspace::new(study, Structure { test, axis, orbits, mirrors, is_point_symmetric }));
             }
         }
     }
@@ -177,7 +198,9 @@ impl Subspace {
             if !orbit.on_x {
                 let half = 0.5 * (length - diameter.min) - edge;
                 variables.push(Variable::X(index));
-                ranges.push(Range { min: if structure.mirrors[0] { 0.0 } else { -half }, max: half });
+                // Of a pair through the centre the one with x ≥ 0 stands for both.
+                let is_half = structure.mirrors[0] || structure.is_point_symmetric;
+                ranges.push(Range { min: if is_half { 0.0 } else { -half }, max: half });
             }
             if !orbit.on_other {
                 let half = (0.5 * (other - diameter.min) - edge).max(0.0);
@@ -188,7 +211,7 @@ impl Subspace {
             ranges.push(diameter);
         }
         for (variable, interval) in [
-            (Variable::Drive, Some(vary.drive_mm)),
+            (Variable::Drive, Some(study.drive_range())),
             (Variable::Length, vary.length_mm),
             (Variable::Thickness, vary.thickness_mm),
             (Variable::Width, vary.width_mm),
@@ -219,7 +242,7 @@ impl Subspace {
         }
         specimen.holes.clear();
         for (orbit, (center, diameter_mm)) in self.structure.orbits.iter().zip(&orbits) {
-            for signs in self.image_signs(*orbit) {
+            for signs in self.structure.image_signs(*orbit) {
                 specimen.holes.push(Hole {
                     axis: self.structure.axis,
                     center_mm: [signs[0] * center[0], signs[1] * center[1]],
@@ -244,18 +267,6 @@ impl Subspace {
         specimen
     }
 
-    /// Signs of the images of an orbit.
-    fn image_signs(&self, orbit: Orbit) -> Vec<[f64; 2]> {
-        let signs = |mirror: bool, on: bool| if mirror && !on { vec![1.0, -1.0] } else { vec![1.0] };
-        let mut all = Vec::new();
-        for sx in signs(self.structure.mirrors[0], orbit.on_x) {
-            for so in signs(self.structure.mirrors[1], orbit.on_other) {
-                all.push([sx, so]);
-            }
-        }
-        all
-    }
-
     fn nearest_punch(&self, diameter: f64) -> f64 {
         match &self.punches_mm {
             None => diameter,
@@ -277,7 +288,8 @@ impl Subspace {
         let first =
             |orbit: usize| -> usize { self.structure.orbits[..orbit].iter().map(|o| self.structure.images(*o)).sum() };
         let of_orbit = |orbit: usize, make: fn(usize) -> DesignVariable, component: Option<usize>| {
-            self.image_signs(self.structure.orbits[orbit])
+            self.structure
+                .image_signs(self.structure.orbits[orbit])
                 .iter()
                 .enumerate()
                 .map(|(i, signs)| (make(first(orbit) + i), component.map_or(1.0, |c| signs[c])))
@@ -334,13 +346,17 @@ impl Subspace {
         for orbit in &self.structure.orbits {
             let is_on = [orbit.on_x, orbit.on_other];
             let fits = |hole: &Hole| {
+                if self.structure.is_point_symmetric {
+                    let is_central = hole.center_mm.iter().all(|c| near(*c, 0.0));
+                    return is_central == orbit.on_x && hole.center_mm[0] >= 0.0;
+                }
                 (0..2).all(|c| {
                     let value = hole.center_mm[c];
                     !self.structure.mirrors[c] || if is_on[c] { near(value, 0.0) } else { value > MIRROR_TOLERANCE_MM }
                 })
             };
             let hole = *left.iter().find(|h| fits(h))?;
-            for signs in self.image_signs(*orbit) {
+            for signs in self.structure.image_signs(*orbit) {
                 let image = [signs[0] * hole.center_mm[0], signs[1] * hole.center_mm[1]];
                 let index = left.iter().position(|h| {
                     near(h.center_mm[0], image[0])

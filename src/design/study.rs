@@ -1,6 +1,7 @@
 //! The study (`study/1`): a base specimen, what may vary, for which materials, how it is scanned, what can be made, what
 //! is sought and how hard.
 
+use super::aim::Objective;
 use crate::material::Ogden;
 use crate::sensitivity::ScanSettings;
 use crate::specimen::{ManufacturingLimits, Specimen, Symmetry, TestKind};
@@ -150,47 +151,6 @@ pub struct Range {
     pub max: f64,
 }
 
-/// What is maximised: a gain over the base specimen, 1 for the base itself.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ObjectiveKind {
-    /// Integrated sensitivity 𝒮 (sum over voxels) of each μᵢ and αᵢ, relative to the base.
-    #[default]
-    IntegratedSensitivity,
-    /// D-optimal: inverse of the generalised relative standard deviation of all μᵢ, αᵢ.
-    DOptimal,
-    /// A-optimal: inverse root of the sum of relative variances.
-    AOptimal,
-    /// E-optimal: inverse root of the largest eigenvalue of the relative covariance.
-    EOptimal,
-    /// Inverse of the largest relative standard deviation of a single parameter.
-    WorstRelativeSd,
-}
-
-/// How several parameters, and several materials, combine.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Combine {
-    /// The smallest gain counts.
-    #[default]
-    Maximin,
-    /// The geometric mean of the gains, materials by their weights.
-    GeometricMean,
-}
-
-/// The objective.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Objective {
-    /// What is maximised.
-    pub kind: ObjectiveKind,
-    /// How gains combine.
-    pub combine: Combine,
-    /// Besides: no μᵢ or αᵢ of the first material may be promised a larger standard deviation than by the base. What
-    /// happens to the other materials' is reported.
-    pub guard_promised_sd: bool,
-}
-
 /// How many evaluations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -203,11 +163,14 @@ pub struct Budget {
     pub iterations: usize,
     /// Designs confirmed on a finer mesh with the scan's voxels.
     pub confirm: usize,
+    /// Whether the search judges every design at the priors' stiffer and softer variants too. If not, it is judged at the
+    /// central values, three times as many designs are seen in the same time, and the variants enter at confirmation.
+    pub variants_in_search: bool,
 }
 
 impl Default for Budget {
     fn default() -> Self {
-        Budget { explore: 160, refine: 6, iterations: 12, confirm: 10 }
+        Budget { explore: 160, refine: 6, iterations: 12, confirm: 10, variants_in_search: true }
     }
 }
 
@@ -321,6 +284,21 @@ impl Study {
                 range(field, r.max, r.min, 1e3, "at least its min, at most 1000 mm")?;
             }
         }
+        if let Some(limit) = self.limits.max_drive_mm
+            && vary.drive_mm.min > limit
+        {
+            return Err(StudyError::Inconsistent {
+                message: format!(
+                    "vary.drive_mm.min is {} mm and limits.max_drive_mm {limit} mm; no drive keeps both",
+                    vary.drive_mm.min
+                ),
+            });
+        }
+        let names = |prior: &MaterialPrior| {
+            let parameters = prior.material.parameters().into_iter().map(|p| p.name());
+            parameters.filter(|n| n != "kappa").collect::<Vec<_>>()
+        };
+        self.objective.validate(&self.materials.iter().map(names).collect::<Vec<_>>())?;
         for (field, value) in [
             ("budget.explore", self.budget.explore),
             ("budget.refine", self.budget.refine),
@@ -332,10 +310,17 @@ impl Study {
         }
         if self.limits.symmetry == Symmetry::MirrorY || self.limits.symmetry == Symmetry::MirrorXAndY {
             return Err(StudyError::Inconsistent {
-                message: "limits.symmetry: a design search supports none, mirror_x, mirror_z and mirror_x_and_z".into(),
+                message: "limits.symmetry: a design search supports none, mirror_x, mirror_z, mirror_x_and_z and point"
+                    .into(),
             });
         }
         Ok(())
+    }
+
+    /// Drives to try, mm: `vary.drive_mm`, never above `limits.max_drive_mm`.
+    pub fn drive_range(&self) -> Range {
+        let Range { min, max } = self.vary.drive_mm;
+        Range { min, max: self.limits.max_drive_mm.map_or(max, |limit| max.min(limit)) }
     }
 
     /// Kinds of test to try.

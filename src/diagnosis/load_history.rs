@@ -126,7 +126,6 @@ pub struct LoadHistoryFit {
 
 struct Problem {
     time_s: Vec<f64>,
-    drive_mm: Vec<f64>,
     measured: Vec<f64>,
     direction: Vec<f64>,
     elastic: Vec<f64>,
@@ -375,5 +374,5 @@ fn prepare(curve: &LoadCurve, table: &ElasticTable, drift_sd_n: f64) -> Option<P
         drift + each
     });
     let whitener = Cholesky::new(matrix)?;
-    Some(Problem { time_s, drive_mm, measured, direction, elastic, derivatives, work, largest_work, whitener })
+    Some(Problem { time_s, measured, direction, elastic, derivatives, work, largest_work, whitener })
 }

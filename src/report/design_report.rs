@@ -2,11 +2,11 @@
 
 use super::{
     BarGroup, CalloutKind, Column, GroupedBars, HistoryPlot, HistoryPoint, LimitBar, LimitsPlot, ParetoPlot,
-    ParetoPoint, PointKind, RankedItem, RankingPlot, Report, ReportHeader, SpreadPlot, SpreadRow, Table, significant,
-    symbol_of_parameter,
+    ParetoPoint, PointKind, RankedItem, RankingPlot, Report, ReportHeader, Table, design_verification::verification,
+    significant, symbol_of_parameter,
 };
 use crate::design::{DesignEntry, DesignResult};
-use crate::specimen::to_svg;
+use crate::specimen::{HoleAxis, to_svg};
 
 /// Pictures made elsewhere, put in the page where they belong.
 #[derive(Clone, Debug, Default)]
@@ -65,9 +65,9 @@ pub fn design_report(result: &DesignResult, pictures: &DesignPictures) -> String
     page.figures(&[(pareto_plot(result).to_svg(), "Information against force; the front is marked.")]);
     for (index, d) in result.disagreement.iter().enumerate() {
         let items = result.ranked.iter().enumerate().map(|(i, entry)| RankedItem {
-            label: format!("{}. {}", i + 1, short(entry)),
-            left: -(d.rank_by_integrated_sensitivity[i] as f64),
-            right: -(d.rank_by_information[i] as f64),
+            label: format!("{}. {}", i + 1, count_of_holes(entry)),
+            left: least_sensitivity_gain(entry, &d.material),
+            right: information_gain(entry, &result.base, index),
             is_base: false,
             is_best: i == 0,
         });
@@ -80,8 +80,9 @@ pub fn design_report(result: &DesignResult, pictures: &DesignPictures) -> String
             items: items.collect(),
         };
         let caption = format!(
-            "The two measures' rankings of the confirmed designs; Kendall's τ = {}.",
-            show(result.disagreement[index].kendall_tau, 2)
+            "The confirmed designs ranked by the least gain in 𝒮 and by the gain in the generalised standard deviation, both over \
+             the base; Kendall's τ = {}.",
+            show(d.kendall_tau, 2)
         );
         page.figure(&plot.to_svg(), &caption);
     }
@@ -122,24 +123,55 @@ pub fn design_report(result: &DesignResult, pictures: &DesignPictures) -> String
     };
     page.figure(&history.to_svg(), "Best gain within all limits after each evaluation, at search fidelity.");
     page.paragraph(&format!(
-        "Objective: {:?}, combined by {:?}{}. Gains are relative to the base specimen at its drive; confirmed values come from \
-         the standard mesh and the scan's own voxels. Seed {}.",
-        result.objective.kind,
-        result.objective.combine,
-        if result.objective.guard_promised_sd { ", the first material's promised standard deviations no worse than the base's" } else { "" },
+        "{} Gains are relative to the base specimen at its drive; confirmed values come from the standard mesh and the scan's own \
+         voxels. Seed {}.",
+        result.objective.words(),
         result.seed
     ));
     page.to_html()
 }
 
+fn count_of_holes(entry: &DesignEntry) -> String {
+    match entry.specimen.holes.len() {
+        0 => "solid".into(),
+        1 => "1 hole".into(),
+        n => format!("{n} holes"),
+    }
+}
+
+/// The least gain in 𝒮 over a material's parameters; NaN without any.
+fn least_sensitivity_gain(entry: &DesignEntry, material: &str) -> f64 {
+    let of_material = entry.gains.iter().filter(|g| g.material == material);
+    of_material.filter_map(|g| g.integrated_sensitivity).reduce(f64::min).unwrap_or(f64::NAN)
+}
+
+/// Gain in a material's generalised standard deviation; NaN where it is not determined.
+fn information_gain(entry: &DesignEntry, base: &DesignEntry, material: usize) -> f64 {
+    let of = |e: &DesignEntry| e.by_material.get(material)?.relative_sd_by_criterion.d_optimal;
+    of(base).zip(of(entry)).map_or(f64::NAN, |(base, own)| base / own)
+}
+
+/// The holes in brief: equal diameters together.
 fn short(entry: &DesignEntry) -> String {
-    match entry.specimen.holes.as_slice() {
-        [] => "solid".into(),
-        holes => {
-            let diameters: Vec<String> = holes.iter().map(|h| format!("⌀{:.1}", h.diameter_mm)).collect();
-            format!("{} × {}", holes.len(), diameters.join(" "))
+    let mut groups: Vec<(String, usize)> = Vec::new();
+    for hole in &entry.specimen.holes {
+        let diameter = format!("⌀{:.1}", hole.diameter_mm);
+        match groups.iter_mut().find(|(d, _)| *d == diameter) {
+            Some((_, count)) => *count += 1,
+            None => groups.push((diameter, 1)),
         }
     }
+    let along_width = entry.specimen.holes.first().is_some_and(|h| h.axis == HoleAxis::Width);
+    let list: Vec<String> = groups.into_iter().map(|(d, n)| if n > 1 { format!("{n} × {d}") } else { d }).collect();
+    match list.as_slice() {
+        [] => "solid".into(),
+        list => format!("{}{}", list.join(" + "), if along_width { " (along the width)" } else { "" }),
+    }
+}
+
+fn block(entry: &DesignEntry) -> String {
+    let b = &entry.specimen.block;
+    format!("{:.1} × {:.2} × {:.1}", b.length_mm, b.thickness_mm, b.width_mm)
 }
 
 fn gains_table(best: &DesignEntry) -> Table {
@@ -150,6 +182,7 @@ fn gains_table(best: &DesignEntry) -> Table {
             Column::words("Parameter"),
             Column::numbers("Integrated sensitivity", "×"),
             Column::numbers("Promised sd, base / best", "×"),
+            Column::numbers("the least over the variants", "×"),
         ],
         rows: best
             .gains
@@ -160,9 +193,11 @@ fn gains_table(best: &DesignEntry) -> Table {
                     symbol_of_parameter(&g.parameter),
                     show(g.integrated_sensitivity, 3),
                     show(g.promised_sd, 3),
+                    show(g.worst_promised_sd, 3),
                 ]
             })
             .collect(),
+        note: "Variants: the material's stiffer and softer values that the study names as uncertain.".into(),
         ..Table::default()
     }
 }
@@ -203,13 +238,24 @@ fn ranked_table(result: &DesignResult) -> Table {
         vec![
             label,
             short(entry),
+            block(entry),
             significant(entry.specimen.drive_mm.last().copied().unwrap_or(f64::NAN), 3),
             significant(entry.force_n(), 3),
             significant(entry.objective, 4),
             show(entry.information().map(|i| 100.0 * i), 3),
-            if entry.is_within_limits { entry.closest_limit.clone() } else { "breaks a limit or the guard".into() },
+            if entry.is_within_limits {
+                entry.closest_limit.clone()
+            } else {
+                format!("not kept: {}", entry.not_kept())
+            },
         ]
     };
+    let remarks: Vec<String> = result
+        .ranked
+        .iter()
+        .enumerate()
+        .filter_map(|(i, e)| Some(format!("{}: {}", i + 1, e.remark.as_ref()?)))
+        .collect();
     let mut rows = vec![row("base".into(), &result.base)];
     rows.extend(result.ranked.iter().enumerate().map(|(i, e)| row((i + 1).to_string(), e)));
     Table {
@@ -217,6 +263,7 @@ fn ranked_table(result: &DesignResult) -> Table {
         columns: vec![
             Column::words("Rank"),
             Column::words("Holes"),
+            Column::words("Block, mm"),
             Column::numbers("Drive", "mm"),
             Column::numbers("Force", "N"),
             Column::numbers("Gain", "×"),
@@ -225,7 +272,7 @@ fn ranked_table(result: &DesignResult) -> Table {
         ],
         rows,
         emphasised_rows: vec![1],
-        note: "Generalised sd: (det C)^(1/2n) of all μ and α of the first material.".into(),
+        note: format!("Generalised sd: (det C)^(1/2n) of all μ and α of the first material. {}", remarks.join(" ")),
     }
 }
 
@@ -258,56 +305,5 @@ fn pareto_plot(result: &DesignResult) -> ParetoPlot {
         larger_x_is_better: false,
         larger_y_is_better: false,
         points,
-    }
-}
-
-fn verification(page: &mut Report, result: &DesignResult) {
-    page.section("Verification");
-    page.paragraph(
-        "Both specimens were calibrated on synthetic scans of a known material, made on a finer and different mesh than the \
-         one used for fitting, with fresh noise in every draw. The spread of the estimates is set beside the spread promised.",
-    );
-    for v in &result.verification_by_material {
-        let mut table_rows = Vec::new();
-        let mut rows = Vec::new();
-        for (label, list) in [("best", &v.best), ("base", &v.base)] {
-            for p in list {
-                table_rows.push(vec![
-                    label.to_string(),
-                    symbol_of_parameter(&p.parameter),
-                    significant(p.truth, 4),
-                    significant(p.mean, 4),
-                    significant(p.found_sd, 3),
-                    show(p.promised_sd, 3),
-                    show(p.promised_sd.map(|sd| p.found_sd / sd), 3),
-                    format!("{}", p.draws),
-                ]);
-                rows.push(SpreadRow {
-                    specimen: label.into(),
-                    parameter: symbol_of_parameter(&p.parameter),
-                    unit: if p.parameter.starts_with("alpha") { String::new() } else { "kPa".into() },
-                    truth: p.truth,
-                    found: p.estimates.clone(),
-                    promised_sd: p.promised_sd.unwrap_or(f64::NAN),
-                });
-            }
-        }
-        page.table(&Table {
-            caption: format!("Material \"{}\".", v.material),
-            columns: vec![
-                Column::words("Specimen"),
-                Column::words("Parameter"),
-                Column::numbers("Truth", ""),
-                Column::numbers("Mean", ""),
-                Column::numbers("Found sd", ""),
-                Column::numbers("Promised sd", ""),
-                Column::numbers("Found / promised", ""),
-                Column::numbers("Draws", ""),
-            ],
-            rows: table_rows,
-            ..Table::default()
-        });
-        let plot = SpreadPlot { title: format!("Material \"{}\"", v.material), rows };
-        page.figure(&plot.to_svg(), "Each draw's estimate, the truth, and ± the promised standard deviation.");
     }
 }

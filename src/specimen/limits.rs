@@ -36,10 +36,12 @@ pub enum Symmetry {
     MirrorXAndZ,
     /// x → −x and y → −y.
     MirrorXAndY,
+    /// Half a turn about the holes' direction: every hole has its image through the centre of the section.
+    Point,
 }
 
 impl Symmetry {
-    /// The mirrors, as the signs of (x, y, z).
+    /// The mirrors (for `Point` the half turn), as the signs of (x, y, z).
     pub fn mirrors(self) -> &'static [[f64; 3]] {
         const X: [f64; 3] = [-1.0, 1.0, 1.0];
         const Y: [f64; 3] = [1.0, -1.0, 1.0];
@@ -51,6 +53,8 @@ impl Symmetry {
             Symmetry::MirrorZ => &[Z],
             Symmetry::MirrorXAndZ => &[X, Z],
             Symmetry::MirrorXAndY => &[X, Y],
+            // The sign along the holes' direction means nothing.
+            Symmetry::Point => &[[-1.0, -1.0, -1.0]],
         }
     }
 }

@@ -1,0 +1,164 @@
+//! The end of a search: confirmation of the finalists on the finer mesh, and the repair of those that keep a limit in the
+//! search and break it there.
+
+use super::confirm::{Confirmed, confirm};
+use super::local::{LocalSettings, improve};
+use super::objective::Reference;
+use super::problem::Problem;
+use super::response::{EvaluationFailure, sample_materials};
+use super::search::{Progress, Search, SearchError};
+use super::space::Subspace;
+use super::state::{Finalist, State};
+use crate::provenance::input_hash;
+use crate::specimen::Specimen;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Designs that are repaired at most: those with the largest gains.
+const MAX_REPAIRS: usize = 2;
+
+/// Evaluations of one repair at most.
+const REPAIR_EVALUATIONS: usize = 6;
+
+type Attempt = Option<Result<Confirmed, EvaluationFailure>>;
+
+impl Search<'_> {
+    fn confirmed(&self, specimen: &Specimen) -> Attempt {
+        let key = input_hash(&serde_json::json!({ "specimen": specimen, "kind": "confirm" }));
+        self.checkpoint.get_or(&key, || match confirm(self.study, specimen, &|| (self.is_cancelled)()) {
+            Err(EvaluationFailure::Cancelled) => None,
+            other => Some(other),
+        })
+    }
+
+    /// The base and the ranked designs, best first, those within every limit before others.
+    pub(super) fn confirm_all(
+        &self,
+        base: &Specimen,
+        reference: &Reference,
+        spaces: &[Subspace],
+        state: &mut State,
+    ) -> Result<(Confirmed, Vec<Confirmed>), SearchError> {
+        let study = self.study;
+        let finalists = state.finalists(study);
+        let specimens: Vec<&Specimen> = std::iter::once(base).chain(finalists.iter().map(|f| &f.specimen)).collect();
+        let (total, done) = (specimens.len(), AtomicUsize::new(0));
+        let best = state.history.last().copied();
+        let results: Vec<Attempt> = specimens
+            .par_iter()
+            .map(|specimen| {
+                let result = self.confirmed(specimen);
+                let count = done.fetch_add(1, Ordering::Relaxed) + 1;
+                (self.progress)(&Progress { stage: "confirm", done: count, total, best });
+                result
+            })
+            .collect();
+        let mut results = results.into_iter();
+        let base = match results.next().flatten() {
+            None => return Err(state.stopped(study, "confirm")),
+            Some(Err(cause)) => return Err(SearchError::Base { cause }),
+            Some(Ok(mut base)) => {
+                base.compare(study, &base.clone());
+                base
+            }
+        };
+        let samples = sample_materials(&study.materials);
+        let fine = Reference::new(study, &samples, &base.responses);
+        let mut ranked = Vec::new();
+        let mut broken = Vec::new();
+        for (finalist, result) in finalists.iter().zip(results) {
+            match result {
+                None => return Err(state.stopped(study, "confirm")),
+                Some(Err(cause)) => state.fail(&finalist.specimen, &cause),
+                Some(Ok(mut confirmed)) => {
+                    confirmed.compare(study, &base);
+                    if !confirmed.is_within_limits && finalist.is_within_limits {
+                        let shifts = shifts(&fine, &confirmed, finalist);
+                        confirmed.remark = Some(broken_limits(&fine, &confirmed));
+                        broken.push((finalist, shifts, confirmed.objective));
+                    }
+                    ranked.push(confirmed);
+                }
+            }
+        }
+        // What broke is worth repairing if it is better than what is left.
+        let is_kept = |c: &&Confirmed| c.is_within_limits;
+        let best_kept = ranked.iter().filter(is_kept).map(|c| c.objective).fold(0.0, f64::max);
+        broken.retain(|(_, _, objective)| *objective > best_kept);
+        broken.sort_by(|a, b| b.2.total_cmp(&a.2));
+        broken.truncate(MAX_REPAIRS);
+        for (finalist, shifts, objective) in broken {
+            if let Some(mut repaired) = self.repair(finalist, shifts, reference, spaces, state)? {
+                repaired.compare(study, &base);
+                repaired.remark = Some(format!(
+                    "Repaired: a design with a gain of {objective:.3} kept every limit on the coarse mesh of the search and broke \
+                     one at confirmation; this is the design nearby that keeps it."
+                ));
+                ranked.push(repaired);
+            }
+        }
+        if !ranked.iter().any(|c| c.is_within_limits) && base.is_within_limits {
+            let mut only = base.clone();
+            only.remark = Some("The base specimen itself: no other design kept every limit at confirmation.".into());
+            ranked.push(only);
+        }
+        ranked.sort_by(|a, b| b.is_within_limits.cmp(&a.is_within_limits).then(b.objective.total_cmp(&a.objective)));
+        if !ranked.first().is_some_and(|best| best.is_within_limits) {
+            return Err(SearchError::NothingFeasible { tried: state.candidates.len() });
+        }
+        Ok((base, ranked))
+    }
+
+    /// Improves a finalist anew with its margins shifted to what the confirmation gave, and confirms where that ends. `None`
+    /// where nothing came of it.
+    fn repair(
+        &self,
+        finalist: &Finalist,
+        shifts: Vec<Vec<f64>>,
+        reference: &Reference,
+        spaces: &[Subspace],
+        state: &mut State,
+    ) -> Result<Option<Confirmed>, SearchError> {
+        let shifted = reference.with_shifts(shifts);
+        let (index, start) = &finalist.point;
+        let (done, best) = (AtomicUsize::new(0), state.history.last().copied());
+        let on_evaluation = |_: Option<f64>| {
+            let count = done.fetch_add(1, Ordering::Relaxed) + 1;
+            let total = REPAIR_EVALUATIONS;
+            (self.progress)(&Progress { stage: "repair", done: count.min(total), total, best });
+        };
+        let problem = Problem::new(self, &shifted, &spaces[*index], &on_evaluation);
+        // Near the start: what broke is small.
+        let settings = LocalSettings { max_evaluations: REPAIR_EVALUATIONS, radius: 0.05, smallest_radius: 1e-4 };
+        let improved = improve(&problem, start, &settings);
+        state.num_evaluations += done.load(Ordering::Relaxed);
+        if problem.was_stopped.load(Ordering::Relaxed) {
+            return Err(state.stopped(self.study, "repair"));
+        }
+        let Some(improved) = improved else { return Ok(None) };
+        match self.confirmed(&spaces[*index].specimen(&improved.x)) {
+            None => Err(state.stopped(self.study, "repair")),
+            Some(Err(_)) => Ok(None),
+            Some(Ok(confirmed)) => Ok(Some(confirmed)),
+        }
+    }
+}
+
+/// Confirmed less searched margin of each limit, where it is smaller: the search fidelity's error, as seen at this design.
+fn shifts(fine: &Reference, confirmed: &Confirmed, finalist: &Finalist) -> Vec<Vec<f64>> {
+    let fine = confirmed.judged(fine).worst_margins;
+    let of_prior = |(f, c): (&Vec<f64>, &Vec<f64>)| f.iter().zip(c).map(|(f, c)| (f - c).min(0.0)).collect();
+    fine.iter().zip(&finalist.margins).map(of_prior).collect()
+}
+
+/// Which response limits break at confirmation, in words.
+fn broken_limits(fine: &Reference, confirmed: &Confirmed) -> String {
+    let margins = confirmed.judged(fine).worst_margins;
+    let mut names: Vec<String> = Vec::new();
+    for (prior, of_prior) in margins.iter().enumerate() {
+        for (limit, margin) in of_prior.iter().enumerate().filter(|(_, m)| **m < -1e-9) {
+            names.push(format!("{} by {:.2} %", fine.limit_name(prior, limit), 100.0 * (1.0 - margin.exp())));
+        }
+    }
+    format!("Kept every limit on the coarse mesh of the search; at confirmation it misses {}.", names.join(", "))
+}

@@ -1,0 +1,73 @@
+//! Judging by hand-made responses: what is averaged, what is the worst, what weighs how much.
+
+use super::*;
+use crate::design::aim::{Guard, Objective};
+use crate::design::response::sample_materials;
+use std::path::Path;
+
+fn study() -> Study {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("geometries/studies");
+    let text = std::fs::read_to_string(folder.join("uniaxial-bar.json")).expect("the study is there");
+    let mut study = Study::from_json(&text, &folder).expect("the study is valid");
+    study.materials[0].relative_sd = 0.1;
+    study.limits.max_force_n = Some(5.0);
+    study.limits.max_local_stretch = Some(2.0);
+    study.objective = Objective { guard_promised_sd: Guard::FirstMaterial, ..Objective::default() };
+    study
+}
+
+/// One term: 𝒮 of (μ, α), relative standard deviations, criteria, force, stretch.
+fn response(integrated: [f64; 2], sd: [f64; 2], force: f64, stretch: f64) -> Response {
+    Response {
+        log_integrated: integrated.map(f64::ln).to_vec(),
+        log_relative_sd: sd.map(f64::ln).to_vec(),
+        log_criteria: [0.0; 4],
+        log_force: force.ln(),
+        log_stretch: stretch.ln(),
+    }
+}
+
+fn judged(study: &Study, own: [Response; 3]) -> (Judged, f64) {
+    let samples = sample_materials(&study.materials);
+    let base = vec![response([1.0, 1.0], [0.1, 0.1], 1.0, 1.5); 3];
+    let reference = Reference::new(study, &samples, &base);
+    let judged = reference.judge(&Evaluated { responses: own.to_vec(), gradients: Vec::new() });
+    let objective = reference.objective(&judged).exp();
+    (judged, objective)
+}
+
+/// Weights ½, ¼, ¼: the central value's gain of 4 and the variants' of 1 average to 4^½ = 2. The limits are those of the
+/// worst sample: a force of 6 N with one variant breaks 5 N although the mean keeps it.
+#[test]
+fn gains_are_averaged_and_limits_are_the_worst() {
+    let own = [
+        response([4.0, 9.0], [0.05, 0.05], 1.0, 1.5),
+        response([1.0, 1.0], [0.05, 0.20], 6.0, 1.5),
+        response([1.0, 1.0], [0.05, 0.05], 1.0, 1.9),
+    ];
+    let (judged, objective) = judged(&study(), own);
+    // Closed form; rounding only, here and below.
+    assert!((objective - 2.0).abs() < 1e-12, "{objective}");
+    let expected = [2.0f64, 0.5, 5.0 / 6.0, 2.0 / 1.9];
+    for (found, expected) in judged.worst_margins[0].iter().zip(expected) {
+        assert!((found - expected.ln()).abs() < 1e-12, "{found} {expected}");
+    }
+    // Every sample's margins are there for the search.
+    assert_eq!(judged.margins.len(), 3 * 4);
+}
+
+#[test]
+fn weights_and_kinds_combine_as_written() {
+    let own = [0, 1, 2].map(|_| response([4.0, 9.0], [0.2, 0.025], 1.0, 1.5));
+    let mut study = study();
+    study.objective.combine = Combine::Weighted;
+    study.objective.parameter_weights = [("mu_1".to_string(), 3.0)].into();
+    assert!((judged(&study, own.clone()).1 - (4.0f64.powi(3) * 9.0).powf(0.25)).abs() < 1e-12);
+    study.objective.parameter_weights = [("mu_1".to_string(), 0.0)].into();
+    assert!((judged(&study, own.clone()).1 - 9.0).abs() < 1e-12);
+    // With standard deviations as well: gains 4, 9, ½, 4.
+    study.objective = Objective { kind: ObjectiveKind::SensitivityAndPromisedSd, ..Objective::default() };
+    assert!((judged(&study, own.clone()).1 - 0.5).abs() < 1e-12);
+    study.objective.combine = Combine::GeometricMean;
+    assert!((judged(&study, own).1 - 72.0f64.powf(0.25)).abs() < 1e-12);
+}

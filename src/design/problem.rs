@@ -1,0 +1,93 @@
+//! The local problem of one structure: evaluations with gradients, in scaled variables.
+
+use super::aim::Combine;
+use super::explore::geometry_margins;
+use super::local::{LocalModel, LocalProblem};
+use super::objective::{Judged, Reference};
+use super::search::Search;
+use super::space::Subspace;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// A structure's local problem.
+pub(super) struct Problem<'a> {
+    pub search: &'a Search<'a>,
+    pub reference: &'a Reference<'a>,
+    pub subspace: &'a Subspace,
+    /// Points seen and what they were judged.
+    pub log: Mutex<Log>,
+    /// Set when an evaluation was cancelled.
+    pub was_stopped: AtomicBool,
+    /// Called after each evaluation with the gain of a design within the limits.
+    pub on_evaluation: &'a (dyn Fn(Option<f64>) + Sync),
+}
+
+/// Points of a refinement and what they were judged.
+pub(super) type Log = Vec<(Vec<f64>, Option<Judged>)>;
+
+/// ln of the factor by which a refinement stays away from force, stretch and guard limits: the search's mesh is coarser than
+/// the confirmation's, and a limit that is just met on the one can be broken on the other.
+pub(super) const RESERVE: f64 = 2e-3;
+
+impl<'a> Problem<'a> {
+    /// A problem that nothing was tried of yet.
+    pub fn new(
+        search: &'a Search<'a>,
+        reference: &'a Reference<'a>,
+        subspace: &'a Subspace,
+        on_evaluation: &'a (dyn Fn(Option<f64>) + Sync),
+    ) -> Problem<'a> {
+        let (log, was_stopped) = (Mutex::default(), AtomicBool::new(false));
+        Problem { search, reference, subspace, log, was_stopped, on_evaluation }
+    }
+}
+
+impl LocalProblem for Problem<'_> {
+    fn model(&self, x: &[f64]) -> Option<LocalModel> {
+        let specimen = self.subspace.specimen(x);
+        let tried = self.search.tried(&specimen, Some(self.subspace));
+        let judged = match tried {
+            None => {
+                self.was_stopped.store(true, Ordering::Relaxed);
+                None
+            }
+            Some(Err(_)) => None,
+            Some(Ok(evaluated)) => Some(self.reference.judge(&evaluated)),
+        };
+        let kept = judged.as_ref().filter(|j| j.margins.iter().all(|m| *m >= 0.0));
+        (self.on_evaluation)(kept.map(|j| self.reference.objective(j).exp()));
+        if let Ok(mut log) = self.log.lock() {
+            log.push((x.to_vec(), judged.clone()));
+        }
+        let judged = judged?;
+        // From per-millimetre to per-unit of the scaled variables.
+        let scaled = |rows: &[Vec<f64>]| -> Vec<Vec<f64>> {
+            let count = rows.first().map_or(0, Vec::len);
+            (0..count)
+                .map(|entry| {
+                    rows.iter()
+                        .zip(&self.subspace.ranges)
+                        .map(|(row, range)| row[entry] * (range.max - range.min))
+                        .collect()
+                })
+                .collect()
+        };
+        let is_mean = self.search.study.objective.combine != Combine::Maximin;
+        Some(LocalModel {
+            weights: if is_mean { judged.weights.clone() } else { Vec::new() },
+            gain_gradients: scaled(&judged.gain_gradients),
+            margin_gradients: scaled(&judged.margin_gradients),
+            gains: judged.gains,
+            margins: judged.margins.iter().map(|m| m - RESERVE).collect(),
+        })
+    }
+
+    fn geometry(&self, x: &[f64]) -> Vec<f64> {
+        let study = self.search.study;
+        geometry_margins(&self.subspace.specimen(x), &study.limits, study.scan.voxel_mm)
+    }
+
+    fn is_free(&self, index: usize) -> bool {
+        self.subspace.is_continuous(index)
+    }
+}
