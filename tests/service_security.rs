@@ -114,3 +114,39 @@ fn answers_carry_protective_headers() {
         assert_eq!(service.get(path).header("x-content-type-options"), Some("nosniff"), "{path}");
     }
 }
+
+/// A tar entry with a right checksum.
+fn tar_entry(name: &str, kind: u8, bytes: &[u8]) -> Vec<u8> {
+    let mut header = [0u8; 512];
+    header[..name.len()].copy_from_slice(name.as_bytes());
+    header[124..135].copy_from_slice(format!("{:011o}", bytes.len()).as_bytes());
+    header[148..156].fill(b' ');
+    header[156] = kind;
+    let sum: u64 = header.iter().map(|b| u64::from(*b)).sum();
+    header[148..154].copy_from_slice(format!("{sum:06o}").as_bytes());
+    header[154] = 0;
+    let mut out = header.to_vec();
+    out.extend_from_slice(bytes);
+    out.resize(out.len().div_ceil(512) * 512, 0);
+    out
+}
+
+#[test]
+fn uploads_are_recordings_or_refused() {
+    let (_folder, service) = service();
+    let send = |body: &[u8]| service.call("POST", "/v1/recordings", &[("content-type", "application/x-tar")], body);
+    for (what, body) in [
+        ("no tar", b"hello".to_vec()),
+        ("a path", tar_entry("../../etc/cron.d/x", b'0', b"x")),
+        ("a link", tar_entry("mask.nii.gz", b'2', b"")),
+        ("no recording", tar_entry("recording.json", b'0', b"{}")),
+        ("a length that is not there", tar_entry("u.nii", b'0', &[0; 600])[..700].to_vec()),
+    ] {
+        let reply = send(&body);
+        assert_eq!((reply.status, reply.cause().as_str()), (422, "unsafe-upload"), "{what}");
+        assert!(!String::from_utf8_lossy(&reply.body).contains("/tmp/"), "{what}: no paths of the machine");
+    }
+    assert_eq!(service.get("/v1/recordings").json()["recordings"].as_array().unwrap().len(), 0);
+    let reply = service.post("/v1/diagnoses", &json!({ "recording": "../../x" }));
+    assert_eq!(reply.json()["errors"][0]["pointer"], "/recording");
+}

@@ -234,7 +234,7 @@ fn finish(
 ) -> Response {
     // axum's own refusals (a body that is too long, say) become problems too.
     let is_plain_error = answer.status().as_u16() >= 400
-        && !answer.headers().get(header::CONTENT_TYPE).is_some_and(|t| t == "application/problem+json");
+        && answer.headers().get(header::CONTENT_TYPE).is_none_or(|t| t != "application/problem+json");
     if is_plain_error {
         let name = match answer.status().as_u16() {
             404 => "not-found",

@@ -7,11 +7,14 @@ use std::fmt::Write;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
+/// Method, route, status.
+type RequestKind = (String, String, u16);
+
 /// What the service counts.
 #[derive(Default)]
 pub struct Metrics {
     /// Requests and their seconds by (method, route, status).
-    requests: Mutex<BTreeMap<(String, String, u16), (u64, f64)>>,
+    requests: Mutex<BTreeMap<RequestKind, (u64, f64)>>,
     /// Requests in work.
     pub in_flight: AtomicI64,
     /// Open event streams.

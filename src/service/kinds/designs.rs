@@ -126,27 +126,27 @@ fn verify_both(
     let draws = study.verification.draws;
     let total = (2 * study.materials.len() * draws) as u64;
     let done = AtomicU64::new(0);
-    let of = |specimen: &Specimen, material: &Ogden| -> Result<Vec<ParameterSpread>, RunError> {
+    // A specimen that cannot be verified is a finding, not a failed job.
+    let of = |specimen: &Specimen, material: &Ogden| -> Result<(Vec<ParameterSpread>, Option<String>), RunError> {
         let options = VerifyOptions::new(specimen, draws, study.seed);
         let on_draw = || {
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
             let best = Some(result.best.objective);
             (context.progress)(TaskProgress { stage: "verify".into(), done, total, best });
         };
-        verify(specimen, material, &study.scan, &options, &on_draw, context.is_cancelled)
-            .map_err(|e| if (context.is_cancelled)() { RunError::Stopped } else { failed(&e) })
+        match verify(specimen, material, &study.scan, &options, &on_draw, context.is_cancelled) {
+            Ok(spread) => Ok((spread, None)),
+            Err(_) if (context.is_cancelled)() => Err(RunError::Stopped),
+            Err(error) => Ok((Vec::new(), Some(error.to_string()))),
+        }
     };
-    study
-        .materials
-        .iter()
-        .map(|prior| {
-            Ok(MaterialVerification {
-                material: prior.name.clone(),
-                best: of(&result.best.specimen, &prior.material)?,
-                base: of(&result.base.specimen, &prior.material)?,
-            })
-        })
-        .collect()
+    let mut verified = Vec::new();
+    for prior in &study.materials {
+        let (best, best_failure) = of(&result.best.specimen, &prior.material)?;
+        let (base, base_failure) = of(&result.base.specimen, &prior.material)?;
+        verified.push(MaterialVerification { material: prior.name.clone(), best, base, best_failure, base_failure });
+    }
+    Ok(verified)
 }
 
 /// Base and best once more, for what needs fields: histograms, deformed shapes, surfaces for the page.

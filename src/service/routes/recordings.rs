@@ -71,7 +71,8 @@ pub(super) async fn get(State(app): State<App>, Path(id): Path<String>) -> Resul
 }
 
 /// Upload a recording: a tar file of its folder. Its content is read and checked before it is kept.
-#[utoipa::path(post, path = "/v1/recordings", request_body(content = Vec<u8>, content_type = "application/x-tar"), responses(
+/// `application/x-tar` is taken too.
+#[utoipa::path(post, path = "/v1/recordings", request_body(content = String, content_type = "application/octet-stream"), responses(
     (status = 201, description = "Kept", body = RecordingView, headers(("Location" = String, description = "The recording"))),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "recordings")]
@@ -82,7 +83,7 @@ pub(super) async fn upload(
     body: Body,
 ) -> Result<Response, Problem> {
     caller.require(Role::Submit)?;
-    if headers.get(header::CONTENT_TYPE).is_none_or(|t| t != "application/x-tar") {
+    if !headers.get(header::CONTENT_TYPE).is_some_and(|t| t == "application/x-tar" || t == "application/octet-stream") {
         return Err(Problem::new("unsupported-media-type", "send the recording's folder as application/x-tar"));
     }
     let max = app.limits.max_upload_bytes;

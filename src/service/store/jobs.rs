@@ -116,6 +116,9 @@ pub struct ArtefactRow {
     pub num_bytes: i64,
 }
 
+/// Numbers of jobs by (kind, state) and of tasks by state.
+pub type Counts = (Vec<(String, String, i64)>, Vec<(String, i64)>);
+
 /// Which jobs to list.
 #[derive(Clone, Debug, Default)]
 pub struct JobFilter {
@@ -357,7 +360,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn counts(&self) -> Result<(Vec<(String, String, i64)>, Vec<(String, i64)>), StoreError> {
+    pub fn counts(&self) -> Result<Counts, StoreError> {
         let jobs = self.database.read("SELECT kind, state, count(*) FROM jobs GROUP BY kind, state", &[])?;
         let tasks = self.database.read("SELECT state, count(*) FROM tasks GROUP BY state", &[])?;
         Ok((
