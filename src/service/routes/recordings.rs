@@ -71,7 +71,6 @@ pub(super) async fn get(State(app): State<App>, Path(id): Path<String>) -> Resul
 }
 
 /// Upload a recording: a tar file of its folder. Its content is read and checked before it is kept.
-/// `application/x-tar` is taken too.
 #[utoipa::path(post, path = "/v1/recordings", request_body(content = String, content_type = "application/octet-stream"), responses(
     (status = 201, description = "Kept", body = RecordingView, headers(("Location" = String, description = "The recording"))),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
