@@ -2,7 +2,7 @@
 //!
 //! The rooms stand on one another in this order; a room uses only those before it:
 //! [`specimen`] → [`mesh`] → [`material`] → [`fem`] → [`kinematics`] → [`homogeneous`] → [`rate`] → [`voxel`] →
-//! [`sensitivity`] → [`recording`] → [`acquisition`] → [`calibration`] → [`design`] → [`report`] → [`cli`].
+//! [`sensitivity`] → [`recording`] → [`acquisition`] → [`calibration`] → [`diagnosis`], [`design`] → [`sweep`] → [`report`] → [`service`] → [`cli`].
 //!
 //! One unit system inside: lengths mm, moduli and stresses kPa, times s. Stress × area is then
 //! kPa·mm² = 10⁻³ N; forces cross every public boundary in N.
@@ -23,6 +23,7 @@ pub mod rate;
 pub mod recording;
 pub mod report;
 pub mod sensitivity;
+pub mod service;
 pub mod slurm;
 pub mod specimen;
 pub mod sweep;

@@ -20,11 +20,13 @@ mod output;
 mod paper_tables;
 mod progress;
 mod scan;
+mod serve;
 mod slurm;
 mod solve;
 mod sweep;
 mod task_bar;
 mod uniaxial;
+mod worker;
 
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -70,6 +72,10 @@ enum Command {
     Uniaxial(uniaxial::UniaxialArguments),
     /// Ogden terms fitted to curves of several homogeneous tests together.
     Curves(curves::CurvesArguments),
+    /// The service: REST, jobs, and a page for planners.
+    Serve(serve::ServeArguments),
+    /// A worker of a service on PostgreSQL.
+    Worker(worker::WorkerArguments),
 }
 
 /// What every command takes.
@@ -116,7 +122,10 @@ pub fn run() -> ExitCode {
             return ExitCode::from(code);
         }
     };
-    interrupt::listen();
+    // The service and its workers end gracefully by signals of their own.
+    if !matches!(arguments.command, Command::Serve(_) | Command::Worker(_)) {
+        interrupt::listen();
+    }
     let result = match &arguments.command {
         Command::Solve(a) => solve::run(a),
         Command::Evaluate(a) => evaluate::run(a),
@@ -130,6 +139,8 @@ pub fn run() -> ExitCode {
         Command::Diagnose(a) => diagnose::run(a),
         Command::Uniaxial(a) => uniaxial::run(a),
         Command::Curves(a) => curves::run(a),
+        Command::Serve(a) => serve::run(a),
+        Command::Worker(a) => worker::run(a),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -142,7 +153,12 @@ pub fn run() -> ExitCode {
 
 /// Starts the thread pool.
 fn start_threads(common: &Common) -> Result<(), CliError> {
-    let Some(n) = common.threads else { return Ok(()) };
+    start_thread_pool(common.threads)
+}
+
+/// Starts the thread pool with this many threads.
+fn start_thread_pool(threads: Option<usize>) -> Result<(), CliError> {
+    let Some(n) = threads else { return Ok(()) };
     if !(1..=1024).contains(&n) {
         return Err(CliError::Option { option: "threads", message: format!("{n} is not from 1 to 1024") });
     }

@@ -1,0 +1,185 @@
+//! Errors as RFC 9457 `application/problem+json`, with a stable `type` per cause and JSON pointers to offending fields.
+
+use axum::http::{HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// Where in the request something is wrong.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct FieldProblem {
+    /// JSON pointer (RFC 6901) to the field; empty for the whole body.
+    pub pointer: String,
+    /// What is wrong and what to change.
+    pub detail: String,
+}
+
+/// A problem (RFC 9457).
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct Problem {
+    /// Stable name of the cause, `urn:lambdak:problem:…`.
+    #[serde(rename = "type")]
+    pub kind: String,
+    /// The cause in words.
+    pub title: String,
+    /// HTTP status.
+    #[schema(minimum = 400, maximum = 599)]
+    pub status: u16,
+    /// This case: the value, the limit, what to change.
+    pub detail: String,
+    /// Offending fields.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub errors: Vec<FieldProblem>,
+    /// Seconds after which to try again.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub retry_after_s: Option<u32>,
+}
+
+/// Every cause: name, status, title. The names are stable.
+pub const CATALOGUE: &[(&str, u16, &str)] = &[
+    ("invalid-json", 400, "The body is not JSON"),
+    ("invalid-parameter", 400, "A parameter is not usable"),
+    ("bad-host", 400, "The Host header names another server"),
+    ("unauthorized", 401, "A valid token is needed"),
+    ("forbidden", 403, "The token's role or the page's origin does not allow this"),
+    ("not-found", 404, "There is no such thing here"),
+    ("method-not-allowed", 405, "The method is not allowed here"),
+    ("not-finished", 409, "The job has no result yet"),
+    ("wrong-state", 409, "The job's state does not allow this"),
+    ("key-reused", 409, "The Idempotency-Key was used with another request"),
+    ("too-large", 413, "The body is too large"),
+    ("unsupported-media-type", 415, "The content type is not supported"),
+    ("invalid-input", 422, "The input is not valid"),
+    ("too-big-a-problem", 422, "The problem is larger than allowed"),
+    ("no-solution", 422, "The computation found no solution"),
+    ("unsafe-upload", 422, "The upload is not a safe recording"),
+    ("queue-full", 429, "The queue is full"),
+    ("quota", 429, "The token's quota is used up"),
+    ("too-many-requests", 429, "Too many requests at a time"),
+    ("internal", 500, "The service failed"),
+    ("worker-lost", 500, "The task ended its worker too often"),
+    ("version-changed", 500, "The program changed while the job was unfinished"),
+    ("storage", 503, "The storage does not answer"),
+    ("shutting-down", 503, "The service is shutting down"),
+    ("timeout", 504, "The request took too long"),
+];
+
+impl Problem {
+    /// A problem of the catalogue.
+    pub fn new(name: &'static str, detail: impl Into<String>) -> Self {
+        let (_, status, title) =
+            CATALOGUE.iter().find(|entry| entry.0 == name).copied().unwrap_or(("internal", 500, "The service failed"));
+        Problem {
+            kind: format!("urn:lambdak:problem:{name}"),
+            title: title.into(),
+            status,
+            detail: detail.into(),
+            errors: Vec::new(),
+            retry_after_s: None,
+        }
+    }
+
+    /// `invalid-input` at a field.
+    pub fn at(pointer: impl Into<String>, detail: impl Into<String>) -> Self {
+        let detail = detail.into();
+        let mut problem = Problem::new("invalid-input", detail.clone());
+        problem.errors.push(FieldProblem { pointer: pointer.into(), detail });
+        problem
+    }
+
+    /// With a time after which to try again.
+    pub fn after(mut self, seconds: u32) -> Self {
+        self.retry_after_s = Some(seconds);
+        self
+    }
+
+    /// As JSON text, for the storage.
+    pub fn to_json(&self) -> String {
+        serde_json::to_string(self).unwrap_or_default()
+    }
+}
+
+impl From<super::store::StoreError> for Problem {
+    fn from(error: super::store::StoreError) -> Self {
+        match error {
+            super::store::StoreError::QueueFull { is_quota, .. } => {
+                Problem::new(if is_quota { "quota" } else { "queue-full" }, error.to_string()).after(10)
+            }
+            other => {
+                // What the database says may name hosts and files: it is for the log.
+                super::log::error("storage", &other.to_string());
+                Problem::new("storage", "the storage did not answer; try again").after(5)
+            }
+        }
+    }
+}
+
+impl IntoResponse for Problem {
+    fn into_response(self) -> Response {
+        let status = StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
+        let mut response = (status, serde_json::to_vec(&self).unwrap_or_default()).into_response();
+        let headers = response.headers_mut();
+        headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));
+        if let Some(seconds) = self.retry_after_s {
+            headers.insert(header::RETRY_AFTER, HeaderValue::from(seconds));
+        }
+        if self.status == 401 {
+            headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
+        }
+        response
+    }
+}
+
+/// The JSON pointer of a path as validators write it: `holes[1].diameter_mm` → `/holes/1/diameter_mm`.
+pub fn pointer_of(path: &str) -> String {
+    if path.is_empty() || path == "." || path == "(root)" {
+        return String::new();
+    }
+    path.split(['.', '['])
+        .map(|part| part.trim_end_matches(']'))
+        .filter(|part| !part.is_empty())
+        .map(|part| format!("/{}", part.replace('~', "~0").replace('/', "~1")))
+        .collect()
+}
+
+/// Reads a value, with a pointer to the field that does not fit.
+///
+/// # Errors
+/// A [`Problem`] `invalid-json` or `invalid-input`.
+pub fn parse<T: serde::de::DeserializeOwned>(value: &serde_json::Value) -> Result<T, Problem> {
+    serde_path_to_error::deserialize(value).map_err(|error| {
+        let path = pointer_of(&error.path().to_string());
+        Problem::at(path, error.inner().to_string())
+    })
+}
+
+/// A pointer from a message that starts with a field's path, as those of the validators do.
+pub fn pointer_in_message(prefix: &str, message: &str) -> String {
+    let first = message.split([' ', ':', ',']).next().unwrap_or_default();
+    let is_path =
+        first.contains('_') || first.contains('[') || first.contains('.') || first == "schema" || first == "name";
+    if is_path { format!("{prefix}{}", pointer_of(first)) } else { prefix.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pointers() {
+        assert_eq!(pointer_of("holes[1].diameter_mm"), "/holes/1/diameter_mm");
+        assert_eq!(pointer_of("(root)"), "");
+        assert_eq!(pointer_of("a/b.c~d"), "/a~1b/c~0d");
+        assert_eq!(pointer_in_message("/specimen", "block.length_mm is -1 mm; choose"), "/specimen/block/length_mm");
+        assert_eq!(pointer_in_message("/specimen", "there are 65 holes; use at most 64"), "/specimen");
+    }
+
+    #[test]
+    fn names_are_unique_and_known() {
+        let mut names: Vec<_> = CATALOGUE.iter().map(|e| e.0).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), CATALOGUE.len());
+        assert_eq!(Problem::new("quota", "").status, 429);
+    }
+}

@@ -1,0 +1,207 @@
+//! Uploaded recordings: a tar file taken apart with bounds, checked by the library's reader, then kept as blobs.
+//!
+//! Only regular files with plain names are taken; folders before a name are dropped, links and devices refused. The
+//! compressed images inside are bounded in what they may unpack to.
+
+use super::problem::Problem;
+use super::store::{Store, StoreError, sha256_hex};
+use crate::recording::{ReadLimits, Recording};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::path::Path;
+
+/// Most files of a recording.
+const MAX_FILES: usize = 2000;
+/// Length of a tar block, bytes.
+const BLOCK: usize = 512;
+
+/// What an upload may take.
+pub const LIMITS: ReadLimits = ReadLimits { max_file_bytes: 256 << 20, max_values: 40_000_000, max_steps: 200 };
+
+fn unsafe_upload(detail: impl Into<String>) -> Problem {
+    Problem::new("unsafe-upload", detail)
+}
+
+/// A file's own name: letters, digits, `.`, `_`, `-`, not starting with a dot, at most 100.
+fn plain_name(name: &str) -> Result<String, Problem> {
+    let last = name.rsplit('/').next().unwrap_or_default();
+    let is_plain = (1..=100).contains(&last.len())
+        && !last.starts_with('.')
+        && last.bytes().all(|b| b.is_ascii_alphanumeric() || b"._-".contains(&b));
+    let climbs = name.starts_with('/') || name.split('/').any(|part| part == "..") || name.contains('\\');
+    if is_plain && !climbs {
+        return Ok(last.into());
+    }
+    let shown: String = name.chars().filter(|c| !c.is_control()).take(60).collect();
+    Err(unsafe_upload(format!("the name {shown:?} is not plain; use letters, digits, dots, hyphens and underscores")))
+}
+
+fn text_of(field: &[u8]) -> String {
+    let end = field.iter().position(|b| *b == 0).unwrap_or(field.len());
+    String::from_utf8_lossy(&field[..end]).into_owned()
+}
+
+/// Takes a tar file apart.
+///
+/// # Errors
+/// `unsafe-upload`.
+pub fn unpack(mut stream: impl Read, max_bytes: usize) -> Result<BTreeMap<String, Vec<u8>>, Problem> {
+    let cut = |_| unsafe_upload("the tar file ends in the middle of an entry");
+    let mut files = BTreeMap::new();
+    let mut total = 0usize;
+    loop {
+        let mut header = [0u8; BLOCK];
+        if let Err(error) = stream.read_exact(&mut header) {
+            if error.kind() == std::io::ErrorKind::UnexpectedEof && !files.is_empty() {
+                break;
+            }
+            return Err(unsafe_upload("the body is not a tar file"));
+        }
+        if header.iter().all(|b| *b == 0) {
+            break;
+        }
+        let sum: u64 =
+            header.iter().enumerate().map(|(i, b)| u64::from(if (148..156).contains(&i) { b' ' } else { *b })).sum();
+        let octal = |field: &[u8]| u64::from_str_radix(text_of(field).trim(), 8).ok();
+        if octal(&header[148..156]) != Some(sum) {
+            return Err(unsafe_upload("the body is not a tar file: a header's checksum is wrong"));
+        }
+        let length = octal(&header[124..136]).ok_or_else(|| unsafe_upload("an entry has no length"))?;
+        let length = usize::try_from(length).unwrap_or(usize::MAX);
+        total = total.saturating_add(length);
+        if total > max_bytes {
+            return Err(Problem::new("too-large", format!("the files hold more than {max_bytes} bytes")));
+        }
+        let mut bytes = Vec::new();
+        let padded = length.div_ceil(BLOCK) * BLOCK;
+        let read = stream.by_ref().take(padded as u64).read_to_end(&mut bytes).map_err(cut)?;
+        if read < padded {
+            return Err(unsafe_upload("the tar file ends in the middle of an entry"));
+        }
+        bytes.truncate(length);
+        match header[156] {
+            b'0' | 0 => {
+                let name = plain_name(&text_of(&header[0..100]))?;
+                if files.insert(name.clone(), bytes).is_some() {
+                    return Err(unsafe_upload(format!("{name} is there twice")));
+                }
+                if files.len() > MAX_FILES {
+                    return Err(unsafe_upload(format!("more than {MAX_FILES} files")));
+                }
+            }
+            // Folders and extended headers hold nothing that is needed.
+            b'5' | b'x' | b'g' => {}
+            _ => return Err(unsafe_upload("links and devices are refused")),
+        }
+    }
+    Ok(files)
+}
+
+/// Writes files with names of [`unpack`] into a fresh folder.
+fn lay_out(folder: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<(), Problem> {
+    for (name, bytes) in files {
+        std::fs::write(folder.join(name), bytes).map_err(|e| Problem::new("internal", format!("scratch: {e}")))?;
+    }
+    Ok(())
+}
+
+/// A folder that is removed when dropped.
+struct Scratch(std::path::PathBuf);
+
+impl Scratch {
+    fn new() -> Result<Scratch, Problem> {
+        let failed = |e: String| Problem::new("internal", format!("scratch: {e}"));
+        let name = super::access::random_hex::<8>().map_err(|e| failed(e.to_string()))?;
+        let path = std::env::temp_dir().join(format!("lambdak-recording-{name}"));
+        std::fs::create_dir(&path).map_err(|e| failed(e.to_string()))?;
+        Ok(Scratch(path))
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// Identifier of an upload: of its names and contents.
+pub fn identifier(files: &BTreeMap<String, Vec<u8>>) -> String {
+    let mut hash = Sha256::new();
+    for (name, bytes) in files {
+        hash.update(format!("{name}\n{}\n{}\n", bytes.len(), sha256_hex(bytes)).as_bytes());
+    }
+    hash.finalize().iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// Reads a recording from its files.
+///
+/// # Errors
+/// `unsafe-upload` with what the reader says.
+pub fn read(files: &BTreeMap<String, Vec<u8>>) -> Result<Recording, Problem> {
+    let scratch = Scratch::new()?;
+    lay_out(&scratch.0, files)?;
+    Recording::read(&scratch.0, &LIMITS).map_err(|e| {
+        // The reader names files by their path here, which is nobody's business.
+        let message = e.to_string().replace(&format!("{}/", scratch.0.display()), "");
+        unsafe_upload(message)
+    })
+}
+
+/// Reads a kept recording; `None` where there is none of that name.
+///
+/// # Errors
+/// [`StoreError`], inside a [`Problem`].
+pub fn load(store: &Store, id: &str) -> Result<Option<Recording>, Problem> {
+    let files: Result<Vec<(String, Vec<u8>)>, StoreError> = store.upload_files(id);
+    let files: BTreeMap<_, _> = files.map_err(Problem::from)?.into_iter().collect();
+    if files.is_empty() {
+        return Ok(None);
+    }
+    read(&files).map(Some)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entry(name: &str, kind: u8, bytes: &[u8]) -> Vec<u8> {
+        let mut header = [0u8; BLOCK];
+        header[..name.len()].copy_from_slice(name.as_bytes());
+        header[124..135].copy_from_slice(format!("{:011o}", bytes.len()).as_bytes());
+        header[148..156].fill(b' ');
+        header[156] = kind;
+        let sum: u64 = header.iter().map(|b| u64::from(*b)).sum();
+        header[148..154].copy_from_slice(format!("{sum:06o}").as_bytes());
+        header[154] = 0;
+        let mut out = header.to_vec();
+        out.extend_from_slice(bytes);
+        out.resize(out.len().div_ceil(BLOCK) * BLOCK, 0);
+        out
+    }
+
+    #[test]
+    fn only_plain_files_are_taken() {
+        let tar = [
+            entry("a/", b'5', b""),
+            entry("a/recording.json", b'0', b"{}"),
+            entry("u_1.nii.gz", 0, b"xyz"),
+            vec![0; 1024],
+        ]
+        .concat();
+        let files = unpack(&tar[..], 1000).unwrap();
+        assert_eq!(files.keys().collect::<Vec<_>>(), ["recording.json", "u_1.nii.gz"]);
+        assert_eq!(files["u_1.nii.gz"], b"xyz");
+        for name in ["../x", "/etc/passwd", ".hidden", "a/../b", "a\\b", "a b", "", "ü"] {
+            assert_eq!(unpack(&entry(name, b'0', b"")[..], 1000).unwrap_err().status, 422, "{name:?}");
+        }
+        for kind in [b'1', b'2', b'3', b'6'] {
+            assert_eq!(unpack(&entry("x", kind, b"")[..], 1000).unwrap_err().status, 422);
+        }
+        assert_eq!(unpack(&entry("x", b'0', &[0; 2000])[..], 1000).unwrap_err().status, 413);
+        assert_eq!(unpack(&entry("x", b'0', &[0; 900])[..700], 1000).unwrap_err().status, 422);
+        assert_eq!(unpack(&b"no tar"[..], 1000).unwrap_err().status, 422);
+        let twice = [entry("x", b'0', b""), entry("y/x", b'0', b"")].concat();
+        assert_eq!(unpack(&twice[..], 1000).unwrap_err().status, 422);
+    }
+}

@@ -1,0 +1,264 @@
+//! Runs tasks: claims one, runs its library call on an own thread, keeps its lease alive, hands its result over.
+
+use super::kinds::{JobKind, RunContext, RunError, TaskProgress, kind_named};
+use super::log;
+use super::problem::Problem;
+use super::store::{Claimed, Finished, Store, StoreError, TaskResult};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// How a worker works.
+#[derive(Clone, Debug)]
+pub struct WorkerSettings {
+    /// Name, unique among workers.
+    pub name: String,
+    /// Tasks at a time.
+    pub slots: usize,
+    /// How long a lease lasts; it is prolonged well before.
+    pub lease: Duration,
+    /// For checkpoints of running tasks.
+    pub scratch: PathBuf,
+}
+
+/// How often progress is stored and a cancelled task noticed, at most.
+const HEARTBEAT: Duration = Duration::from_millis(500);
+/// How long an idle slot waits before it looks again.
+const IDLE: Duration = Duration::from_millis(250);
+/// A checkpoint is stored when it has changed, this often.
+const CHECKPOINT: Duration = Duration::from_secs(3);
+/// How long to wait when the storage does not answer.
+const STORAGE_PAUSE: Duration = Duration::from_secs(1);
+
+/// Wakes idle slots and stops all.
+#[derive(Default)]
+pub struct Signal {
+    is_stopping: AtomicBool,
+    generation: Mutex<u64>,
+    changed: Condvar,
+    /// Tasks finished, for metrics.
+    pub finished: AtomicU64,
+    /// Tasks failed, for metrics.
+    pub failed: AtomicU64,
+    /// Milliseconds of tasks run, for metrics.
+    pub busy_ms: AtomicU64,
+}
+
+impl Signal {
+    /// There may be new work.
+    pub fn wake(&self) {
+        let mut generation = self.generation.lock().unwrap_or_else(PoisonError::into_inner);
+        *generation += 1;
+        self.changed.notify_all();
+    }
+
+    /// Running tasks keep their checkpoints and go back into the queue.
+    pub fn stop(&self) {
+        self.is_stopping.store(true, Ordering::SeqCst);
+        self.wake();
+    }
+
+    fn is_stopping(&self) -> bool {
+        self.is_stopping.load(Ordering::SeqCst)
+    }
+
+    fn wait(&self, time: Duration) {
+        let generation = self.generation.lock().unwrap_or_else(PoisonError::into_inner);
+        let _unused = self.changed.wait_timeout(generation, time);
+    }
+}
+
+/// Starts a worker's slots; join them after [`Signal::stop`].
+pub fn start(store: &Arc<Store>, settings: &WorkerSettings, signal: &Arc<Signal>) -> Vec<std::thread::JoinHandle<()>> {
+    (0..settings.slots.max(1))
+        .filter_map(|slot| {
+            let (store, settings, signal) = (store.clone(), settings.clone(), signal.clone());
+            std::thread::Builder::new()
+                .name(format!("slot-{slot}"))
+                // Numerics recurse little, but pictures and parsers run here too.
+                .stack_size(8 << 20)
+                .spawn(move || run_slot(&store, &settings, &signal, slot))
+                .inspect_err(|e| log::error("slot", &e.to_string()))
+                .ok()
+        })
+        .collect()
+}
+
+fn run_slot(store: &Store, settings: &WorkerSettings, signal: &Signal, slot: usize) {
+    let worker = format!("{}/{slot}", settings.name);
+    let lease_ms = settings.lease.as_millis() as i64;
+    let dead = Problem::new(
+        "worker-lost",
+        format!(
+            "the task lost its worker {} times; it is put aside. Resume the job to try again",
+            super::store::MAX_LOSSES
+        ),
+    )
+    .to_json();
+    let mut seen = Instant::now().checked_sub(Duration::from_secs(60)).unwrap_or_else(Instant::now);
+    while !signal.is_stopping() {
+        if slot == 0 && seen.elapsed() > Duration::from_secs(20) {
+            seen = Instant::now();
+            let _ = store.worker_seen(&settings.name, settings.slots);
+        }
+        match store.claim(&worker, lease_ms, &dead) {
+            Ok(Some(task)) => run_task(store, settings, signal, &worker, &task),
+            Ok(None) => signal.wait(IDLE),
+            Err(error) => {
+                log::error("claim", &error.to_string());
+                signal.wait(STORAGE_PAUSE);
+            }
+        }
+    }
+}
+
+/// Runs the work on this thread while another keeps the lease alive.
+fn run_task(store: &Store, settings: &WorkerSettings, signal: &Signal, worker: &str, task: &Claimed) {
+    let started = Instant::now();
+    let path = settings.scratch.join(format!("{}-{}-{}", task.job_id, task.index, task.attempt));
+    if let Ok(Some(bytes)) = store.checkpoint(task) {
+        let _ = std::fs::write(&path, bytes);
+    }
+    let is_lost = AtomicBool::new(false);
+    let is_done = AtomicBool::new(false);
+    let progress = Mutex::new(String::new());
+    let outcome = std::thread::scope(|scope| {
+        let keeper = scope.spawn(|| keep(store, settings, worker, task, &path, &is_lost, &is_done, &progress));
+        let context = RunContext {
+            is_cancelled: &|| is_lost.load(Ordering::Relaxed) || signal.is_stopping(),
+            progress: &|p: TaskProgress| {
+                let text = serde_json::to_string(&p).unwrap_or_default();
+                *progress.lock().unwrap_or_else(PoisonError::into_inner) = text;
+            },
+            recording: &|id: &str| {
+                super::recordings::load(store, id)?
+                    .ok_or_else(|| Problem::new("not-found", "the recording is gone; upload it again"))
+            },
+            checkpoint: &path,
+        };
+        let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| run_kind(store, task, &context)));
+        is_done.store(true, Ordering::SeqCst);
+        keeper.thread().unpark();
+        outcome
+    });
+    let elapsed = started.elapsed();
+    signal.busy_ms.fetch_add(elapsed.as_millis() as u64, Ordering::Relaxed);
+    let outcome = outcome.unwrap_or_else(|_| {
+        Err(Problem::new("internal", "the computation ended with a programming error; please report it").into())
+    });
+    let (what, stored) = match outcome {
+        Ok(result) => {
+            signal.finished.fetch_add(1, Ordering::Relaxed);
+            ("finished", again(|| store.finish(task, worker, &result)))
+        }
+        Err(RunError::Failed(problem)) => {
+            signal.failed.fetch_add(1, Ordering::Relaxed);
+            ("failed", again(|| store.fail(task, worker, &problem.to_json())))
+        }
+        Err(RunError::Stopped) => {
+            save_checkpoint(store, worker, task, &path);
+            ("stopped", again(|| store.release(task, worker).map(|()| Finished::Taken)))
+        }
+    };
+    let _ = std::fs::remove_file(&path);
+    log::info(
+        "task",
+        &serde_json::json!({
+            "job": task.job_id, "task": task.index, "attempt": task.attempt, "worker": worker, "outcome": what,
+            "taken": matches!(stored, Ok(Finished::Taken)), "seconds": elapsed.as_secs_f64(),
+            "storage_error": stored.err().map(|e| e.to_string()),
+        }),
+    );
+    signal.wake();
+}
+
+fn run_kind(store: &Store, task: &Claimed, context: &RunContext) -> Result<TaskResult, RunError> {
+    let unreadable = || Problem::new("internal", "the stored task cannot be read");
+    let kind: &dyn JobKind =
+        kind_named(&task.kind).ok_or_else(|| Problem::new("internal", format!("no kind of job {}", task.kind)))?;
+    if !task.is_gather {
+        let input: serde_json::Value = serde_json::from_str(&task.input).map_err(|_| unreadable())?;
+        return kind.run(&input, context);
+    }
+    let body: serde_json::Value = serde_json::from_str(&task.body).map_err(|_| unreadable())?;
+    let mut results = Vec::new();
+    for (result, problem) in store.task_results(&task.job_id).map_err(Problem::from)? {
+        results.push(if problem.is_empty() {
+            Ok(serde_json::from_slice(&result).map_err(|_| unreadable())?)
+        } else {
+            Err(serde_json::from_str(&problem).map_err(|_| unreadable())?)
+        });
+    }
+    kind.gather(&body, results)
+}
+
+/// A result is worth waiting for a storage that does not answer; the lease decides whether it is still wanted.
+fn again(store: impl Fn() -> Result<Finished, StoreError>) -> Result<Finished, StoreError> {
+    for _ in 0..20 {
+        match store() {
+            Err(error) => {
+                log::error("storage", &error.to_string());
+                std::thread::sleep(STORAGE_PAUSE);
+            }
+            done => return done,
+        }
+    }
+    store()
+}
+
+fn keep(
+    store: &Store,
+    settings: &WorkerSettings,
+    worker: &str,
+    task: &Claimed,
+    path: &Path,
+    is_lost: &AtomicBool,
+    is_done: &AtomicBool,
+    progress: &Mutex<String>,
+) {
+    let lease_ms = settings.lease.as_millis() as i64;
+    let mut prolonged = Instant::now();
+    let mut last_progress = String::new();
+    let mut last_checkpoint = (Instant::now(), 0u64);
+    loop {
+        std::thread::park_timeout(HEARTBEAT.min(settings.lease / 4));
+        if is_done.load(Ordering::SeqCst) {
+            return;
+        }
+        let text = progress.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let text = if text == last_progress { String::new() } else { text };
+        match store.heartbeat(task, worker, lease_ms, &text) {
+            Ok(Finished::Taken) => prolonged = Instant::now(),
+            Ok(Finished::NotOurs) => {
+                is_lost.store(true, Ordering::SeqCst);
+                return;
+            }
+            // Without an answer for a whole lease the task may be somebody else's.
+            Err(_) if prolonged.elapsed() > settings.lease => {
+                is_lost.store(true, Ordering::SeqCst);
+                return;
+            }
+            Err(_) => {}
+        }
+        if !text.is_empty() {
+            last_progress = text;
+        }
+        if last_checkpoint.0.elapsed() > CHECKPOINT {
+            let length = std::fs::metadata(path).map_or(0, |m| m.len());
+            if length != last_checkpoint.1 {
+                save_checkpoint(store, worker, task, path);
+            }
+            last_checkpoint = (Instant::now(), length);
+        }
+    }
+}
+
+fn save_checkpoint(store: &Store, worker: &str, task: &Claimed, path: &Path) {
+    if let Ok(bytes) = std::fs::read(path)
+        && !bytes.is_empty()
+        && let Err(error) = store.save_checkpoint(task, worker, &bytes)
+    {
+        log::error("checkpoint", &error.to_string());
+    }
+}

@@ -1,0 +1,282 @@
+//! Listening, serving, shutting down; and the worker on another machine.
+
+use super::access::{Access, TokenError, random_hex};
+use super::app::{Limits, Shared, router};
+use super::hub::{self, Hub};
+use super::log;
+use super::metrics::Metrics;
+use super::problem::Problem;
+use super::runner::{self, Signal, WorkerSettings};
+use super::store::{Store, StoreError};
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::server::graceful::GracefulShutdown;
+use hyper_util::service::TowerToHyperService;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::sync::{Semaphore, watch};
+
+/// Settings of the service.
+#[derive(Clone, Debug)]
+pub struct ServeOptions {
+    /// Where to listen.
+    pub listen: SocketAddr,
+    /// Data folder.
+    pub data: PathBuf,
+    /// `postgres://…` instead of SQLite in the data folder.
+    pub database: Option<String>,
+    /// File of tokens.
+    pub tokens: Option<PathBuf>,
+    /// Tasks at a time in this process; 0 leaves all to workers.
+    pub slots: usize,
+    /// Limits.
+    pub limits: Limits,
+    /// How long a lease lasts.
+    pub lease: Duration,
+}
+
+/// Settings of a worker.
+#[derive(Clone, Debug)]
+pub struct WorkerOptions {
+    /// `postgres://…`.
+    pub database: String,
+    /// Tasks at a time.
+    pub slots: usize,
+    /// How long a lease lasts.
+    pub lease: Duration,
+}
+
+/// Why the service or a worker does not run.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ServeError {
+    /// The address is not of this machine alone and there are no tokens.
+    #[error(
+        "{listen} can be reached from other machines; give --tokens FILE (make one with --add-token NAME:ROLE) or listen on 127.0.0.1"
+    )]
+    TokensNeeded {
+        /// The address.
+        listen: SocketAddr,
+    },
+    /// The address cannot be listened on.
+    #[error("cannot listen on {listen}: {source}")]
+    Listen {
+        /// The address.
+        listen: SocketAddr,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Tokens.
+    #[error(transparent)]
+    Tokens(#[from] TokenError),
+    /// Storage.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// Threads or folders of this process.
+    #[error("{what}: {source}")]
+    System {
+        /// What failed.
+        what: &'static str,
+        /// Why.
+        source: std::io::Error,
+    },
+}
+
+/// How long open requests may take to end at shutdown.
+const GRACE: Duration = Duration::from_secs(10);
+
+fn runtime() -> Result<tokio::runtime::Runtime, ServeError> {
+    tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .max_blocking_threads(64)
+        .enable_all()
+        .build()
+        .map_err(|source| ServeError::System { what: "threads", source })
+}
+
+fn scratch() -> Result<PathBuf, ServeError> {
+    let name = random_hex::<8>()?;
+    let path = std::env::temp_dir().join(format!("lambdak-{name}"));
+    std::fs::create_dir(&path).map_err(|source| ServeError::System { what: "a folder for checkpoints", source })?;
+    Ok(path)
+}
+
+/// Resolves at SIGINT or SIGTERM.
+async fn interrupted() {
+    #[cfg(unix)]
+    {
+        use tokio::signal::unix::{SignalKind, signal};
+        if let (Ok(mut interrupt), Ok(mut terminate)) =
+            (signal(SignalKind::interrupt()), signal(SignalKind::terminate()))
+        {
+            tokio::select! { _ = interrupt.recv() => {}, _ = terminate.recv() => {} }
+            return;
+        }
+    }
+    let _ = tokio::signal::ctrl_c().await;
+}
+
+/// Host names of a service that only this machine reaches; a page elsewhere whose name resolves here sends its own.
+fn hosts(listen: &SocketAddr, is_closed: bool) -> Vec<String> {
+    if is_closed || !listen.ip().is_loopback() {
+        return Vec::new();
+    }
+    vec!["localhost".into(), "127.0.0.1".into(), "[::1]".into(), listen.ip().to_string()]
+}
+
+/// Runs the service until it is told to stop. `on_ready` is given the address listened on.
+///
+/// # Errors
+/// [`ServeError`].
+pub fn serve(options: &ServeOptions, on_ready: &dyn Fn(SocketAddr)) -> Result<(), ServeError> {
+    let access = match &options.tokens {
+        Some(path) => Access::read(path)?,
+        None => Access::default(),
+    };
+    if !options.listen.ip().is_loopback() && !access.is_closed() {
+        return Err(ServeError::TokensNeeded { listen: options.listen });
+    }
+    // Bound before the storage is touched: a second service on the same address changes nothing.
+    let fail = |source| ServeError::Listen { listen: options.listen, source };
+    let listener = std::net::TcpListener::bind(options.listen).map_err(fail)?;
+    listener.set_nonblocking(true).map_err(fail)?;
+    let listen = listener.local_addr().map_err(fail)?;
+    let store = Arc::new(match &options.database {
+        Some(url) => Store::connect(url)?,
+        None => Store::open_folder(&options.data)?,
+    });
+    let changed =
+        Problem::new("version-changed", "the program was replaced by another version; resume the job to run it anew");
+    store.start_service(&changed.to_json())?;
+    let runtime = runtime()?;
+    let signal = Arc::new(Signal::default());
+    let scratch = scratch()?;
+    let slots = if options.slots == 0 {
+        Vec::new()
+    } else {
+        let name = format!("service-{}", random_hex::<4>()?);
+        let settings = WorkerSettings { name, slots: options.slots, lease: options.lease, scratch: scratch.clone() };
+        runner::start(&store, &settings, &signal)
+    };
+    let (stop, stopping) = watch::channel(false);
+    let hub = Arc::new(Hub::default());
+    let app = Arc::new(Shared {
+        hosts: hosts(&listen, access.is_closed()),
+        store: store.clone(),
+        access,
+        limits: options.limits,
+        hub: hub.clone(),
+        metrics: Metrics::default(),
+        signal: signal.clone(),
+        stopping: stopping.clone(),
+        requests: Semaphore::new(options.limits.max_requests),
+        quick: Semaphore::new(2),
+    });
+    let head_time = options.limits.head_time;
+    let result = runtime.block_on(async move {
+        let listener = tokio::net::TcpListener::from_std(listener).map_err(fail)?;
+        tokio::spawn(hub::run(hub, store, stopping));
+        log::info(
+            "listening",
+            &serde_json::json!({ "address": listen.to_string(), "version": crate::provenance::VERSION }),
+        );
+        on_ready(listen);
+        accept(listener, router(app), head_time, stop).await;
+        Ok(())
+    });
+    // Running tasks keep their checkpoints and go back into the queue.
+    signal.stop();
+    for slot in slots {
+        let _ = slot.join();
+    }
+    let _ = std::fs::remove_dir_all(scratch);
+    runtime.shutdown_timeout(Duration::from_secs(2));
+    log::info("stopped", &serde_json::json!({}));
+    result
+}
+
+async fn accept(
+    listener: tokio::net::TcpListener,
+    router: axum::Router,
+    head_time: Duration,
+    stop: watch::Sender<bool>,
+) {
+    let graceful = GracefulShutdown::new();
+    let mut http = hyper::server::conn::http1::Builder::new();
+    http.timer(TokioTimer::new()).header_read_timeout(head_time).max_headers(64).max_buf_size(64 << 10);
+    // More connections than requests and streams together are nobody's need.
+    let connections = Arc::new(Semaphore::new(4096));
+    let mut stopped = std::pin::pin!(interrupted());
+    loop {
+        let accepted = tokio::select! {
+            accepted = listener.accept() => accepted,
+            () = &mut stopped => break,
+        };
+        let Ok((socket, _)) = accepted else {
+            // Out of file descriptors, say: connections end and free some.
+            tokio::time::sleep(Duration::from_millis(50)).await;
+            continue;
+        };
+        let Ok(permit) = connections.clone().try_acquire_owned() else { continue };
+        let _ = socket.set_nodelay(true);
+        let service = TowerToHyperService::new(router.clone());
+        let connection = graceful.watch(http.serve_connection(TokioIo::new(socket), service));
+        tokio::spawn(async move {
+            let _permit = permit;
+            let _ = connection.await;
+        });
+    }
+    log::info("stopping", &serde_json::json!({}));
+    drop(listener);
+    // Streams end, then connections.
+    let _ = stop.send(true);
+    tokio::select! {
+        () = graceful.shutdown() => {}
+        () = tokio::time::sleep(GRACE) => {}
+    }
+}
+
+/// Runs a worker until it is told to stop.
+///
+/// # Errors
+/// [`ServeError`].
+pub fn work(options: &WorkerOptions) -> Result<(), ServeError> {
+    let store = Arc::new(Store::connect(&options.database)?);
+    store.check_version()?;
+    let runtime = runtime()?;
+    let signal = Arc::new(Signal::default());
+    let scratch = scratch()?;
+    let name = format!("worker-{}", random_hex::<4>()?);
+    log::info(
+        "worker",
+        &serde_json::json!({ "name": name, "slots": options.slots, "version": crate::provenance::VERSION }),
+    );
+    let settings = WorkerSettings { name, slots: options.slots, lease: options.lease, scratch: scratch.clone() };
+    let slots = runner::start(&store, &settings, &signal);
+    let other = runtime.block_on(async {
+        let mut stopped = std::pin::pin!(interrupted());
+        loop {
+            tokio::select! {
+                () = &mut stopped => return None,
+                () = tokio::time::sleep(Duration::from_secs(10)) => {}
+            }
+            // A service of another version that starts meanwhile is noticed too.
+            let store = store.clone();
+            if let Ok(Err(error @ StoreError::OtherVersion { .. })) =
+                tokio::task::spawn_blocking(move || store.check_version()).await
+            {
+                return Some(error);
+            }
+        }
+    });
+    signal.stop();
+    for slot in slots {
+        let _ = slot.join();
+    }
+    let _ = std::fs::remove_dir_all(scratch);
+    match other {
+        Some(error) => Err(error.into()),
+        None => Ok(()),
+    }
+}

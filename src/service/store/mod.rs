@@ -1,0 +1,189 @@
+//! Where jobs, tasks, results and artefacts are kept: SQLite in the data folder, or PostgreSQL shared by several machines.
+//!
+//! | Invariant | Kept by |
+//! |---|---|
+//! | a task is run by one worker at a time | a claim is one transaction that takes a lease (SKIP LOCKED on PostgreSQL) |
+//! | a task has exactly one result | a result is taken only from the attempt that holds the task (`attempt` fences late ones) |
+//! | equal evaluations are computed once | results are kept under their content's key; equal tasks do not run side by side |
+//! | a task that ends its worker cannot do so for ever | [`MAX_LOSSES`], then it is put aside with a problem |
+
+mod database;
+mod error;
+mod jobs;
+mod tasks;
+mod uploads;
+
+pub use database::{Database, Row, Transaction, Value};
+pub use error::StoreError;
+pub use jobs::{ArtefactRow, Idempotency, JobFilter, JobRow, NewJob, NewTask, Submitted, TaskRow};
+pub use tasks::{Claimed, Finished, TaskResult};
+pub use uploads::{NewUpload, UploadRow};
+
+use crate::provenance::VERSION;
+use sha2::{Digest, Sha256};
+use std::path::Path;
+
+/// How often a task may lose its worker, without a new checkpoint between, before it is put aside.
+pub const MAX_LOSSES: i64 = 5;
+/// Ending of the key of an evaluation kept without pictures; one with pictures serves too.
+pub const NUMBERS_ONLY: &str = ":numbers";
+/// Version of the tables.
+const SCHEMA_VERSION: &str = "1";
+
+/// SHA-256, hexadecimal.
+pub fn sha256_hex(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// The storage. All methods block; asynchronous callers use a blocking thread.
+pub struct Store {
+    pub(super) database: Database,
+    /// Held as long as the service owns its data folder.
+    _lock: Option<std::fs::File>,
+}
+
+impl Store {
+    /// SQLite in `folder`, which this process then owns.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn open_folder(folder: &Path) -> Result<Store, StoreError> {
+        let fail = |source| StoreError::Folder { path: folder.into(), source };
+        std::fs::create_dir_all(folder).map_err(fail)?;
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            std::fs::set_permissions(folder, std::fs::Permissions::from_mode(0o700)).map_err(fail)?;
+        }
+        let lock = std::fs::File::create(folder.join("lock")).map_err(fail)?;
+        match lock.try_lock() {
+            Ok(()) => {}
+            Err(std::fs::TryLockError::WouldBlock) => return Err(StoreError::FolderInUse { path: folder.into() }),
+            Err(std::fs::TryLockError::Error(source)) => return Err(fail(source)),
+        }
+        let store = Store { database: Database::open_sqlite(&folder.join("lambdak.sqlite"))?, _lock: Some(lock) };
+        store.prepare()?;
+        Ok(store)
+    }
+
+    /// PostgreSQL at `postgres://…`.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn connect(url: &str) -> Result<Store, StoreError> {
+        let store = Store { database: Database::connect_postgres(url)?, _lock: None };
+        store.prepare()?;
+        Ok(store)
+    }
+
+    /// Whether several machines may share it.
+    pub fn is_shared(&self) -> bool {
+        self.database.is_shared()
+    }
+
+    fn prepare(&self) -> Result<(), StoreError> {
+        self.database.transact(&|t| {
+            if let Transaction::Postgres(inner) = t {
+                // Two programs that start together make the tables once.
+                inner.execute("SELECT pg_advisory_xact_lock(7153402)", &[])?;
+            }
+            t.batch(include_str!("schema.sql"))?;
+            t.execute(
+                "INSERT INTO meta (key, value) VALUES ('schema', $1) ON CONFLICT DO NOTHING",
+                &[SCHEMA_VERSION.into()],
+            )?;
+            t.execute("INSERT INTO revisions (id, last) VALUES (1, 0) ON CONFLICT DO NOTHING", &[])?;
+            let found = t.query("SELECT value FROM meta WHERE key = 'schema'", &[])?;
+            let found = found.first().map(|r| r.text(0)).unwrap_or_default();
+            if found == SCHEMA_VERSION {
+                Ok(())
+            } else {
+                Err(StoreError::OtherSchema { found, expected: SCHEMA_VERSION })
+            }
+        })
+    }
+
+    /// Called by the service at its start: says its version to the workers, frees what a crashed process of this folder
+    /// held, and puts unfinished jobs of other versions aside.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn start_service(&self, version_problem: &str) -> Result<(), StoreError> {
+        let is_shared = self.is_shared();
+        self.database.transact(&|t| {
+            t.execute(
+                "INSERT INTO meta (key, value) VALUES ('version', $1) \
+                 ON CONFLICT (key) DO UPDATE SET value = excluded.value",
+                &[VERSION.into()],
+            )?;
+            if !is_shared {
+                t.execute("UPDATE tasks SET lease_ms = 0 WHERE state = 'running'", &[])?;
+            }
+            let stale = t.query(
+                "SELECT id FROM jobs WHERE state IN ('queued', 'running') AND version <> $1",
+                &[VERSION.into()],
+            )?;
+            for job in stale {
+                jobs::end_job(t, &job.text(0), "failed", version_problem)?;
+            }
+            Ok(())
+        })
+    }
+
+    /// Called by a worker at its start.
+    ///
+    /// # Errors
+    /// [`StoreError::OtherVersion`] where the service is of another version.
+    pub fn check_version(&self) -> Result<(), StoreError> {
+        let rows = self.database.read("SELECT value FROM meta WHERE key = 'version'", &[])?;
+        match rows.first().map(|r| r.text(0)) {
+            Some(service) if service != VERSION => Err(StoreError::OtherVersion { service, worker: VERSION.into() }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether the database answers.
+    pub fn is_ready(&self) -> bool {
+        self.database.read("SELECT 1", &[]).is_ok()
+    }
+
+    /// Bytes under a SHA-256.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn blob(&self, sha: &str) -> Result<Option<Vec<u8>>, StoreError> {
+        Ok(self.database.read("SELECT bytes FROM blobs WHERE sha = $1", &[sha.into()])?.first().map(|r| r.blob(0)))
+    }
+}
+
+/// Keeps bytes; equal ones once.
+fn put_blob(t: &mut Transaction, bytes: &[u8]) -> Result<String, StoreError> {
+    let sha = sha256_hex(bytes);
+    t.execute(
+        "INSERT INTO blobs (sha, bytes, num_bytes) VALUES ($1, $2, $3) ON CONFLICT DO NOTHING",
+        &[(&sha).into(), bytes.to_vec().into(), bytes.len().into()],
+    )?;
+    Ok(sha)
+}
+
+/// The next revision; taking it serialises writers, so revisions become visible in their order.
+fn next_revision(t: &mut Transaction) -> Result<i64, StoreError> {
+    let rows = t.query("UPDATE revisions SET last = last + 1 WHERE id = 1 RETURNING last", &[])?;
+    rows.first().map(|r| r.int(0)).ok_or(StoreError::Corrupt { what: "revision" })
+}
+
+/// Marks a job as changed.
+fn touch(t: &mut Transaction, job: &str) -> Result<(), StoreError> {
+    let revision = next_revision(t)?;
+    t.execute("UPDATE jobs SET revision = $1 WHERE id = $2", &[revision.into(), job.into()])?;
+    Ok(())
+}
+
+/// Locks a job's row on PostgreSQL, so that everything that ends tasks of one job takes its locks in the same order.
+fn lock_job(t: &mut Transaction, job: &str) -> Result<bool, StoreError> {
+    let sql = match t {
+        Transaction::Sqlite(_) => "SELECT id FROM jobs WHERE id = $1",
+        Transaction::Postgres(_) => "SELECT id FROM jobs WHERE id = $1 FOR UPDATE",
+    };
+    Ok(!t.query(sql, &[job.into()])?.is_empty())
+}

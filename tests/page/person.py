@@ -1,0 +1,182 @@
+"""A person's path through the page in real headless Chromium: open, draw, evaluate, read, download, cancel.
+
+    python person.py http://127.0.0.1:8080/ SHOTS [chromium]
+
+Needs the package websocket-client. Speaks the DevTools protocol; screenshots land in SHOTS.
+"""
+
+import base64
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+
+import websocket
+
+address = sys.argv[1].rstrip("/")
+shots = pathlib.Path(sys.argv[2])
+chromium = sys.argv[3] if len(sys.argv) > 3 else "chromium"
+shots.mkdir(parents=True, exist_ok=True)
+LONG_S = 600
+
+
+class Page:
+    """One tab."""
+
+    def __init__(self, size):
+        self.folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+        self.process = subprocess.Popen(
+            [chromium, "--headless=new", "--no-sandbox", "--disable-gpu-sandbox", "--use-gl=angle", "--use-angle=swiftshader",
+             "--enable-unsafe-swiftshader", "--remote-debugging-port=0", "--remote-allow-origins=*",
+             f"--user-data-dir={self.folder.name}", f"--window-size={size[0]},{size[1]}", "about:blank"],
+            stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        port_file = pathlib.Path(self.folder.name) / "DevToolsActivePort"
+        end = time.monotonic() + 120
+        while not (port_file.exists() and port_file.read_text().strip()):
+            assert time.monotonic() < end, "Chromium did not start"
+            time.sleep(0.1)
+        port = port_file.read_text().split()[0]
+        targets = json.load(urllib.request.urlopen(f"http://127.0.0.1:{port}/json/list", timeout=30))
+        url = next(t for t in targets if t["type"] == "page")["webSocketDebuggerUrl"]
+        self.socket = websocket.create_connection(url, timeout=180)
+        self.number, self.errors = 0, []
+        for domain in ["Page", "Runtime", "Log"]:
+            self.send(f"{domain}.enable")
+        self.send("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(shots.resolve()))
+        self.send("Emulation.setDeviceMetricsOverride", width=size[0], height=size[1], deviceScaleFactor=1, mobile=False)
+
+    def send(self, method, **parameters):
+        self.number += 1
+        self.socket.send(json.dumps({"id": self.number, "method": method, "params": parameters}))
+        while True:
+            message = json.loads(self.socket.recv())
+            if message.get("method") == "Runtime.exceptionThrown":
+                self.errors.append(message["params"]["exceptionDetails"].get("exception", {}).get("description", "exception"))
+            if message.get("method") == "Log.entryAdded" and message["params"]["entry"]["level"] == "error":
+                self.errors.append(message["params"]["entry"]["text"])
+            if message.get("id") == self.number:
+                assert "error" not in message, message
+                return message["result"]
+
+    def js(self, expression):
+        found = self.send("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
+        assert "exceptionDetails" not in found, found["exceptionDetails"]
+        return found["result"].get("value")
+
+    def until(self, expression, limit_s=60):
+        end = time.monotonic() + limit_s
+        while not self.js(f"!!({expression})"):
+            assert time.monotonic() < end, f"not within {limit_s} s: {expression}\n{self.js('document.body.innerText')}"
+            time.sleep(0.2)
+
+    def open(self, url):
+        self.send("Page.navigate", url=url)
+        self.until("document.readyState === 'complete'")
+
+    def shot(self, name, whole=False):
+        time.sleep(0.5)
+        data = self.send("Page.captureScreenshot", format="png", captureBeyondViewport=whole)["data"] if not whole else self._whole()
+        (shots / f"{name}.png").write_bytes(base64.b64decode(data))
+
+    def _whole(self):
+        size = self.send("Page.getLayoutMetrics")["cssContentSize"]
+        clip = {"x": 0, "y": 0, "width": size["width"], "height": min(size["height"], 6000), "scale": 1}
+        return self.send("Page.captureScreenshot", format="png", captureBeyondViewport=True, clip=clip)["data"]
+
+    def key(self, key, code=None, text=None):
+        more = {"text": text} if text else {}
+        self.send("Input.dispatchKeyEvent", type="keyDown", key=key, code=code or key, **more)
+        self.send("Input.dispatchKeyEvent", type="keyUp", key=key, code=code or key)
+
+    def drag(self, start, end):
+        self.send("Input.dispatchMouseEvent", type="mousePressed", x=start[0], y=start[1], button="left", clickCount=1)
+        for part in range(1, 6):
+            x, y = (start[i] + (end[i] - start[i]) * part / 5 for i in range(2))
+            self.send("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y, button="left", buttons=1)
+        self.send("Input.dispatchMouseEvent", type="mouseReleased", x=end[0], y=end[1], button="left", clickCount=1)
+
+    def scheme(self, name):
+        self.send("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": name}])
+
+    def close(self):
+        self.socket.close()
+        self.process.terminate()
+        self.process.wait(timeout=60)
+
+
+HOLE = "(() => { const r = document.querySelectorAll('svg.section .hole')[%d].getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]; })()"
+CHECK = "document.querySelector('[aria-label=\"Limits and cost\"]').innerText"
+
+page = Page((1280, 900))
+try:
+    page.scheme("light")
+    page.open(f"{address}/")
+    page.until("document.querySelectorAll('svg.section .hole').length === 2")
+    page.until(f"{CHECK}.includes('Every limit is kept')")
+    page.shot("1-plan", whole=True)
+
+    # A hole dragged to the edge breaks a limit at once; the keyboard brings it back.
+    x, y = page.js(HOLE % 0)
+    width = page.js("document.querySelector('svg.section').getBoundingClientRect().width")
+    page.drag((x, y), (x - 0.18 * width, y))
+    page.until(f"!{CHECK}.includes('Every limit is kept')")
+    page.shot("2-broken")
+    page.js("document.querySelectorAll('svg.section .hole')[0].focus()")
+    for _ in range(45):
+        page.key("ArrowRight")
+        time.sleep(0.02)
+        if page.js("Number(document.querySelectorAll('svg.section .hole')[0].getAttribute('cx'))") >= -4.5:
+            break
+    page.until(f"{CHECK}.includes('Every limit is kept')")
+
+    # One drive and the coarse mesh; evaluate; follow; read.
+    page.js("(() => { const m = document.querySelector('select[aria-label=Mesh]'); m.value = 'search'; m.dispatchEvent(new Event('change')); })()")
+    page.js("(() => { const d = [...document.querySelectorAll('label')].find((l) => l.textContent.startsWith('Drives')).querySelector('input'); d.value = '5'; d.dispatchEvent(new Event('change')); })()")
+    page.js("document.getElementById('evaluate').focus()")
+    page.key("Enter", text="\r")
+    page.until("location.hash.startsWith('#/job/')")
+    page.shot("3-running")
+    page.until("document.body.innerText.includes('What the scan promises')", LONG_S)
+    page.until("document.querySelectorAll('canvas').length === 1 && [...document.images].every((i) => i.complete)")
+    page.shot("4-evaluation", whole=True)
+    drawn = page.js("""(() => { const c = document.querySelector('canvas'); const gl = c.getContext('webgl'); if (!gl) return -1;
+      const p = new Uint8Array(4 * c.width * c.height); gl.readPixels(0, 0, c.width, c.height, gl.RGBA, gl.UNSIGNED_BYTE, p);
+      let n = 0; for (let i = 3; i < p.length; i += 4) n += p[i] > 0; return n / (c.width * c.height); })()""")
+    assert drawn > 0.05, f"the 3D view is empty: {drawn}"
+    page.scheme("dark")
+    page.shot("5-evaluation-dark", whole=True)
+    page.scheme("light")
+
+    # A downloaded result.
+    page.js("[...document.querySelectorAll('ul.files a')].find((a) => a.textContent === 'specimen.dxf').click()")
+    end = time.monotonic() + 60
+    while not (shots / "specimen.dxf").exists():
+        assert time.monotonic() < end, "no download"
+        time.sleep(0.2)
+    assert "ENTITIES" in (shots / "specimen.dxf").read_text()
+
+    # A design with the smallest budget, watched live; then base against chosen.
+    page.js("location.hash = '#/plan'")
+    page.until("document.getElementById('design')")
+    for label, value in [("Designs sampled", 6), ("Designs improved", 1), ("Steps of each", 1), ("Designs confirmed", 1)]:
+        page.js(f"(() => {{ const i = [...document.querySelectorAll('label')].find((l) => l.textContent.startsWith('{label}')).querySelector('input'); i.value = {value}; i.dispatchEvent(new Event('change')); }})()")
+    page.js("document.getElementById('design').click()")
+    page.until("document.querySelector('progress')", LONG_S)
+    page.shot("6-design-running")
+    page.until("document.body.innerText.includes('gain over the base specimen')", LONG_S)
+    page.until("document.querySelectorAll('canvas').length === 2")
+    page.shot("7-design", whole=True)
+
+    page.js("location.hash = '#/jobs'")
+    page.until("document.querySelectorAll('tbody tr').length >= 2")
+    page.shot("8-jobs")
+    page.open(f"{address}/docs")
+    page.until("document.querySelectorAll('details').length > 20")
+    page.shot("9-interface")
+    assert not page.errors, page.errors
+finally:
+    page.close()
+print("a person's path: 9 screenshots, no errors in the browser")

@@ -1,0 +1,273 @@
+//! The service as its users see it: jobs, results, errors, access.
+
+mod service_common;
+
+use serde_json::{Value, json};
+use service_common::{Service, lambdak, shipped, small_evaluation, small_sweep};
+use std::io::{Read, Write};
+use std::time::Duration;
+
+const LONG: Duration = Duration::from_secs(600);
+
+#[test]
+fn openapi_document_is_current() {
+    let (_, text) = lambdak::service::open_api();
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/api/openapi.json");
+    if std::env::var_os("LAMBDAK_WRITE_OPENAPI").is_some() {
+        std::fs::write(path, &text).unwrap();
+    }
+    let kept = std::fs::read_to_string(path).unwrap();
+    assert!(kept == text, "api/openapi.json is not what the code says; LAMBDAK_WRITE_OPENAPI=1 writes it");
+    let document: Value = serde_json::from_str(&text).unwrap();
+    assert!(document["openapi"].as_str().unwrap().starts_with("3.1"));
+}
+
+#[test]
+fn an_evaluation_from_post_to_artefact() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut service = Service::start(folder.path(), &[]);
+    let body = small_evaluation(2.0);
+    let job = service.submit("evaluations", &body);
+    let view = service.wait(&job, LONG);
+    assert_eq!(view["state"], "succeeded", "{view}");
+    let result = service.get(&format!("{job}/result"));
+    assert_eq!(result.json()["schema"], "evaluation/1");
+    assert!(result.json()["steps"][0]["force_n"].as_f64().unwrap() > 0.0);
+    // Content addressing: the same content is not sent again.
+    let tag = result.header("etag").unwrap().to_string();
+    let again = service.call("GET", &format!("{job}/result"), &[("if-none-match", &tag)], b"");
+    assert_eq!((again.status, again.body.len()), (304, 0));
+    let list = service.get(&format!("{job}/artefacts")).json();
+    let names: Vec<&str> = list["artefacts"].as_array().unwrap().iter().map(|a| a["name"].as_str().unwrap()).collect();
+    for name in ["histogram.svg", "solution.vtu", "specimen.dxf", "specimen.stl", "surface.json"] {
+        assert!(names.contains(&name), "{name} is not among {names:?}");
+        let file = service.get(&format!("{job}/artefacts/{name}"));
+        assert_eq!(file.status, 200);
+        assert!(!file.body.is_empty());
+    }
+    // The same evaluation is not computed again: not by another job, not after a crash.
+    let second = service.wait(&service.submit("evaluations", &body), LONG);
+    assert_eq!(second["state"], "succeeded");
+    service.kill();
+    let service = Service::start(folder.path(), &["--slots", "0"]);
+    let third = service.submit("evaluations", &body);
+    let view = service.get(&third).json();
+    assert_eq!(view["state"], "succeeded", "without any slot the result can only be the kept one: {view}");
+    assert_eq!(service.get(&format!("{third}/result")).body, result.body);
+    // Nor as a part of a sweep.
+    let sweep = service.submit("sweeps", &json!({ "evaluations": [body] }));
+    assert_eq!(service.get(&sweep).json()["num_done"], 1);
+}
+
+#[test]
+fn a_sweep_holds_every_evaluation_in_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &[]);
+    let job = service.submit("sweeps", &small_sweep(5));
+    let view = service.wait(&job, LONG);
+    assert_eq!((view["state"].as_str(), view["num_done"].as_i64()), (Some("succeeded"), Some(5)), "{view}");
+    let result = service.get(&format!("{job}/result")).json();
+    let forces: Vec<f64> = result["evaluations"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|e| e["evaluation"]["steps"][0]["force_n"].as_f64().unwrap())
+        .collect();
+    assert!(forces.len() == 5 && forces.windows(2).all(|w| w[0] < w[1]), "{forces:?}");
+    let csv = service.get(&format!("{job}/artefacts/table.csv"));
+    assert_eq!(String::from_utf8(csv.body).unwrap().lines().count(), 6);
+}
+
+#[test]
+fn a_design_reports_progress_and_can_be_cancelled_and_resumed() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &[]);
+    let library = service.get("/v1/library").json();
+    let mut study = library["studies"][1].clone();
+    study["budget"] = json!({ "explore": 6, "refine": 1, "iterations": 1, "confirm": 1 });
+    study["verification"] = json!({ "is_on": false, "draws": 1 });
+    let job = service.submit("designs", &study);
+    let started = std::time::Instant::now();
+    while service.get(&job).json()["progress"]["done"].as_u64().unwrap_or(0) == 0 {
+        assert!(started.elapsed() < LONG, "no progress");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    assert_eq!(service.post(&format!("{job}/cancel"), &json!({})).json()["state"], "cancelled");
+    assert_eq!(service.get(&format!("{job}/result")).cause(), "not-finished");
+    assert_eq!(service.post(&format!("{job}/resume"), &json!({})).json()["state"], "queued");
+    let view = service.wait(&job, LONG);
+    assert_eq!(view["state"], "succeeded", "{view}");
+    let result = service.get(&format!("{job}/result")).json();
+    assert_eq!(result["schema"], "design/1");
+    assert!(result["best"]["objective"].as_f64().unwrap() > 0.0);
+    assert_eq!(service.get(&format!("{job}/artefacts/report.html")).header("content-type"), Some("text/html"));
+    assert_eq!(service.post(&format!("{job}/cancel"), &json!({})).cause(), "wrong-state");
+}
+
+#[test]
+fn events_tell_every_state_and_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &[]);
+    let job = service.submit("evaluations", &small_evaluation(1.7));
+    // The stream ends by itself when the job has ended, so the whole reply can be read.
+    let reply = service.get(&format!("{job}/events"));
+    assert_eq!(reply.header("content-type"), Some("text/event-stream"));
+    let text = String::from_utf8(reply.body).unwrap();
+    let last = text.lines().rfind(|l| l.starts_with("data: ")).unwrap();
+    let view: Value = serde_json::from_str(&last["data: ".len()..]).unwrap();
+    assert_eq!(view["state"], "succeeded", "{text}");
+}
+
+#[test]
+fn problems_point_at_fields() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &["--slots", "0"]);
+    let with = |pointer: &str, value: Value| {
+        let mut body = small_evaluation(2.0);
+        *body.pointer_mut(pointer).unwrap() = value;
+        service.post("/v1/evaluations", &body)
+    };
+    for (pointer, value) in [
+        ("/specimen/block/length_mm", json!("long")),
+        ("/specimen/block/length_mm", json!(-1.0)),
+        ("/material/bulk_kpa", json!(null)),
+        ("/drive_mm/0", json!(-3.0)),
+        ("/mesh", json!("finest")),
+    ] {
+        let reply = with(pointer, value.clone());
+        assert_eq!((reply.status, reply.cause().as_str()), (422, "invalid-input"), "{pointer} {value}");
+        assert_eq!(reply.json()["errors"][0]["pointer"], pointer, "{}", reply.json());
+    }
+    let mut unknown = small_evaluation(2.0);
+    unknown["specimen"]["hight_mm"] = json!(1);
+    let reply = service.post("/v1/evaluations", &unknown);
+    assert_eq!(reply.json()["errors"][0]["pointer"], "/specimen/hight_mm", "{}", reply.json());
+    let reply = service.call("POST", "/v1/evaluations", &[("content-type", "application/json")], b"{");
+    assert_eq!((reply.status, reply.cause().as_str()), (400, "invalid-json"));
+    let reply = service.call("POST", "/v1/evaluations", &[("content-type", "text/plain")], b"{}");
+    assert_eq!((reply.status, reply.cause().as_str()), (415, "unsupported-media-type"));
+    assert_eq!(service.get("/v1/jobs/none").cause(), "not-found");
+    assert_eq!(service.get("/nowhere").cause(), "not-found");
+    assert_eq!(service.call("DELETE", "/v1/jobs", &[], b"").cause(), "method-not-allowed");
+    assert_eq!(with("/mesh", json!("0.2")).cause(), "too-big-a-problem");
+    assert_eq!(service.get("/v1/jobs?limit=0").cause(), "invalid-parameter");
+}
+
+#[test]
+fn the_same_key_gives_the_same_job() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &["--slots", "0"]);
+    let send = |drive: f64| {
+        let body = small_evaluation(drive).to_string();
+        let headers = [("content-type", "application/json"), ("idempotency-key", "k-1")];
+        service.call("POST", "/v1/evaluations", &headers, body.as_bytes())
+    };
+    let (first, second, other) = (send(1.0), send(1.0), send(2.0));
+    assert_eq!((first.status, second.status), (202, 202));
+    assert_eq!(first.header("location"), second.header("location"));
+    assert_eq!((other.status, other.cause().as_str()), (409, "key-reused"));
+    assert_eq!(service.get("/v1/jobs").json()["jobs"].as_array().unwrap().len(), 1);
+}
+
+#[test]
+fn tokens_roles_and_quotas() {
+    let folder = tempfile::tempdir().unwrap();
+    let tokens = folder.path().join("tokens.json");
+    let add = |name: &str| {
+        let out = lambdak().args(["serve", "--add-token", name, "--tokens"]).arg(&tokens).output().unwrap();
+        assert!(out.status.success());
+        String::from_utf8(out.stdout).unwrap().trim().to_string()
+    };
+    let (reader, anna, bert) = (add("rita:read"), add("anna:submit"), add("bert:submit"));
+    let text = std::fs::read_to_string(&tokens).unwrap();
+    assert!(!text.contains(&anna), "tokens are kept as hashes only");
+    let mut file: Value = serde_json::from_str(&text).unwrap();
+    file["tokens"][1]["max_queued_tasks"] = json!(2);
+    file["tokens"][1]["max_elements"] = json!(100);
+    std::fs::write(&tokens, file.to_string()).unwrap();
+    let data = folder.path().join("data");
+    let mut service = Service::start(&data, &["--slots", "0", "--tokens", tokens.to_str().unwrap()]);
+    assert_eq!((service.get("/v1/jobs").status, service.get("/healthz").status), (401, 200));
+    assert_eq!(service.get("/v1/jobs").header("www-authenticate"), Some("Bearer"));
+    service.token = Some("lk_forged".into());
+    assert_eq!(service.get("/v1/jobs").cause(), "unauthorized");
+    service.token = Some(reader);
+    assert_eq!(service.get("/v1/jobs").status, 200);
+    assert_eq!(service.post("/v1/evaluations", &small_evaluation(1.0)).cause(), "forbidden");
+    assert_eq!(service.get("/metrics").cause(), "forbidden");
+    service.token = Some(anna);
+    let job = service.submit("evaluations", &small_evaluation(1.0));
+    service.submit("evaluations", &small_evaluation(2.0));
+    let third = service.post("/v1/evaluations", &small_evaluation(3.0));
+    assert_eq!((third.status, third.cause().as_str()), (429, "quota"));
+    assert!(third.header("retry-after").unwrap().parse::<u32>().unwrap() > 0);
+    let mut fine = small_evaluation(1.0);
+    fine["mesh"] = json!("1");
+    assert_eq!(service.post("/v1/evaluations", &fine).cause(), "too-big-a-problem");
+    service.token = Some(bert);
+    assert_eq!(service.post(&format!("{job}/cancel"), &json!({})).cause(), "forbidden");
+}
+
+#[test]
+fn other_addresses_need_tokens() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = lambdak().args(["serve", "--listen", "0.0.0.0:0", "--data"]).arg(folder.path()).output().unwrap();
+    assert_eq!(out.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&out.stderr).contains("--tokens"));
+}
+
+#[test]
+fn health_metrics_and_request_ids() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &["--slots", "0"]);
+    assert_eq!((service.get("/healthz").status, service.get("/readyz").status), (200, 200));
+    let reply = service.call("GET", "/v1/jobs", &[("x-request-id", "abc-1")], b"");
+    assert_eq!(reply.header("x-request-id"), Some("abc-1"));
+    let text = String::from_utf8(service.get("/metrics").body).unwrap();
+    assert!(text.contains("lambdak_requests_total{method=\"GET\",route=\"/v1/jobs\",status=\"200\"} 1"), "{text}");
+    assert!(text.contains("# TYPE lambdak_jobs gauge"));
+}
+
+#[test]
+fn a_folder_has_one_service() {
+    let folder = tempfile::tempdir().unwrap();
+    let _service = Service::start(folder.path(), &["--slots", "0"]);
+    let out = lambdak().args(["serve", "--listen", "127.0.0.1:0", "--data"]).arg(folder.path()).output().unwrap();
+    assert_eq!(out.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&out.stderr).contains("in use"));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_shutdown_ends_streams_and_keeps_the_job() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut service = Service::start(folder.path(), &["--slots", "0"]);
+    let job = service.submit("evaluations", &small_evaluation(1.1));
+    let mut stream = std::net::TcpStream::connect(&service.address).unwrap();
+    write!(stream, "GET {job}/events HTTP/1.1\r\nhost: {}\r\n\r\n", service.address).unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    let id = service.child.id().to_string();
+    assert!(std::process::Command::new("kill").args(["-TERM", &id]).status().unwrap().success());
+    let mut text = String::new();
+    stream.read_to_string(&mut text).unwrap();
+    assert!(text.contains("event: job") && text.contains("event: shutdown"), "{text}");
+    assert!(service.child.wait().unwrap().success());
+    let service = Service::start(folder.path(), &[]);
+    assert_eq!(service.wait(&job, LONG)["state"], "succeeded");
+}
+
+#[test]
+fn a_check_answers_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &["--slots", "0"]);
+    let study = shipped("studies/two-hole-shear.json");
+    let body = json!({ "specimen": shipped("two-hole-shear.json"), "limits": study["limits"] });
+    let found = service.post("/v1/specimens/check", &body).json();
+    assert_eq!(found["is_valid"], true, "{found}");
+    assert!(found["drawing_svg"].as_str().unwrap().starts_with("<svg"));
+    assert!(found["cost"]["num_elements"].as_u64().unwrap() > 100);
+    let mut broken = body;
+    broken["specimen"]["holes"][0]["diameter_mm"] = json!(9.0);
+    let found = service.post("/v1/specimens/check", &broken).json();
+    assert_eq!(found["is_valid"], false);
+}
