@@ -77,8 +77,8 @@ fn meunier_equibiaxial_is_predicted() {
     }
     let kept = matches_of(&sequence.chosen().terms(), None, &[equibiaxial]).unwrap();
     println!("chosen {} terms", sequence.chosen().num_terms);
-    // The bulge test turns up beyond a stretch of 1.8, which the other two tests do not show; the published models fitted to
-    // them miss it as well. What is asked is the curve below.
+    // The bulge test turns up beyond a stretch of 1.8, which the other two tests do not show: the prediction misses it (an error
+    // of about a fifth). What is asked is the curve below that.
     assert!(kept[0].r_squared > 0.8, "{kept:?}");
 }
 

@@ -96,7 +96,7 @@ pub(super) struct Checked {
     cost: Option<Cost>,
 }
 
-/// Seconds of a standard evaluation, measured: about 1.2 s per drive at 900 elements, growing with the power 1.4.
+/// Seconds of a standard evaluation, roughly: 1.2 s per drive at 900 elements, growing with the power 1.4.
 fn seconds(num_elements: usize, num_voxels: usize) -> f64 {
     1.2 * (num_elements as f64 / 900.0).powf(1.4) + 1e-5 * num_voxels as f64
 }
