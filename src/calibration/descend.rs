@@ -44,6 +44,9 @@ impl Descent {
     }
 }
 
+/// Solves a material near given predictions.
+pub(super) type Predict<'a> = dyn FnMut(&Ogden, &[Prediction]) -> Result<Vec<Prediction>, CalibrationError> + 'a;
+
 /// Descends until the optimum is reached or the iterations run out. `predict` solves a material near given predictions,
 /// `evaluate` compares with the data.
 ///
@@ -53,7 +56,7 @@ pub(super) fn descend(
     constraints: &Constraints,
     options: &FitOptions,
     start: Vec<Prediction>,
-    predict: &mut dyn FnMut(&Ogden, &[Prediction]) -> Result<Vec<Prediction>, CalibrationError>,
+    predict: &mut Predict,
     evaluate: &dyn Fn(&[Prediction]) -> Result<NormalSystem, CalibrationError>,
 ) -> Result<Descent, CalibrationError> {
     let mut predictions = start;

@@ -125,9 +125,12 @@ impl fmt::Display for Study {
     }
 }
 
+/// Estimates, their standard deviations and χ² per datum of a fit.
+type DrawFit = (Vec<f64>, Vec<Option<f64>>, f64);
+
 struct Draw {
     /// The fit with as many terms as the truth.
-    fit: Option<(Vec<f64>, Vec<Option<f64>>, f64)>,
+    fit: Option<DrawFit>,
     chosen: [usize; 3],
 }
 
@@ -222,7 +225,7 @@ fn summarise(
     expected_decrease: Option<f64>,
     needed_decrease: f64,
 ) -> Study {
-    let fitted: Vec<&(Vec<f64>, Vec<Option<f64>>, f64)> = draws.iter().filter_map(|d| d.fit.as_ref()).collect();
+    let fitted: Vec<&DrawFit> = draws.iter().filter_map(|d| d.fit.as_ref()).collect();
     // 0/0 is the NaN that is meant.
     let mean = |values: &mut dyn Iterator<Item = f64>| {
         let (sum, count) = values.fold((0.0, 0.0), |(s, n), x| (s + x, n + 1.0));

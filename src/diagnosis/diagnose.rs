@@ -22,7 +22,10 @@ const EVIDENCE: f64 = 30.0;
 /// Causes whose fits differ by less than this cannot be told apart.
 const AMBIGUITY: f64 = 15.0;
 /// An effect is physics where its displacement exceeds this part of the allowance (rms), or its force its own allowance.
-const SMALLEST_EFFECT: f64 = 0.8;
+const SMALLEST_EFFECT: f64 = 1.0;
+/// A further cause must explain this part of what the ones before it did: a model of a large effect errs by some percent, which
+/// is no effect of its own.
+const SMALLEST_SHARE: f64 = 0.02;
 /// Fits of leading causes per round.
 const MAX_FITS: usize = 4;
 /// Exponents tried for a further Ogden term.
@@ -241,7 +244,8 @@ pub fn diagnose(
         fits.sort_by(|a, b| b.0.total_cmp(&a.0));
         let Some((gain, best)) = fits.first() else { break };
         let effect = best.prediction.trace.plus(-1.0, &current.prediction.trace);
-        if *gain < EVIDENCE || !is_large(&observed, &effect, allowance_mm) {
+        let explained = nominal.deviance - current.deviance;
+        if *gain < EVIDENCE.max(SMALLEST_SHARE * explained) || !is_large(&observed, &effect, allowance_mm) {
             break;
         }
         for (other_gain, other) in &fits[1..] {
@@ -383,7 +387,8 @@ impl Work<'_, '_> {
             let mu_kpa = 1e-9 * shear_modulus(&one.material) / alpha;
             probe.terms.push(OgdenTerm { mu_kpa, alpha });
         }
-        let columns = self.laboratory.derivatives(&probe, &Scene::default(), &one.prediction, true, &[], STEP)?;
+        let probed = self.laboratory.derivatives(&probe, &Scene::default(), &one.prediction, true, &[], STEP);
+        let Ok(columns) = probed else { return Ok(one) };
         let nuisance: Vec<Trace> = columns[..=2 * base]
             .iter()
             .zip(one.material.parameters())

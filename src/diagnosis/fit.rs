@@ -149,17 +149,10 @@ pub fn fit(
     let mut deviance = deviance_of(metric, measured, &prediction, &material, &causes, settings);
     let mut damping = 0.0f64;
     let mut iterations = 0;
-    let mut system: Option<(DMatrix<f64>, DVector<f64>)> = None;
+    let columns = derivatives(laboratory, &material, &causes, &prediction)?;
+    let (mut matrix, mut gradient) =
+        normal_system(metric, measured, &prediction, &material, &causes, settings, &columns);
     loop {
-        let (matrix, gradient) = match &system {
-            Some(kept) => kept.clone(),
-            None => {
-                let columns = derivatives(laboratory, &material, &causes, &prediction)?;
-                let made = normal_system(metric, measured, &prediction, &material, &causes, settings, &columns);
-                system = Some(made.clone());
-                made
-            }
-        };
         let n = gradient.len();
         let mut damped = matrix.clone();
         for i in 0..n {
@@ -178,16 +171,23 @@ pub fn fit(
         let better = match trial {
             Ok(next) => {
                 let next_deviance = deviance_of(metric, measured, &next, &next_material, &next_causes, settings);
-                (next_deviance < deviance).then_some((next, next_deviance))
+                // A state without a definite tangent is on the verge of instability: no better place to be.
+                let columns = if next_deviance < deviance {
+                    derivatives(laboratory, &next_material, &next_causes, &next).ok()
+                } else {
+                    None
+                };
+                columns.map(|columns| (next, next_deviance, columns))
             }
             Err(_) if !is_cancelled() => None,
             Err(error) => return Err(error),
         };
         match better {
-            Some((next, next_deviance)) => {
+            Some((next, next_deviance, columns)) => {
                 let gained = deviance - next_deviance;
                 (material, causes, prediction, deviance) = (next_material, next_causes, next, next_deviance);
-                system = None;
+                (matrix, gradient) =
+                    normal_system(metric, measured, &prediction, &material, &causes, settings, &columns);
                 damping = if damping > 1e-3 { damping * 0.1 } else { 0.0 };
                 if gained < 0.2 * settings.tolerance {
                     damping = 0.0;

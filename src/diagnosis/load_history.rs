@@ -20,6 +20,8 @@ const DRIFT_TIME_S: f64 = 20.0;
 const MAX_READINGS: usize = 1200;
 /// A further effect must lower the deviance by ln n per parameter and this much more.
 const EVIDENCE: f64 = 12.0;
+/// … and by this part of what the effects before it explained: their models err by some percent.
+const SMALLEST_SHARE: f64 = 0.02;
 /// Allowance of the force model, relative to the force: common effects of the mesh are in the free material.
 const ALLOWANCE: f64 = 0.002;
 /// Start times of a relaxation, s.
@@ -221,7 +223,8 @@ impl Problem {
             match effect {
                 LoadEffect::Relaxation => {
                     bound(at, 0.0, 10.0);
-                    bound(at + 1, 0.2f64.ln(), (3.0 * duration.max(1.0)).ln());
+                    // A relaxation longer than half the record is not told from elasticity.
+                    bound(at + 1, 0.2f64.ln(), (0.5 * duration.max(2.0)).ln());
                     largest_step.extend([0.5, 0.7]);
                 }
                 LoadEffect::Mullins => {
@@ -246,6 +249,9 @@ impl Problem {
     }
 }
 
+/// Gain, effect, deviance, parameters and their standard deviations of a fit.
+type Trial = (f64, LoadEffect, f64, Vec<f64>, Vec<f64>);
+
 /// Looks for effects in a load curve whose elastic force is `table`; `drift_sd_n` is the standard deviation of the load cell's
 /// slow drift, `windows_s` are the steps' windows.
 pub fn fit_load_history(
@@ -263,7 +269,7 @@ pub fn fit_load_history(
     let mut deviance = nominal_deviance;
     let n = problem.measured.len() as f64;
     loop {
-        let mut found: Option<(f64, LoadEffect, f64, Vec<f64>, Vec<f64>)> = None;
+        let mut found: Option<Trial> = None;
         let candidates = [LoadEffect::Offset, LoadEffect::Friction, LoadEffect::Mullins, LoadEffect::Relaxation];
         for candidate in candidates {
             let count = effects.iter().filter(|e| **e == candidate).count();
@@ -288,7 +294,7 @@ pub fn fit_load_history(
             }
         }
         let Some((gain, effect, d, p, s)) = found else { break };
-        if gain < EVIDENCE || effects.len() >= 5 {
+        if gain < EVIDENCE.max(SMALLEST_SHARE * (nominal_deviance - deviance)) || effects.len() >= 5 {
             break;
         }
         effects.push(effect);

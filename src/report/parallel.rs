@@ -113,7 +113,7 @@ mod tests {
                 axes: vec![
                     axis("drive / mm", n, |i| f64::from(i % 7)),
                     axis("hole / mm", n, |i| if i % 5 == 0 { f64::NAN } else { f64::from(i % 3) }),
-                    axis("force / N", n, |i| f64::from(i)),
+                    axis("force / N", n, f64::from),
                 ],
             };
             let svg = plot.to_svg();
