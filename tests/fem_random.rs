@@ -70,9 +70,9 @@ fn random_material(random: &mut Random) -> Ogden {
 }
 
 fn outcome(s: &Specimen, material: &Ogden) -> (String, Option<f64>) {
-    // As coarse as the mesher goes: convergence is asked, not accuracy.
-    let options = MeshOptions::scaled(s, 5.0);
-    let options = MeshOptions { levels: options.levels.min(3), ..options };
+    // Coarse, and at most four levels: convergence is asked, not accuracy. Coarser ones lose definiteness earlier.
+    let options = MeshOptions::scaled(s, 3.0);
+    let options = MeshOptions { levels: options.levels.min(4), ..options };
     let mesh = match mesh_specimen(s, &options) {
         Ok(mesh) => mesh,
         Err(MeshError::PoorElement { .. }) => return ("mesh: poor element".into(), None),
@@ -83,8 +83,8 @@ fn outcome(s: &Specimen, material: &Ogden) -> (String, Option<f64>) {
     let start = Instant::now();
     let is_over = || start.elapsed() > PATIENCE;
     let drive = s.drive_mm[0];
-    // What does not converge in steps of 1/32 rarely does in smaller ones.
-    let options = SolveOptions { min_step: 1.0 / 32.0, ..SolveOptions::default() };
+    // What does not converge in steps of 1/64 rarely does in smaller ones.
+    let options = SolveOptions { min_step: 1.0 / 64.0, ..SolveOptions::default() };
     match model.solve(material, drive, None, &options, &is_over) {
         Ok(found) => {
             assert!(found.force_n.is_finite() && found.force_n > 0.0);

@@ -149,7 +149,17 @@ pub fn fit(
     let mut deviance = deviance_of(metric, measured, &prediction, &material, &causes, settings);
     let mut damping = 0.0f64;
     let mut iterations = 0;
-    let columns = derivatives(laboratory, &material, &causes, &prediction)?;
+    let columns = match derivatives(laboratory, &material, &causes, &prediction) {
+        Ok(columns) => columns,
+        // A state reached from another material's may be an unstable one; from rest the stable branch is followed.
+        Err(_) if !is_cancelled() => {
+            laboratory.forget();
+            prediction = laboratory.predict(&material, &scene_of(&causes), is_cancelled)?;
+            deviance = deviance_of(metric, measured, &prediction, &material, &causes, settings);
+            derivatives(laboratory, &material, &causes, &prediction)?
+        }
+        Err(error) => return Err(error),
+    };
     let (mut matrix, mut gradient) =
         normal_system(metric, measured, &prediction, &material, &causes, settings, &columns);
     loop {

@@ -131,6 +131,13 @@ impl<'a> Laboratory<'a> {
         Ok(Prediction { trace, states, seen })
     }
 
+    /// Forgets the equilibria found so far: the next prediction starts from rest.
+    pub fn forget(&mut self) {
+        for station in &mut self.stations {
+            station.states.clear();
+        }
+    }
+
     /// Forces at other drives, N: an elastic load curve of the scene.
     ///
     /// # Errors
