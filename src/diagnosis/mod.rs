@@ -1,6 +1,6 @@
 //! Diagnosis: where a recording and its nominal model differ, and what physics was left out.
 //!
-//! * [`diagnose`] fits the nominal model, tests every cause of the registry ([`causes`]) to first order, fits the leading ones
+//! * [`diagnose()`] fits the nominal model, tests every cause of the registry ([`causes`]) to first order, fits the leading ones
 //!   in full with the material free, adds them one by one, and predicts data that were kept back.
 //! * A misfit counts by its pattern and size: noise and what meshes leave are in its weights.
 

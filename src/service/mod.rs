@@ -9,7 +9,7 @@
 //! * [`store`]: SQLite or PostgreSQL; exactly one result per task, equal evaluations computed once.
 //! * [`kinds`]: one file per kind of job: validate, run the library call, say what it leaves.
 //! * [`runner`]: slots on own threads, so that readers are never blocked by numerics.
-//! * [`routes`]: the addresses with their OpenAPI 3.1 document.
+//! * `routes`: the addresses with their OpenAPI 3.1 document.
 
 pub mod access;
 pub mod app;
