@@ -13,7 +13,7 @@ export function section(specimen) {
 export function editor(model, change) {
   const svg = s("svg", { class: "section", role: "group", "aria-label": "Section of the specimen with its holes" });
   const list = h("div", { class: "scroll" });
-  const element = h("div", {}, svg, h("p", { class: "quiet" }, "Drag a hole, or choose it with Tab and move it with the arrow keys; + and − change its size, Delete removes it."), list);
+  const element = h("div", {}, svg, h("p", { class: "quiet" }, "Drag a hole, or choose it with Tab and move it with the arrow keys; + and − change its size, Delete removes it. Where the limits ask for symmetry, mirrored holes move together."), list);
   let dragging = null;
 
   const toMm = (event) => {
@@ -24,12 +24,28 @@ export function editor(model, change) {
   const move = (index, x, y) => {
     const { length, height } = section(model.specimen);
     const clamp = (value, half) => Math.max(-half, Math.min(half, value));
-    model.specimen.holes[index].center_mm = [round(clamp(x, length / 2)), round(clamp(y, height / 2))];
+    const images = mirrored(index);
+    const to = [round(clamp(x, length / 2)), round(clamp(y, height / 2))];
+    model.specimen.holes[index].center_mm = to;
+    for (const { hole, signs } of images) hole.center_mm = [signs[0] * to[0], signs[1] * to[1]];
     edited();
+  };
+  // The holes that the symmetry among the limits ties to this one, with the signs of the mirrors between them.
+  const mirrored = (index) => {
+    const holes = model.specimen.holes;
+    const { center_mm: [x, y], diameter_mm } = holes[index];
+    const signs = { mirror_x: [[-1, 1]], mirror_z: [[1, -1]], mirror_x_and_z: [[-1, 1], [1, -1], [-1, -1]], point: [[-1, -1]] }[model.limits.symmetry] ?? [];
+    return holes.flatMap((hole, other) => {
+      const found = other === index ? undefined : signs.find((m) =>
+        Math.abs(hole.center_mm[0] - m[0] * x) < 1e-6 && Math.abs(hole.center_mm[1] - m[1] * y) < 1e-6 && Math.abs(hole.diameter_mm - diameter_mm) < 1e-6);
+      return found ? [{ hole, signs: found }] : [];
+    });
   };
   const resize = (index, by) => {
     const hole = model.specimen.holes[index];
+    const images = mirrored(index);
     hole.diameter_mm = Math.max(0.5, Math.round((hole.diameter_mm + by) * 20) / 20);
+    for (const image of images) image.hole.diameter_mm = hole.diameter_mm;
     edited();
   };
   const remove = (index) => {
