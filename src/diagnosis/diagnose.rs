@@ -4,7 +4,7 @@ use super::causes::{Category, Cause, Location, registry};
 use super::error::DiagnosisError;
 use super::fit::{BulkPrior, FitSettings, Fitted, STEP, Supposed, fit, paths_of, scene_of, shear_modulus};
 use super::laboratory::Laboratory;
-use super::load_history::{ElasticTable, FittedEffect, LoadEffect, LoadHistoryFit, fit_load_history};
+use super::load_history::{ElasticTable, FittedEffect, Homogeneous, LoadEffect, LoadHistoryFit, fit_load_history};
 use super::maps::{ScoreMap, debond_map, inclusion_map, jumps};
 use super::metric::Metric;
 use super::scene::Scene;
@@ -183,7 +183,8 @@ pub fn diagnose(
         let table = work.elastic_table(&nominal, curve.drive_mm.iter().fold(largest, |s, d| s.max(d.abs())))?;
         let drift = observed.steps.iter().filter_map(|s| s.force).map(|f| f.sd_n).fold(0.0, f64::max);
         let windows: Vec<Option<[f64; 2]>> = recording.steps.iter().map(|s| s.window_s).collect();
-        load = fit_load_history(curve, &table, drift.max(1e-6), &windows);
+        let sample = Homogeneous::of(&observed.specimen, &nominal.material);
+        load = fit_load_history(curve, &table, &sample, drift.max(1e-6), &windows);
     }
     let has_curve = load.is_some();
     let mut causes: Vec<FoundCause> = Vec::new();
