@@ -132,6 +132,15 @@ pub enum LoadEffect {
 }
 
 impl LoadEffect {
+    /// The cause that it is a part of.
+    pub fn cause(self) -> &'static str {
+        match self {
+            LoadEffect::Relaxation => "relaxation",
+            LoadEffect::Mullins => "mullins",
+            LoadEffect::Offset | LoadEffect::Friction => "cell",
+        }
+    }
+
     fn num_parameters(self) -> usize {
         match self {
             LoadEffect::Relaxation | LoadEffect::Mullins => 2,
@@ -316,13 +325,14 @@ type Trial = (f64, LoadEffect, f64, Vec<f64>, Vec<f64>);
 
 /// Looks for effects in a load curve whose elastic force is `table`, of a specimen in which what relaxes does so as in
 /// `sample`; `drift_sd_n` is the standard deviation of the load cell's
-/// slow drift, `windows_s` are the steps' windows.
+/// slow drift, `windows_s` are the steps' windows; only effects that are allowed are supposed.
 pub fn fit_load_history(
     curve: &LoadCurve,
     table: &ElasticTable,
     sample: &Homogeneous,
     drift_sd_n: f64,
     windows_s: &[Option<[f64; 2]>],
+    is_allowed: &dyn Fn(LoadEffect) -> bool,
 ) -> Option<LoadHistoryFit> {
     let problem = prepare(curve, table, sample, drift_sd_n)?;
     let num_material = problem.derivatives.len();
@@ -338,7 +348,7 @@ pub fn fit_load_history(
         for candidate in candidates {
             let count = effects.iter().filter(|e| **e == candidate).count();
             let most = if candidate == LoadEffect::Relaxation { 3 } else { 1 };
-            if count >= most {
+            if count >= most || !is_allowed(candidate) {
                 continue;
             }
             let mut trial = effects.clone();
