@@ -11,6 +11,7 @@ mod curves;
 mod design;
 mod design_slurm;
 mod diagnose;
+mod diagnose_curves;
 mod error;
 mod evaluate;
 mod import;
