@@ -76,3 +76,34 @@ fn bad_input_ends_with_code_two_and_says_why() {
         assert!(said.contains(words), "{arguments:?}: {said}");
     }
 }
+
+/// Stress of a neo-Hookean strip with one relaxation, at two rates: the command names it and predicts the third rate.
+#[test]
+fn load_curves_alone_are_diagnosed() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut arguments = vec!["diagnose".to_string(), "--json".into(), "--keep-back".into(), "rate-3".into()];
+    for (name, rate) in [("rate-1", 0.01), ("rate-2", 0.1), ("rate-3", 0.03)] {
+        let mut text = String::from("time_s,stretch,nominal_stress_kpa\n");
+        let (mut memory, mut last) = (0.0, 0.0);
+        for n in 0..=120 {
+            // Up to a stretch of 1.6 and back.
+            let strain = 0.01 * if n <= 60 { f64::from(n) } else { f64::from(120 - n) };
+            let (stretch, dt) = (1.0 + strain, 0.01 / rate);
+            let elastic = 20.0 * (stretch - stretch.powi(-2));
+            // Fung's model, g = 0.5, τ = 5 s, by the midpoint rule.
+            memory = memory * (-dt / 5.0f64).exp() + (elastic - last) * (-0.5 * dt / 5.0f64).exp();
+            last = elastic;
+            text += &format!("{},{stretch},{}\n", f64::from(n) * dt, elastic + 0.5 * memory);
+        }
+        let path = folder.path().join(format!("{name}.csv"));
+        std::fs::write(&path, text).unwrap();
+        arguments.extend(["--curve".into(), format!("uniaxial={}", path.display())]);
+    }
+    let out = std::process::Command::new(env!("CARGO_BIN_EXE_lambdak")).args(&arguments).output().unwrap();
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let result: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!(result["causes"][0]["name"], "relaxation", "{result}");
+    let [before, after] =
+        ["before", "after"].map(|k| result["kept_back"][0][k]["relative_rms_error"].as_f64().unwrap());
+    assert!(after < 0.2 * before, "{before} {after}");
+}

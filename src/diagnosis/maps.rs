@@ -199,6 +199,10 @@ const MIN_JUMP_VOXELS: usize = 12;
 const MIN_JUMP_SD: f64 = 7.0;
 /// Largest mean residual beside a jump, relative to the jump.
 const MAX_BESIDE: f64 = 0.25;
+/// A step across a jump's edge is full where it differs from the jump by less than this part of it (noise of two voxels at the
+/// smallest jump is a fifth); so many of them must be.
+const FULL_STEP: f64 = 0.5;
+const MIN_FULL_STEPS: f64 = 0.9;
 /// A voxel belongs to a jump where its residual exceeds this many standard deviations of the noise.
 const JUMP_SD: f64 = 5.0;
 
@@ -231,7 +235,9 @@ pub fn jumps(observed: &Observed, residual: &Trace) -> Vec<Wrap> {
                 }
                 is_seen[start as usize] = true;
                 let mut members = vec![start];
+                // Voxels beside it, and the step to each from the voxel inside.
                 let mut outside = Vec::new();
+                let mut steps = Vec::new();
                 let mut next = 0;
                 while next < members.len() {
                     let voxel = mask.voxels[members[next] as usize] as usize;
@@ -248,7 +254,9 @@ pub fn jumps(observed: &Observed, residual: &Trace) -> Vec<Wrap> {
                                 continue;
                             }
                             if sign(neighbour) != s {
-                                outside.push(field[neighbour as usize][component]);
+                                let beside = field[neighbour as usize][component];
+                                outside.push(beside);
+                                steps.push(field[members[next - 1] as usize][component] - beside);
                             } else if !is_seen[neighbour as usize] {
                                 is_seen[neighbour as usize] = true;
                                 members.push(neighbour);
@@ -267,7 +275,10 @@ pub fn jumps(observed: &Observed, residual: &Trace) -> Vec<Wrap> {
                 // out over several voxels is no jump.
                 let noise = observed.noise_sd_mm[component];
                 let beside = outside.iter().sum::<f64>() / outside.len().max(1) as f64;
-                let is_sharp = !outside.is_empty() && beside.abs() < MAX_BESIDE * size_mm.abs();
+                let full = steps.iter().filter(|x| (*x / size_mm - 1.0).abs() < FULL_STEP).count();
+                let is_sharp = !outside.is_empty()
+                    && beside.abs() < MAX_BESIDE * size_mm.abs()
+                    && full as f64 >= MIN_FULL_STEPS * steps.len() as f64;
                 if spread > 1.6 * noise || size_mm.abs() < MIN_JUMP_SD * noise || !is_sharp {
                     continue;
                 }
