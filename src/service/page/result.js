@@ -110,7 +110,7 @@ const VERDICTS = {
   explained_ambiguously: "Explained, but not by one cause alone: the data cannot tell these apart.", unexplained: "Something is left that no known cause explains.",
 };
 
-function diagnosis(result) {
+function diagnosis(result, files) {
   const change = (pair, unit = "") => (pair ? `${digits(pair.before, 3)} → ${digits(pair.after, 3)}${unit}` : "–");
   return [h("section", { class: "sheet" },
     bigNumbers([[change(result.chi2_per_datum), "χ² per datum, before and after"], [change(result.kept_back_rms_mm, " mm"), "misfit of data kept back, rms"]]),

@@ -12,11 +12,26 @@ async function readImage(href) {
   const dim = (n) => (view.getInt16(40, true) >= n ? Math.max(1, view.getInt16(40 + 2 * n, true)) : 1);
   const shape = [dim(1), dim(2), dim(3)];
   const offset = view.getFloat32(108, true);
+  const values = new Float32Array(bytes, offset, shape[0] * shape[1] * shape[2] * dim(5));
   return {
-    shape, components: dim(5), voxel: [1, 2, 3].map((n) => view.getFloat32(76 + 4 * n, true)),
+    shape, components: dim(5), bounds: bounds(values, shape), voxel: [1, 2, 3].map((n) => view.getFloat32(76 + 4 * n, true)),
     origin: [0, 1, 2].map((n) => view.getFloat32(292 + 16 * n, true)),
-    values: new Float32Array(bytes, offset, shape[0] * shape[1] * shape[2] * dim(5)),
+    values,
   };
+}
+
+/** First and last place along each axis where there is a value: maps leave out the empty margin. */
+function bounds(values, [nx, ny, nz]) {
+  const found = [[nx, -1], [ny, -1], [nz, -1]];
+  for (let z = 0, i = 0; z < nz; z += 1) {
+    for (let y = 0; y < ny; y += 1) {
+      for (let x = 0; x < nx; x += 1, i += 1) {
+        if (!Number.isFinite(values[i])) continue;
+        [x, y, z].forEach((p, a) => { found[a] = [Math.min(found[a][0], p), Math.max(found[a][1], p)]; });
+      }
+    }
+  }
+  return found.map(([low, high], a) => (high < low ? [0, [nx, ny, nz][a] - 1] : [low, high]));
 }
 
 const AXES = ["x", "y", "z"];
@@ -32,17 +47,17 @@ function color(t) {
 
 /** The slice's values of one component, row by row from the top, and its width and height. */
 function slice(image, component, [across, up, through], index) {
-  const { shape } = image;
+  const { shape, bounds } = image;
   const [nx, ny] = shape;
   const size = nx * ny * shape[2];
-  const [width, height] = [shape[across], shape[up]];
+  const [width, height] = [across, up].map((a) => bounds[a][1] - bounds[a][0] + 1);
   const values = new Float32Array(width * height);
   const place = [0, 0, 0];
   place[through] = index;
   for (let row = 0; row < height; row += 1) {
-    place[up] = height - 1 - row;
+    place[up] = bounds[up][1] - row;
     for (let column = 0; column < width; column += 1) {
-      place[across] = column;
+      place[across] = bounds[across][0] + column;
       values[row * width + column] = image.values[component * size + place[0] + nx * (place[1] + ny * place[2])];
     }
   }
@@ -101,12 +116,13 @@ export function slicesView(title, sets, note) {
       if (mine !== turn) return;
       const axes = PLANES[state.plane];
       const first = loaded[0];
-      const count = first.shape[axes[2]];
-      state.index = Math.min(state.index ?? Math.floor(count / 2), count - 1);
-      range.max = count - 1;
+      const [low, high] = first.bounds[axes[2]];
+      state.index = Math.max(low, Math.min(state.index ?? Math.floor((low + high) / 2), high));
+      range.min = low;
+      range.max = high;
       range.value = state.index;
       const at = first.origin[axes[2]] + state.index * first.voxel[axes[2]];
-      where.textContent = `${AXES[axes[2]]} = ${digits(at, 3)} mm (${state.index + 1} of ${count})`;
+      where.textContent = `${AXES[axes[2]]} = ${digits(at, 3)} mm (${state.index - low + 1} of ${high - low + 1})`;
       const limit = reach(loaded[Math.min(state.scale, loaded.length - 1)], state.component) || 1;
       fill(panels, loaded.map((image, i) => {
         const cut = slice(image, state.component, axes, state.index);
