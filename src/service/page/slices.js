@@ -121,7 +121,7 @@ export function slicesView(title, sets, note) {
       range.min = low;
       range.max = high;
       range.value = state.index;
-      const at = first.origin[axes[2]] + state.index * first.voxel[axes[2]];
+      const at = Math.round(1e4 * (first.origin[axes[2]] + state.index * first.voxel[axes[2]])) / 1e4;
       where.textContent = `${AXES[axes[2]]} = ${digits(at, 3)} mm (${state.index - low + 1} of ${high - low + 1})`;
       const limit = reach(loaded[Math.min(state.scale, loaded.length - 1)], state.component) || 1;
       fill(panels, loaded.map((image, i) => {
