@@ -8,6 +8,9 @@ use crate::service::recordings::Scratch;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+/// Files that a job leaves: name, media type, bytes.
+pub(super) type Artefacts = Vec<(String, String, Vec<u8>)>;
+
 /// Media type of compressed images.
 pub(super) const NIFTI: &str = "application/gzip";
 

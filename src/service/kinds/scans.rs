@@ -1,7 +1,7 @@
 //! `POST /v1/scans`: a synthetic scan of a specimen with noise, wraps and a loading history. Its displacements become a
 //! recording of the service, which calibrations and diagnoses take by its identifier.
 
-use super::fields::{media_type, written};
+use super::fields::{Artefacts, media_type, written};
 use super::{
     EvaluationRequest, JobKind, MaterialSchema, Plan, RunContext, RunError, SizeLimits, SpecimenSchema, TaskProgress,
     json_bytes, mesh_of, plan_evaluation,
@@ -221,7 +221,7 @@ fn files(
     found: Option<&Reconstruction>,
     material: &Ogden,
     context: &RunContext,
-) -> Result<(Vec<(String, String, Vec<u8>)>, Option<String>), RunError> {
+) -> Result<(Artefacts, Option<String>), RunError> {
     let folder = written(|folder| match found {
         None => made.raw.write(folder),
         Some(found) => found.recording.write(folder),
@@ -230,7 +230,7 @@ fn files(
         None => None,
         Some(_) => Some((context.keep)(folder.clone())?),
     };
-    let mut artefacts: Vec<_> =
+    let mut artefacts: Artefacts =
         folder.into_iter().map(|(name, bytes)| (name.clone(), media_type(&name).to_string(), bytes)).collect();
     if let Some(found) = found {
         let noise = written(|folder| {
