@@ -1,4 +1,4 @@
-"""Readers and event streams against a running service: python service_load.py ADDRESS SECONDS [READERS] [PID].
+"""Readers and event streams against a running service: python service_load.py ADDRESS SECONDS|until-it-ends [READERS] [PID].
 
 Every reader asks for a job about 2.5 times a second; every stream follows it. Prints requests, failures, slowest answers and,
 with the service's process id, the processor time that serving took.
@@ -10,13 +10,16 @@ import time
 import urllib.request
 import json
 
-address, seconds = sys.argv[1].rstrip("/"), float(sys.argv[2])
+address = sys.argv[1].rstrip("/")
+# `until-it-ends` goes on until the newest job has ended, so that the load covers it.
+is_open_ended = sys.argv[2] == "until-it-ends"
+seconds = 3600.0 if is_open_ended else float(sys.argv[2])
 count = int(sys.argv[3]) if len(sys.argv) > 3 else 200
 pid = sys.argv[4] if len(sys.argv) > 4 else None
 host, port = address.removeprefix("http://").split(":")
 jobs = json.load(urllib.request.urlopen(f"{address}/v1/jobs?limit=1"))["jobs"]
 path = f"/v1/jobs/{jobs[0]['id']}"
-times, failures, events = [], [], 0
+times, failures, events, has_ended = [], [], 0, False
 
 
 def processor():
@@ -25,13 +28,15 @@ def processor():
 
 
 async def reader(end):
+    global has_ended
     stream_in, stream_out = await asyncio.open_connection(host, int(port))
-    while time.monotonic() < end:
+    while time.monotonic() < end and not has_ended:
         start = time.monotonic()
         stream_out.write(f"GET {path} HTTP/1.1\r\nhost: {host}:{port}\r\n\r\n".encode())
         head = await stream_in.readuntil(b"\r\n\r\n")
         length = int(next(l for l in head.lower().split(b"\r\n") if l.startswith(b"content-length")).split(b":")[1])
-        await stream_in.readexactly(length)
+        body = await stream_in.readexactly(length)
+        has_ended |= is_open_ended and b'"finished_ms"' in body
         times.append(time.monotonic() - start)
         if not head.startswith(b"HTTP/1.1 200"):
             failures.append(head)
@@ -63,10 +68,10 @@ async def main():
     failures.extend(r for r in results if isinstance(r, BaseException))
 
 
-before = processor() if pid else 0
+before, began = processor() if pid else 0, time.monotonic()
 asyncio.run(main())
 times.sort()
-print(f"{count} readers and {count} streams for {seconds:.0f} s: {len(times)} requests, {events} events, {len(failures)} failures, "
+print(f"{count} readers and {count} streams for {time.monotonic() - began:.0f} s: {len(times)} requests, {events} events, {len(failures)} failures, "
       f"median {1e3 * times[len(times) // 2]:.1f} ms, 99 % {1e3 * times[int(0.99 * len(times))]:.1f} ms")
 if pid:
     print(f"processor time of the service: {processor() - before:.2f} s")

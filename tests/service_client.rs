@@ -21,5 +21,8 @@ fn python_example_runs() {
         .unwrap();
     let (text, errors) = (String::from_utf8_lossy(&out.stdout), String::from_utf8_lossy(&out.stderr));
     assert!(out.status.success(), "{text}\n{errors}");
-    assert!(text.contains("gain of the best over the base"), "{text}");
+    for part in ["gain of the best over the base", "verdict:", "residual-after_1.nii.gz", "misfit_1_2.nii.gz"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    eprintln!("{text}");
 }

@@ -75,7 +75,127 @@ fn a_sweep_holds_every_evaluation_in_order() {
         .collect();
     assert!(forces.len() == 5 && forces.windows(2).all(|w| w[0] < w[1]), "{forces:?}");
     let csv = service.get(&format!("{job}/artefacts/table.csv"));
-    assert_eq!(String::from_utf8(csv.body).unwrap().lines().count(), 6);
+    let text = String::from_utf8(csv.body).unwrap();
+    assert_eq!(text.lines().count(), 6);
+    assert!(text.starts_with("index,specimen,/drive_mm/0,drive_mm,force_n,"), "{text}");
+    let parquet = service.get(&format!("{job}/artefacts/table.parquet"));
+    assert_eq!(parquet.header("content-type"), Some("application/vnd.apache.parquet"));
+    assert!(parquet.body.starts_with(b"PAR1") && parquet.body.ends_with(b"PAR1"));
+}
+
+#[test]
+fn a_sample_of_ranges_follows_its_seed() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &["--slots", "0"]);
+    let body = |count: usize, seed: u64| {
+        json!({ "base": small_evaluation(1.0), "vary": [{ "pointer": "/drive_mm/0", "range": [0.5, 2.5] }],
+                "sample": { "count": count, "seed": seed } })
+    };
+    let drawn = |body: &Value| {
+        let job = service.submit("sweeps", body);
+        assert_eq!(service.get(&format!("{job}/request")).json(), *body);
+        service.get(&job).json()["num_tasks"].as_u64().unwrap()
+    };
+    assert_eq!((drawn(&body(4, 1)), drawn(&body(7, 2))), (4, 7));
+    for (pointer, wrong) in [
+        ("/sample/count", body(0, 1)),
+        (
+            "/vary/0/range",
+            json!({ "base": small_evaluation(1.0), "vary": [{ "pointer": "/drive_mm/0", "range": [1.0, 2.0] }] }),
+        ),
+        (
+            "/vary/0/pointer",
+            json!({ "base": small_evaluation(1.0), "vary": [{ "pointer": "/nothing", "values": [1.0] }] }),
+        ),
+        (
+            "/vary/0/values/1",
+            json!({ "base": small_evaluation(1.0), "vary": [{ "pointer": "/drive_mm/0", "values": [1.0, -2.0] }] }),
+        ),
+        ("/base/material/bulk_kpa", {
+            let mut wrong = body(2, 1);
+            wrong["base"]["material"]["bulk_kpa"] = json!(-1.0);
+            wrong
+        }),
+        ("/evaluations/1/specimen/block/width_mm", {
+            let mut second = small_evaluation(1.0);
+            second["specimen"]["block"]["width_mm"] = json!(-5.0);
+            json!({ "evaluations": [small_evaluation(1.0), second] })
+        }),
+    ] {
+        let reply = service.post("/v1/sweeps", &wrong);
+        assert_eq!(reply.status, 422, "{pointer}");
+        assert_eq!(reply.json()["errors"][0]["pointer"], pointer, "{}", reply.json());
+    }
+}
+
+#[test]
+fn a_scan_becomes_a_recording_that_is_calibrated() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &[]);
+    let mut specimen = shipped("solid-shear.json");
+    specimen["drive_mm"] = json!([4.0]);
+    let body = json!({
+        "specimen": specimen, "material": shipped("materials/ecoflex-0020.json"), "mesh": "2.5",
+        "voxel_mm": [2.0, 0.7, 2.0], "mm_per_radian": [0.4, 0.4, 0.4], "noise_sd_mm": [0.01, 0.01, 0.01], "seed": 5,
+    });
+    let job = service.submit("scans", &body);
+    let view = service.wait(&job, LONG);
+    assert_eq!(view["state"], "succeeded", "{view}");
+    let result = service.get(&format!("{job}/result")).json();
+    assert_eq!(result["schema"], "scan/1");
+    let recording = result["recording"].as_str().unwrap();
+    let kept = service.get(&format!("/v1/recordings/{recording}")).json();
+    assert_eq!(kept["summary"]["num_voxels"], result["num_voxels"]);
+    for name in ["u_1.nii.gz", "sd_1.nii.gz", "mask.nii.gz"] {
+        let image = service.get(&format!("{job}/artefacts/{name}"));
+        assert_eq!((image.status, image.header("content-type")), (200, Some("application/gzip")), "{name}");
+        assert!(image.body.starts_with(&[0x1f, 0x8b]), "{name}");
+    }
+    // Raw phases are files and no recording.
+    let mut raw = body;
+    raw["is_raw"] = json!(true);
+    let job = service.submit("scans", &raw);
+    assert_eq!(service.wait(&job, LONG)["state"], "succeeded");
+    assert_eq!(service.get(&format!("{job}/result")).json()["recording"], Value::Null);
+    assert_eq!(service.get(&format!("{job}/artefacts/px_1.nii.gz")).status, 200);
+
+    let calibration = json!({ "recordings": [recording], "num_terms": 1, "mesh_factor": 2.5, "has_mesh_allowance": false, "num_starts": 1 });
+    let job = service.submit("calibrations", &calibration);
+    let view = service.wait(&job, LONG);
+    assert_eq!(view["state"], "succeeded", "{view}");
+    let result = service.get(&format!("{job}/result")).json();
+    assert_eq!(result["schema"], "calibration/1");
+    let terms = shipped("materials/ecoflex-0020.json")["terms"].clone();
+    let truth = 0.5 * terms[0]["mu_kpa"].as_f64().unwrap() * terms[0]["alpha"].as_f64().unwrap();
+    let found = result["initial_shear_modulus_kpa"]["value"].as_f64().unwrap();
+    // One mesh made and fitted the data: noise alone lies between them, far below a twentieth.
+    assert!((found / truth - 1.0).abs() < 0.05, "{found} for {truth}");
+    for name in ["measured_1_1.nii.gz", "model_1_1.nii.gz", "misfit_1_1.nii.gz", "report.html", "material.json"] {
+        assert_eq!(service.get(&format!("{job}/artefacts/{name}")).status, 200, "{name}");
+    }
+    for (pointer, wrong) in [
+        ("/recordings/1", json!({ "recordings": [recording, "none"] })),
+        ("/recordings", json!({ "recordings": [] })),
+        ("/num_terms", json!({ "recordings": [recording], "num_terms": 9 })),
+        ("/rule", json!({ "recordings": [recording], "rule": "guess" })),
+        ("/mesh_factor", json!({ "recordings": [recording], "mesh_factor": 0.2 })),
+    ] {
+        let reply = service.post("/v1/calibrations", &wrong);
+        assert_eq!((reply.status, reply.json()["errors"][0]["pointer"].as_str()), (422, Some(pointer)), "{wrong}");
+    }
+    for (pointer, value) in [
+        ("/noise_sd_mm/1", json!({ "noise_sd_mm": [0.1, 0.0, 0.1] })),
+        ("/voxel_mm", json!({ "voxel_mm": [0.001, 0.001, 0.001] })),
+        ("/offset_voxels/2", json!({ "offset_voxels": [0.0, 0.0, 2.0] })),
+        ("/kspace/keep", json!({ "kspace": { "keep": [0.5, 0.0, 1.0] } })),
+        ("/force_sd_n", json!({ "force_sd_n": -1.0 })),
+        ("/filter", json!({ "filter": "hamming2" })),
+    ] {
+        let mut wrong = raw.clone();
+        wrong.as_object_mut().unwrap().extend(value.as_object().unwrap().clone());
+        let reply = service.post("/v1/scans", &wrong);
+        assert_eq!((reply.status, reply.json()["errors"][0]["pointer"].as_str()), (422, Some(pointer)), "{value}");
+    }
 }
 
 #[test]
@@ -189,8 +309,19 @@ fn tokens_roles_and_quotas() {
     let mut service = Service::start(&data, &["--slots", "0", "--tokens", tokens.to_str().unwrap()]);
     assert_eq!((service.get("/v1/jobs").status, service.get("/healthz").status), (401, 200));
     assert_eq!(service.get("/v1/jobs").header("www-authenticate"), Some("Bearer"));
-    service.token = Some("lk_forged".into());
-    assert_eq!(service.get("/v1/jobs").cause(), "unauthorized");
+    for forged in ["lk_forged", "", &reader[..reader.len() - 1], &format!("{reader}0"), &reader.to_uppercase()] {
+        service.token = Some(forged.into());
+        assert_eq!(service.get("/v1/jobs").cause(), "unauthorized", "{forged}");
+    }
+    service.token = None;
+    for value in [format!("Basic {reader}"), reader.clone(), format!("Bearer {reader}, Bearer {reader}")] {
+        let reply = service.call("GET", "/v1/jobs", &[("authorization", &value)], b"");
+        assert_eq!((reply.status, reply.cause().as_str()), (401, "unauthorized"), "{value}");
+    }
+    // The hash that is kept opens nothing.
+    let kept = file["tokens"][0]["sha256"].as_str().unwrap_or("0").to_string();
+    let reply = service.call("GET", "/v1/jobs", &[("authorization", &format!("Bearer {kept}"))], b"");
+    assert_eq!(reply.status, 401);
     service.token = Some(reader);
     assert_eq!(service.get("/v1/jobs").status, 200);
     assert_eq!(service.post("/v1/evaluations", &small_evaluation(1.0)).cause(), "forbidden");
@@ -246,14 +377,70 @@ fn a_shutdown_ends_streams_and_keeps_the_job() {
     let mut stream = std::net::TcpStream::connect(&service.address).unwrap();
     write!(stream, "GET {job}/events HTTP/1.1\r\nhost: {}\r\n\r\n", service.address).unwrap();
     std::thread::sleep(Duration::from_millis(500));
-    let id = service.child.id().to_string();
-    assert!(std::process::Command::new("kill").args(["-TERM", &id]).status().unwrap().success());
+    terminate(&service);
+    // For a moment it still answers, so that whoever sends it requests hears that it goes.
+    let started = std::time::Instant::now();
+    let reply = loop {
+        let reply = service.get("/readyz");
+        if reply.status != 200 {
+            break reply;
+        }
+        assert!(started.elapsed() < Duration::from_secs(10), "still ready");
+    };
+    assert_eq!((reply.status, reply.cause().as_str()), (503, "shutting-down"));
+    assert!(reply.header("retry-after").is_some());
     let mut text = String::new();
     stream.read_to_string(&mut text).unwrap();
     assert!(text.contains("event: job") && text.contains("event: shutdown"), "{text}");
     assert!(service.child.wait().unwrap().success());
     let service = Service::start(folder.path(), &[]);
     assert_eq!(service.wait(&job, LONG)["state"], "succeeded");
+}
+
+#[cfg(unix)]
+fn terminate(service: &Service) {
+    let id = service.child.id().to_string();
+    assert!(std::process::Command::new("kill").args(["-TERM", &id]).status().unwrap().success());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_shutdown_keeps_the_checkpoint_of_a_running_design() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut service = Service::start(folder.path(), &[]);
+    let mut study = service.get("/v1/library").json()["studies"][1].clone();
+    study["budget"] = json!({ "explore": 8, "refine": 1, "iterations": 1, "confirm": 1 });
+    study["verification"] = json!({ "is_on": false, "draws": 1 });
+    let job = service.submit("designs", &study);
+    let started = std::time::Instant::now();
+    while service.get(&job).json()["progress"]["done"].as_u64().unwrap_or(0) < 2 {
+        assert!(started.elapsed() < LONG, "no progress");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    terminate(&service);
+    assert!(service.child.wait().unwrap().success());
+    {
+        let store = lambdak::service::store::Store::open_folder(folder.path()).unwrap();
+        // A lease that is over at once: the task is only looked at.
+        let task = store.claim("look", -1, "{}").unwrap().expect("the task is back in the queue");
+        let kept = store.checkpoint(&task).unwrap().expect("a checkpoint is kept");
+        let text = String::from_utf8(kept).unwrap();
+        assert!(text.lines().count() >= 3, "a header and two evaluations at least: {text}");
+    }
+    let service = Service::start(folder.path(), &[]);
+    let view = service.wait(&job, LONG);
+    assert_eq!(view["state"], "succeeded", "{view}");
+}
+
+#[test]
+fn a_full_queue_says_when_to_come_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &["--slots", "0", "--max-queued", "2"]);
+    service.submit("evaluations", &small_evaluation(1.0));
+    let reply = service.post("/v1/sweeps", &small_sweep(3));
+    assert_eq!((reply.status, reply.cause().as_str()), (429, "queue-full"));
+    let after = reply.header("retry-after").unwrap().parse::<u32>().unwrap();
+    assert!(after > 0 && reply.json()["retry_after_s"] == after);
 }
 
 #[test]

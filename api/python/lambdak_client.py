@@ -60,7 +60,7 @@ class Client:
         return json.loads(self.request("POST", path, {} if body is None else body, headers)[0])
 
     def submit(self, kind, body, key=None):
-        """A job of a kind: evaluations, sweeps, designs. Equal keys give the same job."""
+        """A job of a kind: evaluations, sweeps, designs, scans, calibrations, diagnoses. Equal keys give the same job."""
         headers = {"idempotency-key": key} if key else {}
         return Job(self, self.post(f"/v1/{kind}", body, headers)["id"])
 
@@ -71,6 +71,12 @@ class Client:
         """`vary`: {"/specimen/holes/0/diameter_mm": [3, 4, 5]}; all combinations."""
         axes = [{"pointer": pointer, "values": list(values)} for pointer, values in vary.items()]
         return self.submit("sweeps", {"name": name, "base": base, "vary": axes})
+
+    def sample(self, base, ranges, count, seed=0, name="sample"):
+        """`ranges`: {"/specimen/holes/0/diameter_mm": (3, 5)}; a Latin hypercube of `count` points."""
+        axes = [{"pointer": pointer, "range": list(ends)} for pointer, ends in ranges.items()]
+        body = {"name": name, "base": base, "vary": axes, "sample": {"count": count, "seed": seed}}
+        return self.submit("sweeps", body)
 
     def design(self, study):
         return self.submit("designs", study)
@@ -88,6 +94,18 @@ class Client:
                     archive.add(path, arcname=path.name)
         body, _ = self.request("POST", "/v1/recordings", raw=buffer.getvalue(), headers={"content-type": "application/x-tar"})
         return json.loads(body)["id"]
+
+    def scan(self, specimen, material, **more):
+        """A synthetic scan; its result's `recording` is the identifier of the recording it made."""
+        return self.submit("scans", {"specimen": specimen, "material": material, **more})
+
+    def recording(self, id):
+        return self.get(f"/v1/recordings/{id}")
+
+    def calibrate(self, recordings, **more):
+        """A calibration on recordings of the service, all fitted together."""
+        ids = [recordings] if isinstance(recordings, str) else list(recordings)
+        return self.submit("calibrations", {"recordings": ids, **more})
 
     def diagnose(self, recording, material=None, **more):
         """A diagnosis of an uploaded recording."""

@@ -87,6 +87,14 @@ impl Problem {
         problem
     }
 
+    /// `too-big-a-problem` at a field.
+    pub fn too_big(pointer: impl Into<String>, detail: impl Into<String>) -> Self {
+        let detail = detail.into();
+        let mut problem = Problem::new("too-big-a-problem", detail.clone());
+        problem.errors.push(FieldProblem { pointer: pointer.into(), detail });
+        problem
+    }
+
     /// With a time after which to try again.
     pub fn after(mut self, seconds: u32) -> Self {
         self.retry_after_s = Some(seconds);

@@ -4,7 +4,7 @@
 //! compressed images inside are bounded in what they may unpack to.
 
 use super::problem::Problem;
-use super::store::{Store, StoreError, sha256_hex};
+use super::store::{NewUpload, Store, StoreError, sha256_hex};
 use crate::recording::{ReadLimits, Recording};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -107,15 +107,19 @@ fn lay_out(folder: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<(), Probl
 }
 
 /// A folder that is removed when dropped.
-struct Scratch(std::path::PathBuf);
+pub(super) struct Scratch(std::path::PathBuf);
 
 impl Scratch {
-    fn new() -> Result<Scratch, Problem> {
+    pub(super) fn new() -> Result<Scratch, Problem> {
         let failed = |e: String| Problem::new("internal", format!("scratch: {e}"));
         let name = super::access::random_hex::<8>().map_err(|e| failed(e.to_string()))?;
         let path = std::env::temp_dir().join(format!("lambdak-recording-{name}"));
         std::fs::create_dir(&path).map_err(|e| failed(e.to_string()))?;
         Ok(Scratch(path))
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.0
     }
 }
 
@@ -146,6 +150,46 @@ pub fn read(files: &BTreeMap<String, Vec<u8>>) -> Result<Recording, Problem> {
         let message = e.to_string().replace(&format!("{}/", scratch.0.display()), "");
         unsafe_upload(message)
     })
+}
+
+/// An upload to keep, once its files are read without complaint.
+///
+/// # Errors
+/// `unsafe-upload`.
+pub fn upload_of(files: BTreeMap<String, Vec<u8>>, owner: String) -> Result<NewUpload, Problem> {
+    let recording = read(&files)?;
+    let steps: Vec<_> =
+        recording.steps.iter().map(|s| serde_json::json!({ "drive_mm": s.drive_mm, "force_n": s.force_n })).collect();
+    let manifest = serde_json::json!({
+        "specimen": recording.specimen,
+        "shape": recording.grid.shape,
+        "voxel_mm": recording.grid.voxel_mm,
+        "num_voxels": recording.num_voxels(),
+        "steps": steps,
+    });
+    Ok(NewUpload {
+        id: identifier(&files),
+        owner,
+        title: recording.id.chars().filter(|c| !c.is_control()).take(200).collect(),
+        manifest: manifest.to_string(),
+        files: files.into_iter().collect(),
+    })
+}
+
+/// Keeps the recording of a scan made by job `job`. Its identifier is a hash of its content.
+///
+/// # Errors
+/// `quota` where recordings fill the service's space.
+pub fn keep(store: &Store, job: &str, files: BTreeMap<String, Vec<u8>>) -> Result<String, Problem> {
+    let length: usize = files.values().map(Vec::len).sum();
+    let kept = usize::try_from(store.uploaded_bytes()?).unwrap_or(0);
+    if kept + length > super::app::Limits::default().max_uploads_bytes {
+        return Err(Problem::new("quota", "the recordings fill the service's space"));
+    }
+    let owner = store.job(job)?.map(|row| row.owner).unwrap_or_default();
+    let upload = upload_of(files, owner)?;
+    store.put_upload(&upload)?;
+    Ok(upload.id)
 }
 
 /// Reads a kept recording; `None` where there is none of that name.

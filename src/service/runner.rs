@@ -135,6 +135,7 @@ fn run_task(store: &Store, settings: &WorkerSettings, signal: &Signal, worker: &
                 super::recordings::load(store, id)?
                     .ok_or_else(|| Problem::new("not-found", "the recording is gone; upload it again"))
             },
+            keep: &|files| super::recordings::keep(store, &task.job_id, files),
             checkpoint: &path,
         };
         let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| run_kind(store, task, &context)));

@@ -83,6 +83,8 @@ pub enum ServeError {
     },
 }
 
+/// How long a service that was told to stop still answers that it is not ready, so that a load balancer hears of it.
+const DRAIN: Duration = Duration::from_secs(1);
 /// How long open requests may take to end at shutdown.
 const GRACE: Duration = Duration::from_secs(10);
 
@@ -174,6 +176,7 @@ pub fn serve(options: &ServeOptions, on_ready: &dyn Fn(SocketAddr)) -> Result<()
         quick: Semaphore::new(2),
     });
     let head_time = options.limits.head_time;
+    let slots_signal = signal.clone();
     let result = runtime.block_on(async move {
         let listener = tokio::net::TcpListener::from_std(listener).map_err(fail)?;
         tokio::spawn(hub::run(hub, store, stopping));
@@ -182,10 +185,14 @@ pub fn serve(options: &ServeOptions, on_ready: &dyn Fn(SocketAddr)) -> Result<()
             &serde_json::json!({ "address": listen.to_string(), "version": crate::provenance::VERSION }),
         );
         on_ready(listen);
-        accept(listener, router(app), head_time, stop).await;
+        accept(listener, router(app), head_time, || {
+            // Streams end; running tasks keep their checkpoints and go back into the queue.
+            let _ = stop.send(true);
+            slots_signal.stop();
+        })
+        .await;
         Ok(())
     });
-    // Running tasks keep their checkpoints and go back into the queue.
     signal.stop();
     for slot in slots {
         let _ = slot.join();
@@ -196,22 +203,24 @@ pub fn serve(options: &ServeOptions, on_ready: &dyn Fn(SocketAddr)) -> Result<()
     result
 }
 
-async fn accept(
-    listener: tokio::net::TcpListener,
-    router: axum::Router,
-    head_time: Duration,
-    stop: watch::Sender<bool>,
-) {
+async fn accept(listener: tokio::net::TcpListener, router: axum::Router, head_time: Duration, on_stop: impl Fn()) {
     let graceful = GracefulShutdown::new();
     let mut http = hyper::server::conn::http1::Builder::new();
     http.timer(TokioTimer::new()).header_read_timeout(head_time).max_headers(64).max_buf_size(64 << 10);
     // More connections than requests and streams together are nobody's need.
     let connections = Arc::new(Semaphore::new(4096));
     let mut stopped = std::pin::pin!(interrupted());
+    let mut end: Option<tokio::time::Instant> = None;
     loop {
         let accepted = tokio::select! {
             accepted = listener.accept() => accepted,
-            () = &mut stopped => break,
+            () = &mut stopped, if end.is_none() => {
+                log::info("stopping", &serde_json::json!({}));
+                on_stop();
+                end = Some(tokio::time::Instant::now() + DRAIN);
+                continue;
+            }
+            () = tokio::time::sleep_until(end.unwrap_or_else(tokio::time::Instant::now)), if end.is_some() => break,
         };
         let Ok((socket, _)) = accepted else {
             // Out of file descriptors, say: connections end and free some.
@@ -227,10 +236,7 @@ async fn accept(
             let _ = connection.await;
         });
     }
-    log::info("stopping", &serde_json::json!({}));
     drop(listener);
-    // Streams end, then connections.
-    let _ = stop.send(true);
     tokio::select! {
         () = graceful.shutdown() => {}
         () = tokio::time::sleep(GRACE) => {}

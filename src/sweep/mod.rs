@@ -19,6 +19,7 @@ mod task;
 
 pub use error::{StoreError, SweepError, SweepStudyError};
 pub use parquet::to_parquet;
+pub use points::latin_hypercube_points;
 pub use result::{SweepCell, SweepResult};
 pub use run::{Observe, RunOptions, SweepProgress, SweepRun, run};
 pub use shard::Shard;

@@ -63,10 +63,8 @@ impl JobKind for Designs {
         let fine = mesh_specimen(&study.base, &MeshOptions::fine(&study.base))
             .map_err(|e| Problem::at("/base", e.to_string()))?;
         if fine.num_elements() > limits.max_elements {
-            return Err(Problem::new(
-                "too-big-a-problem",
-                format!("the base specimen needs {} elements; at most {}", fine.num_elements(), limits.max_elements),
-            ));
+            let (count, most) = (fine.num_elements(), limits.max_elements);
+            return Err(Problem::too_big("/base", format!("the base specimen needs {count} elements; at most {most}")));
         }
         // Equal studies of one version have equal results: the search is deterministic by its seed.
         let cache_key = format!("design:{}", study_hash(&study));

@@ -1,11 +1,16 @@
 //! `POST /v1/diagnoses`: where a recording and its model differ, and what physics was left out.
 
-use super::{JobKind, MaterialSchema, Plan, RunContext, RunError, SizeLimits, TaskProgress, json_bytes};
+use super::fields::displacement_images;
+use super::{
+    JobKind, MaterialSchema, Plan, RunContext, RunError, SizeLimits, TaskProgress, json_bytes, mesh_is_small_enough,
+};
 use crate::diagnosis::{DiagnosisOptions, DiagnosisResult, diagnose};
 use crate::material::Ogden;
 use crate::provenance::{VERSION, input_hash};
+use crate::report::{diagnosis_pictures, diagnosis_report};
 use crate::service::problem::{Problem, parse, pointer_in_message};
 use crate::service::store::{NewTask, TaskResult};
+use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -53,8 +58,19 @@ impl JobKind for Diagnoses {
         "diagnoses"
     }
 
-    fn recording<'a>(&self, body: &'a serde_json::Value) -> Option<&'a str> {
-        body.get("recording").and_then(|r| r.as_str())
+    fn recordings(&self, body: &serde_json::Value) -> Vec<(String, String)> {
+        let id = body.get("recording").and_then(|r| r.as_str());
+        id.map(|id| ("/recording".to_string(), id.to_string())).into_iter().collect()
+    }
+
+    fn check_recording(
+        &self,
+        body: &serde_json::Value,
+        specimen: &Specimen,
+        limits: &SizeLimits,
+    ) -> Result<(), Problem> {
+        let request: DiagnosisRequest = parse(body)?;
+        mesh_is_small_enough(specimen, options_of(&request).mesh_factor, limits)
     }
 
     fn plan(&self, body: &serde_json::Value, _limits: &SizeLimits) -> Result<Plan, Problem> {
@@ -107,6 +123,22 @@ impl JobKind for Diagnoses {
         })?;
         let hash = input_hash(&serde_json::json!({ "version": VERSION, "request": request }));
         let result = DiagnosisResult::new(&found, &recording.id, hash);
-        Ok(TaskResult { result: json_bytes(&result)?, artefacts: Vec::new() })
+        // Measured less predicted, by the nominal model and with the causes.
+        let mut artefacts = Vec::new();
+        let residuals = [("before", &found.nominal.residual), ("after", &found.corrected.residual)];
+        let fields: Vec<(String, &[[f64; 3]])> = residuals
+            .iter()
+            .flat_map(|(when, trace)| {
+                let steps = trace.displacement.iter().enumerate();
+                steps.map(move |(s, u)| (format!("residual-{when}_{}", s + 1), &u[..]))
+            })
+            .collect();
+        displacement_images(&found.observed, &fields, &mut artefacts)?;
+        for (name, svg) in diagnosis_pictures(&found) {
+            artefacts.push((format!("{name}.svg"), "image/svg+xml".into(), svg.into_bytes()));
+        }
+        let report = diagnosis_report(&found, &result).to_html();
+        artefacts.push(("report.html".into(), "text/html".into(), report.into_bytes()));
+        Ok(TaskResult { result: json_bytes(&result)?, artefacts })
     }
 }

@@ -133,7 +133,9 @@ pub fn plan_evaluation(request: &EvaluationRequest, prefix: &str, limits: &SizeL
     let scan = scan_of(request.scan);
     let noise_is_fine = scan.noise_sd_mm.iter().chain([&scan.force_sd_n]).all(|sd| sd.is_finite() && *sd > 1e-100);
     if !noise_is_fine {
-        return Err(Problem::at(format!("{prefix}/scan"), "every standard deviation must be positive and finite"));
+        let name = if scan.force_sd_n.is_finite() && scan.force_sd_n > 1e-100 { "noise_sd_mm" } else { "force_sd_n" };
+        let detail = "every standard deviation must be positive and finite";
+        return Err(Problem::at(format!("{prefix}/scan/{name}"), detail));
     }
     let grid = crate::voxel::VoxelGrid::covering(&request.specimen, scan.voxel_mm)
         .map_err(|e| Problem::at(format!("{prefix}/scan/voxel_mm"), e.to_string()))?;
@@ -147,15 +149,9 @@ pub fn plan_evaluation(request: &EvaluationRequest, prefix: &str, limits: &SizeL
     let built = mesh_specimen(&request.specimen, &mesh)
         .map_err(|e| Problem::at(format!("{prefix}/specimen"), e.to_string()))?;
     if built.num_elements() > limits.max_elements {
-        let mut problem = Problem::new(
-            "too-big-a-problem",
-            format!("{} elements; at most {}: use a coarser mesh", built.num_elements(), limits.max_elements),
-        );
-        problem.errors.push(crate::service::problem::FieldProblem {
-            pointer: format!("{prefix}/mesh"),
-            detail: problem.detail.clone(),
-        });
-        return Err(problem);
+        let (count, most) = (built.num_elements(), limits.max_elements);
+        let detail = format!("{count} elements; at most {most}: use a coarser mesh");
+        return Err(Problem::too_big(format!("{prefix}/mesh"), detail));
     }
     let options = EvaluationOptions { mesh, ..EvaluationOptions::standard(&request.specimen) };
     let content = serde_json::json!({

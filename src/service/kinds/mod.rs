@@ -1,21 +1,30 @@
 //! Kinds of jobs, one file each: what a request must hold, the library call that answers it, what it leaves behind.
 
+mod calibrations;
 mod designs;
 mod diagnoses;
 mod evaluations;
+mod fields;
+mod scans;
 mod schemas;
+mod sweep_table;
 mod sweeps;
 
+pub use calibrations::{CalibrationRequest, Calibrations};
 pub use designs::Designs;
 pub use diagnoses::{Diagnoses, DiagnosisRequest};
 pub use evaluations::{EvaluationRequest, Evaluations, mesh_of, plan_evaluation, scan_of};
+pub use scans::{KSpaceRequest, ScanRequest, Scans};
 pub use schemas::*;
-pub use sweeps::{SweepAxis, SweepRequest, Sweeps};
+pub use sweeps::{SweepAxis, SweepRequest, SweepSample, Sweeps};
 
 use super::problem::Problem;
 use super::store::{NewTask, TaskResult};
+use crate::mesh::{MeshOptions, mesh_specimen};
 use crate::recording::Recording;
+use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::Path;
 use utoipa::ToSchema;
 
@@ -76,6 +85,8 @@ pub struct RunContext<'a> {
     pub progress: &'a (dyn Fn(TaskProgress) + Sync),
     /// Reads an uploaded recording.
     pub recording: &'a dyn Fn(&str) -> Result<Recording, Problem>,
+    /// Keeps a recording made here: files by name. Gives its identifier; an equal one is kept once.
+    pub keep: &'a dyn Fn(BTreeMap<String, Vec<u8>>) -> Result<String, Problem>,
     /// A file whose content is kept across attempts.
     pub checkpoint: &'a Path,
 }
@@ -85,9 +96,23 @@ pub trait JobKind: Send + Sync {
     /// Name, as in the address.
     fn name(&self) -> &'static str;
 
-    /// The uploaded recording that a request names; its existence is checked before the job is taken.
-    fn recording<'a>(&self, _body: &'a serde_json::Value) -> Option<&'a str> {
-        None
+    /// The recordings that a request names, with the pointers to their names. That they exist is checked before the job is
+    /// taken.
+    fn recordings(&self, _body: &serde_json::Value) -> Vec<(String, String)> {
+        Vec::new()
+    }
+
+    /// Whether what is asked of a recording of `specimen` keeps the limits.
+    ///
+    /// # Errors
+    /// A [`Problem`] `too-big-a-problem`.
+    fn check_recording(
+        &self,
+        _body: &serde_json::Value,
+        _specimen: &Specimen,
+        _limits: &SizeLimits,
+    ) -> Result<(), Problem> {
+        Ok(())
     }
 
     /// Validates a request's body and says what there is to run.
@@ -117,8 +142,19 @@ pub trait JobKind: Send + Sync {
 
 /// The kinds that this program runs.
 pub fn kind_named(name: &str) -> Option<&'static dyn JobKind> {
-    const KINDS: &[&dyn JobKind] = &[&Evaluations, &Designs, &Sweeps, &Diagnoses];
+    const KINDS: &[&dyn JobKind] = &[&Evaluations, &Designs, &Sweeps, &Scans, &Calibrations, &Diagnoses];
     KINDS.iter().copied().find(|kind| kind.name() == name)
+}
+
+/// Whether the mesh of a recording's specimen keeps the limit; `factor` is the element size relative to standard.
+fn mesh_is_small_enough(specimen: &Specimen, factor: f64, limits: &SizeLimits) -> Result<(), Problem> {
+    let mesh = mesh_specimen(specimen, &MeshOptions::scaled(specimen, factor))
+        .map_err(|e| Problem::at("/mesh_factor", e.to_string()))?;
+    if mesh.num_elements() <= limits.max_elements {
+        return Ok(());
+    }
+    let (count, most) = (mesh.num_elements(), limits.max_elements);
+    Err(Problem::too_big("/mesh_factor", format!("{count} elements; at most {most}: use a larger factor")))
 }
 
 /// JSON of a result, pretty, with a final newline.

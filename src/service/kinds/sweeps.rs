@@ -1,18 +1,20 @@
 //! `POST /v1/sweeps`: many evaluations, split in tasks over all workers.
 //!
-//! Either a list of `evaluations`, or a `base` evaluation and `vary`: JSON pointers into it with the values to try, all
-//! combinations, the last pointer fastest.
+//! Either a list of `evaluations`, or a `base` evaluation and `vary`: JSON pointers into it with the values to try (all
+//! combinations, the last pointer fastest), or with ranges that `sample` fills.
 
 use super::evaluations::{EvaluationRequest, Evaluations, plan_evaluation};
+use super::sweep_table::{Entry, sweep_table};
 use super::{JobKind, Plan, RunContext, RunError, SizeLimits, json_bytes};
 use crate::provenance::VERSION;
-use crate::sensitivity::{Evaluation, evaluate};
+use crate::sensitivity::evaluate;
 use crate::service::problem::{Problem, parse};
 use crate::service::store::TaskResult;
+use crate::sweep::{latin_hypercube_points, to_parquet};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// One thing that a sweep varies.
+/// One thing that a sweep varies: `values`, or a `range` where the sweep has a `sample`.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SweepAxis {
@@ -20,8 +22,26 @@ pub struct SweepAxis {
     #[schema(pattern = "^/", max_length = 200)]
     pub pointer: String,
     /// Values to try.
-    #[schema(value_type = Vec<serde_json::Value>, min_items = 1, max_items = 10000)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(value_type = Vec<serde_json::Value>, max_items = 10000)]
     pub values: Vec<serde_json::Value>,
+    /// Least and greatest value.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(min_items = 2, max_items = 2)]
+    pub range: Option<[f64; 2]>,
+}
+
+/// A Latin hypercube over the ranges.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SweepSample {
+    /// Points.
+    #[schema(minimum = 1, maximum = 10000)]
+    pub count: usize,
+    /// Seed; the same seed gives the same points.
+    #[serde(default)]
+    #[schema(minimum = 0)]
+    pub seed: u64,
 }
 
 /// Body of a sweep: `evaluations`, or `base` and `vary`.
@@ -44,58 +64,122 @@ pub struct SweepRequest {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(max_items = 8)]
     pub vary: Option<Vec<SweepAxis>>,
+    /// Points drawn from the ranges instead of all combinations of values.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub sample: Option<SweepSample>,
 }
 
-/// One evaluation of a sweep's result.
-#[derive(Serialize, Deserialize)]
-struct Entry {
-    index: usize,
-    request: serde_json::Value,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    evaluation: Option<serde_json::Value>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    problem: Option<Problem>,
+/// Where in the body an evaluation's content stands.
+enum Origin {
+    /// In the list.
+    Listed(usize),
+    /// In the base, but for the axes: their pointers into the base, and the pointers of the values in the body.
+    Varied(Vec<(String, String)>),
 }
 
-/// The evaluations of a sweep with the pointers of their requests.
-fn expand(body: &serde_json::Value, limits: &SizeLimits) -> Result<Vec<(String, serde_json::Value)>, Problem> {
+impl Origin {
+    /// The pointer in the body of what is at `pointer` in the evaluation.
+    fn locate(&self, pointer: &str) -> String {
+        match self {
+            Origin::Listed(index) => format!("/evaluations/{index}{pointer}"),
+            Origin::Varied(axes) => {
+                let within = axes.iter().find_map(|(axis, value)| {
+                    let rest = pointer.strip_prefix(axis.as_str())?;
+                    (rest.is_empty() || rest.starts_with('/')).then(|| format!("{value}{rest}"))
+                });
+                within.unwrap_or_else(|| format!("/base{pointer}"))
+            }
+        }
+    }
+}
+
+/// The combinations of an axis list: per point, per axis, the value and its pointer in the body.
+fn points(
+    axes: &[SweepAxis],
+    sample: Option<SweepSample>,
+    max: usize,
+) -> Result<Vec<Vec<(serde_json::Value, String)>>, Problem> {
+    let too_many = |pointer: &str, count: usize| Problem::at(pointer, format!("{count} evaluations; give 1 to {max}"));
+    if let Some(sample) = sample {
+        if sample.count == 0 || sample.count > max {
+            return Err(too_many("/sample/count", sample.count));
+        }
+        let mut ranges = Vec::new();
+        for (index, axis) in axes.iter().enumerate() {
+            match axis.range {
+                Some([low, high]) if low.is_finite() && high.is_finite() && low <= high && axis.values.is_empty() => {
+                    ranges.push([low, high]);
+                }
+                _ => {
+                    let detail = "a sample needs a range from a least to a greatest value, and no values";
+                    return Err(Problem::at(format!("/vary/{index}/range"), detail));
+                }
+            }
+        }
+        let drawn = latin_hypercube_points(&ranges, sample.count, sample.seed);
+        let named = |point: Vec<f64>| {
+            point.into_iter().enumerate().map(|(a, v)| (v.into(), format!("/vary/{a}/range"))).collect()
+        };
+        return Ok(drawn.into_iter().map(named).collect());
+    }
+    if let Some(index) = axes.iter().position(|a| a.range.is_some()) {
+        return Err(Problem::at(format!("/vary/{index}/range"), "a range needs sample with the number of points"));
+    }
+    let count = axes.iter().fold(1usize, |n, a| n.saturating_mul(a.values.len()));
+    if count == 0 || count > max {
+        return Err(too_many("/vary", count));
+    }
+    let point = |number: usize| {
+        let mut rest = number;
+        let mut chosen = Vec::with_capacity(axes.len());
+        for (index, axis) in axes.iter().enumerate().rev() {
+            let choice = rest % axis.values.len();
+            rest /= axis.values.len();
+            chosen.push((axis.values[choice].clone(), format!("/vary/{index}/values/{choice}")));
+        }
+        chosen.reverse();
+        chosen
+    };
+    Ok((0..count).map(point).collect())
+}
+
+/// The evaluations of a sweep with where they stand in the body.
+fn expand(body: &serde_json::Value, limits: &SizeLimits) -> Result<Vec<(Origin, serde_json::Value)>, Problem> {
     let request: SweepRequest = parse(body)?;
     let to_value = |e: &EvaluationRequest| serde_json::to_value(e).map_err(|e| Problem::new("internal", e.to_string()));
-    let too_many = |pointer: &str, count: usize| {
-        Problem::at(pointer, format!("{count} evaluations; give 1 to {}", limits.max_tasks))
-    };
+    let axes = request.vary.unwrap_or_default();
     match (&request.evaluations, &request.base) {
-        (Some(list), None) if request.vary.is_none() => {
+        (Some(list), None) if axes.is_empty() && request.sample.is_none() => {
             if list.is_empty() || list.len() > limits.max_tasks {
-                return Err(too_many("/evaluations", list.len()));
+                let detail = format!("{} evaluations; give 1 to {}", list.len(), limits.max_tasks);
+                return Err(Problem::at("/evaluations", detail));
             }
-            list.iter().enumerate().map(|(i, e)| Ok((format!("/evaluations/{i}"), to_value(e)?))).collect()
+            list.iter().enumerate().map(|(i, e)| Ok((Origin::Listed(i), to_value(e)?))).collect()
         }
         (None, Some(base)) => {
-            let axes = request.vary.unwrap_or_default();
-            let count = axes.iter().fold(1usize, |n, a| n.saturating_mul(a.values.len()));
-            if count == 0 || count > limits.max_tasks {
-                return Err(too_many("/vary", count));
-            }
             let base = to_value(base)?;
-            (0..count)
-                .map(|number| {
-                    let mut value = base.clone();
-                    let mut rest = number;
-                    for (index, axis) in axes.iter().enumerate().rev() {
-                        let choice = axis.values[rest % axis.values.len()].clone();
-                        rest /= axis.values.len();
-                        let slot = value.pointer_mut(&axis.pointer).ok_or_else(|| {
-                            Problem::at(
-                                format!("/vary/{index}/pointer"),
-                                format!("{} is not in base; write the field out there", axis.pointer),
-                            )
-                        })?;
-                        *slot = choice;
-                    }
-                    Ok(("/base".to_string(), value))
-                })
-                .collect()
+            for (index, axis) in axes.iter().enumerate() {
+                if base.pointer(&axis.pointer).is_none() {
+                    let detail = format!("{} is not in base; write the field out there", axis.pointer);
+                    return Err(Problem::at(format!("/vary/{index}/pointer"), detail));
+                }
+            }
+            let mut all = Vec::new();
+            for point in points(&axes, request.sample, limits.max_tasks)? {
+                let mut value = base.clone();
+                let mut origin = Vec::with_capacity(axes.len());
+                for (index, (axis, (choice, place))) in axes.iter().zip(point).enumerate() {
+                    let slot = value.pointer_mut(&axis.pointer).ok_or_else(|| {
+                        let detail = format!("{} is gone once an axis before it has its value", axis.pointer);
+                        Problem::at(format!("/vary/{index}/pointer"), detail)
+                    })?;
+                    *slot = choice;
+                    origin.push((axis.pointer.clone(), place));
+                }
+                all.push((Origin::Varied(origin), value));
+            }
+            Ok(all)
         }
         _ => Err(Problem::at("", "give either evaluations, or base and vary")),
     }
@@ -112,9 +196,14 @@ impl JobKind for Sweeps {
     fn plan(&self, body: &serde_json::Value, limits: &SizeLimits) -> Result<Plan, Problem> {
         let title = body.get("name").and_then(|n| n.as_str()).unwrap_or("sweep").to_string();
         let mut tasks = Vec::new();
-        for (pointer, value) in expand(body, limits)? {
-            let request: EvaluationRequest = parse(&value)?;
-            let mut task = plan_evaluation(&request, &pointer, limits)?;
+        for (origin, value) in expand(body, limits)? {
+            let planned = parse(&value).and_then(|request: EvaluationRequest| plan_evaluation(&request, "", limits));
+            let mut task = planned.map_err(|mut problem| {
+                for error in &mut problem.errors {
+                    error.pointer = origin.locate(&error.pointer);
+                }
+                problem
+            })?;
             // Only numbers are kept: a full evaluation's key is looked up too.
             task.cache_key.push_str(super::super::store::NUMBERS_ONLY);
             tasks.push(task);
@@ -141,12 +230,18 @@ impl JobKind for Sweeps {
                 Err(problem) => Entry { index, request, evaluation: None, problem: Some(problem) },
             })
             .collect();
-        let table = table(&entries);
-        let result = serde_json::json!({ "schema": "evaluation-list/1", "version": VERSION, "evaluations": entries });
-        Ok(TaskResult {
-            result: json_bytes(&result)?,
-            artefacts: vec![("table.csv".into(), "text/csv".into(), table.into_bytes())],
-        })
+        let request: SweepRequest = parse(body)?;
+        let pointers: Vec<String> = request.vary.unwrap_or_default().into_iter().map(|a| a.pointer).collect();
+        let table = sweep_table(&entries, &pointers);
+        let parquet = to_parquet(&table).map_err(|e| Problem::new("internal", e.to_string()))?;
+        let result = serde_json::json!({
+            "schema": "evaluation-list/1", "version": VERSION, "varied": pointers, "evaluations": entries,
+        });
+        let artefacts = vec![
+            ("table.csv".into(), "text/csv".into(), table.to_csv().into_bytes()),
+            ("table.parquet".into(), "application/vnd.apache.parquet".into(), parquet),
+        ];
+        Ok(TaskResult { result: json_bytes(&result)?, artefacts })
     }
 }
 
@@ -167,24 +262,4 @@ impl Evaluations {
         .map_err(|e| if cancelled() { RunError::Stopped } else { Problem::new("no-solution", e.to_string()).into() })?;
         Ok(TaskResult { result: json_bytes(&evaluation)?, artefacts: Vec::new() })
     }
-}
-
-/// One line per evaluation and drive.
-fn table(entries: &[Entry]) -> String {
-    let mut text = String::from("index,specimen,drive_mm,force_n,num_voxels,median_stretch,problem\n");
-    for entry in entries {
-        let name = entry.request.pointer("/specimen/name").and_then(|n| n.as_str()).unwrap_or_default();
-        let name = name.replace('"', "\"\"");
-        if let Some(problem) = &entry.problem {
-            text += &format!("{},\"{name}\",,,,,\"{}\"\n", entry.index, problem.detail.replace('"', "\"\""));
-        }
-        let evaluation: Option<Evaluation> = entry.evaluation.as_ref().and_then(|e| Evaluation::deserialize(e).ok());
-        for step in evaluation.iter().flat_map(|e| &e.steps) {
-            text += &format!(
-                "{},\"{name}\",{},{},{},{},\n",
-                entry.index, step.drive_mm, step.force_n, step.num_voxels, step.median_stretch
-            );
-        }
-    }
-    text
 }

@@ -3,6 +3,7 @@
 import { Failure, getJson, post } from "./api.js";
 import { digits, duration, fill, h, say } from "./dom.js";
 import { editor, section } from "./editor.js";
+import { sweepForm } from "./sweep.js";
 
 const copy = (value) => structuredClone(value);
 const numberList = (text) => text.split(/[\s,;]+/).filter(Boolean).map(Number);
@@ -22,9 +23,11 @@ export async function planView(content, signal, from) {
   const report = h("div", { role: "region", "aria-label": "Limits and cost" });
   let timer;
   let number = 0;
-  const changed = () => { clearTimeout(timer); timer = setTimeout(check, 180); };
+  // A sweep's form follows the specimen, but not while somebody types into it.
+  const changed = () => { clearTimeout(timer); timer = setTimeout(() => { check(); if (!sweep.element.contains(document.activeElement)) sweep.render(); }, 180); };
   signal.addEventListener("abort", () => clearTimeout(timer));
   const draw = editor(model, changed);
+  const sweep = sweepForm(model);
 
   async function check() {
     const mine = number += 1;
@@ -138,7 +141,11 @@ export async function planView(content, signal, from) {
           h("p", { class: "quiet" }, "What the scan would see, and how well it would tell the material."),
           h("div", { class: "row" },
             h("button", { class: "main", id: "evaluate", onclick: (e) => start(e, "evaluations", { specimen: model.specimen, material: model.material, scan: model.scan, mesh: mesh.value }) }, "Evaluate"),
-            h("select", { "aria-label": "Mesh", style: null, onchange: (e) => { mesh.value = e.target.value; } }, ["standard", "search", "fine"].map((m) => h("option", { value: m }, `${m} mesh`))))),
+            h("select", { "aria-label": "Mesh", style: null, onchange: (e) => { mesh.value = e.target.value; } }, ["standard", "search", "fine"].map((m) => h("option", { value: m }, `${m} mesh`))),
+            h("button", { id: "scan", onclick: (e) => start(e, "scans", { specimen: model.specimen, material: model.material, voxel_mm: model.scan.voxel_mm, noise_sd_mm: model.scan.noise_sd_mm, force_sd_n: model.scan.force_sd_n, mesh: mesh.value }) }, "Scan it synthetically")),
+          h("p", { class: "quiet" }, "A synthetic scan becomes a recording to calibrate on.")),
+        h("section", { class: "sheet" }, h("h3", {}, "Sweep"), sweep.element,
+          h("p", {}, h("button", { class: "main", id: "sweep", onclick: (e) => start(e, "sweeps", sweep.body(mesh.value)) }, "Sweep"))),
         h("section", { class: "sheet" }, h("h3", {}, "Search for a better one"), goal,
           h("details", {}, h("summary", {}, "Limits of what can be made"), limits),
           h("p", {}, h("button", { class: "main", id: "design", onclick: (e) => start(e, "designs", study(model)) }, "Search"))),

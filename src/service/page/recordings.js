@@ -1,4 +1,4 @@
-// Recordings: upload a folder, look at what it holds, diagnose it.
+// Recordings: upload a folder, look at what it holds, calibrate on it, diagnose it.
 
 import { Failure, getJson, post, upload } from "./api.js";
 import { digits, fill, h, say } from "./dom.js";
@@ -46,19 +46,22 @@ export async function recordingsView(content, signal) {
     const { summary } = recording;
     const material = h("select", { "aria-label": "Material as believed" }, h("option", { value: "" }, "material unknown"), library.materials.map((m, i) => h("option", { value: i }, m.name)));
     const mesh = h("select", { "aria-label": "Mesh" }, [["", "default mesh"], ["2", "coarse mesh"], ["1", "standard mesh"]].map(([v, t]) => h("option", { value: v }, t)));
-    const start = async (event) => {
+    const terms = h("select", { "aria-label": "Number of terms" }, [["", "number of terms: chosen"], ["1", "one term"], ["2", "two terms"], ["3", "three terms"]].map(([v, t]) => h("option", { value: v }, t)));
+    const start = (kind, body) => async (event) => {
       event.target.disabled = true;
-      const body = { recording: recording.id };
-      if (material.value !== "") body.material = library.materials[Number(material.value)].material;
-      if (mesh.value !== "") body.mesh_factor = Number(mesh.value);
-      try { location.hash = `#/job/${(await post("/v1/diagnoses", body)).id}`; } catch (error) { fail(error); event.target.disabled = false; }
+      try { location.hash = `#/job/${(await post(`/v1/${kind}`, body())).id}`; } catch (error) { fail(error); event.target.disabled = false; }
     };
+    const factor = () => (mesh.value === "" ? {} : { mesh_factor: Number(mesh.value) });
+    const calibrate = start("calibrations", () => ({ recordings: [recording.id], ...(terms.value === "" ? {} : { num_terms: Number(terms.value) }), ...factor() }));
+    const diagnose = start("diagnoses", () => ({ recording: recording.id, ...(material.value === "" ? {} : { material: library.materials[Number(material.value)].material }), ...factor() }));
     return h("section", { class: "sheet" },
       h("h3", {}, recording.title || recording.id.slice(0, 12)),
       h("p", { class: "quiet" }, `${summary.specimen.name} · ${summary.shape.join(" × ")} voxels of ${summary.voxel_mm.map((v) => digits(v)).join(" × ")} mm, ${summary.num_voxels.toLocaleString("en")} of them material · ${(recording.num_bytes / 1e6).toFixed(1)} MB`),
       h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ["Drive, mm", "Force, N"].map((t) => h("th", {}, t)))),
         h("tbody", {}, summary.steps.map((s) => h("tr", {}, h("td", {}, digits(s.drive_mm)), h("td", {}, digits(s.force_n))))))),
-      h("div", { class: "row" }, h("button", { class: "main", onclick: start }, "Diagnose"), h("div", {}, material), h("div", {}, mesh)));
+      h("div", { class: "row" }, h("div", {}, mesh)),
+      h("div", { class: "row" }, h("button", { class: "main calibrate", onclick: calibrate }, "Calibrate"), h("div", {}, terms)),
+      h("div", { class: "row" }, h("button", { class: "main diagnose", onclick: diagnose }, "Diagnose"), h("div", {}, material)));
   }
 
   fill(content, h("h2", {}, "Recordings"),

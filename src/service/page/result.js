@@ -1,13 +1,16 @@
-// Results: an evaluation, a design, a sweep.
+// Results: an evaluation, a design, a sweep, a scan, a calibration, a diagnosis.
 
 import { getBlob, getJson } from "./api.js";
 import { digits, fill, h, symbol } from "./dom.js";
+import { scatter } from "./plot.js";
+import { slicesView } from "./slices.js";
+import { wordsOf } from "./sweep.js";
 import { view3d } from "./view3d.js";
 
 export async function resultView(element, job, download) {
   const [result, { artefacts }] = await Promise.all([getJson(`/v1/jobs/${job.id}/result`), getJson(`/v1/jobs/${job.id}/artefacts`)]);
   const files = new Map(artefacts.map((a) => [a.name, a]));
-  const parts = { "evaluation/1": evaluation, "design/1": design, "evaluation-list/1": list, "diagnosis/1": diagnosis }[result.schema]?.(result, files) ?? [h("section", { class: "sheet" }, h("pre", {}, JSON.stringify(result, null, 2).slice(0, 20000)))];
+  const parts = { "evaluation/1": evaluation, "design/1": design, "evaluation-list/1": list, "scan/1": scan, "calibration/1": calibration, "diagnosis/1": diagnosis }[result.schema]?.(result, files) ?? [h("section", { class: "sheet" }, h("pre", {}, JSON.stringify(result, null, 2).slice(0, 20000)))];
   fill(element, await Promise.all(parts), downloads(job, artefacts, download));
 }
 
@@ -71,6 +74,27 @@ function design(result, files) {
 }
 
 function list(result) {
+  const varied = result.varied ?? [];
+  const at = (value, pointer) => pointer.slice(1).split("/").reduce((v, key) => v?.[key.replaceAll("~1", "/").replaceAll("~0", "~")], value);
+  const rows = result.evaluations.filter((e) => e.evaluation).map((e) => {
+    const last = e.evaluation.steps.at(-1);
+    const row = { force: last.force_n, stretch: last.median_stretch, drive: last.drive_mm };
+    varied.forEach((p) => { row[p] = at(e.request, p); });
+    e.evaluation.promised_sd.forEach((p) => { row[p.parameter] = p.relative_sd === null ? NaN : 100 * p.relative_sd; });
+    return row;
+  });
+  const first = result.evaluations[0]?.request;
+  const named = varied.map((p) => [p, wordsOf(p, first)]);
+  const parameters = (result.evaluations.find((e) => e.evaluation)?.evaluation.promised_sd ?? []).map((p) => [p.parameter, `promised deviation of ${symbol(p.parameter)}, %`]);
+  const failed = result.evaluations.length - rows.length;
+  const heads = [...named.map((n) => n[1]), "Force, N", "Median stretch", ...parameters.map((p) => p[1])];
+  if (varied.length > 0) {
+    return [h("section", { class: "sheet" }, h("h3", {}, `${rows.length} evaluations${failed ? `, ${failed} without a solution` : ""}`),
+      scatter(rows, named, [["force", "force, N"], ["stretch", "median stretch"], ...parameters])),
+    h("section", { class: "sheet" }, h("h3", {}, "Table"),
+      table(heads, rows.slice(0, 500).map((r) => [...varied.map((p) => digits(r[p])), digits(r.force), digits(r.stretch), ...parameters.map((p) => digits(r[p[0]], 3))])),
+      rows.length > 500 && h("p", { class: "quiet" }, "The first 500; all are in table.csv and table.parquet."))];
+  }
   return [h("section", { class: "sheet" }, h("h3", {}, `${result.evaluations.length} evaluations`),
     table(["Specimen", "Drive, mm", "Force, N", "Median stretch", "Promised"], result.evaluations.slice(0, 500).map((e) => {
       const last = e.evaluation?.steps.at(-1);
@@ -86,7 +110,7 @@ const VERDICTS = {
   explained_ambiguously: "Explained, but not by one cause alone: the data cannot tell these apart.", unexplained: "Something is left that no known cause explains.",
 };
 
-function diagnosis(result) {
+function diagnosis(result, files) {
   const change = (pair, unit = "") => (pair ? `${digits(pair.before, 3)} → ${digits(pair.after, 3)}${unit}` : "–");
   return [h("section", { class: "sheet" },
     bigNumbers([[change(result.chi2_per_datum), "χ² per datum, before and after"], [change(result.kept_back_rms_mm, " mm"), "misfit of data kept back, rms"]]),
@@ -94,7 +118,44 @@ function diagnosis(result) {
   ...result.causes.map((cause) => h("section", { class: "sheet" },
     h("h3", {}, `${cause.name} (${cause.category})`), cause.description && h("p", {}, cause.description),
     table(["Parameter", "Value", "95 % interval"], cause.parameters.map((p) => [p.name, digits(p.value), p.interval_95 ? p.interval_95.map((v) => digits(v)).join(" to ") : "not bounded"])),
-    cause.location && h("p", { class: "quiet" }, `At the ${cause.location.region}: centre ${cause.location.center_mm.map((v) => digits(v, 3)).join(", ")} mm, extent ${cause.location.extent_mm.map((v) => digits(v, 3)).join(", ")} mm.`)))];
+    cause.location && h("p", { class: "quiet" }, `At the ${cause.location.region}: centre ${cause.location.center_mm.map((v) => digits(v, 3)).join(", ")} mm, extent ${cause.location.extent_mm.map((v) => digits(v, 3)).join(", ")} mm.`))),
+  slicesView("What the model leaves: measured less predicted",
+    numbered(files, /^residual-before_(\d+)\.nii\.gz$/).map(([name, n]) => ({
+      label: `drive ${n}`, panels: [["Before: material alone", name], ["After: with the causes", `residual-after_${n}.nii.gz`]].map(([label, file]) => ({ label, href: files.get(file).href })),
+    }))),
+  pictureSheet(files, [["evidence.svg", "Causes by what they would explain"], ["load-curve.svg", "The load curve"]])];
+}
+
+/** Files whose name fits, with what the brackets caught. */
+const numbered = (files, pattern) => [...files.keys()].map((name) => name.match(pattern)).filter(Boolean).sort((a, b) => a[0].localeCompare(b[0], "en", { numeric: true }));
+
+function scan(result, files) {
+  return [h("section", { class: "sheet" },
+    bigNumbers([[result.num_voxels.toLocaleString("en"), "voxels"], [String(result.steps.length), "drives"], [result.noise_sd_mm ? `${result.noise_sd_mm.map((v) => digits(v, 2)).join(", ")} mm` : "–", "noise found along x, y, z"]]),
+    table(["Drive, mm", "Force, N", "True force, N", "Error rms x, y, z, mm"], result.steps.map((s) => [digits(s.drive_mm), digits(s.force_n), digits(s.true_force_n), s.error ? s.error.map((e) => digits(e.rms_mm, 2)).join(", ") : "raw phases"])),
+    result.recording && h("p", {}, "The scan is kept as a recording: ", h("a", { href: "#/recordings" }, "calibrate on it or diagnose it"), ".")),
+  slicesView("Displacements as scanned", numbered(files, /^u_(\d+)\.nii\.gz$/).map(([name, n]) => ({ label: `drive ${digits(result.steps[n - 1].drive_mm)} mm`, panels: [{ label: "Displacement", href: files.get(name).href }] })))];
+}
+
+function calibration(result, files) {
+  const shear = result.initial_shear_modulus_kpa;
+  const ends = ([low, high]) => `${low === null ? "open" : digits(low)} to ${high === null ? "open" : digits(high)}`;
+  const panel = (label, name) => ({ label, href: files.get(name).href });
+  const steps = numbered(files, /^measured_(\d+)_(\d+)\.nii\.gz$/).map(([, r, n], i) => {
+    const s = result.steps[i];
+    return { r, n, label: `${s ? `${result.recordings.length > 1 ? `${s.recording}, ` : ""}${digits(s.drive_mm)} mm` : `${r}.${n}`}` };
+  });
+  return [h("section", { class: "sheet" },
+    bigNumbers([...(shear ? [[`${digits(shear.value)} kPa`, "initial shear modulus"]] : []), [String(result.num_terms), result.num_terms === 1 ? "term" : "terms"], [digits(result.chi2_per_datum, 3), "χ² per datum"]]),
+    table(["Parameter", "Value", "Deviation", "95 % interval", ""], result.parameters.map((p) => [symbol(p.name), p.value === null ? "–" : digits(p.value), p.sd === null ? "–" : digits(p.sd, 3), ends(p.interval_95), p.identifiable ? "" : "not identifiable"])),
+    result.notes.map((n) => h("p", { class: "quiet" }, n))),
+  h("section", { class: "sheet" }, h("h3", {}, "Fit per drive"),
+    table(["Drive, mm", "Voxels", "Misfit rms x, y, z, mm", "Force, N", "Model's force, N"], result.steps.map((s) => [digits(s.drive_mm), s.num_voxels.toLocaleString("en"), s.rms_mm.map((v) => digits(v, 3)).join(", "), digits(s.force_n), digits(s.model_force_n)]))),
+  slicesView("Before and after the material is taken into account", steps.flatMap(({ r, n, label }) => [
+    { label: `${label}: measured and model`, panels: [panel("Measured", `measured_${r}_${n}.nii.gz`), panel("Model", `model_${r}_${n}.nii.gz`)] },
+    { label: `${label}: measured and what is left`, panels: [panel("Before: measured", `measured_${r}_${n}.nii.gz`), panel("After: measured less model", `misfit_${r}_${n}.nii.gz`)] },
+  ])),
+  pictureSheet(files, [...files.keys()].filter((f) => f.endsWith(".svg")).map((f) => [f, f.slice(0, -4).replaceAll("-", " ")]))];
 }
 
 async function pictureSheet(files, wanted) {

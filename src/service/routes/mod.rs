@@ -38,6 +38,8 @@ pub fn open_api() -> (Router<App>, String) {
         .routes(routes!(submit::post_evaluation))
         .routes(routes!(submit::post_design))
         .routes(routes!(submit::post_sweep))
+        .routes(routes!(submit::post_scan))
+        .routes(routes!(submit::post_calibration))
         .routes(routes!(submit::post_diagnosis))
         .routes(routes!(recordings::list, recordings::upload))
         .routes(routes!(recordings::get))

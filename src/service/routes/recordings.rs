@@ -131,19 +131,5 @@ async fn receive(mut body: Body, max: usize) -> Result<std::fs::File, Problem> {
 
 fn checked(file: std::fs::File, max: usize, owner: String) -> Result<NewUpload, Problem> {
     let files = recordings::unpack(std::io::BufReader::new(file), max)?;
-    let recording = recordings::read(&files)?;
-    let manifest = serde_json::json!({
-        "specimen": recording.specimen,
-        "shape": recording.grid.shape,
-        "voxel_mm": recording.grid.voxel_mm,
-        "num_voxels": recording.num_voxels(),
-        "steps": recording.steps.iter().map(|s| serde_json::json!({ "drive_mm": s.drive_mm, "force_n": s.force_n })).collect::<Vec<_>>(),
-    });
-    Ok(NewUpload {
-        id: recordings::identifier(&files),
-        owner,
-        title: recording.id.chars().filter(|c| !c.is_control()).take(200).collect(),
-        manifest: manifest.to_string(),
-        files: files.into_iter().collect(),
-    })
+    recordings::upload_of(files, owner)
 }

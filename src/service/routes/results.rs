@@ -96,7 +96,7 @@ pub(super) async fn artefacts(State(app): State<App>, Path(id): Path<String>) ->
 ), responses(
     (status = 200, description = "The file", content(
         (String = "image/svg+xml"), (String = "text/html"), (String = "text/csv"), (String = "application/xml"),
-        (String = "image/vnd.dxf"), (Vec<u8> = "model/stl"), (Object = "application/json"),
+        (String = "image/vnd.dxf"), (Vec<u8> = "application/gzip"), (Vec<u8> = "application/vnd.apache.parquet"), (Vec<u8> = "model/stl"), (Object = "application/json"),
     )),
     (status = 304, description = "Unchanged"),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),

@@ -2,14 +2,19 @@
 
 use crate::service::access::{Caller, Role, random_hex};
 use crate::service::app::App;
-use crate::service::kinds::{DiagnosisRequest, EvaluationRequest, SizeLimits, StudySchema, SweepRequest, kind_named};
+use crate::service::kinds::{
+    CalibrationRequest, DiagnosisRequest, EvaluationRequest, ScanRequest, SizeLimits, StudySchema, SweepRequest,
+    kind_named,
+};
 use crate::service::problem::Problem;
 use crate::service::store::{Idempotency, NewJob, Submitted, sha256_hex};
 use crate::service::view::JobView;
+use crate::specimen::Specimen;
 use axum::body::Bytes;
 use axum::extract::{Extension, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
+use serde::Deserialize;
 
 /// Reads a JSON body.
 pub(super) fn json_body(headers: &HeaderMap, body: &[u8]) -> Result<serde_json::Value, Problem> {
@@ -37,12 +42,17 @@ async fn submit(
     };
     let job_kind = kind_named(kind).ok_or_else(|| Problem::new("internal", "no such kind of job"))?;
     let canonical = value.to_string();
-    let recording = job_kind.recording(&value).map(String::from);
-    let plan = app.compute(move || job_kind.plan(&value, &limits)).await?;
-    if let Some(recording) = recording
-        && app.with_store(move |store| store.upload(&recording)).await?.is_none()
-    {
-        return Err(Problem::at("/recording", "there is no such recording; upload it first"));
+    let wanted = job_kind.recordings(&value);
+    let body = value.clone();
+    let plan = app.compute(move || job_kind.plan(&body, &limits)).await?;
+    for (pointer, recording) in wanted {
+        let row = app.with_store(move |store| store.upload(&recording)).await?;
+        let row = row.ok_or_else(|| Problem::at(pointer, "there is no such recording; upload it first"))?;
+        let manifest: serde_json::Value = serde_json::from_str(&row.manifest).unwrap_or_default();
+        if let Ok(specimen) = Specimen::deserialize(&manifest["specimen"]) {
+            let body = value.clone();
+            app.compute(move || job_kind.check_recording(&body, &specimen, &limits)).await?;
+        }
     }
     let id = random_hex::<16>().map_err(|e| Problem::new("internal", e.to_string()))?;
     let fingerprint = sha256_hex(format!("{kind}\n{canonical}").as_bytes());
@@ -113,6 +123,14 @@ macro_rules! submission {
 submission!(post_evaluation, "/v1/evaluations", "evaluations", EvaluationRequest, "Evaluate a specimen.");
 submission!(post_design, "/v1/designs", "designs", StudySchema, "Search for the best specimen of a study.");
 submission!(post_sweep, "/v1/sweeps", "sweeps", SweepRequest, "Evaluate many specimens.");
+submission!(post_scan, "/v1/scans", "scans", ScanRequest, "Scan a specimen synthetically; the result is a recording.");
+submission!(
+    post_calibration,
+    "/v1/calibrations",
+    "calibrations",
+    CalibrationRequest,
+    "Find the material from recordings."
+);
 submission!(
     post_diagnosis,
     "/v1/diagnoses",
