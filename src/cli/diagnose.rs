@@ -158,7 +158,9 @@ fn summary(r: &DiagnosisResult, d: &Diagnosis) -> String {
         text += &format!("  evidence {:.0}, explains {:.4} mm rms\n", c.evidence, c.effect_rms_mm);
     }
     for c in &r.alternatives {
-        text += &format!("\nnot told apart from it: {} ({})\n", c.name, c.description);
+        let what =
+            if r.verdict == Verdict::Unexplained { "tried, and no explanation" } else { "not told apart from it" };
+        text += &format!("\n{what}: {} ({})\n", c.name, c.description);
     }
     text += &format!(
         "\nchi2 per datum      {:.4} -> {:.4}\nmisfit beyond noise {:.4} -> {:.4} mm rms (allowance {:.4})\nkept back           {:.4} -> {:.4} mm rms\n",

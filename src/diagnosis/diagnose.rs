@@ -37,6 +37,8 @@ const PULL_OF_BULK: f64 = 1.5;
 /// … which then is as good as known, or as good as free.
 const KNOWN_BULK: f64 = 0.02;
 const FREE_BULK: f64 = 3.0;
+/// Where causes leave more than this part of the squares unexplained, they are not named but listed as tried.
+const UNEXPLAINED_SHARE: f64 = 0.5;
 /// Drives of the load curve's table.
 const TABLE_POINTS: usize = 8;
 
@@ -135,7 +137,7 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// Causes, first found first.
     pub causes: Vec<FoundCause>,
-    /// What the data cannot tell apart from them.
+    /// What the data cannot tell apart from them; where the verdict is unexplained, what was tried and does not explain it.
     pub alternatives: Vec<FoundCause>,
     /// The nominal model's fit.
     pub nominal: Fitted,
@@ -295,6 +297,24 @@ pub fn diagnose(
         causes.push(found_cause(best, best.causes.len() - 1, &observed, *gain, effect.rms_mm()));
         current = best.clone();
     }
+    // What pulled κ before the other causes were known may be one of them.
+    if let Some(place) = causes.iter().position(|c| c.name == "compressibility").filter(|_| !current.causes.is_empty())
+    {
+        progress("testing whether the material is compressible beside the other causes");
+        let free_bulk = work.settings.bulk;
+        work.settings.bulk = settings.bulk;
+        let mut start = current.material.clone();
+        start.bulk_kpa = settings.bulk.center_kpa;
+        let believed = work.fit(&measured, &start, &current.causes)?;
+        let gain = believed.deviance - current.deviance - penalty(&metric, 1);
+        if gain < EVIDENCE.max(SMALLEST_SHARE * (nominal.deviance - believed.deviance)) {
+            causes.remove(place);
+            current = believed;
+        } else {
+            causes[place].evidence = gain;
+            work.settings.bulk = free_bulk;
+        }
+    }
     // Wraps are named even where nothing else is.
     for (index, c) in current.causes.iter().enumerate().filter(|(_, c)| c.cause.name() == "wrap") {
         let _ = c;
@@ -320,6 +340,11 @@ pub fn diagnose(
     } else {
         Verdict::ExplainedAmbiguously
     };
+    // Causes that take away the smaller part of what is there are no explanation of it.
+    let [before, after] = [0, 1].map(|n: usize| left[n].structured_rms_mm.powi(2));
+    if verdict == Verdict::Unexplained && after > UNEXPLAINED_SHARE * before {
+        alternatives.splice(0..0, causes.drain(..));
+    }
     let num_solves = laboratory.num_solves;
     Ok(Diagnosis {
         verdict,

@@ -82,7 +82,8 @@ pub struct DiagnosisResult {
     pub nominal_material: Ogden,
     /// Causes, most telling first.
     pub causes: Vec<CauseResult>,
-    /// What the data cannot tell apart from the last cause.
+    /// What the data cannot tell apart from the last cause; where the verdict is unexplained, what was tried and explains less
+    /// than half.
     pub alternatives: Vec<CauseResult>,
     /// χ² of the displacement per datum.
     pub chi2_per_datum: BeforeAfter,
