@@ -3,7 +3,7 @@
 use super::error::CalibrationError;
 use super::fit::{Bulk, FitOptions, Held};
 use super::system::NormalSystem;
-use crate::material::{Ogden, Parameter};
+use crate::material::{MAX_ALPHA, MIN_ALPHA, Ogden, Parameter};
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus};
 use nalgebra::{DMatrix, DVector};
@@ -16,6 +16,8 @@ const MAX_LOG_CHANGE: f64 = 1.0;
 const BULK_RATIO: [f64; 2] = [5.0, 1e4];
 /// μ and α come no nearer to zero than this fraction of the start's: a term that fades stops there and is reported.
 const SMALLEST_PART: f64 = 1e-3;
+/// |α| stays a little below what a material may have.
+const LARGEST_EXPONENT: f64 = 0.99 * MAX_ALPHA;
 /// Added to the matrix scaled to a unit diagonal, so that directions without information stay where they are.
 const RIDGE: f64 = 1e-12;
 /// A limit counts as reached where less than this is left of it (scaled parameters).
@@ -74,7 +76,14 @@ impl Constraints {
         Ok(Constraints {
             // A start outside may stay there.
             bulk_range: [(BULK_RATIO[0] * shear).min(start.bulk_kpa), (BULK_RATIO[1] * shear).max(start.bulk_kpa)],
-            smallest: start.parameters().iter().map(|p| SMALLEST_PART * start.value(*p).abs()).collect(),
+            smallest: start
+                .parameters()
+                .iter()
+                .map(|p| {
+                    let least = if matches!(p, Parameter::Alpha(_)) { 1.01 * MIN_ALPHA } else { 0.0 };
+                    (SMALLEST_PART * start.value(*p).abs()).max(least)
+                })
+                .collect(),
             order,
             min_gap: options.min_alpha_gap,
             held: if options.bulk == Bulk::Held { options.held.with(0) } else { options.held },
@@ -102,6 +111,10 @@ impl Constraints {
             if *parameter != Parameter::Kappa {
                 let room = (1.0 - self.smallest[i] / system.values[i].abs()).max(0.0);
                 limits.push(Limit { name: format!("{name}: smallest size"), coefficients: vec![(i, -1.0)], room });
+            }
+            if let Parameter::Alpha(_) = parameter {
+                let room = (LARGEST_EXPONENT / system.values[i].abs() - 1.0).max(0.0);
+                limits.push(Limit { name: format!("{name}: largest size"), coefficients: vec![(i, 1.0)], room });
             }
             if is_trusted {
                 for sign in [1.0, -1.0] {
