@@ -35,7 +35,7 @@ fn published_scan() {
             truth,
             filter,
             draws,
-            blind_draws: draws.min(4),
+            blind_draws: draws.min(2),
             seed: 7,
             // Other section, layers and grading than the mesh of the fits.
             truth_mesh: MeshOptions { grading: 0.4, ..MeshOptions::scaled(&specimen, 1.3) },

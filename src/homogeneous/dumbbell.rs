@@ -24,6 +24,9 @@ const HALF_GAUGE_MM: f64 = 3.0;
 const NUM_DRIVES: usize = 8;
 /// Rounds that the acceleration looks back on.
 const DEPTH: usize = 3;
+/// Changes below this part of the largest strain are in proportion to the distance from the end: before, turns are taken as
+/// they are.
+const LINEAR: f64 = 0.03;
 /// Ridge of its least squares, relative to the trace: rounds that say the same must not be told apart.
 const RIDGE: f64 = 1e-8;
 
@@ -166,13 +169,23 @@ pub fn fit_dumbbell(
     let mut stretch: Vec<f64> = displacement_mm.iter().map(|d| 1.0 + d / length).collect();
     let mut round = 0;
     let mut past: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
+    // What the last turn led to, where a combination was taken instead.
+    let mut plain: Option<Vec<f64>> = None;
     loop {
         round += 1;
         let curve = Curve::new("uniaxial", HomogeneousTest::Uniaxial, &stretch, &stress)?;
         let sequence = fit_curves(&[curve], &options.fit)?;
         let chosen = sequence.chosen();
         let bulk_kpa = options.fit.bulk_kpa.unwrap_or(BULK_RATIO * chosen.initial_shear_modulus_kpa.value);
-        let conversion = gauge_stretches(&mut model, &chosen.terms(), bulk_kpa, &drives, is_cancelled)?;
+        let conversion = match gauge_stretches(&mut model, &chosen.terms(), bulk_kpa, &drives, is_cancelled) {
+            // A combination that leads to a material without an equilibrium was a bad one: on with the turn itself.
+            Err(SolveError::Diverged { .. }) if plain.is_some() && round < options.max_rounds => {
+                stretch = plain.take().unwrap_or(stretch);
+                past.clear();
+                continue;
+            }
+            other => other?,
+        };
         let at: Vec<f64> = std::iter::once(0.0).chain(conversion.iter().map(|c| c.displacement_mm)).collect();
         let gauge: Vec<f64> = std::iter::once(1.0).chain(conversion.iter().map(|c| c.gauge_stretch)).collect();
         let table = ForceTable::new(&at, &gauge)?;
@@ -200,7 +213,12 @@ pub fn fit_dumbbell(
         if past.len() > DEPTH + 1 {
             past.remove(0);
         }
-        stretch = accelerated(&past).filter(|s| is_ordered(displacement_mm, s)).unwrap_or(next);
+        if last_change > LINEAR {
+            past.clear();
+        }
+        let combined = accelerated(&past).filter(|s| is_ordered(displacement_mm, s));
+        plain = combined.is_some().then(|| next.clone());
+        stretch = combined.unwrap_or(next);
     }
 }
 
