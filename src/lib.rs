@@ -18,6 +18,7 @@ pub mod homogeneous;
 pub mod kinematics;
 pub mod material;
 pub mod mesh;
+pub mod proof;
 pub mod provenance;
 pub mod rate;
 pub mod recording;

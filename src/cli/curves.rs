@@ -47,7 +47,7 @@ struct CurvesResult<'a> {
     kept_back: Vec<CurveMatch>,
 }
 
-fn test_of(name: &str, option: &'static str) -> Result<HomogeneousTest, CliError> {
+pub(super) fn test_of(name: &str, option: &'static str) -> Result<HomogeneousTest, CliError> {
     match name.replace('_', "-").as_str() {
         "uniaxial" => Ok(HomogeneousTest::Uniaxial),
         "equibiaxial" => Ok(HomogeneousTest::Equibiaxial),

@@ -1,19 +1,32 @@
 //! `lambdak diagnose`.
 
+use super::curve_input::ColumnArguments;
 use super::error::CliError;
-use super::{Common, input, interrupt, output};
+use super::{Common, diagnose_curves, input, interrupt, output};
 use crate::diagnosis::{Diagnosis, DiagnosisError, DiagnosisOptions, DiagnosisResult, Verdict, diagnose};
 use crate::provenance::input_hash;
-use crate::recording::{ReadLimits, Recording};
+use crate::recording::{ReadLimits, Recording, write_vectors};
 use crate::report::{diagnosis_pictures, diagnosis_report};
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 #[derive(Args)]
 pub(super) struct DiagnoseArguments {
-    /// Folder of a recording (mru-recording/1).
-    recording: PathBuf,
+    /// Folders of recordings (mru-recording/1). Several are diagnosed one after the other and compared.
+    #[arg(required_unless_present = "curve")]
+    recordings: Vec<PathBuf>,
+    /// A load curve (CSV) of a homogeneous test in place of recordings: uniaxial=FILE, simple-shear=FILE, …; may be repeated.
+    #[arg(long, value_name = "TEST=FILE", conflicts_with = "recordings")]
+    curve: Vec<String>,
+    /// Curves that are predicted, not fitted: names of files without folder and ending, comma-separated.
+    #[arg(long, value_delimiter = ',', value_name = "NAME", requires = "curve")]
+    keep_back: Vec<String>,
+    /// Shape factor of a compressed cylinder, diameter / (4 height).
+    #[arg(long, requires = "curve")]
+    shape_factor: Option<f64>,
+    #[command(flatten)]
+    columns: ColumnArguments,
     /// The material as believed (ogden/1): its number of terms is the nominal one.
     #[arg(long)]
     material: Option<PathBuf>,
@@ -32,8 +45,50 @@ pub(super) struct DiagnoseArguments {
 
 pub(super) fn run(a: &DiagnoseArguments) -> Result<(), CliError> {
     super::start_threads(&a.common)?;
-    let bad = |message: String| CliError::Input { path: a.recording.clone(), message };
-    let recording = Recording::read(&a.recording, &ReadLimits::default()).map_err(|e| bad(e.to_string()))?;
+    if !a.curve.is_empty() {
+        let (out, stopped) = (a.common.out.as_deref(), &interrupt::is_requested);
+        let columns = a.columns.options()?;
+        return diagnose_curves::run(&a.curve, &a.keep_back, a.shape_factor, &columns, out, a.common.json, stopped);
+    }
+    let mut results: Vec<(DiagnosisResult, String)> = Vec::new();
+    for path in &a.recordings {
+        let folder = output::folder(a.common.out.as_deref(), a.common.json, path)
+            .map(|f| if a.recordings.len() > 1 { f.join(path.file_name().unwrap_or_default()) } else { f });
+        results.push(one(a, path, folder)?);
+    }
+    if let [(result, text)] = &results[..] {
+        return output::print(&if a.common.json { output::to_json(result)? } else { text.clone() });
+    }
+    if a.common.json {
+        let list: Vec<&DiagnosisResult> = results.iter().map(|(r, _)| r).collect();
+        return output::print(&output::to_json(&serde_json::json!({ "schema": "diagnoses/1", "diagnoses": list }))?);
+    }
+    let texts: Vec<&str> = results.iter().map(|(_, t)| &**t).collect();
+    output::print(&format!("{}\n{}", texts.join("\n"), together(&results)))
+}
+
+/// Whether the recordings agree: causes of each, and materials side by side.
+fn together(results: &[(DiagnosisResult, String)]) -> String {
+    let mut text = String::from("all recordings        verdict, causes; material with the causes\n");
+    for (r, _) in results {
+        let causes: Vec<&str> = r.causes.iter().map(|c| &*c.name).collect();
+        let parameters: Vec<String> = r
+            .material_parameters
+            .iter()
+            .map(|p| {
+                let half = p.interval_95.map_or(f64::NAN, |[a, b]| 0.5 * (b - a));
+                format!("{} {:.3} ± {:.3}", p.name, p.value, half)
+            })
+            .collect();
+        text += &format!("  {:<18} {:?} [{}]; {}\n", r.recording, r.verdict, causes.join(", "), parameters.join(", "));
+    }
+    text
+}
+
+/// Diagnoses one recording, writes its files, and gives its result and a summary.
+fn one(a: &DiagnoseArguments, path: &Path, folder: Option<PathBuf>) -> Result<(DiagnosisResult, String), CliError> {
+    let bad = |message: String| CliError::Input { path: path.into(), message };
+    let recording = Recording::read(path, &ReadLimits::default()).map_err(|e| bad(e.to_string()))?;
     let prior = match &a.material {
         Some(path) => Some(input::read_material(Some(path))?),
         None => None,
@@ -63,14 +118,24 @@ pub(super) fn run(a: &DiagnoseArguments) -> Result<(), CliError> {
         "max_causes": options.max_causes,
     });
     let result = DiagnosisResult::new(&found, &recording.id, input_hash(&inputs));
-    if let Some(folder) = output::folder(a.common.out.as_deref(), a.common.json, &a.recording) {
+    if let Some(folder) = folder {
         output::write_file(&folder, "diagnosis.json", output::to_json(&result)?.as_bytes())?;
         output::write_file(&folder, "report.html", diagnosis_report(&found, &result).to_html().as_bytes())?;
         for (name, svg) in diagnosis_pictures(&found) {
             output::write_file(&folder, &format!("{name}.svg"), svg.as_bytes())?;
         }
+        // Residual maps on the compared grid, measured minus predicted.
+        for (name, fitted) in [("before", &found.nominal), ("after", &found.corrected)] {
+            let mask = &found.observed.mask;
+            for (n, field) in fitted.residual.displacement.iter().enumerate() {
+                let vectors = mask.spread(field, [f64::NAN; 3]);
+                write_vectors(&folder, &format!("residual_{name}_{}.nii.gz", n + 1), &mask.grid, &vectors)
+                    .map_err(|e| bad(e.to_string()))?;
+            }
+        }
     }
-    output::print(&if a.common.json { output::to_json(&result)? } else { summary(&result, &found) })
+    let text = summary(&result, &found);
+    Ok((result, text))
 }
 
 fn summary(r: &DiagnosisResult, d: &Diagnosis) -> String {

@@ -11,6 +11,7 @@ mod curves;
 mod design;
 mod design_slurm;
 mod diagnose;
+mod diagnose_curves;
 mod error;
 mod evaluate;
 mod import;
@@ -19,6 +20,7 @@ mod interrupt;
 mod output;
 mod paper_tables;
 mod progress;
+mod prove;
 mod scan;
 mod serve;
 mod slurm;
@@ -68,6 +70,8 @@ enum Command {
     Compare(compare::CompareArguments),
     /// Where a recording and its model differ, and what physics was left out.
     Diagnose(diagnose::DiagnoseArguments),
+    /// Conceal causes in synthetic recordings and score the diagnosis on them.
+    ProveDiagnosis(prove::ProveArguments),
     /// The traditional route: one uniaxial curve, of a strip or a dumb-bell, fitted with Ogden terms.
     Uniaxial(uniaxial::UniaxialArguments),
     /// Ogden terms fitted to curves of several homogeneous tests together.
@@ -137,6 +141,7 @@ pub fn run() -> ExitCode {
         Command::Sweep(a) => sweep::run(a),
         Command::Compare(a) => compare::run(a),
         Command::Diagnose(a) => diagnose::run(a),
+        Command::ProveDiagnosis(a) => prove::run(a),
         Command::Uniaxial(a) => uniaxial::run(a),
         Command::Curves(a) => curves::run(a),
         Command::Serve(a) => serve::run(a),

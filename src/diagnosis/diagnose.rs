@@ -4,7 +4,7 @@ use super::causes::{Category, Cause, Location, registry};
 use super::error::DiagnosisError;
 use super::fit::{BulkPrior, FitSettings, Fitted, STEP, Supposed, fit, paths_of, scene_of, shear_modulus};
 use super::laboratory::Laboratory;
-use super::load_history::{ElasticTable, FittedEffect, LoadEffect, LoadHistoryFit, fit_load_history};
+use super::load_history::{ElasticTable, FittedEffect, Homogeneous, LoadEffect, LoadHistoryFit, fit_load_history};
 use super::maps::{ScoreMap, debond_map, inclusion_map, jumps};
 use super::metric::Metric;
 use super::scene::Scene;
@@ -32,6 +32,11 @@ const MAX_FITS: usize = 4;
 const EXPONENTS: [f64; 5] = [-6.0, -2.0, 5.0, 9.0, 14.0];
 /// Structured misfit that is left counts as unexplained above this multiple of the allowance (rms).
 const UNEXPLAINED: f64 = 2.0;
+/// κ is looked at where the data pull it below the believed one by this many standard deviations of ln κ…
+const PULL_OF_BULK: f64 = 1.5;
+/// … which then is as good as known, or as good as free.
+const KNOWN_BULK: f64 = 0.02;
+const FREE_BULK: f64 = 3.0;
 /// Drives of the load curve's table.
 const TABLE_POINTS: usize = 8;
 
@@ -48,11 +53,20 @@ pub struct DiagnosisOptions {
     pub max_causes: usize,
     /// Drift of the load cell where the recording does not state it, N.
     pub force_sd_n: f64,
+    /// Names of causes that are not to be supposed.
+    pub left_out: Vec<String>,
 }
 
 impl Default for DiagnosisOptions {
     fn default() -> Self {
-        DiagnosisOptions { mesh_factor: 1.35, allowance_mm: None, prior: None, max_causes: 3, force_sd_n: 0.02 }
+        DiagnosisOptions {
+            mesh_factor: 1.35,
+            allowance_mm: None,
+            prior: None,
+            max_causes: 3,
+            force_sd_n: 0.02,
+            left_out: Vec::new(),
+        }
     }
 }
 
@@ -173,7 +187,15 @@ pub fn diagnose(
     let settings =
         FitSettings { max_iterations: 12, bulk: BulkPrior { center_kpa: start.bulk_kpa, log_sd: 0.5 }, tolerance: 0.3 };
     progress(&format!("fitting the nominal model ({num_unknowns} unknowns)"));
-    let mut work = Work { laboratory: &mut laboratory, metric: &metric, settings, is_cancelled, allowance_mm };
+    let mut work = Work {
+        laboratory: &mut laboratory,
+        metric: &metric,
+        settings,
+        nominal_bulk: settings.bulk,
+        is_cancelled,
+        allowance_mm,
+        left_out: &options.left_out,
+    };
     let mut nominal = work.nominal(&measured, &start, options.prior.is_some())?;
 
     // The load curve first: what time and the load cell add is taken off before the model is compared.
@@ -183,7 +205,8 @@ pub fn diagnose(
         let table = work.elastic_table(&nominal, curve.drive_mm.iter().fold(largest, |s, d| s.max(d.abs())))?;
         let drift = observed.steps.iter().filter_map(|s| s.force).map(|f| f.sd_n).fold(0.0, f64::max);
         let windows: Vec<Option<[f64; 2]>> = recording.steps.iter().map(|s| s.window_s).collect();
-        load = fit_load_history(curve, &table, drift.max(1e-6), &windows);
+        let sample = Homogeneous::of(&observed.specimen, &nominal.material);
+        load = fit_load_history(curve, &table, &sample, drift.max(1e-6), &windows, &|e| !work.is_left_out(e.cause()));
     }
     let has_curve = load.is_some();
     let mut causes: Vec<FoundCause> = Vec::new();
@@ -199,8 +222,23 @@ pub fn diagnose(
     let mut maps = Vec::new();
     let mut alternatives = Vec::new();
     let mut current = nominal.clone();
+    if !work.is_left_out("compressibility")
+        && let Some((stiff, free, evidence)) = work.compressibility(&measured, &nominal)?
+    {
+        causes.push(compressible(&free, &stiff, evidence));
+        work.nominal_bulk.log_sd = KNOWN_BULK;
+        (nominal, work.settings.bulk) = (stiff, BulkPrior { center_kpa: free.material.bulk_kpa, log_sd: FREE_BULK });
+        current = free;
+    }
+    if options.prior.is_some()
+        && !work.is_left_out("terms")
+        && let Some((richer, evidence)) = work.further_term(&measured, &current)?
+    {
+        causes.push(terms(&richer, &current, evidence));
+        current = richer;
+    }
 
-    let wraps = jumps(&observed, &nominal.residual);
+    let wraps = if work.is_left_out("wrap") { Vec::new() } else { jumps(&observed, &current.residual) };
     if !wraps.is_empty() {
         progress(&format!("{} groups of voxels are a whole turn of phase off", wraps.len()));
         let supposed: Vec<Supposed> = wraps
@@ -210,7 +248,7 @@ pub fn diagnose(
                 Supposed { cause: Arc::new(w) as Arc<dyn Cause>, values }
             })
             .collect();
-        current = work.fit(&measured, &nominal.material, &supposed)?;
+        current = work.fit(&measured, &current.material, &supposed)?;
     }
     let mut round = 0;
     while current.causes.iter().filter(|c| c.cause.name() != "wrap").count() + causes.len() < options.max_causes {
@@ -365,11 +403,46 @@ struct Work<'a, 'b> {
     laboratory: &'a mut Laboratory<'b>,
     metric: &'a Metric,
     settings: FitSettings,
+    /// κ of the nominal model.
+    nominal_bulk: BulkPrior,
     is_cancelled: &'a dyn Fn() -> bool,
     allowance_mm: f64,
+    left_out: &'a [String],
 }
 
 impl Work<'_, '_> {
+    fn is_left_out(&self, name: &str) -> bool {
+        self.left_out.iter().any(|n| n == name)
+    }
+
+    /// Where the data pull κ far below that of a rubber: the fits with κ as believed and with κ free, and the evidence.
+    fn compressibility(
+        &mut self,
+        measured: &Trace,
+        nominal: &Fitted,
+    ) -> Result<Option<(Fitted, Fitted, f64)>, DiagnosisError> {
+        let believed = self.settings.bulk;
+        if (believed.center_kpa / nominal.material.bulk_kpa).ln() < PULL_OF_BULK * believed.log_sd {
+            return Ok(None);
+        }
+        let fit_with = |work: &mut Self, bulk: BulkPrior| {
+            let settings = FitSettings { bulk, ..work.settings };
+            let mut start = nominal.material.clone();
+            if bulk.log_sd < believed.log_sd {
+                start.bulk_kpa = bulk.center_kpa;
+            }
+            fit(work.laboratory, work.metric, measured, &start, &[], &settings, work.is_cancelled)
+        };
+        let stiff = match fit_with(self, BulkPrior { log_sd: KNOWN_BULK, ..believed }) {
+            Ok(stiff) => stiff,
+            Err(error) if (self.is_cancelled)() => return Err(error),
+            Err(_) => return Ok(None),
+        };
+        let free = fit_with(self, BulkPrior { log_sd: FREE_BULK, ..believed })?;
+        let evidence = stiff.deviance - free.deviance - penalty(self.metric, 1);
+        Ok((evidence > EVIDENCE).then_some((stiff, free, evidence)))
+    }
+
     fn fit(&mut self, measured: &Trace, material: &Ogden, causes: &[Supposed]) -> Result<Fitted, DiagnosisError> {
         fit(self.laboratory, self.metric, measured, material, causes, &self.settings, self.is_cancelled)
     }
@@ -380,6 +453,11 @@ impl Work<'_, '_> {
         if is_fixed {
             return Ok(one);
         }
+        Ok(self.further_term(measured, &one)?.map_or(one, |found| found.0))
+    }
+
+    /// The fit with one more Ogden term and its evidence, where the data call for it.
+    fn further_term(&mut self, measured: &Trace, one: &Fitted) -> Result<Option<(Fitted, f64)>, DiagnosisError> {
         // Which exponent a further term would have: first order, all tried at once.
         let mut probe = one.material.clone();
         let base = one.material.terms.len();
@@ -388,7 +466,7 @@ impl Work<'_, '_> {
             probe.terms.push(OgdenTerm { mu_kpa, alpha });
         }
         let probed = self.laboratory.derivatives(&probe, &Scene::default(), &one.prediction, true, &[], STEP);
-        let Ok(columns) = probed else { return Ok(one) };
+        let Ok(columns) = probed else { return Ok(None) };
         let nuisance: Vec<Trace> = columns[..=2 * base]
             .iter()
             .zip(one.material.parameters())
@@ -405,8 +483,7 @@ impl Work<'_, '_> {
                 best = Some((score.explained, OgdenTerm { mu_kpa, alpha }));
             }
         }
-        let Some((explained, term)) = best.filter(|b| b.0 > EVIDENCE) else { return Ok(one) };
-        let _ = explained;
+        let Some((_, term)) = best.filter(|b| b.0 > EVIDENCE) else { return Ok(None) };
         let mut two = one.material.clone();
         two.terms.push(term);
         match self.fit(measured, &two, &[]) {
@@ -414,10 +491,10 @@ impl Work<'_, '_> {
                 let gain = one.deviance - found.deviance - penalty(self.metric, 2);
                 let effect = found.prediction.trace.plus(-1.0, &one.prediction.trace);
                 let is_used = gain > EVIDENCE && is_large(self.laboratory.observed(), &effect, self.allowance_mm);
-                Ok(if is_used { found } else { one })
+                Ok(is_used.then_some((found, gain)))
             }
             Err(error) if (self.is_cancelled)() => Err(error),
-            Err(_) => Ok(one),
+            Err(_) => Ok(None),
         }
     }
 
@@ -447,6 +524,7 @@ impl Work<'_, '_> {
         let list: Vec<Arc<dyn Cause>> = registry(&specimen, shear_modulus(&current.material))
             .into_iter()
             .filter(|c| !(has_curve && c.name() == "cell"))
+            .filter(|c| !self.is_left_out(c.name()))
             // One of a kind: what is in the fit already is free there.
             .filter(|c| !current.causes.iter().any(|s| s.cause.description() == c.description()))
             .filter(|c| !(c.name() == "fibre" && scene.fibre.is_some()))
@@ -497,13 +575,13 @@ impl Work<'_, '_> {
                 let (map, found) =
                     debond_map(self.laboratory, &current.material, &current.prediction, &test, is_moved)?;
                 maps.push((format!("bond of the {} plate", if is_moved { "moved" } else { "fixed" }), map));
-                if let Some((score, cause)) = found {
+                if let Some((score, cause)) = found.filter(|_| !self.is_left_out("debond")) {
                     candidates.push(Candidate { values: cause.start(), cause: Arc::new(cause), score });
                 }
             }
             let (map, found) = inclusion_map(self.laboratory, &current.material, &current.prediction, &test)?;
             maps.push(("stiffness of the sample".into(), map));
-            if let Some((score, cause)) = found {
+            if let Some((score, cause)) = found.filter(|_| !self.is_left_out("inclusion")) {
                 candidates.push(Candidate { values: cause.start(), cause: Arc::new(cause), score });
             }
         }
@@ -525,7 +603,8 @@ impl Work<'_, '_> {
         for side in [false, true] {
             let metric = Metric::new(observed, self.allowance_mm, &|v| fold[v] != side);
             for (n, fitted) in [nominal, corrected].into_iter().enumerate() {
-                let settings = FitSettings { max_iterations: 3, ..self.settings };
+                let bulk = if n == 0 { self.nominal_bulk } else { self.settings.bulk };
+                let settings = FitSettings { max_iterations: 3, bulk, ..self.settings };
                 let found = fit(
                     self.laboratory,
                     &metric,
@@ -582,6 +661,45 @@ fn found_cause(fitted: &Fitted, index: usize, observed: &Observed, evidence: f64
         location: supposed.cause.location(&supposed.values, &observed.specimen),
         evidence,
         effect_rms_mm,
+    }
+}
+
+/// The cause that κ was far below the believed one.
+fn compressible(free: &Fitted, stiff: &Fitted, evidence: f64) -> FoundCause {
+    let ratio = free.material.bulk_kpa / shear_modulus(&free.material);
+    let sd = ratio * free.sd[0] / free.material.bulk_kpa;
+    FoundCause {
+        name: "compressibility",
+        category: Category::Material,
+        description: "the material is compressible, far from a rubber".into(),
+        parameters: vec![("bulk_over_shear_modulus".into(), ratio, [ratio - 1.96 * sd, ratio + 1.96 * sd])],
+        location: None,
+        evidence,
+        effect_rms_mm: free.prediction.trace.plus(-1.0, &stiff.prediction.trace).rms_mm(),
+    }
+}
+
+/// The cause that the material has more Ogden terms than believed.
+fn terms(richer: &Fitted, before: &Fitted, evidence: f64) -> FoundCause {
+    let parameters = richer
+        .material
+        .parameters()
+        .into_iter()
+        .zip(&richer.sd)
+        .filter(|(p, _)| !before.material.parameters().contains(p))
+        .map(|(p, sd)| {
+            let value = richer.material.value(p);
+            (p.name(), value, [value - 1.96 * sd, value + 1.96 * sd])
+        })
+        .collect();
+    FoundCause {
+        name: "terms",
+        category: Category::Material,
+        description: "the material needs a further Ogden term".into(),
+        parameters,
+        location: None,
+        evidence,
+        effect_rms_mm: richer.prediction.trace.plus(-1.0, &before.prediction.trace).rms_mm(),
     }
 }
 

@@ -2,15 +2,18 @@
 //!
 //! The force is F(t) = Prony ∗ [η F∞(d(t))] + offset + friction · direction of motion. F∞ is the finite element force over
 //! drive, its material free (to first order). η = 1 − ρ erf((W_max − W)/m) is Ogden and Roxburgh's softening with the work
-//! W(d) = ∫ F∞ dd of the whole sample in place of the local energy; the Prony series acts on the force as Simo's does on the
-//! isochoric stress, which is exact where the drive alone sets the deformation.
+//! W(d) = ∫ F∞ dd of the whole sample in place of the local energy. The Prony series acts on the isochoric second
+//! Piola–Kirchhoff stress (Simo 1987) of a homogeneous sample of the same test, whose share of the force is scaled to F∞: at
+//! large shear the memory of the stress and that of the force differ.
 //!
 //! Readings carry white noise and a slow drift; both are in the weights.
 
 use super::error::DiagnosisError;
-use crate::homogeneous::{LeastSquaresOptions, Limit, covariance, erf, minimise};
-use crate::rate::{ForceTable, PronyTerm, relax};
+use crate::homogeneous::{Deformation, LeastSquaresOptions, Limit, ShearTerm, covariance, erf, minimise};
+use crate::material::Ogden;
+use crate::rate::{ForceTable, channels, memory};
 use crate::recording::LoadCurve;
+use crate::specimen::{Specimen, TestKind};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use serde::{Deserialize, Serialize};
 
@@ -20,10 +23,18 @@ const DRIFT_TIME_S: f64 = 20.0;
 const MAX_READINGS: usize = 1200;
 /// A further effect must lower the deviance by ln n per parameter and this much more.
 const EVIDENCE: f64 = 12.0;
-/// … and by this part of what the effects before it explained: their models err by some percent.
+/// … and by this part of what the effects before it explained: their models err by some percent. Further relaxations are parts of
+/// one model.
 const SMALLEST_SHARE: f64 = 0.02;
+
 /// Allowance of the force model, relative to the force: common effects of the mesh are in the free material.
 const ALLOWANCE: f64 = 0.002;
+/// Allowance below the largest drive so far, relative to the force there: what is remembered of it is that of a homogeneous
+/// sample, and a sample with holes is none.
+const ALLOWANCE_OF_MEMORY: f64 = 0.004;
+/// … and near zero drive, within this part of the largest so far, where the force is all memory.
+const NEAR_REST: f64 = 0.15;
+const ALLOWANCE_NEAR_REST: f64 = 0.03;
 /// Start times of a relaxation, s.
 const START_TIMES_S: [f64; 4] = [2.0, 8.0, 30.0, 100.0];
 
@@ -69,6 +80,43 @@ impl ElasticTable {
     }
 }
 
+/// A homogeneous sample of the same test: what relaxes in it.
+pub struct Homogeneous {
+    test: TestKind,
+    /// Gap of the plates or length between the clamps, mm.
+    length_mm: f64,
+    terms: Vec<ShearTerm>,
+}
+
+impl Homogeneous {
+    /// Of a specimen's block.
+    pub fn of(specimen: &Specimen, material: &Ogden) -> Homogeneous {
+        let length_mm = match specimen.test {
+            TestKind::DoubleLapShear => specimen.block.thickness_mm,
+            TestKind::Uniaxial => specimen.block.length_mm,
+        };
+        let terms =
+            material.terms.iter().map(|t| ShearTerm { modulus_kpa: t.mu_kpa * t.alpha, alpha: t.alpha }).collect();
+        Homogeneous { test: specimen.test, length_mm, terms }
+    }
+
+    /// Two channels of reference stress and their weights in the nominal stress, relative to it.
+    fn channels(&self, drive_mm: f64) -> ([f64; 2], [f64; 2]) {
+        // At rest the ratio is that of small drives.
+        let least = 1e-4 * self.length_mm;
+        let drive = if drive_mm.abs() < least { least } else { drive_mm };
+        let deformation = match self.test {
+            TestKind::DoubleLapShear => Deformation::SimpleShear { shear: drive / self.length_mm },
+            TestKind::Uniaxial => Deformation::Uniaxial { stretch: (1.0 + drive / self.length_mm).max(0.05) },
+        };
+        let c = channels(&self.terms, &deformation);
+        let nominal = c.weight[0] * c.stress[0] + c.weight[1] * c.stress[1];
+        // The stress itself vanishes at rest; the weights keep their limit.
+        let stress = if drive_mm.abs() < least { [0.0; 2] } else { c.stress };
+        (c.weight.map(|w| w * drive / nominal), stress)
+    }
+}
+
 /// An effect on the load curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -84,6 +132,15 @@ pub enum LoadEffect {
 }
 
 impl LoadEffect {
+    /// The cause that it is a part of.
+    pub fn cause(self) -> &'static str {
+        match self {
+            LoadEffect::Relaxation => "relaxation",
+            LoadEffect::Mullins => "mullins",
+            LoadEffect::Offset | LoadEffect::Friction => "cell",
+        }
+    }
+
     fn num_parameters(self) -> usize {
         match self {
             LoadEffect::Relaxation | LoadEffect::Mullins => 2,
@@ -134,11 +191,15 @@ struct Problem {
     derivatives: Vec<Vec<f64>>,
     work: Vec<f64>,
     largest_work: f64,
+    /// Per channel: weights, mm/kPa, and reference stress, kPa, of the homogeneous sample.
+    channels: [(Vec<f64>, Vec<f64>); 2],
+    /// F∞ / drive, N/mm.
+    stiffness: Vec<f64>,
     whitener: Cholesky<f64, Dyn>,
 }
 
 impl Problem {
-    /// Force at every reading with parameters: scaled material changes, then the effects'.
+    /// Force at every reading with parameters: scaled material changes, then the effects'. Also the elastic force alone.
     fn force(&self, effects: &[LoadEffect], p: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let num_material = self.derivatives.len();
         let mut elastic = self.elastic.clone();
@@ -147,19 +208,22 @@ impl Problem {
                 *e += x * d;
             }
         }
-        let mut force = elastic.clone();
-        let mut terms = Vec::new();
-        let mut added = vec![0.0; force.len()];
+        // What the material and softening make of the nominal force; it scales what relaxes.
+        let mut factor: Vec<f64> = elastic
+            .iter()
+            .zip(&self.elastic)
+            .map(|(now, then)| if then.abs() > 0.0 { now / then } else { 1.0 })
+            .collect();
+        let mut relaxations = Vec::new();
+        let mut added = vec![0.0; elastic.len()];
         let mut at = num_material;
         for effect in effects {
             match effect {
-                LoadEffect::Relaxation => {
-                    terms.push(PronyTerm { strength: p[at], time_s: p[at + 1].exp() });
-                }
+                LoadEffect::Relaxation => relaxations.push((p[at], p[at + 1].exp())),
                 LoadEffect::Mullins => {
                     let (rho, width) = (p[at], p[at + 1].exp() * self.largest_work);
                     let mut largest = 0.0f64;
-                    for (f, w) in force.iter_mut().zip(&self.work) {
+                    for (f, w) in factor.iter_mut().zip(&self.work) {
                         largest = largest.max(*w);
                         *f *= 1.0 - rho * erf((largest - w) / width);
                     }
@@ -169,10 +233,17 @@ impl Problem {
             }
             at += effect.num_parameters();
         }
-        if !terms.is_empty()
-            && let Ok(relaxed) = relax(&self.time_s, &force, &terms)
-        {
-            force = relaxed.values;
+        let mut force: Vec<f64> = self.elastic.iter().zip(&factor).map(|(e, f)| e * f).collect();
+        if !relaxations.is_empty() {
+            for (weights, stress) in &self.channels {
+                let scaled: Vec<f64> = stress.iter().zip(&factor).map(|(s, f)| s * f).collect();
+                for &(strength, time_s) in &relaxations {
+                    let (kept, _) = memory(&self.time_s, &scaled, time_s);
+                    for (((f, m), w), k) in force.iter_mut().zip(kept).zip(weights).zip(&self.stiffness) {
+                        *f += strength * w * k * m;
+                    }
+                }
+            }
         }
         force.iter_mut().zip(&added).for_each(|(f, a)| *f += a);
         (force, elastic)
@@ -252,15 +323,18 @@ impl Problem {
 /// Gain, effect, deviance, parameters and their standard deviations of a fit.
 type Trial = (f64, LoadEffect, f64, Vec<f64>, Vec<f64>);
 
-/// Looks for effects in a load curve whose elastic force is `table`; `drift_sd_n` is the standard deviation of the load cell's
-/// slow drift, `windows_s` are the steps' windows.
+/// Looks for effects in a load curve whose elastic force is `table`, of a specimen in which what relaxes does so as in
+/// `sample`; `drift_sd_n` is the standard deviation of the load cell's
+/// slow drift, `windows_s` are the steps' windows; only effects that are allowed are supposed.
 pub fn fit_load_history(
     curve: &LoadCurve,
     table: &ElasticTable,
+    sample: &Homogeneous,
     drift_sd_n: f64,
     windows_s: &[Option<[f64; 2]>],
+    is_allowed: &dyn Fn(LoadEffect) -> bool,
 ) -> Option<LoadHistoryFit> {
-    let problem = prepare(curve, table, drift_sd_n)?;
+    let problem = prepare(curve, table, sample, drift_sd_n)?;
     let num_material = problem.derivatives.len();
     let mut effects: Vec<LoadEffect> = Vec::new();
     let mut gained: Vec<f64> = Vec::new();
@@ -274,7 +348,7 @@ pub fn fit_load_history(
         for candidate in candidates {
             let count = effects.iter().filter(|e| **e == candidate).count();
             let most = if candidate == LoadEffect::Relaxation { 3 } else { 1 };
-            if count >= most {
+            if count >= most || !is_allowed(candidate) {
                 continue;
             }
             let mut trial = effects.clone();
@@ -294,7 +368,9 @@ pub fn fit_load_history(
             }
         }
         let Some((gain, effect, d, p, s)) = found else { break };
-        if gain < EVIDENCE.max(SMALLEST_SHARE * (nominal_deviance - deviance)) || effects.len() >= 5 {
+        let is_further = effect == LoadEffect::Relaxation && effects.contains(&effect);
+        let share = if is_further { 0.0 } else { SMALLEST_SHARE };
+        if gain < EVIDENCE.max(share * (nominal_deviance - deviance)) || effects.len() >= 5 {
             break;
         }
         effects.push(effect);
@@ -340,7 +416,7 @@ pub fn fit_load_history(
     })
 }
 
-fn prepare(curve: &LoadCurve, table: &ElasticTable, drift_sd_n: f64) -> Option<Problem> {
+fn prepare(curve: &LoadCurve, table: &ElasticTable, sample: &Homogeneous, drift_sd_n: f64) -> Option<Problem> {
     let every = curve.time_s.len().div_ceil(MAX_READINGS).max(1);
     let pick = |values: &[f64]| -> Vec<f64> { values.iter().copied().step_by(every).collect() };
     let (mut time_s, mut drive_mm, mut measured) = (pick(&curve.time_s), pick(&curve.drive_mm), pick(&curve.force_n));
@@ -374,11 +450,49 @@ fn prepare(curve: &LoadCurve, table: &ElasticTable, drift_sd_n: f64) -> Option<P
         0..10 => drift_sd_n,
         m => (1.4826 * differences[m / 2] / 6f64.sqrt()).max(1e-3 * drift_sd_n),
     };
+    let mut largest = [0.0f64; 2];
+    let allowance: Vec<f64> = drive_mm
+        .iter()
+        .zip(&elastic)
+        .map(|(drive, force)| {
+            if drive.abs() >= largest[0] {
+                largest = [drive.abs(), force.abs()];
+                return ALLOWANCE * force.abs();
+            }
+            let is_near_rest = drive.abs() < NEAR_REST * largest[0];
+            let of_memory = if is_near_rest { ALLOWANCE_NEAR_REST } else { ALLOWANCE_OF_MEMORY };
+            (ALLOWANCE * force.abs()).max(of_memory * largest[1])
+        })
+        .collect();
     let matrix = DMatrix::from_fn(n, n, |i, j| {
         let drift = drift_sd_n * drift_sd_n * (-(time_s[i] - time_s[j]).abs() / DRIFT_TIME_S).exp();
-        let each = if i == j { white * white + (ALLOWANCE * elastic[i]).powi(2) } else { 0.0 };
+        let each = if i == j { white * white + allowance[i] * allowance[i] } else { 0.0 };
         drift + each
     });
     let whitener = Cholesky::new(matrix)?;
-    Some(Problem { time_s, measured, direction, elastic, derivatives, work, largest_work, whitener })
+    let mut channels = [(Vec::new(), Vec::new()), (Vec::new(), Vec::new())];
+    let least = 1e-4 * sample.length_mm;
+    let slope = ElasticTable::at(&table.force, least) / least;
+    let mut stiffness = Vec::with_capacity(n);
+    for (drive, force) in drive_mm.iter().zip(&elastic) {
+        let (weight, stress) = sample.channels(*drive);
+        for k in 0..2 {
+            channels[k].0.push(weight[k]);
+            channels[k].1.push(stress[k]);
+        }
+        stiffness.push(if drive.abs() > least { force / drive } else { slope });
+    }
+    let known = Problem {
+        time_s,
+        measured,
+        direction,
+        elastic,
+        derivatives,
+        work,
+        largest_work,
+        channels,
+        stiffness,
+        whitener,
+    };
+    Some(known)
 }

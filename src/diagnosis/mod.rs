@@ -21,7 +21,7 @@ pub use diagnose::{Diagnosis, DiagnosisOptions, FoundCause, Leftover, Ranked, Ve
 pub use error::DiagnosisError;
 pub use fit::{BulkPrior, FitSettings, Fitted, Supposed, fit, shear_modulus};
 pub use laboratory::{Laboratory, Prediction};
-pub use load_history::{ElasticTable, FittedEffect, LoadEffect, LoadHistoryFit, fit_load_history};
+pub use load_history::{ElasticTable, FittedEffect, Homogeneous, LoadEffect, LoadHistoryFit, fit_load_history};
 pub use maps::{Division, ScoreMap};
 pub use metric::Metric;
 pub use result::{BeforeAfter, CauseResult, DiagnosisResult, ParameterResult, RankedResult};

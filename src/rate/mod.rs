@@ -22,11 +22,13 @@ pub use analysis::{
     AMBIGUOUS_BIC, EXPLAINED_PART, F_TEST_LEVEL, LoadCurveAnalysisError, LoadCurveOptions, MIN_DELTA_BIC,
     analyse_load_curve,
 };
+pub(crate) use channels::channels;
 pub use force_history::{
     FittedRelaxation, ForceHistory, ForceHistoryError, ForceHistoryFit, ForceHistoryOptions, ForceHistorySequence,
     ShearLayer, fit_force_history,
 };
 pub use load_curve::{LoadCurve, LoadCurveError};
+pub(crate) use prony::memory;
 pub use prony::{HistoryError, PronyTerm, RelaxedHistory, relax};
 pub use verdict::{
     BeforeAfter, CauseParameter, CurveCause, CurveMaterial, CurveTrace, Hypothesis, HypothesisEvidence,

@@ -1,0 +1,15 @@
+//! Proof of the diagnosis: recordings with a hidden, randomly drawn cause, made by code of its own on meshes of its own, and
+//! how the diagnosis fares on them.
+//!
+//! * [`draw_cause`]: a cause, its place, size, material and noise, from a seed.
+//! * [`conceal`]: the recording, from triangular prisms where the diagnosis has hexahedra, with sharp edges where it has
+//!   smooth ones, a remeshed specimen where it moves nodes, and force histories of another model.
+//! * [`prove`]: diagnoses each and scores cause, place and intervals; [`Proof`] sums up.
+
+mod conceal;
+mod draw;
+mod score;
+
+pub use conceal::{ConcealError, Concealed, conceal};
+pub use draw::{Hidden, HiddenCause, draw_cause};
+pub use score::{CauseSummary, Proof, ProofOptions, Scored, prove, score_one};
