@@ -17,7 +17,7 @@ pub(super) struct Descent {
     /// Why the last trial had no equilibrium, where it had none.
     pub(super) failure: Option<SolveError>,
     pub(super) iterations: usize,
-    /// Distance from the optimum of the linear model, in standard deviations.
+    /// Distance from the optimum of the linear model, in standard deviations as the misfit has them.
     pub(super) distance: f64,
     pub(super) reached: Vec<String>,
     /// The objective at the start and after every accepted step.
@@ -48,7 +48,8 @@ impl Descent {
 pub(super) type Predict<'a> = dyn FnMut(&Ogden, &[Prediction]) -> Result<Vec<Prediction>, CalibrationError> + 'a;
 
 /// Descends until the optimum is reached or the iterations run out. `predict` solves a material near given predictions,
-/// `evaluate` compares with the data.
+/// `evaluate` compares with the data; `expected` is the objective of pure noise. Where the misfit is more than noise, so are
+/// the standard deviations in which the distance from the optimum counts.
 ///
 /// # Errors
 /// Those of the calls; a trial without an equilibrium is no error.
@@ -56,6 +57,7 @@ pub(super) fn descend(
     constraints: &Constraints,
     options: &FitOptions,
     start: Vec<Prediction>,
+    expected: f64,
     predict: &mut Predict,
     evaluate: &dyn Fn(&[Prediction]) -> Result<NormalSystem, CalibrationError>,
 ) -> Result<Descent, CalibrationError> {
@@ -68,9 +70,10 @@ pub(super) fn descend(
     let mut iterations = 0;
     loop {
         let full = constraints.step(&system, 0.0, false)?;
-        let is_converged = full.distance < options.tolerance;
+        let distance = full.distance / (system.chi2 / expected.max(1.0)).max(1.0).sqrt();
+        let is_converged = distance < options.tolerance;
         if is_converged || iterations >= options.max_iterations {
-            let (distance, reached) = (full.distance, full.reached);
+            let reached = full.reached;
             return Ok(Descent {
                 predictions,
                 system,
@@ -86,11 +89,7 @@ pub(super) fn descend(
         iterations += 1;
         let step = constraints.step(&system, damping, true)?;
         let Some(present) = predictions.first() else {
-            return Err(CalibrationError::NotConverged {
-                iterations,
-                distance: full.distance,
-                limit: options.tolerance,
-            });
+            return Err(CalibrationError::NotConverged { iterations, distance, limit: options.tolerance });
         };
         let trial = system.moved(&present.material, &step.change);
         match predict(&trial, &predictions) {

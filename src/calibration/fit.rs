@@ -6,6 +6,7 @@
 //!
 //! The fit has converged when the optimum of the linear model at the present parameters is nearer than a fraction of a
 //! standard deviation, in every combination of parameters. A small step alone proves nothing: damping makes steps small.
+//! Where the misfit is more than noise the standard deviation is that of the misfit.
 
 use super::descend::{Descent, descend};
 use super::error::CalibrationError;
@@ -176,9 +177,9 @@ impl FitStart {
         };
         let system = |p: &[Prediction]| NormalSystem::new(p, &targets, options.bulk, options.held);
         let start = vec![self.prediction.clone()];
+        let (expected, num_data) = targets[0].expectation();
         let Descent { mut predictions, system, iterations, distance, reached, .. } =
-            descend(&self.constraints, options, start, &mut predict, &system)?.converged(options)?;
-        let num_data = targets[0].expectation().1;
+            descend(&self.constraints, options, start, expected, &mut predict, &system)?.converged(options)?;
         let held = options.held.count() + usize::from(options.bulk == Bulk::Held);
         let fitted = system.parameters.len() - held;
         let prior = usize::from(matches!(options.bulk, Bulk::LogPrior { .. }));

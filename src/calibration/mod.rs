@@ -2,6 +2,7 @@
 //! is kept.
 
 mod adjoint;
+mod allowance;
 mod calibrate;
 mod contours;
 mod descend;
@@ -25,6 +26,7 @@ mod terms;
 mod test_problem;
 mod verify;
 
+pub use allowance::Allowance;
 pub use calibrate::{CalibrateOptions, Calibration, Estimate, MeshComparison, TermCount, calibrate};
 pub use contours::{Contour, ContourOptions, contours};
 pub use error::CalibrationError;

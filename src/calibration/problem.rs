@@ -196,9 +196,30 @@ impl<'a> CalibrationProblem<'a> {
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<RecordingFit, CalibrationError> {
         check_options(options)?;
-        let constraints = Constraints::new(start, options)?;
         let near = near.map(|n| &n.predictions[..]);
         let first = self.predict(start, near, &options.solve, is_cancelled)?;
+        self.descend_from(first, start, options, is_cancelled)
+    }
+
+    /// Fits from where `from` stands, an earlier fit on this mesh, whose equilibria and derivatives are taken as they are.
+    pub(super) fn fit_from(
+        &mut self,
+        from: &RecordingFit,
+        options: &FitOptions,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<RecordingFit, CalibrationError> {
+        check_options(options)?;
+        self.descend_from(from.predictions.clone(), &from.material, options, is_cancelled)
+    }
+
+    fn descend_from(
+        &mut self,
+        first: Vec<Prediction>,
+        start: &Ogden,
+        options: &FitOptions,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<RecordingFit, CalibrationError> {
+        let constraints = Constraints::new(start, options)?;
         let mut work = Work::default();
         first.iter().for_each(|p| work.add(p.work));
         let CalibrationProblem { observed, models, views, objective } = self;
@@ -207,7 +228,8 @@ impl<'a> CalibrationProblem<'a> {
             predict(observed, models, views, material, Some(near), &options.solve, is_cancelled)
         };
         let evaluate = |p: &[Prediction]| NormalSystem::new(p, &targets, options.bulk, options.held);
-        let descent = descend(&constraints, options, first, &mut trial, &evaluate)?;
+        let (expected, _) = sum_of_expectations(&targets);
+        let descent = descend(&constraints, options, first, expected, &mut trial, &evaluate)?;
         work.add(descent.work);
         let mut fit = finished(descent, &targets, observed, views, options, *objective)?;
         fit.work = work;

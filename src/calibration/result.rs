@@ -70,10 +70,12 @@ pub struct ParameterResult {
     pub value: Option<f64>,
     /// Its standard deviation from the noise; null where undetermined.
     pub sd: Option<f64>,
-    /// 95 % interval, widened by the mesh's error; an open side is null.
+    /// 95 % interval from noise, discretisation and misfit; an open side is null. κ's is symmetric in ln κ.
     pub interval_95: [Option<f64>; 2],
-    /// What the mesh may have shifted it by.
+    /// What our own mesh may have shifted it by.
     pub mesh_error: f64,
+    /// Standard deviation from discretisation errors, those of the data included.
+    pub discretisation_sd: f64,
     /// What the structured part of the misfit may have shifted it by, at most; zero where the misfit is that of the noise.
     pub possible_shift: f64,
     /// Whether the standard deviation is below half of the value.
@@ -126,6 +128,10 @@ pub struct DiscretisationResult {
     pub num_unknowns: [usize; 2],
     /// The estimate on the coarser mesh.
     pub coarse_material: Ogden,
+    /// Estimated displacement error of the finer mesh at the largest drive, rms, mm.
+    pub own_error_mm: f64,
+    /// Standard deviation allowed for discretisation errors, those of the data included, over our own.
+    pub factor: f64,
 }
 
 /// One drive of one recording.
@@ -177,6 +183,7 @@ impl CalibrationResult {
                 sd: e.sd.filter(|_| e.is_identifiable),
                 interval_95: e.interval_95,
                 mesh_error: e.mesh_error,
+                discretisation_sd: e.discretisation_sd,
                 possible_shift: e.possible_shift,
                 identifiable: e.is_identifiable,
             })
@@ -221,10 +228,12 @@ impl CalibrationResult {
             correlation: fit.covariance.correlation_matrix(),
             ratios: if calibration.has_force { Vec::new() } else { ratios(calibration) },
             term_selection: calibration.selection.clone(),
-            discretisation: calibration
-                .meshes
-                .as_ref()
-                .map(|m| DiscretisationResult { num_unknowns: m.num_unknowns, coarse_material: m.coarse.clone() }),
+            discretisation: calibration.meshes.as_ref().map(|m| DiscretisationResult {
+                num_unknowns: m.num_unknowns,
+                coarse_material: m.coarse.clone(),
+                own_error_mm: m.allowance.own_error_mm,
+                factor: m.allowance.factor,
+            }),
             steps,
             profiles: calibration.profiles.clone(),
             contours: calibration.contours.clone(),

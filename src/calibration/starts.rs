@@ -1,10 +1,11 @@
 //! Where fits start: from a force by hand's formula, and new terms by what they promise to gain.
 
 use super::error::CalibrationError;
-use super::fit::FitOptions;
+use super::fit::{FitOptions, Held};
 use super::observed::Observed;
 use super::problem::{CalibrationProblem, RecordingFit};
-use super::system::raw_sums;
+use super::system::{Prediction, raw_sums};
+use super::target::Target;
 use crate::material::{MAX_TERMS, Ogden, OgdenTerm};
 use crate::specimen::TestKind;
 use nalgebra::DVector;
@@ -57,8 +58,108 @@ pub(super) fn first_starts(observed: &[Observed]) -> Vec<Ogden> {
         .collect()
 }
 
-/// `fit` with one term more, in the order of the decrease of the objective that the new term promises: for each exponent the
-/// new μ that the linear model likes best, all old parameters moving along. At most `count`, each with the decrease promised.
+/// What a further term would change, for every exponent that it is tried with. Does not depend on the data.
+pub(super) struct Candidates {
+    old: Ogden,
+    held: Held,
+    /// Exponents solved together, and the predictions with terms of these.
+    groups: Vec<(Vec<f64>, Vec<Prediction>)>,
+}
+
+impl Candidates {
+    /// Around `fit`.
+    ///
+    /// # Errors
+    /// [`CalibrationError`].
+    pub(super) fn new(
+        problem: &mut CalibrationProblem,
+        fit: &RecordingFit,
+        options: &FitOptions,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Candidates, CalibrationError> {
+        let old = &fit.material;
+        let shear = shear_of(old);
+        let gap = 1.1 * options.min_alpha_gap;
+        let exponents: Vec<f64> =
+            NEXT_EXPONENTS.into_iter().filter(|a| old.terms.iter().all(|t| (t.alpha - a).abs() > gap)).collect();
+        let num_at_once = MAX_TERMS.saturating_sub(old.terms.len());
+        let mut groups = Vec::new();
+        if num_at_once > 0 {
+            for chunk in exponents.chunks(num_at_once) {
+                let mut wide = old.clone();
+                wide.terms.extend(chunk.iter().map(|&alpha| OgdenTerm { mu_kpa: NO_MODULUS * shear, alpha }));
+                let predictions = problem.predict(&wide, Some(&fit.predictions), &options.solve, is_cancelled)?;
+                groups.push((chunk.to_vec(), predictions));
+            }
+        }
+        Ok(Candidates { old: old.clone(), held: fit.held, groups })
+    }
+
+    /// The fit's material with one term more, in the order of the decrease of the objective that the new term promises: for
+    /// each exponent the new μ that the linear model likes best, all old parameters moving along. At most `count`, each with
+    /// the decrease promised.
+    pub(super) fn ranked(&self, targets: &[Target], count: usize) -> Vec<(f64, Ogden)> {
+        let old = &self.old;
+        let num_old = 2 * old.terms.len() + 1;
+        let shear = shear_of(old);
+        let mut candidates: Vec<(f64, Ogden)> = Vec::new();
+        for (chunk, predictions) in &self.groups {
+            let (matrix, gradient) = raw_sums(predictions, targets);
+            let free: Vec<usize> = (0..num_old).filter(|&i| !self.held.contains(i)).collect();
+            let inner = matrix.select_rows(&free).select_columns(&free);
+            // Relative parameters: a unit diagonal, and a ridge for directions without information.
+            let root: Vec<f64> = free.iter().map(|&i| matrix[(i, i)].sqrt().max(f64::MIN_POSITIVE)).collect();
+            let scaled = inner.map_with_location(|a, b, x| x / (root[a] * root[b]) + if a == b { 1e-9 } else { 0.0 });
+            let Some(factor) = scaled.cholesky() else { continue };
+            for (n, &alpha) in chunk.iter().enumerate() {
+                let at = num_old + 2 * n;
+                let coupling =
+                    DVector::from_iterator(free.len(), free.iter().zip(&root).map(|(&i, r)| matrix[(i, at)] / r));
+                let rest = DVector::from_iterator(free.len(), free.iter().zip(&root).map(|(&i, r)| gradient[i] / r));
+                let solved = factor.solve(&coupling);
+                let slope = gradient[at] - solved.dot(&rest);
+                let curvature = matrix[(at, at)] - solved.dot(&coupling);
+                if !(curvature > 0.0) {
+                    continue;
+                }
+                let best = slope / curvature;
+                let is_stable = best * alpha > 0.0;
+                let gain = if is_stable { slope * slope / curvature } else { 0.0 };
+                let share = (0.5 * best * alpha / shear).abs().clamp(FIRST_SHARE[0], FIRST_SHARE[1]);
+                let mut start = old.clone();
+                for term in &mut start.terms {
+                    term.mu_kpa *= 1.0 - share;
+                }
+                start.terms.push(OgdenTerm { mu_kpa: 2.0 * share * shear / alpha, alpha });
+                candidates.push((gain, start));
+            }
+        }
+        candidates.sort_by(|a, b| b.0.total_cmp(&a.0));
+        // Neighbouring exponents lead to the same optimum: spread the starts.
+        let mut chosen: Vec<(f64, Ogden)> = Vec::new();
+        for (gain, start) in candidates {
+            let alpha = |m: &Ogden| m.terms.last().map_or(0.0, |t| t.alpha);
+            if chosen.len() < count && chosen.iter().all(|(_, c)| (alpha(c) - alpha(&start)).abs() > 3.0) {
+                chosen.push((gain, start));
+            }
+        }
+        chosen
+    }
+
+    /// The decrease of the objective that a further term promises where the data are what `other`, a fit on another mesh,
+    /// predicts: a term that the meshes' difference asks for.
+    pub(super) fn promise_of_mesh(&self, targets: &[Target], other: &RecordingFit) -> f64 {
+        let moved: Vec<Target> =
+            targets.iter().zip(&other.predictions).map(|(t, p)| t.with_measured(&p.displacements, &p.states)).collect();
+        self.ranked(&moved, 1).first().map_or(0.0, |(gain, _)| *gain)
+    }
+}
+
+fn shear_of(material: &Ogden) -> f64 {
+    0.5 * material.terms.iter().map(|t| t.mu_kpa * t.alpha).sum::<f64>()
+}
+
+/// Starts with one term more than `fit`, the most promising first, at most `count`; see [`Candidates`].
 ///
 /// # Errors
 /// [`CalibrationError`].
@@ -69,59 +170,6 @@ pub(super) fn further_starts(
     count: usize,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Vec<(f64, Ogden)>, CalibrationError> {
-    let old = &fit.material;
-    let num_old = 2 * old.terms.len() + 1;
-    let shear = 0.5 * old.terms.iter().map(|t| t.mu_kpa * t.alpha).sum::<f64>();
-    let gap = 1.1 * options.min_alpha_gap;
-    let exponents: Vec<f64> =
-        NEXT_EXPONENTS.into_iter().filter(|a| old.terms.iter().all(|t| (t.alpha - a).abs() > gap)).collect();
-    let num_at_once = MAX_TERMS.saturating_sub(old.terms.len());
-    if num_at_once == 0 {
-        return Ok(Vec::new());
-    }
-    let mut candidates: Vec<(f64, Ogden)> = Vec::new();
-    for chunk in exponents.chunks(num_at_once) {
-        let mut wide = old.clone();
-        wide.terms.extend(chunk.iter().map(|&alpha| OgdenTerm { mu_kpa: NO_MODULUS * shear, alpha }));
-        let predictions = problem.predict(&wide, Some(&fit.predictions), &options.solve, is_cancelled)?;
-        let (matrix, gradient) = raw_sums(&predictions, &problem.targets()?);
-        let free: Vec<usize> = (0..num_old).filter(|&i| !fit.held.contains(i)).collect();
-        let inner = matrix.select_rows(&free).select_columns(&free);
-        // Relative parameters: a unit diagonal, and a ridge for directions without information.
-        let root: Vec<f64> = free.iter().map(|&i| matrix[(i, i)].sqrt().max(f64::MIN_POSITIVE)).collect();
-        let scaled = inner.map_with_location(|a, b, x| x / (root[a] * root[b]) + if a == b { 1e-9 } else { 0.0 });
-        let Some(factor) = scaled.cholesky() else { continue };
-        for (n, &alpha) in chunk.iter().enumerate() {
-            let at = num_old + 2 * n;
-            let coupling =
-                DVector::from_iterator(free.len(), free.iter().zip(&root).map(|(&i, r)| matrix[(i, at)] / r));
-            let rest = DVector::from_iterator(free.len(), free.iter().zip(&root).map(|(&i, r)| gradient[i] / r));
-            let solved = factor.solve(&coupling);
-            let slope = gradient[at] - solved.dot(&rest);
-            let curvature = matrix[(at, at)] - solved.dot(&coupling);
-            if !(curvature > 0.0) {
-                continue;
-            }
-            let best = slope / curvature;
-            let is_stable = best * alpha > 0.0;
-            let gain = if is_stable { slope * slope / curvature } else { 0.0 };
-            let share = (0.5 * best * alpha / shear).abs().clamp(FIRST_SHARE[0], FIRST_SHARE[1]);
-            let mut start = old.clone();
-            for term in &mut start.terms {
-                term.mu_kpa *= 1.0 - share;
-            }
-            start.terms.push(OgdenTerm { mu_kpa: 2.0 * share * shear / alpha, alpha });
-            candidates.push((gain, start));
-        }
-    }
-    candidates.sort_by(|a, b| b.0.total_cmp(&a.0));
-    // Neighbouring exponents lead to the same optimum: spread the starts.
-    let mut chosen: Vec<(f64, Ogden)> = Vec::new();
-    for (gain, start) in candidates {
-        let alpha = |m: &Ogden| m.terms.last().map_or(0.0, |t| t.alpha);
-        if chosen.len() < count && chosen.iter().all(|(_, c)| (alpha(c) - alpha(&start)).abs() > 3.0) {
-            chosen.push((gain, start));
-        }
-    }
-    Ok(chosen)
+    let candidates = Candidates::new(problem, fit, options, is_cancelled)?;
+    Ok(candidates.ranked(&problem.targets()?, count))
 }

@@ -3,21 +3,25 @@
 use super::error::CalibrationError;
 use super::fit::{Bulk, FitOptions, Held};
 use super::system::NormalSystem;
-use crate::material::{Ogden, Parameter};
+use crate::material::{MAX_ALPHA, MIN_ALPHA, Ogden, Parameter};
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus};
 use nalgebra::{DMatrix, DVector};
 
-/// A step changes a parameter by at most this fraction: it keeps its sign, and with it μα > 0.
+/// A step changes an exponent by at most this fraction: it keeps its sign, and with it μα > 0.
 const MAX_CHANGE: f64 = 0.5;
-/// A step changes ln κ by at most this.
+/// A step changes ln κ and ln |μ| by at most this.
 const MAX_LOG_CHANGE: f64 = 1.0;
 /// κ stays between these multiples of the start's shear modulus, between which the elements neither lock nor invert.
 const BULK_RATIO: [f64; 2] = [5.0, 1e4];
 /// μ and α come no nearer to zero than this fraction of the start's: a term that fades stops there and is reported.
 const SMALLEST_PART: f64 = 1e-3;
+/// |α| stays a little below what a material may have.
+const LARGEST_EXPONENT: f64 = 0.99 * MAX_ALPHA;
 /// Added to the matrix scaled to a unit diagonal, so that directions without information stay where they are.
 const RIDGE: f64 = 1e-12;
+/// Tried in turn where the limited problem cannot be solved.
+const LARGER_RIDGES: [f64; 3] = [1e-9, 1e-7, 1e-5];
 /// A limit counts as reached where less than this is left of it (scaled parameters).
 const REACHED: f64 = 1e-6;
 /// A violation of a limit below this is rounding (scaled parameters).
@@ -74,7 +78,14 @@ impl Constraints {
         Ok(Constraints {
             // A start outside may stay there.
             bulk_range: [(BULK_RATIO[0] * shear).min(start.bulk_kpa), (BULK_RATIO[1] * shear).max(start.bulk_kpa)],
-            smallest: start.parameters().iter().map(|p| SMALLEST_PART * start.value(*p).abs()).collect(),
+            smallest: start
+                .parameters()
+                .iter()
+                .map(|p| {
+                    let least = if matches!(p, Parameter::Alpha(_)) { 1.01 * MIN_ALPHA } else { 0.0 };
+                    (SMALLEST_PART * start.value(*p).abs()).max(least)
+                })
+                .collect(),
             order,
             min_gap: options.min_alpha_gap,
             held: if options.bulk == Bulk::Held { options.held.with(0) } else { options.held },
@@ -85,7 +96,7 @@ impl Constraints {
         let mut limits = Vec::new();
         for (i, parameter) in system.parameters.iter().enumerate() {
             let name = parameter.name();
-            let trust = if *parameter == Parameter::Kappa { MAX_LOG_CHANGE } else { MAX_CHANGE };
+            let trust = if matches!(parameter, Parameter::Alpha(_)) { MAX_CHANGE } else { MAX_LOG_CHANGE };
             if *parameter == Parameter::Kappa {
                 let [low, high] = self.bulk_range.map(|limit| (limit / system.values[i]).ln());
                 limits.push(Limit {
@@ -100,8 +111,13 @@ impl Constraints {
                 });
             }
             if *parameter != Parameter::Kappa {
-                let room = (1.0 - self.smallest[i] / system.values[i].abs()).max(0.0);
+                let part = self.smallest[i] / system.values[i].abs();
+                let room = if let Parameter::Mu(_) = parameter { -part.ln() } else { 1.0 - part }.max(0.0);
                 limits.push(Limit { name: format!("{name}: smallest size"), coefficients: vec![(i, -1.0)], room });
+            }
+            if let Parameter::Alpha(_) = parameter {
+                let room = (LARGEST_EXPONENT / system.values[i].abs() - 1.0).max(0.0);
+                limits.push(Limit { name: format!("{name}: largest size"), coefficients: vec![(i, 1.0)], room });
             }
             if is_trusted {
                 for sign in [1.0, -1.0] {
@@ -158,7 +174,16 @@ impl Constraints {
             // Where no limit is reached the normal equations give the step to more digits.
             Some(x) if limits.iter().all(|(row, room, _)| used(row, &x) <= *room) => x,
             _ => {
-                let mut x = solve_limited(&damped, &gradient, &limits)?;
+                // A nearly singular matrix may be beyond the interior point's accuracy: a larger ridge then.
+                let mut found = solve_limited(&damped, &gradient, &limits);
+                for ridge in LARGER_RIDGES {
+                    if found.is_ok() {
+                        break;
+                    }
+                    let ridged = &damped + DMatrix::from_diagonal_element(m, m, ridge);
+                    found = solve_limited(&ridged, &gradient, &limits);
+                }
+                let mut x = found?;
                 // Rest is within all limits, so drawing back towards it is too. A violation by rounding is let be: where no
                 // room is left it would draw the whole step back.
                 let part = limits

@@ -43,7 +43,7 @@ fn trust_limits_cut_each_parameter() {
     let s = system(&material, DMatrix::from_diagonal(&DVector::from_row_slice(&[1.0, 1e4, 1e6])), &[5.0, -2e4, 1e5]);
     let constraints = Constraints::new(&material, &FitOptions::default()).unwrap();
     let step = constraints.step(&s, 0.0, true).unwrap();
-    for (found, exact) in step.change.iter().zip([MAX_LOG_CHANGE, -MAX_CHANGE, 0.1]) {
+    for (found, exact) in step.change.iter().zip([MAX_LOG_CHANGE, -MAX_LOG_CHANGE, 0.1]) {
         // Interior-point tolerance over the smallest scaled curvature.
         assert!((found - exact).abs() < 1e-6, "{found} {exact}");
     }

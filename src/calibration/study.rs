@@ -2,17 +2,24 @@
 //! terms found?
 //!
 //! The truth is solved on another mesh than the one fitted on. What that mesh shifts is told apart from the noise by a fit to
-//! the noiseless scan; coverage is that of the truth plus this shift. Whether a term can be found at all is said by the
+//! the noiseless scan: coverage by the noise's intervals is that of the truth plus this shift, coverage by the whole intervals,
+//! which allow for discretisation, that of the truth itself. Whether a term can be found at all is said by the
 //! increase δ of χ² of the best model with a term less on the noiseless scan: the decrease seen in a draw is then distributed
 //! as noncentral χ² with two degrees of freedom, and BIC asks for 2 ln n.
+//!
+//! A model's prediction does not depend on the noise: fits of a draw start from the optimum of the noiseless scan, whose
+//! equilibria and derivatives all draws share. The first draws are also fitted from blind starts, which must end in the same
+//! optimum.
 
-use super::calibrate::{CalibrateOptions, Run, falling};
+use super::allowance::ERROR_OVER_SHIFT;
+use super::calibrate::{CalibrateOptions, MESH_RATIO, Run, falling};
 use super::error::CalibrationError;
 use super::observed::Observed;
 use super::problem::{CalibrationProblem, RecordingFit};
 use super::profile::TWO_SIDED_95;
+use super::starts::Candidates;
 use super::synthetic::SyntheticScan;
-use super::terms::{Rule, choose};
+use super::terms::{Rule, choose, compare};
 use crate::material::Ogden;
 use crate::mesh::MeshOptions;
 use crate::recording::Filter;
@@ -34,13 +41,15 @@ pub struct StudyCase {
     pub filter: Filter,
     /// Mesh of the truth.
     pub truth_mesh: MeshOptions,
-    /// Mesh of the fits.
-    pub fit_mesh: MeshOptions,
+    /// Mesh of the fits: its settings for an element size relative to that of the fits.
+    pub fit_mesh: fn(&Specimen, f64) -> MeshOptions,
     /// Draws of noise.
     pub draws: usize,
+    /// Draws that are fitted from blind starts too.
+    pub blind_draws: usize,
     /// Seed of the noise.
     pub seed: u64,
-    /// Settings of the fits; profiles, contours and the second mesh are not used.
+    /// Settings of the fits; profiles, contours and the mesh's factor are not used.
     pub options: CalibrateOptions,
 }
 
@@ -61,6 +70,10 @@ pub struct StudyRow {
     pub promised_sd: f64,
     /// Part of the draws whose 95 % interval holds the truth plus the mesh's shift; NaN where no interval is stated.
     pub coverage: f64,
+    /// Standard deviation allowed for discretisation errors.
+    pub discretisation_sd: f64,
+    /// Part of the draws whose whole 95 % interval holds the truth.
+    pub coverage_of_truth: f64,
 }
 
 /// All draws.
@@ -72,6 +85,8 @@ pub struct Study {
     pub num_fitted: usize,
     /// Draws.
     pub num_draws: usize,
+    /// Draws fitted from blind starts too, and those that ended in the same optimum.
+    pub num_blind: [usize; 2],
     /// Draws for which a rule took 1, 2, 3, … terms: BIC, F-test, decrement.
     pub num_by_rule: [Vec<usize>; 3],
     /// Expected χ² decrease by the last term of the truth; none for one term.
@@ -80,6 +95,8 @@ pub struct Study {
     pub needed_decrease: f64,
     /// Probability that BIC keeps the last term of the truth.
     pub detection_probability: Option<f64>,
+    /// χ² decrease that a term more than the truth's promises on the noiseless scan: the meshes' doing.
+    pub spurious_decrease: f64,
     /// Mean of χ² per datum.
     pub chi2_per_datum: f64,
     /// Standard deviation of χ² per datum over the draws.
@@ -90,17 +107,17 @@ impl fmt::Display for Study {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "{} of {} draws fitted, chi2 per datum {:.4} ± {:.4}",
-            self.num_fitted, self.num_draws, self.chi2_per_datum, self.chi2_sd
+            "{} of {} draws fitted, {} of {} blind ones alike, chi2 per datum {:.4} ± {:.4}",
+            self.num_fitted, self.num_draws, self.num_blind[1], self.num_blind[0], self.chi2_per_datum, self.chi2_sd
         )?;
         writeln!(
             f,
-            "  parameter      truth  mesh shift  mean shift    found sd   promised sd  ratio  coverage of 95 % intervals"
+            "  parameter      truth  mesh shift  mean shift    found sd   promised sd  ratio  covered   mesh sd  truth covered"
         )?;
         for r in &self.rows {
             writeln!(
                 f,
-                "  {:<8} {:>11.4} {:>+11.4} {:>+11.4} {:>11.4} {:>13.4}  {:.3}  {:.1} %",
+                "  {:<8} {:>11.4} {:>+11.4} {:>+11.4} {:>11.4} {:>13.4}  {:.3}  {:>5.1} % {:>9.4}  {:>5.1} %",
                 r.parameter,
                 r.truth,
                 r.mesh_shift,
@@ -108,11 +125,18 @@ impl fmt::Display for Study {
                 r.found_sd,
                 r.promised_sd,
                 r.found_sd / r.promised_sd,
-                100.0 * r.coverage
+                100.0 * r.coverage,
+                r.discretisation_sd,
+                100.0 * r.coverage_of_truth
             )?;
         }
         let [bic, f_test, decrement] = &self.num_by_rule;
-        writeln!(f, "  draws with 1, 2, … terms: BIC {bic:?}, F-test {f_test:?}, decrement {decrement:?}")?;
+        writeln!(
+            f,
+            "  draws with 1, 2, … terms: BIC {bic:?}, F-test {f_test:?}, decrement {decrement:?}; the meshes promise {:.1} to \
+             a term more",
+            self.spurious_decrease
+        )?;
         if let (Some(expected), Some(probability)) = (self.expected_decrease, self.detection_probability) {
             writeln!(
                 f,
@@ -132,6 +156,16 @@ struct Draw {
     /// The fit with as many terms as the truth.
     fit: Option<DrawFit>,
     chosen: [usize; 3],
+    /// Whether a blind start found the same optimum, where one was tried.
+    is_alike: Option<bool>,
+}
+
+/// What all draws start from.
+struct Reference {
+    /// Of the noiseless scan, with 1, 2, … terms.
+    fits: Vec<RecordingFit>,
+    /// A term more than the truth's.
+    candidates: Candidates,
 }
 
 /// Runs the draws in parallel; the result does not depend on the number of threads.
@@ -153,27 +187,28 @@ pub fn study(
     let truth = falling(&case.truth);
     let num_terms = truth.terms.len();
     let clean = observe(synthetic.noiseless())?;
-    let mut problem = CalibrationProblem::new(&clean, &|_| case.fit_mesh, case.options.objective)?;
-    let noiseless = problem.fit(&truth, None, &case.options.fit, &stop)?;
-    let (expected_decrease, needed_decrease) = {
-        let needed = 2.0 * (noiseless.num_data as f64).ln();
-        let silent = |_: &str| {};
-        let fewer = CalibrateOptions { terms: super::TermCount::Fixed(num_terms.saturating_sub(1)), ..case.options };
-        let expected = if num_terms > 1 {
-            let (_, fits) = Run::new(&fewer, true, &silent, &stop).select(&mut problem)?;
-            fits.last().map(|f| (f.chi2 - noiseless.chi2).max(0.0))
-        } else {
-            None
-        };
-        (expected, needed)
+    let new_problem = |factor: f64| -> Result<CalibrationProblem<'_>, CalibrationError> {
+        CalibrationProblem::new(&clean, &|s| (case.fit_mesh)(s, factor), case.options.objective)
     };
+    let mut problem = new_problem(1.0)?;
+    let noiseless = problem.fit(&truth, None, &case.options.fit, &stop)?;
+    let coarse = new_problem(MESH_RATIO)?.fit(&truth, None, &case.options.fit, &stop)?;
+    let needed_decrease = 2.0 * (noiseless.num_data as f64).ln();
+    let mut fits = Vec::new();
+    if num_terms > 1 {
+        let silent = |_: &str| {};
+        let fewer = CalibrateOptions { terms: super::TermCount::Fixed(num_terms - 1), ..case.options };
+        fits = Run::new(&fewer, true, &silent, &stop).select(&mut problem)?.1;
+    }
+    let expected_decrease = fits.last().map(|f| (f.chi2 - noiseless.chi2).max(0.0));
+    let candidates = Candidates::new(&mut problem, &noiseless, &case.options.fit, &stop)?;
+    let spurious_decrease = candidates.ranked(&problem.targets()?, 1).first().map_or(0.0, |(gain, _)| *gain);
+    fits.push(noiseless.clone());
+    let reference = Reference { fits, candidates };
     let chunk = case.draws.div_ceil(rayon::current_num_threads().max(1)).max(1);
     let starts: Vec<usize> = (0..case.draws).step_by(chunk).collect();
     // Models are made one after another: the ordering library shares its random state between threads.
-    let problems: Vec<CalibrationProblem> = starts
-        .iter()
-        .map(|_| CalibrationProblem::new(&clean, &|_| case.fit_mesh, case.options.objective))
-        .collect::<Result<_, _>>()?;
+    let problems: Vec<CalibrationProblem> = starts.iter().map(|_| new_problem(1.0)).collect::<Result<_, _>>()?;
     let draws: Vec<Vec<Draw>> = problems
         .into_par_iter()
         .zip(starts)
@@ -182,7 +217,8 @@ pub fn study(
             for draw in first..(first + chunk).min(case.draws) {
                 let data = observe(&synthetic.draw(case.seed, draw as u64))?;
                 let mut present = problem.with_data(&data)?;
-                done.push(one_draw(&mut present, case, num_terms, &|| is_cancelled())?);
+                let is_blind = draw < case.blind_draws;
+                done.push(one_draw(&mut present, case, &reference, is_blind, &|| is_cancelled())?);
                 problem = present.with_data(&clean)?;
                 on_draw();
             }
@@ -190,41 +226,60 @@ pub fn study(
         })
         .collect::<Result<_, CalibrationError>>()?;
     let draws: Vec<Draw> = draws.into_iter().flatten().collect();
-    Ok(summarise(&draws, &truth, &noiseless, expected_decrease, needed_decrease))
+    let mut found = summarise(&draws, &truth, &noiseless, &coarse, case.options.discretisation_factor);
+    found.expected_decrease = expected_decrease;
+    found.needed_decrease = needed_decrease;
+    found.detection_probability = expected_decrease.map(|d| detection_probability(d, needed_decrease));
+    found.spurious_decrease = spurious_decrease;
+    Ok(found)
 }
 
 fn one_draw(
     problem: &mut CalibrationProblem,
     case: &StudyCase,
-    num_terms: usize,
+    reference: &Reference,
+    is_blind: bool,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Draw, CalibrationError> {
     let silent = |_: &str| {};
     let mut run = Run::new(&case.options, true, &silent, is_cancelled);
-    let (rows, fits) = match run.select(problem) {
-        Err(e) if e.is_of_the_data() => return Ok(Draw { fit: None, chosen: [0; 3] }),
-        other => other?,
-    };
+    let (mut rows, mut fits) = (Vec::new(), Vec::new());
+    for from in &reference.fits {
+        let fit = match problem.fit_from(from, &case.options.fit, is_cancelled) {
+            Err(e) if e.is_of_the_data() => return Ok(Draw { fit: None, chosen: [0; 3], is_alike: None }),
+            other => other?,
+        };
+        rows.push(run.row(problem, &fit, 1, 1)?);
+        fits.push(fit);
+    }
+    let num_terms = fits.len();
+    let starts = reference.candidates.ranked(&problem.targets()?, case.options.num_starts);
+    let starts: Vec<Ogden> =
+        starts.into_iter().filter(|(promise, _)| *promise >= case.options.least_promise).map(|(_, s)| s).collect();
+    if let Some((row, _)) = run.best_of(problem, &starts)? {
+        rows.push(row);
+    }
+    compare(&mut rows, fits[0].num_data);
     let chosen = [Rule::Bic, Rule::FTest, Rule::Decrement].map(|r| choose(&rows, r, case.options.decrement_threshold));
-    let fit = match fits.get(num_terms - 1).filter(|f| f.is_converged) {
-        None => None,
-        Some(fit) => {
-            let sorted = problem.fit(&falling(&fit.material), Some(fit), &case.options.fit, is_cancelled)?;
-            let parameters = sorted.material.parameters();
-            let values = parameters.iter().map(|p| sorted.material.value(*p)).collect();
-            Some((values, parameters.iter().map(|p| sorted.sd(*p)).collect(), sorted.chi2_per_datum))
-        }
-    };
-    Ok(Draw { fit, chosen })
+    let fit = fits.pop().filter(|f| f.is_converged);
+    let mut is_alike = None;
+    if is_blind {
+        let blind = match run.select(problem) {
+            Err(e) if e.is_of_the_data() => None,
+            other => other?.1.get(num_terms - 1).map(|f| f.chi2),
+        };
+        // Both are within a small part of a standard deviation of the optimum.
+        is_alike = Some(fit.as_ref().zip(blind).is_some_and(|(f, chi2)| (chi2 - f.chi2).abs() < 0.1));
+    }
+    let fit = fit.map(|fit| {
+        let parameters = fit.material.parameters();
+        let values = parameters.iter().map(|p| fit.material.value(*p)).collect();
+        (values, parameters.iter().map(|p| fit.sd(*p)).collect(), fit.chi2_per_datum)
+    });
+    Ok(Draw { fit, chosen, is_alike })
 }
 
-fn summarise(
-    draws: &[Draw],
-    truth: &Ogden,
-    noiseless: &RecordingFit,
-    expected_decrease: Option<f64>,
-    needed_decrease: f64,
-) -> Study {
+fn summarise(draws: &[Draw], truth: &Ogden, noiseless: &RecordingFit, coarse: &RecordingFit, factor: f64) -> Study {
     let fitted: Vec<&DrawFit> = draws.iter().filter_map(|d| d.fit.as_ref()).collect();
     // 0/0 is the NaN that is meant.
     let mean = |values: &mut dyn Iterator<Item = f64>| {
@@ -243,6 +298,9 @@ fn summarise(
             let at = noiseless.material.value(parameter);
             let values: Vec<f64> = fitted.iter().map(|d| d.0[i]).collect();
             let stated = || fitted.iter().filter_map(|d| d.1[i].map(|sd| (d.0[i], sd)));
+            let discretisation_sd = factor * ERROR_OVER_SHIFT * (at - coarse.material.value(parameter)).abs();
+            let true_value = truth.value(parameter);
+            let covers = |v: f64, center: f64, sd: f64| f64::from(u8::from((v - center).abs() <= TWO_SIDED_95 * sd));
             StudyRow {
                 parameter: parameter.name(),
                 truth: truth.value(parameter),
@@ -250,7 +308,11 @@ fn summarise(
                 mean_shift: mean(&mut values.iter().copied()) - at,
                 found_sd: spread(&values),
                 promised_sd: mean(&mut stated().map(|(_, sd)| sd)),
-                coverage: mean(&mut stated().map(|(v, sd)| f64::from(u8::from((v - at).abs() <= TWO_SIDED_95 * sd)))),
+                coverage: mean(&mut stated().map(|(v, sd)| covers(v, at, sd))),
+                discretisation_sd,
+                coverage_of_truth: mean(
+                    &mut stated().map(|(v, sd)| covers(v, true_value, sd.hypot(discretisation_sd))),
+                ),
             }
         })
         .collect();
@@ -263,9 +325,14 @@ fn summarise(
         num_fitted: fitted.len(),
         num_draws: draws.len(),
         num_by_rule,
-        expected_decrease,
-        needed_decrease,
-        detection_probability: expected_decrease.map(|d| detection_probability(d, needed_decrease)),
+        num_blind: [
+            draws.iter().filter(|d| d.is_alike.is_some()).count(),
+            draws.iter().filter(|d| d.is_alike == Some(true)).count(),
+        ],
+        expected_decrease: None,
+        needed_decrease: f64::NAN,
+        detection_probability: None,
+        spurious_decrease: f64::NAN,
         chi2_per_datum: mean(&mut chi2.iter().copied()),
         chi2_sd: spread(&chi2),
     }

@@ -6,12 +6,13 @@ fn case(truth: Ogden, filter: Filter, draws: usize, max_terms: usize) -> StudyCa
     let specimen = block();
     StudyCase {
         truth_mesh: MeshOptions { grading: 0.4, ..MeshOptions::scaled(&specimen, 2.0) },
-        fit_mesh: MeshOptions::scaled(&specimen, 2.5),
+        fit_mesh: |s, factor| MeshOptions::scaled(s, 2.5 * factor),
         specimen,
         truth,
         scan: scan(),
         filter,
         draws,
+        blind_draws: 3,
         seed: 7,
         options: CalibrateOptions {
             terms: TermCount::Auto { max: max_terms },

@@ -1,7 +1,8 @@
 //! The misfit of a model's prediction and its Gauss–Newton system in scaled parameters.
 //!
 //! The objective is that of [`super::target`], plus (ln κ − ln κ₀)²/σ_κ² where a prior is set.
-//! Scaled parameters: ln κ; every other ξ relative to its present value, ξ (1 + s). With the residuals r and their
+//! Scaled parameters: ln κ and ln |μ|, κ eˢ and μ eˢ; α relative to its present value, α (1 + s). What a term's stress at the
+//! largest stretches fixes, ln |μ| + α ln λ, is then a straight valley: with μ (1 + s) steps along it have to be short. With the residuals r and their
 //! derivatives the gradient is g = −½ ∂χ²/∂s and the matrix is H = ½ ∂²χ²/∂s² without the second derivatives of the model.
 
 use super::error::CalibrationError;
@@ -223,7 +224,10 @@ impl NormalSystem {
         let mut next = material.clone();
         for (i, &parameter) in self.parameters.iter().enumerate() {
             let value = self.values[i];
-            let moved = if parameter == Parameter::Kappa { value * step[i].exp() } else { value * (1.0 + step[i]) };
+            let moved = match parameter {
+                Parameter::Kappa | Parameter::Mu(_) => value * step[i].exp(),
+                Parameter::Alpha(_) => value * (1.0 + step[i]),
+            };
             next.set(parameter, moved);
         }
         next

@@ -8,6 +8,7 @@ use super::error::CalibrationError;
 use super::observed::{Observed, View};
 use super::synthetic::Measurement;
 use super::system::Prediction;
+use crate::fem::Equilibrium;
 use crate::sensitivity::ScanSettings;
 use nalgebra::DMatrix;
 
@@ -122,6 +123,18 @@ impl<'a> Target<'a> {
             }
         }
         Ok(targets)
+    }
+
+    /// The same weights for other values: displacements per drive, and forces of `states` where there were forces.
+    pub(super) fn with_measured(&self, displacements: &'a [Vec<[f64; 3]>], states: &[Equilibrium]) -> Target<'a> {
+        let mut other = self.clone();
+        for ((step, field), state) in other.steps.iter_mut().zip(displacements).zip(states) {
+            step.measured = field;
+            if let Some(force) = &mut step.force {
+                force.value_n = state.force_n;
+            }
+        }
+        other
     }
 
     /// Expected objective of pure noise, and the number of data.

@@ -2,7 +2,7 @@
 
 use super::error::CliError;
 use super::{Common, input, interrupt, output};
-use crate::calibration::{Objective, PAPER_BETA, StandIn, StandInOptions, stand_ins};
+use crate::calibration::{Contour, Objective, PAPER_BETA, StandIn, StandInOptions, stand_ins};
 use crate::recording::Filter;
 use crate::report::{ContourPlot, contour_panels};
 use crate::sensitivity::{PartialVoxels, ScanSettings};
@@ -61,7 +61,12 @@ pub(super) fn run(a: &PaperTablesArguments) -> Result<(), CliError> {
         .map_err(|e| CliError::Numerics(e.to_string()))?;
     let name = PathBuf::from("paper-tables");
     if let Some(folder) = output::folder(a.common.out.as_deref(), a.common.json, &name) {
-        let picture = ContourPlot { panels: contour_panels(&contours, &|_| None) }.to_svg();
+        // The one-term fit stands in the middle of every axis.
+        let middle = |name: &str| {
+            let axis = |c: &Contour| c.parameters.iter().position(|p| p == name).map(|a| c.values[a].clone());
+            contours.iter().find_map(axis).and_then(|values| values.get(values.len() / 2).copied())
+        };
+        let picture = ContourPlot { panels: contour_panels(&contours, &middle) }.to_svg();
         output::write_file(&folder, "contours.svg", picture.as_bytes())?;
     }
     if a.common.json {

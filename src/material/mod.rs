@@ -8,7 +8,7 @@ mod read;
 pub use lanes::{LANES, Lanes};
 pub use ogden_lanes::{MAX_TERMS, SpectralState, Tensor};
 pub use point::{energy_density, first_piola_kirchhoff_stress, material_tangent, stress_parameter_derivative};
-pub use read::{MaterialError, SCHEMA};
+pub use read::{MAX_ALPHA, MIN_ALPHA, MaterialError, SCHEMA};
 
 use serde::{Deserialize, Serialize};
 
