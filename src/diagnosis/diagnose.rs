@@ -2,7 +2,7 @@
 
 use super::causes::{Category, Cause, Location, registry};
 use super::error::DiagnosisError;
-use super::fit::{BulkPrior, FitSettings, Fitted, STEP, Supposed, fit, paths_of, scene_of, shear_modulus};
+use super::fit::{BulkPrior, FitSettings, Fitted, STEP, ShearPrior, Supposed, fit, paths_of, scene_of, shear_modulus};
 use super::laboratory::Laboratory;
 use super::load_history::{ElasticTable, FittedEffect, Homogeneous, LoadEffect, LoadHistoryFit, fit_load_history};
 use super::maps::{ScoreMap, debond_map, inclusion_map, jumps};
@@ -186,8 +186,15 @@ pub fn diagnose(
     let num_unknowns = laboratory.num_unknowns()?;
     let mut measured = laboratory.measured();
     let start = first_guess(&mut laboratory, options, is_cancelled)?;
-    let settings =
-        FitSettings { max_iterations: 12, bulk: BulkPrior { center_kpa: start.bulk_kpa, log_sd: 0.5 }, tolerance: 0.3 };
+    // Without a force the modulus is that of the first guess; what is fitted are ratios and shapes.
+    let has_force = observed.steps.iter().any(|s| s.force.is_some());
+    let shear = (!has_force).then(|| ShearPrior { center_kpa: shear_modulus(&start), log_sd: KNOWN_BULK });
+    let settings = FitSettings {
+        max_iterations: 12,
+        bulk: BulkPrior { center_kpa: start.bulk_kpa, log_sd: 0.5 },
+        shear,
+        tolerance: 0.3,
+    };
     progress(&format!("fitting the nominal model ({num_unknowns} unknowns)"));
     let mut work = Work {
         laboratory: &mut laboratory,

@@ -28,6 +28,32 @@ pub struct BulkPrior {
     pub log_sd: f64,
 }
 
+/// What is known of the initial shear modulus beforehand: its logarithm is Gaussian. Without any force the displacement says
+/// nothing of it, only of its ratio to κ.
+#[derive(Clone, Copy, Debug)]
+pub struct ShearPrior {
+    /// Centre, kPa.
+    pub center_kpa: f64,
+    /// Standard deviation of its logarithm.
+    pub log_sd: f64,
+}
+
+impl ShearPrior {
+    /// Squared distance, its gradient's negative half and the curvature's half, in scaled parameters (κ first).
+    fn terms(&self, material: &Ogden) -> (f64, Vec<f64>, f64) {
+        let modulus = shear_modulus(material);
+        let away = (self.center_kpa / modulus).ln();
+        let weight = self.log_sd.powi(-2);
+        let mut slope = vec![0.0];
+        for t in &material.terms {
+            // Modulus and exponent of a term act alike on ½ μ α.
+            let share = 0.5 * t.mu_kpa * t.alpha / modulus;
+            slope.extend([share, share]);
+        }
+        (weight * away * away, slope, weight * away)
+    }
+}
+
 /// Settings of a fit.
 #[derive(Clone, Copy, Debug)]
 pub struct FitSettings {
@@ -35,6 +61,8 @@ pub struct FitSettings {
     pub max_iterations: usize,
     /// κ.
     pub bulk: BulkPrior,
+    /// The shear modulus, where no force was recorded.
+    pub shear: Option<ShearPrior>,
     /// Converged when the linear model promises to lower the deviance by less than this.
     pub tolerance: f64,
 }
@@ -238,6 +266,16 @@ fn normal_system(
     let prior = 1.0 / settings.bulk.log_sd.powi(2);
     matrix[(0, 0)] += prior;
     gradient[0] += prior * (settings.bulk.center_kpa / material.bulk_kpa).ln();
+    if let Some(shear) = &settings.shear {
+        let (_, slope, pull) = shear.terms(material);
+        let weight = shear.log_sd.powi(-2);
+        for a in 0..slope.len() {
+            gradient[a] += pull * slope[a];
+            for b in 0..slope.len() {
+                matrix[(a, b)] += weight * slope[a] * slope[b];
+            }
+        }
+    }
     let mut i = material.parameters().len();
     for supposed in causes {
         let (parameters, start) = (supposed.cause.parameters(), supposed.cause.start());
@@ -262,6 +300,7 @@ fn deviance_of(
     let residual = metric.weigh(&measured.plus(-1.0, &prediction.trace));
     let mut sum = metric.inner(&residual, &residual);
     sum += ((settings.bulk.center_kpa / material.bulk_kpa).ln() / settings.bulk.log_sd).powi(2);
+    sum += settings.shear.map_or(0.0, |shear| shear.terms(material).0);
     for supposed in causes {
         let (parameters, start) = (supposed.cause.parameters(), supposed.cause.start());
         for n in 0..parameters.len() {
