@@ -15,7 +15,7 @@ fn options(specimen: &Specimen, factor: f64) -> DumbbellOptions {
         mesh: MeshOptions::scaled(specimen, factor),
         fit: CurveFitOptions { max_terms: 2, bulk_kpa: Some(2200.0), ..CurveFitOptions::default() },
         max_rounds: 16,
-        tolerance: 1e-3,
+        tolerance: 1.5e-3,
     }
 }
 
@@ -38,7 +38,7 @@ fn the_material_behind_a_dumb_bell_is_recovered() {
     for p in &fit.parameters {
         println!("{} {:.4} {:?}", p.name, p.value, p.interval_95);
     }
-    assert!(found.last_change <= 1e-3 && found.force_mismatch < 0.01, "{}", found.force_mismatch);
+    assert!(found.last_change <= 1.5e-3 && found.force_mismatch < 0.01, "{}", found.force_mismatch);
     let modulus = 0.5 * truth.terms.iter().map(|t| t.mu_kpa * t.alpha).sum::<f64>();
     let g = fit.initial_shear_modulus_kpa.value;
     assert!((g / modulus - 1.0).abs() < 0.03, "{g} {modulus}");

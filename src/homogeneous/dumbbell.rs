@@ -2,8 +2,7 @@
 //!
 //! Shoulders and grips take part of the displacement, and how much depends on the material's curve. Conversion and fit are
 //! repeated in turn: fit → finite elements at a few displacements → gauge stretch over displacement → fit, until the
-//! stretches stay where they are. The turns alone contract slowly where the curve stiffens; they are accelerated by
-//! Anderson's method (D. G. Anderson, J. ACM 12, 1965) over the last few rounds.
+//! stretches stay where they are.
 
 use super::curve::{Curve, CurveError};
 use super::deformation::{HomogeneousTest, ShearTerm};
@@ -13,7 +12,6 @@ use super::table::{ForceTable, TableError};
 use crate::fem::{ForwardModel, PrepareError, SolveError, SolveOptions};
 use crate::mesh::MeshOptions;
 use crate::specimen::{Outline, Specimen, dumbbell};
-use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 /// κ of the finite elements where none is given, relative to the initial shear modulus: Poisson's ratio 0.4995.
@@ -22,13 +20,6 @@ const BULK_RATIO: f64 = 1000.0;
 const HALF_GAUGE_MM: f64 = 3.0;
 /// Displacements at which the finite elements are solved.
 const NUM_DRIVES: usize = 8;
-/// Rounds that the acceleration looks back on.
-const DEPTH: usize = 3;
-/// Changes below this part of the largest strain are in proportion to the distance from the end: before, turns are taken as
-/// they are.
-const LINEAR: f64 = 0.03;
-/// Ridge of its least squares, relative to the trace: rounds that say the same must not be told apart.
-const RIDGE: f64 = 1e-8;
 
 /// Settings of [`fit_dumbbell`].
 #[derive(Clone, Debug)]
@@ -168,24 +159,13 @@ pub fn fit_dumbbell(
     let length = dumbbell::effective_length_mm();
     let mut stretch: Vec<f64> = displacement_mm.iter().map(|d| 1.0 + d / length).collect();
     let mut round = 0;
-    let mut past: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
-    // What the last turn led to, where a combination was taken instead.
-    let mut plain: Option<Vec<f64>> = None;
     loop {
         round += 1;
         let curve = Curve::new("uniaxial", HomogeneousTest::Uniaxial, &stretch, &stress)?;
         let sequence = fit_curves(&[curve], &options.fit)?;
         let chosen = sequence.chosen();
         let bulk_kpa = options.fit.bulk_kpa.unwrap_or(BULK_RATIO * chosen.initial_shear_modulus_kpa.value);
-        let conversion = match gauge_stretches(&mut model, &chosen.terms(), bulk_kpa, &drives, is_cancelled) {
-            // A combination that leads to a material without an equilibrium was a bad one: on with the turn itself.
-            Err(SolveError::Diverged { .. }) if plain.is_some() && round < options.max_rounds => {
-                stretch = plain.take().unwrap_or(stretch);
-                past.clear();
-                continue;
-            }
-            other => other?,
-        };
+        let conversion = gauge_stretches(&mut model, &chosen.terms(), bulk_kpa, &drives, is_cancelled)?;
         let at: Vec<f64> = std::iter::once(0.0).chain(conversion.iter().map(|c| c.displacement_mm)).collect();
         let gauge: Vec<f64> = std::iter::once(1.0).chain(conversion.iter().map(|c| c.gauge_stretch)).collect();
         let table = ForceTable::new(&at, &gauge)?;
@@ -208,74 +188,6 @@ pub fn fit_dumbbell(
                 bulk_kpa,
             });
         }
-        let change: Vec<f64> = next.iter().zip(&stretch).map(|(n, s)| n - s).collect();
-        past.push((stretch, change));
-        if past.len() > DEPTH + 1 {
-            past.remove(0);
-        }
-        if last_change > LINEAR {
-            past.clear();
-        }
-        let combined = accelerated(&past).filter(|s| is_ordered(displacement_mm, s));
-        plain = combined.is_some().then(|| next.clone());
-        stretch = combined.unwrap_or(next);
-    }
-}
-
-/// Anderson's next iterate from pairs (iterate, change that a round makes of it), the latest last: the iterates are combined
-/// so that the combination of their changes is the smallest, and moved by it. `None` where there is nothing to combine.
-fn accelerated(past: &[(Vec<f64>, Vec<f64>)]) -> Option<Vec<f64>> {
-    let (last, before) = past.split_last()?;
-    let m = before.len();
-    if m == 0 {
-        return None;
-    }
-    let difference =
-        |a: &[f64], b: &[f64]| -> DVector<f64> { DVector::from_iterator(a.len(), a.iter().zip(b).map(|(a, b)| a - b)) };
-    let columns: Vec<(DVector<f64>, DVector<f64>)> =
-        before.iter().map(|(x, f)| (difference(&last.0, x), difference(&last.1, f))).collect();
-    let change = DVector::from_column_slice(&last.1);
-    let mut gram = DMatrix::from_fn(m, m, |i, j| columns[i].1.dot(&columns[j].1));
-    let ridge = RIDGE * gram.trace();
-    (0..m).for_each(|i| gram[(i, i)] += ridge);
-    let weights = gram.cholesky()?.solve(&DVector::from_fn(m, |i, _| columns[i].1.dot(&change)));
-    let mut next = DVector::from_column_slice(&last.0) + &change;
-    for (weight, (x, f)) in weights.iter().zip(&columns) {
-        next -= (x + f) * *weight;
-    }
-    Some(next.iter().copied().collect())
-}
-
-/// Whether the stretches rise with the displacements from no less than nearly one.
-fn is_ordered(displacement_mm: &[f64], stretch: &[f64]) -> bool {
-    let mut order: Vec<usize> = (0..stretch.len()).collect();
-    order.sort_by(|&a, &b| displacement_mm[a].total_cmp(&displacement_mm[b]));
-    let is_rising =
-        order.windows(2).all(|w| stretch[w[1]] > stretch[w[0]] || displacement_mm[w[1]] <= displacement_mm[w[0]]);
-    is_rising && stretch.iter().all(|s| *s > 0.9)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A linear map of three dimensions that contracts by 0.9 at best: after three combinations the fixed point is known but
-    /// for the ridge.
-    #[test]
-    fn acceleration_solves_linear_turns() {
-        let fixed = [1.2, 1.5, 2.0];
-        let rates = [0.9, -0.8, 0.5];
-        let turn = |x: &[f64]| -> Vec<f64> { (0..3).map(|i| rates[i] * (x[i] - fixed[i])).collect() };
-        let mut x = vec![1.0, 1.0, 1.0];
-        let mut past: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
-        for _ in 0..5 {
-            let change: Vec<f64> = turn(&x).iter().zip(&x).zip(fixed).map(|((t, x), f)| t + f - x).collect();
-            past.push((x.clone(), change.clone()));
-            x = accelerated(&past).unwrap_or_else(|| x.iter().zip(&change).map(|(x, c)| x + c).collect());
-        }
-        // The ridge leaves a part of 1e-8 over the smallest relative eigenvalue of the Gram matrix, some 1e-3 here.
-        for (x, f) in x.iter().zip(fixed) {
-            assert!((x - f).abs() < 1e-3, "{x} {f}");
-        }
+        stretch = next;
     }
 }
