@@ -66,7 +66,7 @@ pub(super) fn run(a: &ProveArguments) -> Result<(), CliError> {
         let first = s.named.first().map_or("none", |n| n);
         let mark = if s.is_right {
             "right"
-        } else if s.is_detectable || s.named.first().is_some() {
+        } else if s.is_detectable || !s.named.is_empty() {
             "WRONG"
         } else {
             "missed"
@@ -96,7 +96,7 @@ pub(super) fn run(a: &ProveArguments) -> Result<(), CliError> {
     }
     output::print(&if a.common.json { output::to_json(&proof)? } else { table(&proof) })?;
     if interrupt::is_requested() {
-        Err(CliError::Interrupted("stopped; the results so far are kept".into()))
+        Err(CliError::Interrupted("the results so far are kept".into()))
     } else {
         Ok(())
     }

@@ -230,10 +230,10 @@ fn image(u: &mut [f64; 3], x: [f64; 3], hidden: &Hidden, specimen: &Specimen, is
             let d = hidden.direction;
             u[hidden.which] += hidden.strength * (1.0 + d[0] * t[0] + d[1] * t[2] + 0.5 * d[2] * t[0] * t[2]);
         }
-        HiddenCause::Wrap if is_last => {
-            if (0..3).all(|a| (x[a] - hidden.center_mm[a]).abs() < 0.5 * hidden.extent_mm[a]) {
-                u[hidden.which] += hidden.strength;
-            }
+        HiddenCause::Wrap
+            if is_last && (0..3).all(|a| (x[a] - hidden.center_mm[a]).abs() < 0.5 * hidden.extent_mm[a]) =>
+        {
+            u[hidden.which] += hidden.strength;
         }
         _ => {}
     }
