@@ -95,11 +95,7 @@ pub(super) fn run(a: &ProveArguments) -> Result<(), CliError> {
         output::write_file(folder, "confusion.svg", confusion_picture(&proof).as_bytes())?;
     }
     output::print(&if a.common.json { output::to_json(&proof)? } else { table(&proof) })?;
-    if interrupt::is_requested() {
-        Err(CliError::Interrupted("the results so far are kept".into()))
-    } else {
-        Ok(())
-    }
+    if interrupt::is_requested() { Err(CliError::Interrupted("the results so far are kept".into())) } else { Ok(()) }
 }
 
 fn table(proof: &Proof) -> String {
