@@ -2,7 +2,7 @@
 //! how the diagnosis fares on them.
 //!
 //! * [`draw_cause`]: a cause, its place, size, material and noise, from a seed.
-//! * [`mod@conceal`]: the recording, from triangular prisms where the diagnosis has hexahedra, with sharp edges where it has
+//! * [`fn@conceal`]: the recording, from triangular prisms where the diagnosis has hexahedra, with sharp edges where it has
 //!   smooth ones, a remeshed specimen where it moves nodes, and force histories of another model.
 //! * [`prove`]: diagnoses each and scores cause, place and intervals; [`Proof`] sums up.
 
