@@ -37,7 +37,7 @@ fn a_plain_gain_error_is_found_with_its_size() {
     let found = score_one(&specimen(), &hidden, true, 2.2, &common::never).unwrap();
     assert!(found.is_right, "{found:?}");
     // Three intervals of 95 %: one may miss.
-    assert!(found.covered.iter().filter(|c| **c).count() >= 2, "{found:?}");
+    assert!(found.deviations.iter().filter(|d| d.1.abs() <= 1.0).count() >= 2, "{found:?}");
 }
 
 /// Where the diagnosis is not told of debonds it must say that something is left.

@@ -2,7 +2,7 @@
 
 use super::error::CliError;
 use super::{Common, interrupt, output};
-use crate::proof::{CauseSummary, Proof, ProofOptions, Scored, prove};
+use crate::proof::{CauseSummary, HiddenCause, Proof, ProofOptions, Scored, prove};
 use crate::report::confusion_picture;
 use crate::specimen::Specimen;
 use clap::Args;
@@ -28,6 +28,9 @@ pub(super) struct ProveArguments {
     /// Element size of the diagnosis as a factor on the standard one (0.3 to 5).
     #[arg(long, default_value_t = 1.8)]
     mesh: f64,
+    /// Hide these causes alone (as they are named in the table; several with commas); `none` for the controls.
+    #[arg(long, value_delimiter = ',')]
+    only: Vec<String>,
     #[command(flatten)]
     common: Common,
 }
@@ -37,12 +40,25 @@ pub(super) fn run(a: &ProveArguments) -> Result<(), CliError> {
     let input = |message: String| CliError::Input { path: PathBuf::from("the published two-hole specimen"), message };
     let specimen =
         Specimen::from_json(include_str!("../../geometries/two-hole-shear.json")).map_err(|e| input(e.to_string()))?;
+    let mut only = Vec::new();
+    for name in &a.only {
+        let known = std::iter::once(HiddenCause::None).chain(HiddenCause::ALL);
+        let cause = known.clone().find(|c| c.name() == name).ok_or_else(|| {
+            let names: Vec<&str> = known.map(HiddenCause::name).collect();
+            CliError::Input {
+                path: PathBuf::from("--only"),
+                message: format!("'{name}' is no cause that can be hidden; there are {}", names.join(", ")),
+            }
+        })?;
+        only.push(cause);
+    }
     let options = ProofOptions {
         per_cause: a.per_cause,
         controls: a.controls,
         unknown: a.unknown,
         seed: a.seed,
         mesh_factor: a.mesh,
+        only,
     };
     let folder = output::folder(a.common.out.as_deref(), a.common.json, std::path::Path::new("prove-diagnosis"));
     // Results are kept as they come: a stopped proof goes on where it was.
@@ -100,7 +116,7 @@ pub(super) fn run(a: &ProveArguments) -> Result<(), CliError> {
 
 fn table(proof: &Proof) -> String {
     let mut text = String::from(
-        "| hidden | recordings | detectable | right | right of detectable | nothing named | place, mm (median) | intervals that hold | named first |\n|---|---|---|---|---|---|---|---|---|\n",
+        "| hidden | recordings | detectable | right | right of detectable | right, nothing left | nothing named | place, mm (median) | intervals that hold | named first |\n|---|---|---|---|---|---|---|---|---|---|\n",
     );
     let row = |k: &CauseSummary, note: &str| {
         let place = k.median_location_error_mm.map_or(String::new(), |x| format!("{x:.1}"));
@@ -108,12 +124,13 @@ fn table(proof: &Proof) -> String {
             if k.num_covered[1] == 0 { String::new() } else { format!("{}/{}", k.num_covered[0], k.num_covered[1]) };
         let named: Vec<String> = k.first_named.iter().map(|(n, c)| format!("{n} {c}")).collect();
         format!(
-            "| {}{note} | {} | {} | {} | {} | {} | {place} | {held} | {} |\n",
+            "| {}{note} | {} | {} | {} | {} | {} | {} | {place} | {held} | {} |\n",
             k.cause.name(),
             k.num_recordings,
             k.num_detectable,
             k.num_right,
             k.num_right_detectable,
+            k.num_right_explained,
             k.num_silent,
             named.join(", ")
         )

@@ -3,7 +3,7 @@
 use super::causes::Cause;
 use super::error::DiagnosisError;
 use super::laboratory::{Laboratory, Prediction};
-use super::metric::Metric;
+use super::metric::{Metric, Weighed};
 use super::scene::Scene;
 use super::trace::Trace;
 use crate::material::{Ogden, Parameter};
@@ -253,40 +253,59 @@ fn normal_system(
 ) -> (DMatrix<f64>, DVector<f64>) {
     let residual = metric.weigh(&measured.plus(-1.0, &prediction.trace));
     let weighed: Vec<_> = columns.iter().map(|c| metric.weigh(c)).collect();
-    let n = columns.len();
-    let mut matrix = DMatrix::zeros(n, n);
-    let mut gradient = DVector::zeros(n);
-    for i in 0..n {
-        gradient[i] = metric.inner(&weighed[i], &residual);
-        for j in 0..=i {
-            matrix[(i, j)] = metric.inner(&weighed[i], &weighed[j]);
-            matrix[(j, i)] = matrix[(i, j)];
-        }
-    }
-    let prior = 1.0 / settings.bulk.log_sd.powi(2);
-    matrix[(0, 0)] += prior;
-    gradient[0] += prior * (settings.bulk.center_kpa / material.bulk_kpa).ln();
+    let matrix = normal_matrix(metric, &weighed, material, causes, settings);
+    let mut gradient =
+        DVector::from_iterator(weighed.len(), weighed.iter().map(|column| metric.inner(column, &residual)));
+    gradient[0] += settings.bulk.log_sd.powi(-2) * (settings.bulk.center_kpa / material.bulk_kpa).ln();
     if let Some(shear) = &settings.shear {
         let (_, slope, pull) = shear.terms(material);
-        let weight = shear.log_sd.powi(-2);
-        for a in 0..slope.len() {
-            gradient[a] += pull * slope[a];
-            for b in 0..slope.len() {
-                matrix[(a, b)] += weight * slope[a] * slope[b];
-            }
+        for (g, s) in gradient.iter_mut().zip(slope) {
+            *g += pull * s;
         }
     }
     let mut i = material.parameters().len();
     for supposed in causes {
         let (parameters, start) = (supposed.cause.parameters(), supposed.cause.start());
         for n in 0..parameters.len() {
-            let weak = 1.0 / (PRIOR_SCALES * PRIOR_SCALES);
-            matrix[(i, i)] += weak;
-            gradient[i] -= weak * (supposed.values[n] - start[n]) / parameters[n].scale;
+            gradient[i] -= PRIOR_SCALES.powi(-2) * (supposed.values[n] - start[n]) / parameters[n].scale;
             i += 1;
         }
     }
     (matrix, gradient)
+}
+
+/// Half the Hessian of the deviance to first order in the residual, priors included; scaled parameters.
+pub fn normal_matrix(
+    metric: &Metric,
+    weighed: &[Weighed],
+    material: &Ogden,
+    causes: &[Supposed],
+    settings: &FitSettings,
+) -> DMatrix<f64> {
+    let n = weighed.len();
+    let mut matrix = DMatrix::zeros(n, n);
+    for i in 0..n {
+        for j in 0..=i {
+            matrix[(i, j)] = metric.inner(&weighed[i], &weighed[j]);
+            matrix[(j, i)] = matrix[(i, j)];
+        }
+    }
+    matrix[(0, 0)] += settings.bulk.log_sd.powi(-2);
+    if let Some(shear) = &settings.shear {
+        let (_, slope, _) = shear.terms(material);
+        let weight = shear.log_sd.powi(-2);
+        for a in 0..slope.len() {
+            for b in 0..slope.len() {
+                matrix[(a, b)] += weight * slope[a] * slope[b];
+            }
+        }
+    }
+    let first = material.parameters().len();
+    let count: usize = causes.iter().map(|c| c.values.len()).sum();
+    for i in first..first + count {
+        matrix[(i, i)] += PRIOR_SCALES.powi(-2);
+    }
+    matrix
 }
 
 fn deviance_of(
@@ -350,12 +369,8 @@ fn moved(material: &Ogden, causes: &[Supposed], step: &DVector<f64>) -> (Ogden, 
 
 fn standard_deviations(matrix: &DMatrix<f64>, material: &Ogden, causes: &[Supposed]) -> Vec<f64> {
     let covariance = matrix.clone().try_inverse();
-    let scales = material
-        .parameters()
+    scales(material, causes)
         .into_iter()
-        .map(|p| material.value(p).abs())
-        .chain(causes.iter().flat_map(|c| c.cause.parameters()).map(|p| p.scale));
-    scales
         .enumerate()
         .map(|(i, scale)| {
             covariance
@@ -363,6 +378,12 @@ fn standard_deviations(matrix: &DMatrix<f64>, material: &Ogden, causes: &[Suppos
                 .map_or(f64::INFINITY, |c| if c[(i, i)] > 0.0 { scale * c[(i, i)].sqrt() } else { f64::INFINITY })
         })
         .collect()
+}
+
+/// What one unit of each scaled parameter is in its own units (of ln κ: κ).
+pub fn scales(material: &Ogden, causes: &[Supposed]) -> Vec<f64> {
+    let of_material = material.parameters().into_iter().map(|p| material.value(p).abs());
+    of_material.chain(causes.iter().flat_map(|c| c.cause.parameters()).map(|p| p.scale)).collect()
 }
 
 /// ½ Σ μᵢαᵢ, kPa.

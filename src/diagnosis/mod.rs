@@ -7,20 +7,27 @@
 pub mod causes;
 mod diagnose;
 mod error;
+mod fibre_map;
 mod fit;
+mod found;
 mod laboratory;
+mod leftover;
 mod load_history;
 mod maps;
+mod mesh_error;
 mod metric;
 mod result;
 mod scene;
 mod score;
 mod trace;
+mod work;
 
-pub use diagnose::{Diagnosis, DiagnosisOptions, FoundCause, Leftover, Ranked, Verdict, diagnose, scene_of_fit};
+pub use diagnose::{Diagnosis, DiagnosisOptions, Ranked, Verdict, diagnose, scene_of_fit};
 pub use error::DiagnosisError;
 pub use fit::{BulkPrior, FitSettings, Fitted, Supposed, fit, shear_modulus};
+pub use found::FoundCause;
 pub use laboratory::{Laboratory, Prediction};
+pub use leftover::Leftover;
 pub use load_history::{ElasticTable, FittedEffect, Homogeneous, LoadEffect, LoadHistoryFit, fit_load_history};
 pub use maps::{Division, ScoreMap};
 pub use metric::Metric;

@@ -1,8 +1,9 @@
 //! The result of a diagnosis (`diagnosis/1`).
 
 use super::causes::{Category, Location};
-use super::diagnose::{Diagnosis, FoundCause, Verdict};
+use super::diagnose::{Diagnosis, Verdict};
 use super::fit::Fitted;
+use super::found::FoundCause;
 use crate::material::Ogden;
 use serde::{Deserialize, Serialize};
 

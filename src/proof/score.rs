@@ -24,6 +24,8 @@ pub struct ProofOptions {
     pub seed: u64,
     /// Element size of the diagnosis as a factor on the standard one.
     pub mesh_factor: f64,
+    /// Causes hidden; all where empty.
+    pub only: Vec<HiddenCause>,
 }
 
 /// One diagnosis of a concealed cause.
@@ -44,14 +46,17 @@ pub struct Scored {
     pub effect_force_relative: f64,
     /// Whether theory says that it can be seen.
     pub is_detectable: bool,
-    /// Whether the verdict is right: the hidden cause first; none named where none is hidden; unexplained where not known.
+    /// Whether it is right: the hidden cause first; none named where none is hidden; unexplained where not known.
     pub is_right: bool,
+    /// Whether nothing was left unexplained.
+    #[serde(default)]
+    pub is_explained: bool,
     /// Distance from the place found to the hidden one, mm: of the cause, or of what is left where it is not known.
     pub location_error_mm: Option<f64>,
     /// Half the diagonal of the hidden place, mm.
     pub location_size_mm: Option<f64>,
-    /// Parameters of the hidden cause: whether the 95 % interval holds the truth.
-    pub covered: Vec<bool>,
+    /// Parameters of the hidden cause: name, and estimate minus truth in half widths of the 95 % interval.
+    pub deviations: Vec<(String, f64)>,
     /// χ² per datum before and after.
     pub chi2: [f64; 2],
     /// Why the diagnosis failed, if it did.
@@ -72,6 +77,8 @@ pub struct CauseSummary {
     pub num_right: usize,
     /// Right among the detectable.
     pub num_right_detectable: usize,
+    /// Right with nothing left unexplained, of all.
+    pub num_right_explained: usize,
     /// Nothing named.
     pub num_silent: usize,
     /// Median distance to the hidden place where named right, mm.
@@ -129,6 +136,7 @@ fn tasks(options: &ProofOptions) -> Vec<(HiddenCause, u64, bool)> {
             all.extend(unknown.iter().enumerate().map(|(n, c)| (*c, seed(500 + n as u64), false)));
         }
     }
+    all.retain(|(cause, _, _)| options.only.is_empty() || options.only.contains(cause));
     all
 }
 
@@ -214,9 +222,10 @@ fn scored(
         effect_force_relative: made.effect_force_relative,
         is_detectable,
         is_right: false,
+        is_explained: false,
         location_error_mm: None,
         location_size_mm: None,
-        covered: Vec::new(),
+        deviations: Vec::new(),
         chi2: [f64::NAN; 2],
         failure: None,
     };
@@ -228,14 +237,13 @@ fn scored(
         }
     };
     s.verdict = Some(result.verdict);
+    s.is_explained = result.verdict != Verdict::Unexplained;
     s.named = result.causes.iter().chain(&result.alternatives).map(|c| c.name.clone()).collect();
     s.chi2 = [result.chi2_per_datum.before, result.chi2_per_datum.after];
     s.is_right = match (hidden.cause, is_known) {
         (HiddenCause::None, _) => result.verdict == Verdict::NoMismatch,
         (_, false) => result.verdict == Verdict::Unexplained,
-        (cause, true) => {
-            result.verdict != Verdict::Unexplained && result.causes.first().is_some_and(|c| c.name == cause.name())
-        }
+        (cause, true) => result.causes.first().is_some_and(|c| c.name == cause.name()),
     };
     let place = match hidden.cause {
         HiddenCause::Inclusion | HiddenCause::Debond => Some((hidden.center_mm, hidden.extent_mm)),
@@ -254,13 +262,13 @@ fn scored(
     }
     if let Some(cause) = named.filter(|_| is_known) {
         let truths = truths(specimen, hidden);
-        s.covered = cause
+        s.deviations = cause
             .parameters
             .iter()
             .filter_map(|p| {
                 let (_, truth) = truths.iter().find(|(name, _)| *name == p.name)?;
                 let [low, high] = p.interval_95?;
-                Some(low <= *truth && *truth <= high)
+                Some((p.name.clone(), (0.5 * (low + high) - truth) / (0.5 * (high - low))))
             })
             .collect();
     }
@@ -327,7 +335,8 @@ fn sum_up(scored: Vec<Scored>, options: &ProofOptions) -> Proof {
         let count = |f: &dyn Fn(&Scored) -> bool| of.iter().filter(|s| f(s)).count();
         let mut errors: Vec<f64> = of.iter().filter(|s| s.is_right).filter_map(|s| s.location_error_mm).collect();
         errors.sort_by(f64::total_cmp);
-        let covered: Vec<bool> = of.iter().filter(|s| s.is_right).flat_map(|s| s.covered.iter().copied()).collect();
+        let covered: Vec<bool> =
+            of.iter().filter(|s| s.is_right).flat_map(|s| s.deviations.iter().map(|d| d.1.abs() <= 1.0)).collect();
         let mut first_named: Vec<(String, usize)> = Vec::new();
         for s in &of {
             let silent = match s.verdict {
@@ -348,6 +357,7 @@ fn sum_up(scored: Vec<Scored>, options: &ProofOptions) -> Proof {
             num_detectable: count(&|s| s.is_detectable),
             num_right: count(&|s| s.is_right),
             num_right_detectable: count(&|s| s.is_right && s.is_detectable),
+            num_right_explained: count(&|s| s.is_right && s.is_explained),
             num_silent: count(&|s| s.verdict == Some(Verdict::NoMismatch)),
             median_location_error_mm: errors.get(errors.len() / 2).copied(),
             num_covered: [covered.iter().filter(|c| **c).count(), covered.len()],
@@ -365,7 +375,7 @@ fn sum_up(scored: Vec<Scored>, options: &ProofOptions) -> Proof {
     let covered = causes().fold([0, 0], |s, k| [s[0] + k.num_covered[0], s[1] + k.num_covered[1]]);
     let inputs = serde_json::json!({
         "per_cause": options.per_cause, "controls": options.controls, "unknown": options.unknown, "seed": options.seed,
-        "mesh_factor": options.mesh_factor,
+        "mesh_factor": options.mesh_factor, "only": options.only,
     });
     Proof {
         schema: "proof/1".into(),

@@ -13,22 +13,6 @@ pub struct Fibres {
     shear_modulus_kpa: f64,
 }
 
-/// Thirteen directions: axes, face diagonals, space diagonals.
-pub fn directions() -> Vec<[f64; 3]> {
-    let mut all = Vec::new();
-    for x in -1..=1 {
-        for y in -1..=1 {
-            for z in -1..=1 {
-                let is_first = x > 0 || (x == 0 && (y > 0 || (y == 0 && z > 0)));
-                if is_first {
-                    all.push(unit([f64::from(x), f64::from(y), f64::from(z)]));
-                }
-            }
-        }
-    }
-    all
-}
-
 fn unit(a: [f64; 3]) -> [f64; 3] {
     let n = a.iter().map(|x| x * x).sum::<f64>().sqrt();
     a.map(|x| x / n)

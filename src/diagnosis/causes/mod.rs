@@ -19,6 +19,7 @@ mod tilt;
 mod wrap;
 
 pub use debond::Debond;
+pub use fibre::Fibres;
 pub use inclusion::Inclusion;
 pub use wrap::Wrap;
 
@@ -96,9 +97,9 @@ pub trait Cause: Send + Sync {
     }
 }
 
-/// Causes that every recording is tested for by score tests. Those with a place to find (debonds, inclusions, jumps) are made
-/// from maps instead.
-pub fn registry(specimen: &Specimen, initial_shear_modulus_kpa: f64) -> Vec<Arc<dyn Cause>> {
+/// Causes that every recording is tested for by score tests. Those with a place or a direction to find (debonds, inclusions,
+/// jumps, fibres) are made from maps instead.
+pub fn registry(specimen: &Specimen) -> Vec<Arc<dyn Cause>> {
     let mut all: Vec<Arc<dyn Cause>> = vec![
         Arc::new(gradient::Gradient::of(specimen)),
         Arc::new(swelling::Swelling),
@@ -113,8 +114,5 @@ pub fn registry(specimen: &Specimen, initial_shear_modulus_kpa: f64) -> Vec<Arc<
     for hole in 0..specimen.holes.len() {
         all.push(Arc::new(hole::HoleError::of(specimen, hole)));
     }
-    all.extend(
-        fibre::directions().into_iter().map(|d| Arc::new(fibre::Fibres::along(d, initial_shear_modulus_kpa)) as _),
-    );
     all
 }

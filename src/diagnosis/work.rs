@@ -1,0 +1,360 @@
+//! The steps of a diagnosis: fits, tests of candidates, what is kept back.
+
+use super::causes::{Cause, registry};
+use super::diagnose::DiagnosisOptions;
+use super::error::DiagnosisError;
+use super::fibre_map::fibre_directions;
+use super::fit::{BulkPrior, FitSettings, Fitted, STEP, Supposed, fit, paths_of, shear_modulus};
+use super::laboratory::Laboratory;
+use super::load_history::ElasticTable;
+use super::maps::{ScoreMap, debond_map, inclusion_map};
+use super::metric::Metric;
+use super::scene::Scene;
+use super::score::ScoreTest;
+use super::trace::Trace;
+use crate::calibration::Observed;
+use crate::material::{MAX_TERMS, Ogden, OgdenTerm};
+use std::sync::Arc;
+
+/// Exponents tried for a further Ogden term.
+const EXPONENTS: [f64; 5] = [-6.0, -2.0, 5.0, 9.0, 14.0];
+/// Fits of leading causes per round.
+const MAX_FITS: usize = 4;
+/// An effect is physics where its displacement exceeds this part of the allowance (rms), or its force its own allowance.
+const SMALLEST_EFFECT: f64 = 1.0;
+/// Drives of the load curve's table.
+const TABLE_POINTS: usize = 8;
+/// A cause must lower the deviance by this much beyond ln n per parameter: very strong evidence, many times over, because
+/// many causes are tried.
+pub(super) const EVIDENCE: f64 = 30.0;
+/// κ is looked at where the data pull it below the believed one by this many standard deviations of ln κ…
+const PULL_OF_BULK: f64 = 1.5;
+/// … which then is as good as known, or as good as free.
+pub(super) const KNOWN_BULK: f64 = 0.02;
+pub(super) const FREE_BULK: f64 = 3.0;
+
+/// ln n per parameter.
+pub(super) fn penalty(metric: &Metric, num_parameters: usize) -> f64 {
+    num_parameters as f64 * (metric.num_data() as f64).ln()
+}
+
+/// Whether a change of the prediction is large enough to be more than a mesh's.
+pub(super) fn is_large(observed: &Observed, effect: &Trace, allowance_mm: f64) -> bool {
+    let force = observed
+        .steps
+        .iter()
+        .zip(&effect.force)
+        .filter_map(|(s, change)| s.force.map(|f| change.abs() > 4.0 * f.sd_n + 0.01 * f.value_n.abs()))
+        .any(|large| large);
+    let last = Trace { displacement: effect.displacement.last().cloned().into_iter().collect(), force: vec![] };
+    force || last.rms_mm() > SMALLEST_EFFECT * allowance_mm
+}
+
+/// The material as believed, or a neo-Hookean one with the modulus of the measured force.
+pub(super) fn first_guess(
+    laboratory: &mut Laboratory,
+    options: &DiagnosisOptions,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Ogden, DiagnosisError> {
+    if let Some(prior) = &options.prior {
+        return Ok(prior.clone());
+    }
+    // A neo-Hookean guess, its modulus scaled to the measured force; κ/μ of a rubber.
+    let mut material =
+        Ogden { schema: "ogden/1".into(), bulk_kpa: 2000.0, terms: vec![OgdenTerm { mu_kpa: 16.0, alpha: 2.0 }] };
+    let predicted = laboratory.predict(&material, &Scene::default(), is_cancelled)?;
+    let forces = laboratory.measured().force;
+    let ratio = |n: &usize| forces[*n] / predicted.trace.force[*n];
+    if let Some(r) = (0..forces.len()).filter(|n| forces[*n].abs() > 0.0).map(|n| ratio(&n)).find(|r| *r > 0.0) {
+        material.terms[0].mu_kpa *= r;
+        material.bulk_kpa *= r;
+    }
+    Ok(material)
+}
+
+/// A cause to fit, its start, and what it explains to first order.
+pub(super) struct Candidate {
+    pub(super) cause: Arc<dyn Cause>,
+    pub(super) values: Vec<f64>,
+    pub(super) score: f64,
+}
+
+/// The candidates worth a full fit: the best of each name, most explaining first.
+pub(super) fn leading(candidates: &[Candidate]) -> Vec<&Candidate> {
+    let mut chosen: Vec<&Candidate> = Vec::new();
+    let top = candidates.first().map_or(0.0, |c| c.score);
+    for c in candidates {
+        let is_worth = c.score > EVIDENCE && c.score > 0.1 * top;
+        // Two holes, faces or directions are different suspects of one name.
+        let is_new = chosen.iter().filter(|o| o.cause.name() == c.cause.name()).count()
+            < if matches!(c.cause.name(), "debond" | "hole" | "fibre") { 2 } else { 1 };
+        if is_worth && is_new && chosen.len() < MAX_FITS {
+            chosen.push(c);
+        }
+    }
+    chosen
+}
+
+/// What the steps share.
+pub(super) struct Work<'a, 'b> {
+    pub(super) laboratory: &'a mut Laboratory<'b>,
+    pub(super) metric: &'a Metric,
+    pub(super) settings: FitSettings,
+    /// κ of the nominal model.
+    pub(super) nominal_bulk: BulkPrior,
+    pub(super) is_cancelled: &'a dyn Fn() -> bool,
+    pub(super) allowance_mm: f64,
+    pub(super) left_out: &'a [String],
+}
+
+impl Work<'_, '_> {
+    pub(super) fn is_left_out(&self, name: &str) -> bool {
+        self.left_out.iter().any(|n| n == name)
+    }
+
+    /// Where the data pull κ far below that of a rubber: the fits with κ as believed and with κ free, and the evidence.
+    pub(super) fn compressibility(
+        &mut self,
+        measured: &Trace,
+        nominal: &Fitted,
+    ) -> Result<Option<(Fitted, Fitted, f64)>, DiagnosisError> {
+        let believed = self.settings.bulk;
+        if (believed.center_kpa / nominal.material.bulk_kpa).ln() < PULL_OF_BULK * believed.log_sd {
+            return Ok(None);
+        }
+        let fit_with = |work: &mut Self, bulk: BulkPrior| {
+            let settings = FitSettings { bulk, ..work.settings };
+            let mut start = nominal.material.clone();
+            if bulk.log_sd < believed.log_sd {
+                start.bulk_kpa = bulk.center_kpa;
+            }
+            fit(work.laboratory, work.metric, measured, &start, &[], &settings, work.is_cancelled)
+        };
+        let stiff = match fit_with(self, BulkPrior { log_sd: KNOWN_BULK, ..believed }) {
+            Ok(stiff) => stiff,
+            Err(error) if (self.is_cancelled)() => return Err(error),
+            Err(_) => return Ok(None),
+        };
+        let free = fit_with(self, BulkPrior { log_sd: FREE_BULK, ..believed })?;
+        let evidence = stiff.deviance - free.deviance - penalty(self.metric, 1);
+        Ok((evidence > EVIDENCE).then_some((stiff, free, evidence)))
+    }
+
+    pub(super) fn fit(
+        &mut self,
+        measured: &Trace,
+        material: &Ogden,
+        causes: &[Supposed],
+    ) -> Result<Fitted, DiagnosisError> {
+        fit(self.laboratory, self.metric, measured, material, causes, &self.settings, self.is_cancelled)
+    }
+
+    /// The nominal model: as many terms as the prior material, or one or two as the data call for.
+    pub(super) fn nominal(
+        &mut self,
+        measured: &Trace,
+        start: &Ogden,
+        is_fixed: bool,
+    ) -> Result<Fitted, DiagnosisError> {
+        let one = self.fit(measured, start, &[])?;
+        if is_fixed {
+            return Ok(one);
+        }
+        Ok(self.further_term(measured, &one)?.map_or(one, |found| found.0))
+    }
+
+    /// The fit with one more Ogden term and its evidence, where the data call for it.
+    pub(super) fn further_term(
+        &mut self,
+        measured: &Trace,
+        one: &Fitted,
+    ) -> Result<Option<(Fitted, f64)>, DiagnosisError> {
+        // Which exponent a further term would have: first order, all tried at once.
+        let mut probe = one.material.clone();
+        let base = one.material.terms.len();
+        for alpha in EXPONENTS.into_iter().take(MAX_TERMS - base) {
+            let mu_kpa = 1e-9 * shear_modulus(&one.material) / alpha;
+            probe.terms.push(OgdenTerm { mu_kpa, alpha });
+        }
+        let probed = self.laboratory.derivatives(&probe, &Scene::default(), &one.prediction, true, &[], STEP);
+        let Ok(columns) = probed else { return Ok(None) };
+        let nuisance: Vec<Trace> = columns[..=2 * base]
+            .iter()
+            .zip(one.material.parameters())
+            .map(|(t, p)| t.scaled(one.material.value(p)))
+            .collect();
+        let test = ScoreTest::new(self.metric, &one.residual, &nuisance, &[self.settings.bulk.log_sd.powi(-2)]);
+        let mut best: Option<(f64, OgdenTerm)> = None;
+        for (n, alpha) in EXPONENTS.into_iter().take(MAX_TERMS - base).enumerate() {
+            // κ, then μ and α of each term.
+            let direction = &columns[1 + 2 * (base + n)];
+            let score = test.test(std::slice::from_ref(direction));
+            let mu_kpa = score.coefficients[0];
+            if mu_kpa * alpha > 0.0 && best.as_ref().is_none_or(|b| score.explained > b.0) {
+                best = Some((score.explained, OgdenTerm { mu_kpa, alpha }));
+            }
+        }
+        let Some((_, term)) = best.filter(|b| b.0 > EVIDENCE) else { return Ok(None) };
+        let mut two = one.material.clone();
+        two.terms.push(term);
+        match self.fit(measured, &two, &[]) {
+            Ok(found) => {
+                let gain = one.deviance - found.deviance - penalty(self.metric, 2);
+                let effect = found.prediction.trace.plus(-1.0, &one.prediction.trace);
+                let is_used = gain > EVIDENCE && is_large(self.laboratory.observed(), &effect, self.allowance_mm);
+                Ok(is_used.then_some((found, gain)))
+            }
+            Err(error) if (self.is_cancelled)() => Err(error),
+            Err(_) => Ok(None),
+        }
+    }
+
+    /// F∞ over drive with its derivatives with respect to scaled material parameters, κ apart.
+    pub(super) fn elastic_table(&mut self, fitted: &Fitted, largest_mm: f64) -> Result<ElasticTable, DiagnosisError> {
+        let drives: Vec<f64> = (1..=TABLE_POINTS).map(|n| largest_mm * n as f64 / TABLE_POINTS as f64).collect();
+        let rows = self.laboratory.forces(&fitted.material, &fitted.scene(), &drives, self.is_cancelled)?;
+        let parameters = fitted.material.parameters();
+        let at_rest = |values: Vec<f64>| -> Vec<f64> { std::iter::once(0.0).chain(values).collect() };
+        let forces = at_rest(rows.iter().map(|r| r.0).collect());
+        let derivatives: Vec<Vec<f64>> = (1..parameters.len())
+            .map(|i| at_rest(rows.iter().map(|r| r.1[i] * fitted.material.value(parameters[i])).collect()))
+            .collect();
+        ElasticTable::new(&at_rest(drives), &forces, &derivatives)
+    }
+
+    /// All candidates, most explaining first.
+    pub(super) fn candidates(
+        &mut self,
+        current: &Fitted,
+        has_curve: bool,
+        round: usize,
+        maps: &mut Vec<(String, ScoreMap)>,
+    ) -> Result<Vec<Candidate>, DiagnosisError> {
+        let specimen = self.laboratory.observed().specimen.clone();
+        let scene = current.scene();
+        let list: Vec<Arc<dyn Cause>> = registry(&specimen)
+            .into_iter()
+            .filter(|c| !(has_curve && c.name() == "cell"))
+            .filter(|c| !self.is_left_out(c.name()))
+            // One of a kind: what is in the fit already is free there.
+            .filter(|c| !current.causes.iter().any(|s| s.cause.description() == c.description()))
+            .collect();
+        let mut supposed = Vec::new();
+        for cause in &list {
+            let mut all = current.causes.clone();
+            all.push(Supposed { cause: cause.clone(), values: cause.start() });
+            supposed.push(all);
+        }
+        // The cause's own parameters are the last ones.
+        let own: Vec<Vec<super::fit::Path>> = supposed
+            .iter()
+            .zip(&list)
+            .map(|(all, cause)| {
+                let mut paths = paths_of(all);
+                paths.split_off(paths.len() - cause.parameters().len())
+            })
+            .collect();
+        let flat: Vec<(&dyn Fn(f64) -> Scene, bool)> = own.iter().flatten().map(|(p, b)| (&**p as _, *b)).collect();
+        let known = paths_of(&current.causes);
+        let num_known = known.len();
+        let all: Vec<(&dyn Fn(f64) -> Scene, bool)> = known.iter().map(|(p, b)| (&**p as _, *b)).chain(flat).collect();
+        let mut columns =
+            self.laboratory.derivatives(&current.material, &scene, &current.prediction, true, &all, STEP)?;
+        let parameters = current.material.parameters();
+        let mut directions = columns.split_off(parameters.len() + num_known);
+        for (trace, p) in columns.iter_mut().zip(&parameters) {
+            *trace = trace.scaled(current.material.value(*p));
+        }
+        let test = ScoreTest::new(self.metric, &current.residual, &columns, &[self.settings.bulk.log_sd.powi(-2)]);
+        let mut candidates = Vec::new();
+        for (cause, paths) in list.iter().zip(&own) {
+            let rest = directions.split_off(paths.len());
+            let score = test.test(&directions);
+            directions = rest;
+            let mut values = cause.start();
+            for ((value, c), p) in values.iter_mut().zip(&score.coefficients).zip(cause.parameters()) {
+                // First order may overshoot: start a fit at most a few scales away.
+                *value = (*value + c.clamp(-5.0, 5.0) * p.scale).clamp(p.range[0], p.range[1]);
+            }
+            candidates.push(Candidate { cause: cause.clone(), values, score: score.explained });
+        }
+        if scene.fibre.is_none() && !self.is_left_out("fibre") {
+            for (score, cause, strength) in
+                fibre_directions(self.laboratory, &current.material, &scene, &current.prediction, &test)?
+            {
+                candidates.push(Candidate { values: vec![strength, 0.0, 0.0], cause: Arc::new(cause), score });
+            }
+        }
+        if round == 1 || current.causes.is_empty() {
+            for is_moved in [false, true] {
+                let (map, found) =
+                    debond_map(self.laboratory, &current.material, &current.prediction, &test, is_moved)?;
+                maps.push((format!("bond of the {} plate", if is_moved { "moved" } else { "fixed" }), map));
+                if let Some((score, cause)) = found.filter(|_| !self.is_left_out("debond")) {
+                    candidates.push(Candidate { values: cause.start(), cause: Arc::new(cause), score });
+                }
+            }
+            let (map, found) = inclusion_map(self.laboratory, &current.material, &current.prediction, &test)?;
+            maps.push(("stiffness of the sample".into(), map));
+            if let Some((score, cause)) = found.filter(|_| !self.is_left_out("inclusion")) {
+                candidates.push(Candidate { values: cause.start(), cause: Arc::new(cause), score });
+            }
+        }
+        candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
+        Ok(candidates)
+    }
+
+    /// Rms misfit on blocks of voxels that the fits did not see, without and with the causes: two halves in turn.
+    pub(super) fn kept_back(
+        &mut self,
+        measured: &Trace,
+        nominal: &Fitted,
+        corrected: &Fitted,
+    ) -> Result<[f64; 2], DiagnosisError> {
+        let observed = self.laboratory.observed();
+        let fold = block_fold(observed);
+        let mut squares = [0.0; 2];
+        let mut count = 0.0;
+        for side in [false, true] {
+            let metric = Metric::new(observed, self.allowance_mm, &|v| fold[v] != side);
+            for (n, fitted) in [nominal, corrected].into_iter().enumerate() {
+                let bulk = if n == 0 { self.nominal_bulk } else { self.settings.bulk };
+                let settings = FitSettings { max_iterations: 3, bulk, ..self.settings };
+                let found = fit(
+                    self.laboratory,
+                    &metric,
+                    measured,
+                    &fitted.material,
+                    &fitted.causes,
+                    &settings,
+                    self.is_cancelled,
+                )?;
+                for (field, _) in found.residual.displacement.iter().zip(&observed.steps) {
+                    for u in field.iter().zip(&fold).filter(|(_, f)| **f == side).map(|(u, _)| u) {
+                        for x in u.iter().filter(|x| x.is_finite()) {
+                            squares[n] += x * x;
+                            count += if n == 0 { 1.0 } else { 0.0 };
+                        }
+                    }
+                }
+            }
+        }
+        Ok(squares.map(|s| (s / f64::max(count, 1.0)).sqrt()))
+    }
+}
+
+/// A chequerboard of blocks, 4 × 4 in the plane.
+pub(super) fn block_fold(observed: &Observed) -> Vec<bool> {
+    let b = observed.specimen.block;
+    observed
+        .mask
+        .voxels
+        .iter()
+        .map(|&v| {
+            let x = observed.mask.grid.center_mm(v as usize);
+            let i = ((x[0] / b.length_mm + 0.5) * 4.0).floor() as i64;
+            let k = ((x[2] / b.width_mm + 0.5) * 4.0).floor() as i64;
+            (i + k).rem_euclid(2) == 0
+        })
+        .collect()
+}
