@@ -42,7 +42,7 @@ const SPANNING: [[f64; 3]; 16] = [
     [1.0, 0.0, 2.0],
 ];
 
-/// Fibres worth a fit: deviance explained to first order, the cause, and its modulus over the shear modulus.
+/// Fibres worth a fit: deviance explained to first order, the cause, and its modulus, kPa.
 ///
 /// # Errors
 /// [`DiagnosisError::Solve`].
@@ -86,7 +86,7 @@ pub fn fibre_directions(
     Ok(chosen
         .into_iter()
         .map(|(explained, direction, strength)| {
-            (explained, Fibres::along(direction, modulus), strength.min(LARGEST_START))
+            (explained, Fibres::along(direction, modulus), modulus * strength.min(LARGEST_START))
         })
         .collect())
 }

@@ -279,10 +279,10 @@ impl Work<'_, '_> {
             candidates.push(Candidate { cause: cause.clone(), values, score: score.explained });
         }
         if scene.fibre.is_none() && !self.is_left_out("fibre") {
-            for (score, cause, strength) in
+            for (score, cause, modulus_kpa) in
                 fibre_directions(self.laboratory, &current.material, &scene, &current.prediction, &test)?
             {
-                candidates.push(Candidate { values: vec![strength, 0.0, 0.0], cause: Arc::new(cause), score });
+                candidates.push(Candidate { values: vec![modulus_kpa, 0.0, 0.0], cause: Arc::new(cause), score });
             }
         }
         if round == 1 || current.causes.is_empty() {

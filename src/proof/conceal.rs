@@ -9,6 +9,8 @@ use crate::recording::{Filter, LoadCurve, RecordedStep, Recording};
 use crate::specimen::Specimen;
 use crate::voxel::{Sampling, VoxelError, VoxelGrid, VoxelMask, VoxelOperator};
 
+/// κ over the shear modulus of a rubber.
+const RUBBER: f64 = 130.0;
 /// Element size as a factor on the standard one.
 const MESH_FACTOR: f64 = 1.6;
 /// Voxels of the concealed recordings, mm.
@@ -70,7 +72,11 @@ pub fn conceal(specimen: &Specimen, hidden: &Hidden) -> Result<Concealed, Concea
     let mask = VoxelMask::of_specimen(&made, grid)?;
     let operator = VoxelOperator::new(&made, model.mesh(), &mask, Sampling::default())?;
     // What the nominal model would show, for the size of the effect.
-    let nominal = Hidden { cause: HiddenCause::None, ..hidden.clone() };
+    let mut nominal = Hidden { cause: HiddenCause::None, ..hidden.clone() };
+    if hidden.cause == HiddenCause::Compressibility {
+        let shear_modulus: f64 = nominal.material.terms.iter().map(|t| 0.5 * t.mu_kpa * t.alpha).sum();
+        nominal.material.bulk_kpa = RUBBER * shear_modulus;
+    }
     let mut reference = model_of(specimen, &nominal)?;
     let plain = path(&mut reference, &nominal, &drives)?;
     let plain_mask = VoxelMask::of_specimen(specimen, drawn.clone())?;

@@ -316,7 +316,12 @@ fn truths(specimen: &Specimen, h: &Hidden) -> Vec<(String, f64)> {
             .zip(h.direction)
             .map(|(name, d)| (name.to_string(), h.strength * d))
             .collect(),
-        HiddenCause::Fibre => one("modulus_over_shear_modulus"),
+        HiddenCause::Fibre => {
+            vec![(
+                "modulus_kpa".into(),
+                h.strength * h.material.terms.iter().map(|t| 0.5 * t.mu_kpa * t.alpha).sum::<f64>(),
+            )]
+        }
         HiddenCause::Wrap => one("jump_mm"),
         HiddenCause::Registration => {
             (0..3).map(|a| (format!("shift_{}_mm", axis(a)), if a == h.which { h.strength } else { 0.0 })).collect()

@@ -53,16 +53,16 @@ impl Cause for Fibres {
     }
 
     fn parameters(&self) -> Vec<CauseParameter> {
+        let g = self.shear_modulus_kpa;
         vec![
-            CauseParameter::new("modulus_over_shear_modulus", 0.1, [-0.05, 20.0]),
+            CauseParameter::new("modulus_kpa", 0.1 * g, [-0.05 * g, 20.0 * g]),
             CauseParameter::new("turn_1_degrees", 10.0, [-60.0, 60.0]),
             CauseParameter::new("turn_2_degrees", 10.0, [-60.0, 60.0]),
         ]
     }
 
     fn apply(&self, values: &[f64], scene: &mut Scene) {
-        scene.fibre =
-            Some(Fibre { direction: self.direction(values), modulus_kpa: values[0] * self.shear_modulus_kpa });
+        scene.fibre = Some(Fibre { direction: self.direction(values), modulus_kpa: values[0] });
     }
 
     fn location(&self, _: &[f64], _: &Specimen) -> Option<Location> {
