@@ -1,33 +1,10 @@
 //! A stopped `lambdak design`: what was found is written and marked as unfinished, the exit code says so, and the same command
 //! goes on to the end.
 
-use std::path::Path;
-use std::process::{Command, Output};
+mod design_common;
 
-/// A study that takes seconds: the bar, at most one hole, no verification.
-fn write_study(folder: &Path) -> std::path::PathBuf {
-    let geometries = Path::new(env!("CARGO_MANIFEST_DIR")).join("geometries");
-    let text = std::fs::read_to_string(geometries.join("studies/uniaxial-bar.json")).unwrap();
-    let mut study: serde_json::Value = serde_json::from_str(&text).unwrap();
-    study["base"] = geometries.join("uniaxial-bar.json").to_str().unwrap().into();
-    study["materials"][0]["material"] = geometries.join("materials/ecoflex-0020.json").to_str().unwrap().into();
-    study["materials"][0]["relative_sd"] = 0.0.into();
-    study["vary"]["hole_count"] = serde_json::json!({ "min": 0, "max": 1 });
-    study["budget"] = serde_json::json!({ "explore": 6, "refine": 1, "iterations": 3, "confirm": 1 });
-    study["verification"] = serde_json::json!({ "is_on": false });
-    let path = folder.join("study.json");
-    std::fs::write(&path, study.to_string()).unwrap();
-    path
-}
-
-fn design(study: &Path, out: &Path, more: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_lambdak"));
-    command.arg("design").arg(study).arg("--out").arg(out).args(more).output().unwrap()
-}
-
-fn json(path: &Path) -> serde_json::Value {
-    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
-}
+use design_common::{design, json, write_study};
+use std::process::Command;
 
 #[test]
 fn a_stopped_search_leaves_its_best_and_goes_on() {
@@ -63,6 +40,65 @@ fn a_stopped_search_leaves_its_best_and_goes_on() {
     assert!(stops > 0 && bests > 0, "{stops} stops, {bests} with a design");
     assert_eq!(json(&out.join("design.json"))["schema"], "design/1");
     assert!(!out.join("unfinished-design.json").exists(), "what is out of date is removed");
+    its_result_can_be_compared(&out.join("design.json"));
+}
+
+/// Better, worse and not comparable, as `lambdak compare` says it.
+fn its_result_can_be_compared(found: &std::path::Path) {
+    let changed = |name: &str, change: &dyn Fn(&mut serde_json::Value)| {
+        let mut result = json(found);
+        change(&mut result);
+        let path = found.with_file_name(name);
+        std::fs::write(&path, result.to_string()).unwrap();
+        path
+    };
+    let worse = changed("worse.json", &|r| {
+        let objective = r["best"]["objective"].as_f64().unwrap();
+        r["best"]["objective"] = (0.9 * objective).into();
+    });
+    let other = changed("other.json", &|r| r["objective"]["combine"] = "maximin".into());
+    let junit = found.with_file_name("junit.xml");
+    for (current, code) in [(found, 0), (&*worse, 1), (&*other, 2)] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_lambdak"));
+        let output = command.arg("compare").arg(found).arg(current).arg("--junit").arg(&junit).output().unwrap();
+        let said = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+        assert_eq!(output.status.code(), Some(code), "{said}");
+        // What cannot be compared is an error for a CI, not nothing.
+        let report = std::fs::read_to_string(&junit).unwrap();
+        assert_eq!(report.contains("<failure") || report.contains("<error"), code != 0, "{report}");
+    }
+}
+
+#[test]
+fn ctrl_c_keeps_what_was_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = write_study(folder.path());
+    let out = folder.path().join("out");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_lambdak"))
+        .arg("design")
+        .arg(&study)
+        .arg("--out")
+        .arg(&out)
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    // The first evaluation is kept as it comes.
+    let checkpoint = || {
+        std::fs::read_dir(&out)
+            .is_ok_and(|d| d.flatten().any(|f| f.file_name().to_string_lossy().contains("checkpoint")))
+    };
+    while !checkpoint() {
+        assert!(child.try_wait().unwrap().is_none(), "it ended before it could be stopped");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    let told = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(told.success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert_eq!(json(&out.join("unfinished-design.json"))["is_finished"], false);
+    let again = design(&study, &out, &[]);
+    assert!(again.status.success(), "{}", String::from_utf8_lossy(&again.stderr));
+    assert!(out.join("design.json").exists());
 }
 
 #[test]

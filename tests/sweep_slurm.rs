@@ -1,6 +1,7 @@
 //! The same sweep through a real Slurm, with one array task killed and requeued. Skipped by name where there is none
 //! (`.ci/slurm` starts one).
 
+mod design_common;
 mod sweep_common;
 
 use std::process::Command;
@@ -31,7 +32,7 @@ fn processes_of(out: &std::path::Path, shard: &str) -> Vec<String> {
         .collect()
 }
 
-fn wait_until(what: &str, condition: impl Fn() -> bool) {
+fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
     let start = Instant::now();
     while !condition() {
         // Far longer than a small sweep takes on a loaded machine.
@@ -74,6 +75,59 @@ fn an_array_with_a_lost_task_gives_the_same_table() {
     let again = sweep(&study, &array, &options);
     assert_success(&again);
     assert!(!String::from_utf8_lossy(&again.stderr).contains("submitted"));
+}
+
+/// Searches from two seeds as an array give the better of the two searches alone.
+#[test]
+fn a_design_search_runs_as_an_array() {
+    if !has_slurm("a_design_search_runs_as_an_array") {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let study = design_common::write_study(folder.path());
+    let out = folder.path().join("array");
+    let options = ["--slurm", "--tasks", "2", "--time", "30", "--mem", "500M", "--poll", "0.3"];
+    let output = design_common::design(&study, &out, &options);
+    assert_success(&output);
+    let alone: Vec<f64> = (0..2)
+        .map(|n| {
+            let seed = design_common::json(&study)["seed"].as_u64().expect("a seed") + n;
+            let out = folder.path().join(format!("seed-{seed}"));
+            assert_success(&design_common::design(&study, &out, &["--seed", &seed.to_string(), "--threads", "1"]));
+            design_common::json(&out.join("design.json"))["best"]["objective"].as_f64().expect("a number")
+        })
+        .collect();
+    // The same program with the same seed on the same machine: to the bit.
+    let first = design_common::json(&study)["seed"].as_u64().expect("a seed");
+    for (n, objective) in alone.iter().enumerate() {
+        let found = design_common::json(&out.join(format!("seed-{}/design.json", first + n as u64)));
+        assert_eq!(found["best"]["objective"].as_f64(), Some(*objective), "seed {n}");
+    }
+    let winner = first + u64::from(alone[1] > alone[0]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(said.contains(&format!("best: seed {winner} ")), "{said}");
+}
+
+/// With `--cancel` Ctrl-C takes the jobs back; the same command goes on later.
+#[test]
+fn ctrl_c_cancels_the_jobs() {
+    if !has_slurm("ctrl_c_cancels_the_jobs") {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let study = write_study(folder.path(), 40, 8);
+    let out = folder.path().join("out");
+    let options = ["--slurm", "--tasks", "2", "--time", "30", "--poll", "0.3", "--cancel"];
+    let mut child = start(&study, &out, &options);
+    wait_until("a task begins", || {
+        child.try_wait().is_ok_and(|c| c.is_some())
+            || std::fs::read(out.join("shard-1-of-2.jsonl")).is_ok_and(|b| b.contains(&b'\n'))
+    });
+    let told = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(told.is_ok_and(|s| s.success()));
+    assert_eq!(child.wait().expect("it ends").code(), Some(130), "it was over before it could be stopped");
+    wait_until("no task is at work any more", || (1..=2).all(|n| processes_of(&out, &format!("{n}/2")).is_empty()));
+    assert_success(&sweep(&study, &out, &options));
 }
 
 /// What sbatch refuses is told in its words.

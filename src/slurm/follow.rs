@@ -61,6 +61,9 @@ pub enum Following<'a> {
     Progress(TaskProgress),
 }
 
+/// Looks, half a second apart, at cancelled jobs that have not ended yet. (Slurm's grace before it kills is 30 s by default.)
+const MAX_LOOKS_AT_CANCELLED: usize = 120;
+
 /// The jobs submitted for an array, kept beside the script so that the command can be run again and go on.
 #[derive(Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -130,7 +133,7 @@ pub fn follow(
             return Ok(());
         }
         if is_cancelled() {
-            return Err(interrupted(&scheduler, &jobs, &open, settings.cancel_jobs));
+            return Err(interrupted(&scheduler, &jobs, &open, settings.cancel_jobs, pause));
         }
         // A controller that does not answer is waited for.
         if let Some(states) = all_states(&scheduler, &jobs, &open)? {
@@ -248,7 +251,13 @@ fn all_states(
     Ok(Some(states))
 }
 
-fn interrupted(scheduler: &Scheduler, jobs: &Jobs, open: &BTreeMap<usize, Watched>, cancel_jobs: bool) -> SlurmError {
+fn interrupted(
+    scheduler: &Scheduler,
+    jobs: &Jobs,
+    open: &BTreeMap<usize, Watched>,
+    cancel_jobs: bool,
+    pause: &dyn Fn(Duration),
+) -> SlurmError {
     let numbers: std::collections::BTreeSet<&String> = open.keys().filter_map(|t| jobs.job_of_task.get(t)).collect();
     let list = numbers.iter().map(|n| n.as_str()).collect::<Vec<_>>().join(" ");
     if !cancel_jobs {
@@ -260,6 +269,14 @@ fn interrupted(scheduler: &Scheduler, jobs: &Jobs, open: &BTreeMap<usize, Watche
         if let Err(error) = scheduler.cancel(number) {
             return error;
         }
+    }
+    // Jobs take a while to end; run again before that, the command would follow what is being cancelled.
+    for _ in 0..MAX_LOOKS_AT_CANCELLED {
+        let states = all_states(scheduler, jobs, open).ok().flatten();
+        if states.is_some_and(|s| s.values().all(|t| !matches!(t, TaskState::Active | TaskState::Held))) {
+            break;
+        }
+        pause(Duration::from_millis(500));
     }
     SlurmError::Interrupted { message: format!("job {list} was cancelled; run the same command again to go on") }
 }
