@@ -23,6 +23,9 @@ pub enum ObjectiveKind {
     EOptimal,
     /// Inverse of the largest relative standard deviation of a single parameter.
     WorstRelativeSd,
+    /// T-optimal: how far every material's scan is from the closest fit of an earlier material to it, in noise standard
+    /// deviations. Materials stand from the simple to the rich.
+    TellApart,
 }
 
 impl ObjectiveKind {
@@ -41,6 +44,9 @@ impl ObjectiveKind {
             ObjectiveKind::DOptimal => "D-optimal figure (generalised standard deviation of all μ and α)",
             ObjectiveKind::AOptimal => "A-optimal figure (root of the summed relative variances)",
             ObjectiveKind::EOptimal => "E-optimal figure (root of the largest eigenvalue of the relative covariance)",
+            ObjectiveKind::TellApart => {
+                "T-optimal figure (distance of a material's scan from the closest fit of an earlier material)"
+            }
             ObjectiveKind::WorstRelativeSd => "largest relative standard deviation of a single parameter",
         }
     }

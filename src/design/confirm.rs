@@ -1,16 +1,17 @@
 //! Confirmation: a design at the reported fidelity, standard mesh and the scan's own voxels, for every material.
 
-use super::aim::Normalisation;
+use super::aim::{Normalisation, ObjectiveKind};
 use super::objective::{Judged, Reference};
 use super::response::{
     Evaluated, EvaluationFailure, Evaluator, Response, criteria_as_relative_sd, log_or_undetermined, normalised,
     sample_materials, tearing_stretch,
 };
 use super::study::Study;
-use crate::fem::ForwardModel;
+use super::tell_apart::{log_separation, nearest, state_of};
+use crate::fem::{Equilibrium, ForwardModel};
 use crate::kinematics::principal_stretches;
 use crate::sensitivity::{
-    DriveSelection, Evaluation, EvaluationError, EvaluationMaps, EvaluationOptions, evaluate_model,
+    DriveSelection, Evaluation, EvaluationError, EvaluationMaps, EvaluationOptions, MaterialState, evaluate_model,
 };
 use crate::specimen::{LimitMargin, Specimen};
 use serde::{Deserialize, Serialize};
@@ -55,6 +56,10 @@ pub struct MaterialEvaluation {
     pub tearing_stretch: f64,
     /// Force, N.
     pub force_n: f64,
+    /// Distance of this material's scan from the closest fit of an earlier material to it, in noise standard deviations; null for
+    /// the first material, and where the study does not ask to tell materials apart.
+    #[serde(default)]
+    pub separation_sd: Option<f64>,
 }
 
 /// The optimality criteria, as relative standard deviations: smaller is better.
@@ -100,12 +105,28 @@ pub fn confirm(
     let mut by_material: Vec<MaterialEvaluation> = Vec::new();
     let options = EvaluationOptions::standard(specimen);
     let mut model = ForwardModel::of_specimen(specimen, &options.mesh)?;
+    let mut solved: Vec<(MaterialState, Equilibrium)> = Vec::new();
     for prior in &study.materials {
         let drives = DriveSelection::DriveMm(specimen.drive_mm.clone());
         let (evaluation, maps) =
             evaluate_model(&mut model, specimen, &prior.material, &study.scan, &drives, &options, is_cancelled)
                 .map_err(failure)?;
+        if study.objective.kind == ObjectiveKind::TellApart
+            && let Some(state) = maps.equilibria.last()
+        {
+            solved.push((state_of(&mut model, &prior.material, state)?, state.clone()));
+        }
         by_material.push(of_material(&model, &prior.name, &prior.material, evaluation, &maps));
+    }
+    for later in 1..solved.len() {
+        let mut closest = f64::INFINITY;
+        for (earlier, (_, start)) in solved.iter().enumerate().take(later) {
+            let (material, theirs) = (&study.materials[earlier].material, &solved[later].0);
+            let fit =
+                nearest(study, &mut model, material, start, start.drive_mm, theirs, &options.solve, is_cancelled)?;
+            closest = closest.min(fit.distance_sd);
+        }
+        by_material[later].separation_sd = Some(closest);
     }
     let responses = responses(study, specimen, &by_material, is_cancelled)?;
     let largest = |f: fn(&Response) -> f64| responses.iter().map(f).fold(f64::NEG_INFINITY, f64::max).exp();
@@ -180,6 +201,7 @@ fn of_material(
         evaluation,
         relative_sd_by_criterion: CriterionValues { d_optimal: d, a_optimal: a, e_optimal: e, worst_parameter: w },
         tearing_stretch: stretch,
+        separation_sd: None,
     }
 }
 
@@ -201,6 +223,7 @@ impl MaterialEvaluation {
             log_integrated: sensitivities.iter().map(|s| normalised(s, normalisation).max(1e-300).ln()).collect(),
             log_relative_sd: promised.map(|p| log_or_undetermined(p.relative_sd)).collect(),
             log_criteria: [c.d_optimal, c.a_optimal, c.e_optimal, c.worst_parameter].map(log_or_undetermined),
+            log_separation: log_separation(self.separation_sd),
             log_force: self.force_n.abs().max(1e-12).ln(),
             log_stretch: self.tearing_stretch.ln(),
         }

@@ -127,6 +127,7 @@ pub fn findings(
     let Some(best) = ranked.first() else { return Vec::new() };
     let mut said = vec![winner(base, best)];
     said.extend(what_size_does(study, base, best));
+    said.extend(how_far_apart(base, best));
     for (index, prior) in study.materials.iter().enumerate() {
         said.extend(gains_of_material(best, &prior.name));
         said.extend(what_holes_do(base, ranked, index, &prior.name));
@@ -135,6 +136,24 @@ pub fn findings(
     }
     said.extend(at_confirmation(best, ranked));
     said
+}
+
+/// Where the study asks to tell materials apart: how well base and winner do.
+fn how_far_apart(base: &DesignEntry, best: &DesignEntry) -> Vec<String> {
+    best.by_material
+        .iter()
+        .zip(&base.by_material)
+        .filter_map(|(own, of_base)| {
+            let (here, there) = (own.separation_sd?, of_base.separation_sd?);
+            // χ² of the likelihood ratio is the square; four standard deviations leave few doubts.
+            let verdict = if here >= 4.0 { "one scan tells them apart" } else { "one scan does not tell them apart safely" };
+            Some(format!(
+                "The closest that an earlier material comes to the scan of material \"{}\" is {here:.1} noise standard deviations in \
+                 all (base: {there:.1}): {verdict}.",
+                own.material
+            ))
+        })
+        .collect()
 }
 
 fn winner(base: &DesignEntry, best: &DesignEntry) -> String {

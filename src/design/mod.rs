@@ -19,6 +19,7 @@ mod search_tests;
 mod space;
 mod state;
 mod study;
+mod tell_apart;
 mod unfinished;
 
 pub use aim::{Combine, Guard, Normalisation, Objective, ObjectiveKind};

@@ -43,8 +43,8 @@ impl<'a> Reference<'a> {
         Reference { study: self.study, samples: self.samples, base: self.base.clone(), shifts }
     }
 
-    /// ln gains of one response.
-    fn gains(&self, response: &Response, base: &Response) -> Vec<f64> {
+    /// ln gains of one response; none of the first material where materials are to be told apart.
+    fn gains(&self, prior: usize, response: &Response, base: &Response) -> Vec<f64> {
         let criterion = |i: usize| vec![base.log_criteria[i] - response.log_criteria[i]];
         let sensitivity = || response.log_integrated.iter().zip(&base.log_integrated).map(|(a, b)| a - b);
         let promised = response.log_relative_sd.iter().zip(&base.log_relative_sd).map(|(a, b)| b - a);
@@ -55,6 +55,8 @@ impl<'a> Reference<'a> {
             ObjectiveKind::AOptimal => criterion(1),
             ObjectiveKind::EOptimal => criterion(2),
             ObjectiveKind::WorstRelativeSd => criterion(3),
+            ObjectiveKind::TellApart if prior == 0 => Vec::new(),
+            ObjectiveKind::TellApart => vec![response.log_separation - base.log_separation],
         }
     }
 
@@ -112,7 +114,7 @@ impl<'a> Reference<'a> {
                 }
                 sum
             };
-            let gains = mean(&|s| self.gains(&evaluated.responses[s], &self.base[s]));
+            let gains = mean(&|s| self.gains(prior, &evaluated.responses[s], &self.base[s]));
             let share = if self.study.objective.combine == Combine::Maximin { 1.0 / num_priors as f64 } else { total };
             judged.weights.extend(self.weights(prior, gains.len()).into_iter().map(|w| share * w));
             judged.gains.extend(gains);
@@ -130,7 +132,7 @@ impl<'a> Reference<'a> {
             for v in 0..num_variables {
                 let zero = |s: usize| Response::from_vector(&vec![0.0; self.base[s].to_vector().len()]);
                 let slope = |s: usize| Response::from_vector(&evaluated.gradients[s][v]);
-                judged.gain_gradients[v].extend(mean(&|s| self.gains(&slope(s), &zero(s))));
+                judged.gain_gradients[v].extend(mean(&|s| self.gains(prior, &slope(s), &zero(s))));
                 for &s in &of_prior {
                     // The margins are affine in the responses: their slope is the difference from the constant part.
                     let constant = self.margins(prior, &zero(s), &zero(s));

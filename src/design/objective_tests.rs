@@ -22,6 +22,7 @@ fn response(integrated: [f64; 2], sd: [f64; 2], force: f64, stretch: f64) -> Res
         log_integrated: integrated.map(f64::ln).to_vec(),
         log_relative_sd: sd.map(f64::ln).to_vec(),
         log_criteria: [0.0; 4],
+        log_separation: 0.0,
         log_force: force.ln(),
         log_stretch: stretch.ln(),
     }

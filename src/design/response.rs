@@ -5,16 +5,19 @@
 //! back-solve for the state, one for each material sensitivity, and a central difference of the integrals along the known
 //! direction (X + tV, u + tu′, s + ts′): no solution is differenced.
 
-use super::aim::Normalisation;
+use super::aim::{Normalisation, ObjectiveKind};
 use super::space::{Subspace, Variable};
 use super::study::{MaterialPrior, Study};
-use crate::fem::{Equilibrium, ForwardModel, ParameterSensitivity, PrepareError, SolveError, SolveOptions};
+use super::tell_apart::{log_separation, nearest, separation, state_of};
+use crate::fem::{
+    Equilibrium, ForwardModel, ParameterSensitivity, PathSensitivity, PrepareError, SolveError, SolveOptions,
+};
 use crate::kinematics::principal_stretches;
 use crate::material::Ogden;
 use crate::mesh::{MeshOptions, shape_velocity};
 use crate::sensitivity::{
-    Covariance, Criterion, FisherInformation, InformationError, IntegratedSensitivity, information_over_quadrature,
-    integrate_over_quadrature,
+    Covariance, Criterion, FisherInformation, InformationError, IntegratedSensitivity, MaterialState,
+    information_over_quadrature, integrate_over_quadrature,
 };
 use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
@@ -77,6 +80,10 @@ pub struct Response {
     pub log_relative_sd: Vec<f64>,
     /// ln of the D-, A-, E- and worst-parameter figures, each as a relative standard deviation.
     pub log_criteria: [f64; 4],
+    /// ln of the distance of this material's scan from the closest fit of an earlier material to it, in noise standard
+    /// deviations; 0 for the first material, and where the study does not ask to tell materials apart.
+    #[serde(default)]
+    pub log_separation: f64,
     /// ln of the force in N.
     pub log_force: f64,
     /// ln of the principal stretch exceeded in [`TEARING_FRACTION`] of the volume.
@@ -109,19 +116,20 @@ impl Response {
         let mut v = self.log_integrated.clone();
         v.extend(&self.log_relative_sd);
         v.extend(self.log_criteria);
-        v.extend([self.log_force, self.log_stretch]);
+        v.extend([self.log_separation, self.log_force, self.log_stretch]);
         v
     }
 
     /// The inverse of [`Self::to_vector`].
     pub fn from_vector(v: &[f64]) -> Response {
-        let n = (v.len() - 6) / 2;
+        let n = (v.len() - 7) / 2;
         Response {
             log_integrated: v[..n].to_vec(),
             log_relative_sd: v[n..2 * n].to_vec(),
             log_criteria: [v[2 * n], v[2 * n + 1], v[2 * n + 2], v[2 * n + 3]],
-            log_force: v[2 * n + 4],
-            log_stretch: v[2 * n + 5],
+            log_separation: v[2 * n + 4],
+            log_force: v[2 * n + 5],
+            log_stretch: v[2 * n + 6],
         }
     }
 }
@@ -191,6 +199,29 @@ pub struct Evaluator<'a> {
     samples: Vec<MaterialSample>,
     /// Factor on the search mesh's element size.
     coarseness: f64,
+    solve: SolveOptions,
+}
+
+/// How a variable moves the nodes (none: not at all) and the drive.
+type Move = (Option<Vec<[f64; 3]>>, f64);
+
+/// An earlier material fitted to a sample's scan.
+#[derive(Clone)]
+struct Fitted {
+    /// The sample whose scan it is.
+    of: usize,
+    material: Ogden,
+    state: MaterialState,
+}
+
+/// All that a design does at one drive.
+struct Solved {
+    /// Per sample.
+    states: Vec<MaterialState>,
+    /// Earlier materials fitted to them, where the study asks for it.
+    fitted: Vec<Fitted>,
+    /// Per state, then per fitted material: derivatives along each move.
+    paths: Vec<Vec<PathSensitivity>>,
 }
 
 impl<'a> Evaluator<'a> {
@@ -201,12 +232,17 @@ impl<'a> Evaluator<'a> {
         }
         let central: Vec<MaterialPrior> =
             study.materials.iter().map(|prior| MaterialPrior { relative_sd: 0.0, ..prior.clone() }).collect();
-        Evaluator { study, samples: sample_materials(&central), coarseness: 1.0 }
+        Evaluator { study, samples: sample_materials(&central), coarseness: 1.0, solve: SolveOptions::default() }
     }
 
     /// For `study`, always at the variants too.
     pub fn with_variants(study: &'a Study) -> Evaluator<'a> {
-        Evaluator { study, samples: sample_materials(&study.materials), coarseness: 1.0 }
+        Evaluator {
+            study,
+            samples: sample_materials(&study.materials),
+            coarseness: 1.0,
+            solve: SolveOptions::default(),
+        }
     }
 
     /// The same with elements larger by `factor`: for tests.
@@ -240,69 +276,73 @@ impl<'a> Evaluator<'a> {
         let drive = *specimen.drive_mm.last().ok_or_else(no_drive)?;
         specimen.validate().map_err(|e| EvaluationFailure::Geometry { reason: e.to_string() })?;
         let mut model = ForwardModel::of_specimen(specimen, &self.mesh_options(specimen))?;
-        let options = SolveOptions::default();
-        let mut evaluated = Evaluated { responses: Vec::new(), gradients: Vec::new() };
-        let mut last: Option<Equilibrium> = None;
-        for sample in &self.samples {
-            let material = &sample.material;
-            let state = match &last {
-                // A neighbouring material's state is closer than rest; where it is not, start over.
-                Some(previous) => model
-                    .solve(material, drive, Some(previous), &options, is_cancelled)
-                    .or_else(|_| model.solve(material, drive, None, &options, is_cancelled))?,
-                None => model.solve(material, drive, None, &options, is_cancelled)?,
-            };
-            let sensitivities = model.material_sensitivities(material, &state)?;
-            let positions = model.mesh().nodes.clone();
-            let response =
-                self.response(&model, material, &positions, &state.displacement, &sensitivities, state.force_n)?;
-            if let Some(subspace) = subspace {
-                let base = response.to_vector();
-                let mut rows = Vec::with_capacity(subspace.variables.len());
-                for &variable in &subspace.variables {
-                    rows.push(self.gradient(
-                        &mut model,
-                        material,
-                        &state,
-                        &sensitivities,
-                        specimen,
-                        subspace,
-                        variable,
-                        base.len(),
-                    )?);
-                }
-                evaluated.gradients.push(rows);
+        let moves: Vec<Move> =
+            subspace.map(|s| s.variables.iter().map(|&v| a_move(&model, specimen, s, v)).collect()).unwrap_or_default();
+        let solved = self.solve(&mut model, drive, &moves, is_cancelled)?;
+        let responses = self.responses(&model, &model.mesh().nodes, &solved.states, &solved.fitted)?;
+        let mut gradients = Vec::new();
+        if subspace.is_some() {
+            gradients = vec![Vec::with_capacity(moves.len()); solved.states.len()];
+            for (n, moved) in moves.iter().enumerate() {
+                let rows = self.gradient(&model, &solved, n, moved)?;
+                gradients.iter_mut().zip(rows).for_each(|(all, row)| all.push(row));
             }
-            evaluated.responses.push(response);
-            last = Some(state);
         }
-        Ok(evaluated)
+        Ok(Evaluated { responses, gradients })
     }
 
-    /// Derivative of every response entry with respect to one variable, per mm.
-    fn gradient(
+    /// Every sample's state at `drive`, its derivatives along each of `moves`, and what earlier materials make of it.
+    fn solve(
         &self,
         model: &mut ForwardModel,
-        material: &Ogden,
-        state: &Equilibrium,
-        sensitivities: &[ParameterSensitivity],
-        specimen: &Specimen,
-        subspace: &Subspace,
-        variable: Variable,
-        entries: usize,
-    ) -> Result<Vec<f64>, EvaluationFailure> {
-        let mut velocity: Option<Vec<[f64; 3]>> = None;
-        for (design_variable, sign) in subspace.moves(variable) {
-            let one = shape_velocity(model.mesh(), specimen, design_variable);
-            let sum = velocity.get_or_insert_with(|| vec![[0.0; 3]; one.len()]);
-            for (s, v) in sum.iter_mut().zip(&one) {
-                for i in 0..3 {
-                    s[i] += sign * v[i];
+        drive: f64,
+        moves: &[Move],
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Solved, EvaluationFailure> {
+        let mut solved = Solved { states: Vec::new(), fitted: Vec::new(), paths: Vec::new() };
+        let mut equilibria: Vec<Equilibrium> = Vec::new();
+        let along_moves = |model: &mut ForwardModel, material: &Ogden, at: &Equilibrium, state: &MaterialState| {
+            let along = |m: &Move| model.path_sensitivity(material, at, &state.sensitivities, m.0.as_deref(), m.1);
+            moves.iter().map(along).collect::<Result<Vec<_>, _>>()
+        };
+        for sample in &self.samples {
+            let material = &sample.material;
+            let found = match equilibria.last() {
+                // A neighbouring material's state is closer than rest; where it is not, start over.
+                Some(previous) => model
+                    .solve(material, drive, Some(previous), &self.solve, is_cancelled)
+                    .or_else(|_| model.solve(material, drive, None, &self.solve, is_cancelled))?,
+                None => model.solve(material, drive, None, &self.solve, is_cancelled)?,
+            };
+            let state = state_of(model, material, &found)?;
+            solved.paths.push(along_moves(model, material, &found, &state)?);
+            solved.states.push(state);
+            equilibria.push(found);
+        }
+        if self.study.objective.kind == ObjectiveKind::TellApart {
+            for of in 0..self.samples.len() {
+                let earlier = (0..of).filter(|&o| self.is_central(o) && self.samples[o].prior < self.samples[of].prior);
+                for other in earlier.collect::<Vec<_>>() {
+                    let (start, material) = (&equilibria[other], &self.samples[other].material);
+                    let theirs = &solved.states[of];
+                    let fit = nearest(self.study, model, material, start, drive, theirs, &self.solve, is_cancelled)?;
+                    solved.paths.push(along_moves(model, &fit.material, &fit.equilibrium, &fit.state)?);
+                    solved.fitted.push(Fitted { of, material: fit.material, state: fit.state });
                 }
             }
         }
-        let rate = if variable == Variable::Drive { 1.0 } else { 0.0 };
-        let path = model.path_sensitivity(material, state, sensitivities, velocity.as_deref(), rate)?;
+        Ok(solved)
+    }
+
+    /// Derivative of every sample's response entries along the move with this index, per mm. Fitted materials keep their values: at
+    /// the nearest point the distance does not change with them.
+    fn gradient(
+        &self,
+        model: &ForwardModel,
+        solved: &Solved,
+        index: usize,
+        (velocity, _): &Move,
+    ) -> Result<Vec<Vec<f64>>, EvaluationFailure> {
         // A central difference along a known direction: 10⁻⁴ mm balances its truncation and rounding.
         let t = 1e-4;
         let mut sides = Vec::with_capacity(2);
@@ -311,24 +351,65 @@ impl<'a> Evaluator<'a> {
             let shift = |x: &[[f64; 3]], v: &[[f64; 3]]| -> Vec<[f64; 3]> {
                 x.iter().zip(v).map(|(a, b)| [0, 1, 2].map(|i| a[i] + step * b[i])).collect()
             };
-            let positions = match &velocity {
+            let positions = match velocity {
                 Some(v) => shift(&model.mesh().nodes, v),
                 None => model.mesh().nodes.clone(),
             };
-            let displacement = shift(&state.displacement, &path.displacement);
-            let moved: Vec<ParameterSensitivity> = sensitivities
+            let follow = |state: &MaterialState, path: &PathSensitivity| MaterialState {
+                displacement: shift(&state.displacement, &path.displacement),
+                force_n: state.force_n + step * path.force_n,
+                sensitivities: state
+                    .sensitivities
+                    .iter()
+                    .zip(&path.parameters)
+                    .map(|(s, d)| ParameterSensitivity {
+                        parameter: s.parameter,
+                        displacement: shift(&s.displacement, &d.displacement),
+                        force_n: s.force_n + step * d.force_n,
+                    })
+                    .collect(),
+            };
+            let (of_states, of_fitted) = solved.paths.split_at(solved.states.len());
+            let moved: Vec<MaterialState> =
+                solved.states.iter().zip(of_states).map(|(state, paths)| follow(state, &paths[index])).collect();
+            let fitted: Vec<Fitted> = solved
+                .fitted
                 .iter()
-                .zip(&path.parameters)
-                .map(|(s, d)| ParameterSensitivity {
-                    parameter: s.parameter,
-                    displacement: shift(&s.displacement, &d.displacement),
-                    force_n: s.force_n + step * d.force_n,
-                })
+                .zip(of_fitted)
+                .map(|(f, paths)| Fitted { state: follow(&f.state, &paths[index]), ..f.clone() })
                 .collect();
-            let force = state.force_n + step * path.force_n;
-            sides.push(self.response(model, material, &positions, &displacement, &moved, force)?.to_vector());
+            sides.push(self.responses(model, &positions, &moved, &fitted)?);
         }
-        Ok((0..entries).map(|i| (sides[0][i] - sides[1][i]) / (2.0 * t)).collect())
+        let slope = |(a, b): (&Response, &Response)| -> Vec<f64> {
+            a.to_vector().iter().zip(b.to_vector()).map(|(a, b)| (a - b) / (2.0 * t)).collect()
+        };
+        Ok(sides[0].iter().zip(&sides[1]).map(slope).collect())
+    }
+
+    /// Responses of all samples from their states, the mesh's nodes at `positions`.
+    fn responses(
+        &self,
+        model: &ForwardModel,
+        positions: &[[f64; 3]],
+        states: &[MaterialState],
+        fitted: &[Fitted],
+    ) -> Result<Vec<Response>, EvaluationFailure> {
+        let mut all = Vec::with_capacity(states.len());
+        for (index, (sample, state)) in self.samples.iter().zip(states).enumerate() {
+            let mut response = self.response(model, &sample.material, positions, state)?;
+            let mut distances = Vec::new();
+            for f in fitted.iter().filter(|f| f.of == index) {
+                distances.push(separation(self.study, model, positions, &f.material, &f.state, state)?.distance_sd);
+            }
+            response.log_separation = log_separation(distances);
+            all.push(response);
+        }
+        Ok(all)
+    }
+
+    /// Whether a sample is its prior's central value, which comes first.
+    fn is_central(&self, index: usize) -> bool {
+        index == 0 || self.samples[index - 1].prior != self.samples[index].prior
     }
 
     fn response(
@@ -336,16 +417,15 @@ impl<'a> Evaluator<'a> {
         model: &ForwardModel,
         material: &Ogden,
         positions: &[[f64; 3]],
-        displacement: &[[f64; 3]],
-        sensitivities: &[ParameterSensitivity],
-        force_n: f64,
+        state: &MaterialState,
     ) -> Result<Response, EvaluationFailure> {
         let scan = &self.study.scan;
         let voxel_volume = scan.voxel_mm.iter().product();
-        let fields = model.quadrature_fields_at(material, positions, displacement);
+        let fields = model.quadrature_fields_at(material, positions, &state.displacement);
         let integrated = integrate_over_quadrature(material, &fields, model.mesh().mirror, voxel_volume);
+        let (mesh, noise) = (model.mesh(), scan.noise());
         let information: FisherInformation =
-            information_over_quadrature(material, model.mesh(), &fields, sensitivities, &scan.noise(), voxel_volume)?;
+            information_over_quadrature(material, mesh, &fields, &state.sensitivities, &noise, voxel_volume)?;
         let covariance = information.covariance();
         let shear = information.shear_indices();
         let normalisation = self.study.objective.normalisation;
@@ -353,13 +433,29 @@ impl<'a> Evaluator<'a> {
             log_integrated: integrated.iter().map(|s| normalised(s, normalisation).max(1e-300).ln()).collect(),
             log_relative_sd: shear.iter().map(|&i| log_or_undetermined(covariance.relative_sd(i))).collect(),
             log_criteria: criteria_as_relative_sd(&covariance, &shear).map(log_or_undetermined),
-            log_force: force_n.abs().max(1e-12).ln(),
+            log_separation: 0.0,
+            log_force: state.force_n.abs().max(1e-12).ln(),
             log_stretch: tearing_stretch(
                 fields.iter().map(|q| (principal_stretches(&q.deformation_gradient)[0], q.volume_mm3)),
             )
             .ln(),
         })
     }
+}
+
+/// How `variable` moves the nodes and the drive.
+fn a_move(model: &ForwardModel, specimen: &Specimen, subspace: &Subspace, variable: Variable) -> Move {
+    let mut velocity: Option<Vec<[f64; 3]>> = None;
+    for (design_variable, sign) in subspace.moves(variable) {
+        let one = shape_velocity(model.mesh(), specimen, design_variable);
+        let sum = velocity.get_or_insert_with(|| vec![[0.0; 3]; one.len()]);
+        for (s, v) in sum.iter_mut().zip(&one) {
+            for i in 0..3 {
+                s[i] += sign * v[i];
+            }
+        }
+    }
+    (velocity, if variable == Variable::Drive { 1.0 } else { 0.0 })
 }
 
 /// The stretch exceeded in [`TEARING_FRACTION`] of the volume, from (stretch, volume) pairs; 1 without any.

@@ -1,7 +1,7 @@
 //! The study (`study/1`): a base specimen, what may vary, for which materials, how it is scanned, what can be made, what
 //! is sought and how hard.
 
-use super::aim::Objective;
+use super::aim::{Objective, ObjectiveKind};
 use crate::material::Ogden;
 use crate::sensitivity::ScanSettings;
 use crate::specimen::{ManufacturingLimits, Specimen, Symmetry, TestKind};
@@ -298,6 +298,10 @@ impl Study {
             let parameters = prior.material.parameters().into_iter().map(|p| p.name());
             parameters.filter(|n| n != "kappa").collect::<Vec<_>>()
         };
+        if self.objective.kind == ObjectiveKind::TellApart && self.materials.len() < 2 {
+            let message = "objective.kind: tell_apart needs at least two materials to tell apart".into();
+            return Err(StudyError::Inconsistent { message });
+        }
         self.objective.validate(&self.materials.iter().map(names).collect::<Vec<_>>())?;
         for (field, value) in [
             ("budget.explore", self.budget.explore),

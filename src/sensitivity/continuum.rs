@@ -10,6 +10,7 @@ use crate::fem::{ParameterSensitivity, QuadraturePoint};
 use crate::kinematics::{decompose, principal_stretches};
 use crate::material::Ogden;
 use crate::mesh::{Mesh, Mirror};
+use nalgebra::DMatrix;
 
 /// How many reflected copies make the whole specimen.
 pub(super) fn num_copies(mirror: Mirror) -> f64 {
@@ -62,15 +63,36 @@ pub fn information_over_quadrature(
     noise: &MeasurementNoise,
     voxel_volume_mm3: f64,
 ) -> Result<FisherInformation, InformationError> {
-    noise.check()?;
     let mut information = FisherInformation::none(material);
     let num = information.parameters().len();
+    check_length("sensitivities", sensitivities.len(), num)?;
+    let fields: Vec<(&[[f64; 3]], f64)> = sensitivities.iter().map(|s| (&s.displacement[..], s.force_n)).collect();
+    let gram = gram_over_quadrature(mesh, points, &fields, noise, voxel_volume_mm3)?;
+    for i in 0..num {
+        for j in 0..=i {
+            information.set(i, j, gram[(i, j)]);
+        }
+    }
+    information.check_finite()?;
+    Ok(information)
+}
+
+/// Products of pairs (nodal displacements in mm, force in N) in the metric of the scan's noise: ∫ aᵀ N⁻¹ b dV / V_voxel and the
+/// load cell's part.
+pub(super) fn gram_over_quadrature(
+    mesh: &Mesh,
+    points: &[QuadraturePoint],
+    fields: &[(&[[f64; 3]], f64)],
+    noise: &MeasurementNoise,
+    voxel_volume_mm3: f64,
+) -> Result<DMatrix<f64>, InformationError> {
+    noise.check()?;
+    let num = fields.len();
     let rule = mesh.element_kind.quadrature();
     let shape: Vec<[f64; 27]> = rule.iter().map(|(r, _)| mesh.element_kind.shape_functions(*r)).collect();
-    check_length("sensitivities", sensitivities.len(), num)?;
     check_length("quadrature points", points.len(), mesh.num_elements() * rule.len())?;
-    for s in sensitivities {
-        check_length("a parameter's nodal sensitivities", s.displacement.len(), mesh.nodes.len())?;
+    for (field, _) in fields {
+        check_length("a parameter's nodal sensitivities", field.len(), mesh.nodes.len())?;
     }
     let root = noise.displacement_sd_mm.map(|sd| 1.0 / sd);
     let mut sums = vec![0.0; num * num];
@@ -78,11 +100,11 @@ pub fn information_over_quadrature(
     for (n, point) in points.iter().enumerate() {
         let nodes = mesh.element(point.element);
         let weights = &shape[n % rule.len()];
-        for (value, s) in local.iter_mut().zip(sensitivities) {
+        for (value, (field, _)) in local.iter_mut().zip(fields) {
             *value = [0.0; 3];
             for (&node, weight) in nodes.iter().zip(weights) {
                 for c in 0..3 {
-                    value[c] += weight * root[c] * s.displacement[node as usize][c];
+                    value[c] += weight * root[c] * field[node as usize][c];
                 }
             }
         }
@@ -94,15 +116,10 @@ pub fn information_over_quadrature(
         }
     }
     let scale = num_copies(mesh.mirror) / voxel_volume_mm3;
-    for i in 0..num {
-        for j in 0..=i {
-            information.set(i, j, scale * sums[i * num + j]);
-        }
-    }
-    let forces: Vec<f64> = sensitivities.iter().map(|s| s.force_n).collect();
-    information.add_force(&forces, noise.force_sd_n);
-    information.check_finite()?;
-    Ok(information)
+    Ok(DMatrix::from_fn(num, num, |i, j| {
+        let of_force = fields[i].1 / noise.force_sd_n * (fields[j].1 / noise.force_sd_n);
+        scale * sums[i.max(j) * num + i.min(j)] + of_force
+    }))
 }
 
 /// Volume-weighted median of the stretch amplitude λ; none without admissible points.

@@ -8,6 +8,7 @@ mod information;
 mod integrated;
 mod observation;
 mod pointwise;
+mod separation;
 
 pub use continuum::{
     information_over_quadrature, integrate_over_quadrature, largest_principal_stretch, median_stretch_over_quadrature,
@@ -22,3 +23,4 @@ pub use information::{FisherInformation, InformationError, MeasurementNoise, Par
 pub use integrated::{IntegratedSensitivity, integrate_over_voxels, parameter_sensitivity, sensitivity_map};
 pub use observation::{DriveMaps, DrivenState, EvaluationStep, Observation, Scanner, median};
 pub use pointwise::{PointwiseSensitivity, alpha_sensitivity, mu_sensitivity};
+pub use separation::{MaterialState, Separation, separation_over_quadrature};

@@ -96,7 +96,7 @@ export async function planView(content, signal, from) {
 
   const material = h("div", {}, materialFields(model, library));
   const goal = h("div", { class: "fields" },
-    pick("Objective", [["integrated_sensitivity", "integrated sensitivity"], ["d_optimal", "D-optimal"], ["a_optimal", "A-optimal"], ["e_optimal", "E-optimal"], ["worst_relative_sd", "worst relative deviation"]], model.objective.kind, (v) => { model.objective.kind = v; }, { class: "wide" }),
+    pick("Objective", [["integrated_sensitivity", "integrated sensitivity"], ["d_optimal", "D-optimal"], ["a_optimal", "A-optimal"], ["e_optimal", "E-optimal"], ["worst_relative_sd", "worst relative deviation"], ["tell_apart", "telling materials apart"]], model.objective.kind, (v) => { model.objective.kind = v; }, { class: "wide" }),
     number_("Holes, at least", model.vary.hole_count.min, (v) => { model.vary.hole_count.min = v; }, { step: 1, min: 0, max: 8 }),
     number_("Holes, at most", model.vary.hole_count.max, (v) => { model.vary.hole_count.max = v; }, { step: 1, min: 0, max: 8 }),
     number_("Drive, at least, mm", model.vary.drive_mm.min, (v) => { model.vary.drive_mm.min = v; }),
