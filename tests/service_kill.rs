@@ -178,6 +178,42 @@ fn two_workers_share_a_sweep() {
     assert!(shares.len() == 2 && shares.iter().all(|n| *n >= NUM_TASKS as i64 / 5), "{shares:?}");
 }
 
+/// Workers as a Slurm job array take a sweep of the service and end when nothing is left.
+#[test]
+fn a_cluster_takes_a_sweep() {
+    let Some(url) = database("lambdak_cluster") else { return };
+    let answers = std::process::Command::new("sinfo").arg("-h").output().is_ok_and(|o| o.status.success());
+    if !answers {
+        eprintln!("SKIPPED a_cluster_takes_a_sweep: no Slurm answers on this machine (start one with .ci/slurm)");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &["--slots", "0", "--database", url.as_str()]);
+    let job = service.submit("sweeps", &small_sweep(NUM_TASKS));
+    let workers = folder.path().join("workers");
+    let output = lambdak()
+        .args(["worker", "--slurm", "--tasks", "2", "--time", "30", "--mem", "500M", "--idle-exit-s", "2", "--folder"])
+        .arg(&workers)
+        .env("LAMBDAK_DATABASE", &url)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let number = String::from_utf8(output.stdout).unwrap().trim().to_string();
+    assert_eq!(service.wait(&job, LONG)["state"], "succeeded");
+    let script = std::fs::read_to_string(workers.join("array.sh")).unwrap();
+    assert!(!script.contains("postgres://"), "the address is no part of the script");
+    let begin = std::time::Instant::now();
+    loop {
+        let queue = std::process::Command::new("squeue").args(["-h", "-j", &number]).output().unwrap();
+        // Empty, or an error once the controller has forgotten the job.
+        if queue.stdout.is_empty() {
+            break;
+        }
+        assert!(begin.elapsed() < LONG, "the workers did not end");
+        std::thread::sleep(Duration::from_millis(200));
+    }
+}
+
 #[test]
 fn a_task_that_ends_its_workers_is_put_aside_and_late_results_are_refused() {
     use lambdak::service::store::{Finished, MAX_LOSSES, NewJob, NewTask, Store, TaskResult};

@@ -58,7 +58,7 @@ pub(super) fn run(a: &DesignArguments) -> Result<(), CliError> {
     if a.no_verify {
         study.verification.is_on = false;
     }
-    if a.slurm.slurm {
+    if a.slurm.array.slurm {
         let (folder, seed) = design_slurm::search_on_cluster(&a.slurm, &study, &a.study, &a.common)?;
         study.seed = seed;
         return run_search(&study, Some(&folder), false, a);

@@ -49,7 +49,7 @@ pub(super) fn search_on_cluster(
     bar.clear();
     ran?;
     let mut best: Option<(f64, u64)> = None;
-    for task in 1..=a.tasks {
+    for task in 1..=a.array.tasks {
         let seed = seed_of(task);
         let Some(result) = found(study, &folder, seed)? else { continue };
         eprintln!("seed {seed}: objective {:.4} ({})", result.best.objective, result.best.specimen.name);

@@ -7,8 +7,9 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+/// What an array asks for.
 #[derive(Args)]
-pub(super) struct SlurmArguments {
+pub(super) struct ArrayArguments {
     /// Run as a job array on the Slurm cluster, through the installed sbatch.
     #[arg(long)]
     pub slurm: bool,
@@ -30,6 +31,38 @@ pub(super) struct SlurmArguments {
     /// Slurm: a further option of sbatch, such as --slurm-option=--qos=low.
     #[arg(long, requires = "slurm", value_name = "OPTION", allow_hyphen_values = true)]
     pub slurm_option: Vec<String>,
+}
+
+impl ArrayArguments {
+    /// The array of `command` (with `{task}` for the task's number) with its files in `folder`.
+    pub(super) fn job(
+        &self,
+        name: &str,
+        folder: PathBuf,
+        command: Vec<String>,
+        threads: usize,
+    ) -> Result<ArrayJob, CliError> {
+        if !(1..=100_000).contains(&self.tasks) {
+            let message = format!("{} is not from 1 to 100000", self.tasks);
+            return Err(CliError::Option { option: "tasks", message });
+        }
+        let resources = Resources {
+            partition: self.partition.clone(),
+            time: self.time.clone(),
+            memory: self.mem.clone(),
+            account: self.account.clone(),
+            threads,
+            others: self.slurm_option.clone(),
+        };
+        Ok(ArrayJob { name: format!("lambdak-{name}"), folder, command, resources })
+    }
+}
+
+/// An array that is followed to its end.
+#[derive(Args)]
+pub(super) struct SlurmArguments {
+    #[command(flatten)]
+    pub array: ArrayArguments,
     /// Slurm: seconds between two looks at the queue.
     #[arg(long, requires = "slurm", default_value_t = 5.0)]
     pub poll: f64,
@@ -51,25 +84,10 @@ pub(super) fn run_array(
     progress_of: &dyn Fn(usize) -> Result<TaskProgress, String>,
     on_progress: &dyn Fn(TaskProgress),
 ) -> Result<(), CliError> {
-    if !(1..=100_000).contains(&a.tasks) {
-        return Err(CliError::Option { option: "tasks", message: format!("{} is not from 1 to 100000", a.tasks) });
-    }
     if !(0.05..=3600.0).contains(&a.poll) {
         return Err(CliError::Option { option: "poll", message: format!("{} is not from 0.05 to 3600", a.poll) });
     }
-    let job = ArrayJob {
-        name: format!("lambdak-{name}"),
-        folder: folder.join("slurm"),
-        command,
-        resources: Resources {
-            partition: a.partition.clone(),
-            time: a.time.clone(),
-            memory: a.mem.clone(),
-            account: a.account.clone(),
-            threads,
-            others: a.slurm_option.clone(),
-        },
-    };
+    let job = a.array.job(name, folder.join("slurm"), command, threads)?;
     let settings =
         FollowSettings { poll: Duration::from_secs_f64(a.poll), max_restarts: a.restarts, cancel_jobs: a.cancel };
     let say = |event: &Following| match event {
@@ -80,15 +98,19 @@ pub(super) fn run_array(
         }
         Following::Progress(p) => on_progress(*p),
     };
-    let tasks: Vec<usize> = (1..=a.tasks).collect();
-    follow(&job, &tasks, &settings, progress_of, &say, &interrupt::is_requested, &std::thread::sleep).map_err(|e| {
-        match e {
-            SlurmError::Interrupted { message } => CliError::Interrupted(message),
-            SlurmError::Write { path, source } => CliError::Write { path, source },
-            SlurmError::BadValue { .. } => CliError::Option { option: "slurm", message: e.to_string() },
-            other => CliError::Cluster(other.to_string()),
-        }
-    })
+    let tasks: Vec<usize> = (1..=a.array.tasks).collect();
+    follow(&job, &tasks, &settings, progress_of, &say, &interrupt::is_requested, &std::thread::sleep)
+        .map_err(cluster_error)
+}
+
+/// What went wrong with a cluster, for the command line.
+pub(super) fn cluster_error(error: SlurmError) -> CliError {
+    match error {
+        SlurmError::Interrupted { message } => CliError::Interrupted(message),
+        SlurmError::Write { path, source } => CliError::Write { path, source },
+        SlurmError::BadValue { .. } => CliError::Option { option: "slurm", message: error.to_string() },
+        other => CliError::Cluster(other.to_string()),
+    }
 }
 
 /// This program, for the nodes.

@@ -75,7 +75,7 @@ fn run_study(a: &SweepArguments, path: &Path) -> Result<(), CliError> {
     // Results must outlive the run: unlike other commands, a sweep has a folder even with --json.
     let folder = output::folder(a.common.out.as_deref(), false, path).unwrap_or_else(|| PathBuf::from("results"));
     keep_study(&study, &folder)?;
-    if a.slurm.slurm {
+    if a.slurm.array.slurm {
         run_on_cluster(a, &study, &folder)?;
     } else {
         run_here(&study, &folder, shard)?;
@@ -144,7 +144,7 @@ fn run_here(study: &SweepStudy, folder: &Path, shard: Shard) -> Result<(), CliEr
 /// One shard per array task; each writes its own file.
 fn run_on_cluster(a: &SweepArguments, study: &SweepStudy, folder: &Path) -> Result<(), CliError> {
     let absolute = std::fs::canonicalize(folder).map_err(|source| CliError::Read { path: folder.into(), source })?;
-    let count = a.slurm.tasks;
+    let count = a.slurm.array.tasks;
     let threads = a.common.threads.unwrap_or(1);
     let command = vec![
         own_program()?,

@@ -43,6 +43,8 @@ pub struct Signal {
     pub failed: AtomicU64,
     /// Milliseconds of tasks run, for metrics.
     pub busy_ms: AtomicU64,
+    /// Tasks running now.
+    pub running: AtomicU64,
 }
 
 impl Signal {
@@ -103,7 +105,11 @@ fn run_slot(store: &Store, settings: &WorkerSettings, signal: &Signal, slot: usi
             let _ = store.worker_seen(&settings.name, settings.slots);
         }
         match store.claim(&worker, lease_ms, &dead) {
-            Ok(Some(task)) => run_task(store, settings, signal, &worker, &task),
+            Ok(Some(task)) => {
+                signal.running.fetch_add(1, Ordering::SeqCst);
+                run_task(store, settings, signal, &worker, &task);
+                signal.running.fetch_sub(1, Ordering::SeqCst);
+            }
             Ok(None) => signal.wait(IDLE),
             Err(error) => {
                 log::error("claim", &error.to_string());

@@ -14,7 +14,8 @@ use hyper_util::service::TowerToHyperService;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Duration;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
 use tokio::sync::{Semaphore, watch};
 
 /// Settings of the service.
@@ -45,6 +46,8 @@ pub struct WorkerOptions {
     pub slots: usize,
     /// How long a lease lasts.
     pub lease: Duration,
+    /// The worker ends after this long without a task; never without it.
+    pub idle_exit: Option<Duration>,
 }
 
 /// Why the service or a worker does not run.
@@ -243,7 +246,7 @@ async fn accept(listener: tokio::net::TcpListener, router: axum::Router, head_ti
     }
 }
 
-/// Runs a worker until it is told to stop.
+/// Runs a worker until it is told to stop, or has been idle for as long as its options say.
 ///
 /// # Errors
 /// [`ServeError`].
@@ -262,11 +265,24 @@ pub fn work(options: &WorkerOptions) -> Result<(), ServeError> {
     let slots = runner::start(&store, &settings, &signal);
     let other = runtime.block_on(async {
         let mut stopped = std::pin::pin!(interrupted());
+        let (mut idle_since, mut checked, mut tasks) = (Instant::now(), Instant::now(), 0);
         loop {
             tokio::select! {
                 () = &mut stopped => return None,
-                () = tokio::time::sleep(Duration::from_secs(10)) => {}
+                () = tokio::time::sleep(Duration::from_secs(1)) => {}
             }
+            let so_far = signal.finished.load(Ordering::Relaxed) + signal.failed.load(Ordering::Relaxed);
+            if signal.running.load(Ordering::SeqCst) > 0 || so_far != tasks {
+                (idle_since, tasks) = (Instant::now(), so_far);
+            }
+            if options.idle_exit.is_some_and(|limit| idle_since.elapsed() >= limit) {
+                log::info("worker", &serde_json::json!({ "name": settings.name, "outcome": "idle", "tasks": so_far }));
+                return None;
+            }
+            if checked.elapsed() < Duration::from_secs(10) {
+                continue;
+            }
+            checked = Instant::now();
             // A service of another version that starts meanwhile is noticed too.
             let store = store.clone();
             if let Ok(Err(error @ StoreError::OtherVersion { .. })) =
