@@ -6,7 +6,7 @@ use super::fit::{BulkPrior, FitSettings, Fitted, ShearPrior, Supposed, scene_of,
 use super::found::{FoundCause, compressible, found_cause, load_causes, terms};
 use super::laboratory::Laboratory;
 use super::leftover::{Leftover, leftover};
-use super::load_history::{Homogeneous, LoadHistoryFit, fit_load_history};
+use super::load_history::{LoadHistoryFit, fit_load_history};
 use super::maps::{ScoreMap, jumps};
 use super::mesh_error::widen;
 use super::metric::Metric;
@@ -169,11 +169,11 @@ pub fn diagnose(
     progress("reading the load curve");
     let mut load = None;
     if let Some(curve) = recording.load.as_ref().filter(|_| observed.steps.iter().any(|s| s.force.is_some())) {
-        let table = work.elastic_table(&nominal, curve.drive_mm.iter().fold(largest, |s, d| s.max(d.abs())))?;
+        let (table, kernel) =
+            work.elastic_table(&nominal, curve.drive_mm.iter().fold(largest, |s, d| s.max(d.abs())))?;
         let drift = observed.steps.iter().filter_map(|s| s.force).map(|f| f.sd_n).fold(0.0, f64::max);
         let windows: Vec<Option<[f64; 2]>> = recording.steps.iter().map(|s| s.window_s).collect();
-        let sample = Homogeneous::of(&observed.specimen, &nominal.material);
-        load = fit_load_history(curve, &table, &sample, drift.max(1e-6), &windows, &|e| !work.is_left_out(e.cause()));
+        load = fit_load_history(curve, &table, &kernel, drift.max(1e-6), &windows, &|e| !work.is_left_out(e.cause()));
     }
     let has_curve = load.is_some();
     let mut causes: Vec<FoundCause> = Vec::new();

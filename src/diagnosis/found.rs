@@ -65,7 +65,11 @@ pub(super) fn found_cause(
         .parameters()
         .iter()
         .zip(supposed.values.iter().zip(fitted.sd_of(index)))
-        .map(|(p, (value, sd))| (p.name.clone(), *value, [value - 1.96 * sd, value + 1.96 * sd]))
+        .map(|(p, (value, sd))| {
+            // Wider than what the parameter can be, as of a patch's edge beyond the face's own: the data say nothing of it.
+            let sd = if 1.96 * sd > p.range[1] - p.range[0] { f64::INFINITY } else { *sd };
+            (p.name.clone(), *value, [value - 1.96 * sd, value + 1.96 * sd])
+        })
         .collect();
     FoundCause {
         name: supposed.cause.name(),

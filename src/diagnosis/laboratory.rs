@@ -1,6 +1,7 @@
 //! The laboratory: what would be recorded of a scene, and how that changes with the scene.
 
 use super::error::DiagnosisError;
+use super::memory_kernel::KernelState;
 use super::scene::Scene;
 use super::trace::Trace;
 use crate::calibration::{Observed, View};
@@ -138,17 +139,18 @@ impl<'a> Laboratory<'a> {
         }
     }
 
-    /// Forces at other drives, N: an elastic load curve of the scene.
+    /// An elastic load curve of the scene: at each of `drives_mm` the force (N), its derivatives with respect to the material, and
+    /// what its memory needs.
     ///
     /// # Errors
     /// As [`Self::predict`].
-    pub fn forces(
+    pub fn load_curve(
         &mut self,
         material: &Ogden,
         scene: &Scene,
         drives_mm: &[f64],
         is_cancelled: &dyn Fn() -> bool,
-    ) -> Result<Vec<(f64, Vec<f64>)>, DiagnosisError> {
+    ) -> Result<Vec<(f64, Vec<f64>, KernelState)>, DiagnosisError> {
         let at = self.station(scene)?;
         let departures = self.departures(material, scene, 0);
         let station = &mut self.stations[at];
@@ -159,7 +161,8 @@ impl<'a> Laboratory<'a> {
             self.num_solves += 1;
             let state = station.model.solve(material, drive, last.as_ref(), &self.solve, is_cancelled)?;
             let sensitivities = station.model.material_sensitivities(material, &state)?;
-            table.push((state.force_n, sensitivities.iter().map(|s| s.force_n).collect()));
+            let remembered = KernelState::of(&mut station.model, material, &state)?;
+            table.push((state.force_n, sensitivities.iter().map(|s| s.force_n).collect(), remembered));
             last = Some(state);
         }
         Ok(table)

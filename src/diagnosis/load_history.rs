@@ -3,17 +3,16 @@
 //! The force is F(t) = Prony ∗ [η F∞(d(t))] + offset + friction · direction of motion. F∞ is the finite element force over
 //! drive, its material free (to first order). η = 1 − ρ erf((W_max − W)/m) is Ogden and Roxburgh's softening with the work
 //! W(d) = ∫ F∞ dd of the whole sample in place of the local energy. The Prony series acts on the isochoric second
-//! Piola–Kirchhoff stress (Simo 1987) of a homogeneous sample of the same test, whose share of the force is scaled to F∞: at
-//! large shear the memory of the stress and that of the force differ.
+//! Piola–Kirchhoff stress of every point (Simo 1987; see [`super::memory_kernel`]): at large shear the memory of the stress and
+//! that of the force differ.
 //!
 //! Readings carry white noise and a slow drift; both are in the weights.
 
 use super::error::DiagnosisError;
-use crate::homogeneous::{Deformation, LeastSquaresOptions, Limit, ShearTerm, covariance, erf, minimise};
-use crate::material::Ogden;
-use crate::rate::{ForceTable, channels, memory};
+use super::memory_kernel::MemoryKernel;
+use crate::homogeneous::{LeastSquaresOptions, Limit, covariance, erf, minimise};
+use crate::rate::{ForceTable, memory};
 use crate::recording::LoadCurve;
-use crate::specimen::{Specimen, TestKind};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use serde::{Deserialize, Serialize};
 
@@ -29,8 +28,8 @@ const SMALLEST_SHARE: f64 = 0.02;
 
 /// Allowance of the force model, relative to the force: common effects of the mesh are in the free material.
 const ALLOWANCE: f64 = 0.002;
-/// Allowance below the largest drive so far, relative to the force there: what is remembered of it is that of a homogeneous
-/// sample, and a sample with holes is none.
+/// Allowance below the largest drive so far, relative to the force there: the deformation of a sample that remembers is not quite
+/// that of the elastic one.
 const ALLOWANCE_OF_MEMORY: f64 = 0.004;
 /// … and near zero drive, within this part of the largest so far, where the force is all memory.
 const NEAR_REST: f64 = 0.15;
@@ -77,43 +76,6 @@ impl ElasticTable {
         let limit = table.range()[1];
         let value = table.at(drive.abs().min(limit)).map_or(0.0, |v| v.0);
         value * drive.signum()
-    }
-}
-
-/// A homogeneous sample of the same test: what relaxes in it.
-pub struct Homogeneous {
-    test: TestKind,
-    /// Gap of the plates or length between the clamps, mm.
-    length_mm: f64,
-    terms: Vec<ShearTerm>,
-}
-
-impl Homogeneous {
-    /// Of a specimen's block.
-    pub fn of(specimen: &Specimen, material: &Ogden) -> Homogeneous {
-        let length_mm = match specimen.test {
-            TestKind::DoubleLapShear => specimen.block.thickness_mm,
-            TestKind::Uniaxial => specimen.block.length_mm,
-        };
-        let terms =
-            material.terms.iter().map(|t| ShearTerm { modulus_kpa: t.mu_kpa * t.alpha, alpha: t.alpha }).collect();
-        Homogeneous { test: specimen.test, length_mm, terms }
-    }
-
-    /// Two channels of reference stress and their weights in the nominal stress, relative to it.
-    fn channels(&self, drive_mm: f64) -> ([f64; 2], [f64; 2]) {
-        // At rest the ratio is that of small drives.
-        let least = 1e-4 * self.length_mm;
-        let drive = if drive_mm.abs() < least { least } else { drive_mm };
-        let deformation = match self.test {
-            TestKind::DoubleLapShear => Deformation::SimpleShear { shear: drive / self.length_mm },
-            TestKind::Uniaxial => Deformation::Uniaxial { stretch: (1.0 + drive / self.length_mm).max(0.05) },
-        };
-        let c = channels(&self.terms, &deformation);
-        let nominal = c.weight[0] * c.stress[0] + c.weight[1] * c.stress[1];
-        // The stress itself vanishes at rest; the weights keep their limit.
-        let stress = if drive_mm.abs() < least { [0.0; 2] } else { c.stress };
-        (c.weight.map(|w| w * drive / nominal), stress)
     }
 }
 
@@ -191,10 +153,10 @@ struct Problem {
     derivatives: Vec<Vec<f64>>,
     work: Vec<f64>,
     largest_work: f64,
-    /// Per channel: weights, mm/kPa, and reference stress, kPa, of the homogeneous sample.
-    channels: [(Vec<f64>, Vec<f64>); 2],
-    /// F∞ / drive, N/mm.
-    stiffness: Vec<f64>,
+    /// Per row of the memory kernel: its history, N.
+    histories: Vec<Vec<f64>>,
+    /// Per reading: rows and weights that make the force of what is remembered.
+    rows: Vec<Vec<(usize, f64)>>,
     whitener: Cholesky<f64, Dyn>,
 }
 
@@ -234,15 +196,17 @@ impl Problem {
             at += effect.num_parameters();
         }
         let mut force: Vec<f64> = self.elastic.iter().zip(&factor).map(|(e, f)| e * f).collect();
-        if !relaxations.is_empty() {
-            for (weights, stress) in &self.channels {
-                let scaled: Vec<f64> = stress.iter().zip(&factor).map(|(s, f)| s * f).collect();
-                for &(strength, time_s) in &relaxations {
-                    let (kept, _) = memory(&self.time_s, &scaled, time_s);
-                    for (((f, m), w), k) in force.iter_mut().zip(kept).zip(weights).zip(&self.stiffness) {
-                        *f += strength * w * k * m;
-                    }
-                }
+        for &(strength, time_s) in &relaxations {
+            let kept: Vec<Vec<f64>> = self
+                .histories
+                .iter()
+                .map(|history| {
+                    let scaled: Vec<f64> = history.iter().zip(&factor).map(|(h, f)| h * f).collect();
+                    memory(&self.time_s, &scaled, time_s).0
+                })
+                .collect();
+            for (n, (f, rows)) in force.iter_mut().zip(&self.rows).enumerate() {
+                *f += strength * rows.iter().map(|(row, weight)| weight * kept[*row][n]).sum::<f64>();
             }
         }
         force.iter_mut().zip(&added).for_each(|(f, a)| *f += a);
@@ -323,18 +287,17 @@ impl Problem {
 /// Gain, effect, deviance, parameters and their standard deviations of a fit.
 type Trial = (f64, LoadEffect, f64, Vec<f64>, Vec<f64>);
 
-/// Looks for effects in a load curve whose elastic force is `table`, of a specimen in which what relaxes does so as in
-/// `sample`; `drift_sd_n` is the standard deviation of the load cell's
-/// slow drift, `windows_s` are the steps' windows; only effects that are allowed are supposed.
+/// Looks for effects in a load curve whose elastic force is `table` and whose memory is `kernel`; `drift_sd_n` is the standard
+/// deviation of the load cell's slow drift, `windows_s` are the steps' windows; only effects that are allowed are supposed.
 pub fn fit_load_history(
     curve: &LoadCurve,
     table: &ElasticTable,
-    sample: &Homogeneous,
+    kernel: &MemoryKernel,
     drift_sd_n: f64,
     windows_s: &[Option<[f64; 2]>],
     is_allowed: &dyn Fn(LoadEffect) -> bool,
 ) -> Option<LoadHistoryFit> {
-    let problem = prepare(curve, table, sample, drift_sd_n)?;
+    let problem = prepare(curve, table, kernel, drift_sd_n)?;
     let num_material = problem.derivatives.len();
     let mut effects: Vec<LoadEffect> = Vec::new();
     let mut gained: Vec<f64> = Vec::new();
@@ -416,7 +379,7 @@ pub fn fit_load_history(
     })
 }
 
-fn prepare(curve: &LoadCurve, table: &ElasticTable, sample: &Homogeneous, drift_sd_n: f64) -> Option<Problem> {
+fn prepare(curve: &LoadCurve, table: &ElasticTable, kernel: &MemoryKernel, drift_sd_n: f64) -> Option<Problem> {
     let every = curve.time_s.len().div_ceil(MAX_READINGS).max(1);
     let pick = |values: &[f64]| -> Vec<f64> { values.iter().copied().step_by(every).collect() };
     let (mut time_s, mut drive_mm, mut measured) = (pick(&curve.time_s), pick(&curve.drive_mm), pick(&curve.force_n));
@@ -470,29 +433,9 @@ fn prepare(curve: &LoadCurve, table: &ElasticTable, sample: &Homogeneous, drift_
         drift + each
     });
     let whitener = Cholesky::new(matrix)?;
-    let mut channels = [(Vec::new(), Vec::new()), (Vec::new(), Vec::new())];
-    let least = 1e-4 * sample.length_mm;
-    let slope = ElasticTable::at(&table.force, least) / least;
-    let mut stiffness = Vec::with_capacity(n);
-    for (drive, force) in drive_mm.iter().zip(&elastic) {
-        let (weight, stress) = sample.channels(*drive);
-        for k in 0..2 {
-            channels[k].0.push(weight[k]);
-            channels[k].1.push(stress[k]);
-        }
-        stiffness.push(if drive.abs() > least { force / drive } else { slope });
-    }
-    let known = Problem {
-        time_s,
-        measured,
-        direction,
-        elastic,
-        derivatives,
-        work,
-        largest_work,
-        channels,
-        stiffness,
-        whitener,
-    };
+    let histories = kernel.histories(&drive_mm);
+    let rows = drive_mm.iter().map(|d| kernel.weights(*d)).collect();
+    let known =
+        Problem { time_s, measured, direction, elastic, derivatives, work, largest_work, histories, rows, whitener };
     Some(known)
 }

@@ -8,6 +8,7 @@ use super::fit::{BulkPrior, FitSettings, Fitted, STEP, Supposed, fit, paths_of, 
 use super::laboratory::Laboratory;
 use super::load_history::ElasticTable;
 use super::maps::{ScoreMap, debond_map, inclusion_map};
+use super::memory_kernel::{KernelState, MemoryKernel};
 use super::metric::Metric;
 use super::scene::Scene;
 use super::score::ScoreTest;
@@ -24,6 +25,8 @@ const MAX_FITS: usize = 4;
 const SMALLEST_EFFECT: f64 = 1.0;
 /// Drives of the load curve's table.
 const TABLE_POINTS: usize = 8;
+/// The drive that stands for rest, as a part of the largest.
+const SMALL_DRIVE: f64 = 1e-3;
 /// A cause must lower the deviance by this much beyond ln n per parameter: very strong evidence, many times over, because
 /// many causes are tried.
 pub(super) const EVIDENCE: f64 = 30.0;
@@ -209,17 +212,30 @@ impl Work<'_, '_> {
         }
     }
 
-    /// F∞ over drive with its derivatives with respect to scaled material parameters, κ apart.
-    pub(super) fn elastic_table(&mut self, fitted: &Fitted, largest_mm: f64) -> Result<ElasticTable, DiagnosisError> {
-        let drives: Vec<f64> = (1..=TABLE_POINTS).map(|n| largest_mm * n as f64 / TABLE_POINTS as f64).collect();
-        let rows = self.laboratory.forces(&fitted.material, &fitted.scene(), &drives, self.is_cancelled)?;
+    /// F∞ over drive with its derivatives with respect to scaled material parameters, κ apart, and its memory.
+    pub(super) fn elastic_table(
+        &mut self,
+        fitted: &Fitted,
+        largest_mm: f64,
+    ) -> Result<(ElasticTable, MemoryKernel), DiagnosisError> {
+        // The first one stands for rest.
+        let parts = std::iter::once(SMALL_DRIVE).chain((1..=TABLE_POINTS).map(|n| n as f64 / TABLE_POINTS as f64));
+        let drives: Vec<f64> = parts.map(|part| part * largest_mm).collect();
+        let rows = self.laboratory.load_curve(&fitted.material, &fitted.scene(), &drives, self.is_cancelled)?;
         let parameters = fitted.material.parameters();
         let at_rest = |values: Vec<f64>| -> Vec<f64> { std::iter::once(0.0).chain(values).collect() };
         let forces = at_rest(rows.iter().map(|r| r.0).collect());
         let derivatives: Vec<Vec<f64>> = (1..parameters.len())
             .map(|i| at_rest(rows.iter().map(|r| r.1[i] * fitted.material.value(parameters[i])).collect()))
             .collect();
-        ElasticTable::new(&at_rest(drives), &forces, &derivatives)
+        let table = ElasticTable::new(&at_rest(drives), &forces, &derivatives)?;
+        let states: Vec<KernelState> = rows.into_iter().map(|r| r.2).collect();
+        let kernel = MemoryKernel::new(&states).ok_or(DiagnosisError::Setting {
+            name: "the number of drives of the load curve's table",
+            value: states.len() as f64,
+            requirement: "at least one rising drive",
+        })?;
+        Ok((table, kernel))
     }
 
     /// All candidates, most explaining first.

@@ -172,6 +172,11 @@ impl ForwardModel {
         &self.mesh
     }
 
+    /// How often the meshed part stands in the test: mirrored copies times samples. Forces are those of all of them.
+    pub fn multiplicity(&self) -> f64 {
+        self.multiplicity
+    }
+
     /// Displacement unknowns that can move.
     pub fn num_unknowns(&self) -> usize {
         self.topology.num_free_unknowns()

@@ -22,6 +22,7 @@ pub use analysis::{
     AMBIGUOUS_BIC, EXPLAINED_PART, F_TEST_LEVEL, LoadCurveAnalysisError, LoadCurveOptions, MIN_DELTA_BIC,
     analyse_load_curve,
 };
+#[cfg(test)]
 pub(crate) use channels::channels;
 pub use force_history::{
     FittedRelaxation, ForceHistory, ForceHistoryError, ForceHistoryFit, ForceHistoryOptions, ForceHistorySequence,
