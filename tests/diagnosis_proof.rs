@@ -53,3 +53,22 @@ fn an_unknown_cause_is_not_named_no_mismatch() {
     assert_ne!(found.verdict, Some(Verdict::NoMismatch), "{found:?}");
     assert!(!found.named.iter().any(|n| n == "debond"), "{found:?}");
 }
+
+/// A load train that gives way a little looks like a gain error: both are named, with a further step that would tell them apart.
+#[test]
+fn an_ambiguous_cause_comes_with_the_experiment() {
+    use lambdak::diagnosis::{DiagnosisOptions, diagnose};
+    let made = conceal(&specimen(), &draw_cause(HiddenCause::Compliance, 1_004_013)).unwrap();
+    let options = DiagnosisOptions { mesh_factor: 2.2, ..DiagnosisOptions::default() };
+    let found = diagnose(&made.recording, &options, &|_| {}, &common::never).unwrap();
+    assert_eq!(found.verdict, Verdict::ExplainedAmbiguously);
+    let names: Vec<&str> = found.causes.iter().chain(&found.alternatives).map(|c| c.name).collect();
+    assert!(names.contains(&"compliance") && names.contains(&"gain"), "{names:?}");
+    let experiments = &found.alternatives[0].experiments;
+    eprintln!("{experiments:?}");
+    assert!(experiments.len() >= 3, "{experiments:?}");
+    assert!(experiments.windows(2).all(|pair| pair[0].distance_sd >= pair[1].distance_sd), "{experiments:?}");
+    // Half way both do half of what they do, under the same noise: nothing new.
+    let at = |drive: f64| experiments.iter().find(|e| (e.drive_mm - drive).abs() < 1e-9).map_or(0.0, |e| e.distance_sd);
+    assert!(at(3.5) < at(10.5), "{experiments:?}");
+}

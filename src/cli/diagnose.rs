@@ -161,6 +161,12 @@ fn summary(r: &DiagnosisResult, d: &Diagnosis) -> String {
         let what =
             if r.verdict == Verdict::Unexplained { "tried, and no explanation" } else { "not told apart from it" };
         text += &format!("\n{what}: {} ({})\n", c.name, c.description);
+        if let Some(e) = c.experiments.first() {
+            text += &format!(
+                "  a further step at {:.2} mm would tell it apart by {:.1} standard deviations\n",
+                e.drive_mm, e.distance_sd
+            );
+        }
     }
     text += &format!(
         "\nchi2 per datum      {:.4} -> {:.4}\nmisfit beyond noise {:.4} -> {:.4} mm rms (allowance {:.4})\nkept back           {:.4} -> {:.4} mm rms\n",

@@ -260,7 +260,12 @@ pub fn diagnose(
                 && apart.rms_mm() < SAME_EFFECT * effect.rms_mm();
             if gain - other_gain < AMBIGUITY && !is_same {
                 let effect = other.prediction.trace.plus(-1.0, &current.prediction.trace);
-                alternatives.push(found_cause(other, other.causes.len() - 1, &observed, *other_gain, effect.rms_mm()));
+                let mut alternative =
+                    found_cause(other, other.causes.len() - 1, &observed, *other_gain, effect.rms_mm());
+                progress(&format!("looking for the experiment that would tell '{}' apart", alternative.description));
+                let pair = [best, other];
+                alternative.experiments = work.experiments(options.mesh_factor, pair)?;
+                alternatives.push(alternative);
             }
         }
         causes.push(found_cause(best, best.causes.len() - 1, &observed, *gain, effect.rms_mm()));

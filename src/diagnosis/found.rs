@@ -1,6 +1,7 @@
 //! Causes as they are reported: names, words, parameters with intervals, places.
 
 use super::causes::{Category, Location};
+use super::experiment::Experiment;
 use super::fit::{Fitted, shear_modulus};
 use super::load_history::{FittedEffect, LoadEffect};
 use crate::calibration::Observed;
@@ -22,6 +23,8 @@ pub struct FoundCause {
     pub evidence: f64,
     /// Displacement explained, mm rms.
     pub effect_rms_mm: f64,
+    /// Of an alternative: further steps that would tell it apart, most telling first.
+    pub experiments: Vec<Experiment>,
 }
 
 impl FoundCause {
@@ -79,6 +82,7 @@ pub(super) fn found_cause(
         location: supposed.cause.location(&supposed.values, &observed.specimen),
         evidence,
         effect_rms_mm,
+        experiments: Vec::new(),
     }
 }
 
@@ -92,6 +96,7 @@ pub(super) fn compressible(free: &Fitted, stiff: &Fitted, evidence: f64) -> Foun
         location: None,
         evidence,
         effect_rms_mm: free.prediction.trace.plus(-1.0, &stiff.prediction.trace).rms_mm(),
+        experiments: Vec::new(),
     }
 }
 
@@ -116,6 +121,7 @@ pub(super) fn terms(richer: &Fitted, before: &Fitted, evidence: f64) -> FoundCau
         location: None,
         evidence,
         effect_rms_mm: richer.prediction.trace.plus(-1.0, &before.prediction.trace).rms_mm(),
+        experiments: Vec::new(),
     }
 }
 
@@ -156,6 +162,7 @@ pub(super) fn load_causes(effects: &[FittedEffect]) -> Vec<FoundCause> {
                 location: None,
                 evidence: e.gained,
                 effect_rms_mm: 0.0,
+                experiments: Vec::new(),
             }),
         }
     }

@@ -7,6 +7,7 @@
 pub mod causes;
 mod diagnose;
 mod error;
+mod experiment;
 mod fibre_map;
 mod fit;
 mod found;
@@ -25,6 +26,7 @@ mod work;
 
 pub use diagnose::{Diagnosis, DiagnosisOptions, Ranked, Verdict, diagnose, scene_of_fit};
 pub use error::DiagnosisError;
+pub use experiment::Experiment;
 pub use fit::{BulkPrior, FitSettings, Fitted, Supposed, fit, shear_modulus};
 pub use found::FoundCause;
 pub use laboratory::{Laboratory, Prediction};

@@ -2,6 +2,7 @@
 
 use super::causes::{Category, Location};
 use super::diagnose::{Diagnosis, Verdict};
+use super::experiment::Experiment;
 use super::fit::Fitted;
 use super::found::FoundCause;
 use crate::material::Ogden;
@@ -37,6 +38,9 @@ pub struct CauseResult {
     pub evidence: f64,
     /// Displacement explained, mm rms.
     pub effect_rms_mm: f64,
+    /// Of an alternative: further steps that would tell it apart, most telling first.
+    #[serde(default)]
+    pub experiments: Vec<Experiment>,
 }
 
 /// A number before and after.
@@ -160,6 +164,7 @@ fn cause(c: &FoundCause) -> CauseResult {
         location: c.location.clone(),
         evidence: c.evidence,
         effect_rms_mm: c.effect_rms_mm,
+        experiments: c.experiments.clone(),
     }
 }
 

@@ -3,6 +3,7 @@
 use super::causes::{Cause, registry};
 use super::diagnose::DiagnosisOptions;
 use super::error::DiagnosisError;
+use super::experiment::{Experiment, experiments};
 use super::fibre_map::fibre_directions;
 use super::fit::{BulkPrior, FitSettings, Fitted, STEP, Supposed, fit, paths_of, shear_modulus};
 use super::laboratory::Laboratory;
@@ -318,6 +319,16 @@ impl Work<'_, '_> {
         }
         candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
         Ok(candidates)
+    }
+
+    /// Further steps that would tell two fits apart.
+    pub(super) fn experiments(
+        &mut self,
+        mesh_factor: f64,
+        pair: [&Fitted; 2],
+    ) -> Result<Vec<Experiment>, DiagnosisError> {
+        let (allowance, settings) = (self.allowance_mm, self.settings);
+        experiments(self.laboratory, self.metric, mesh_factor, allowance, &settings, pair, self.is_cancelled)
     }
 
     /// Rms misfit on blocks of voxels that the fits did not see, without and with the causes: two halves in turn.

@@ -8,7 +8,7 @@ use super::html::{Report, ReportHeader};
 use super::html_parts::{CalloutKind, Column, Table};
 use super::maps::{VoxelField, VoxelMaps};
 use super::number::significant;
-use crate::diagnosis::{Diagnosis, DiagnosisResult, ScoreMap, Trace, Verdict};
+use crate::diagnosis::{CauseResult, Diagnosis, DiagnosisResult, ScoreMap, Trace, Verdict};
 
 /// Pictures of a diagnosis: file name without ending, SVG.
 pub fn diagnosis_pictures(d: &Diagnosis) -> Vec<(String, String)> {
@@ -91,7 +91,7 @@ pub fn diagnosis_report(d: &Diagnosis, r: &DiagnosisResult) -> Report {
             "Explained, but not by one cause alone",
             &format!(
                 "{names}. The data cannot tell this from: {}.",
-                r.alternatives.iter().map(|c| c.description.clone()).collect::<Vec<_>>().join("; ")
+                r.alternatives.iter().map(alternative).collect::<Vec<_>>().join("; ")
             ),
         ),
     };
@@ -217,6 +217,15 @@ pub fn diagnosis_report(d: &Diagnosis, r: &DiagnosisResult) -> Report {
         page.figure(svg, &format!("Significance of a change of the {title}."));
     }
     page
+}
+
+/// An alternative in words, with the experiment that would tell it apart.
+fn alternative(cause: &CauseResult) -> String {
+    let experiment = cause.experiments.first().map_or(String::new(), |e| {
+        let (drive, distance) = (significant(e.drive_mm, 3), significant(e.distance_sd, 2));
+        format!(" (a further step at {drive} mm would tell it apart by {distance} standard deviations)")
+    });
+    format!("{}{experiment}", cause.description)
 }
 
 fn row(name: &str, before: f64, after: f64) -> Vec<String> {
