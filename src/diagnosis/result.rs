@@ -5,7 +5,7 @@ use super::diagnose::{Diagnosis, Verdict};
 use super::experiment::Experiment;
 use super::fit::Fitted;
 use super::found::FoundCause;
-use crate::material::Ogden;
+use crate::material::{Ogden, Parameter};
 use serde::{Deserialize, Serialize};
 
 /// A number with its 95 % interval.
@@ -181,7 +181,14 @@ fn material_parameters(fitted: &Fitted) -> Vec<ParameterResult> {
         .zip(&fitted.sd)
         .map(|(p, sd)| {
             let value = fitted.material.value(p);
-            parameter(&p.name(), value, [value - 1.96 * sd, value + 1.96 * sd])
+            let interval = if p == Parameter::Kappa {
+                // κ is fitted by its logarithm.
+                let spread = (1.96 * sd / value).exp();
+                [value / spread, value * spread]
+            } else {
+                [value - 1.96 * sd, value + 1.96 * sd]
+            };
+            parameter(&p.name(), value, interval)
         })
         .collect()
 }
