@@ -43,9 +43,6 @@ pub(super) struct DesignArguments {
     common: Common,
 }
 
-/// Iterations that a fit of the verification may take.
-const VERIFY_ITERATIONS: usize = 60;
-
 /// Files of a stopped run, beside its checkpoint.
 const UNFINISHED: [&str; 2] = ["unfinished-design.json", "unfinished-best-specimen.json"];
 
@@ -222,16 +219,16 @@ fn verify_both(
     let done = AtomicUsize::new(0);
     let mut error = None;
     let mut of = |specimen: &Specimen, material: &Ogden| -> Option<(Vec<ParameterSpread>, Option<String>)> {
-        let mut options = VerifyOptions::new(specimen, draws, study.seed);
-        // A weakly determined second term makes a long valley: the way along it may take more than the usual iterations.
-        options.fit.max_iterations = VERIFY_ITERATIONS;
+        let options = VerifyOptions::new(specimen, draws, study.seed);
         let before = done.load(Ordering::Relaxed);
         let on_draw = || {
             let count = done.fetch_add(1, Ordering::Relaxed) + 1;
             bar.show(&Progress { stage: "verify", done: count, total, best: Some(result.best.objective) });
         };
-        let key =
-            input_hash(&serde_json::json!({ "specimen": specimen, "material": material, "kind": "verification" }));
+        let key = input_hash(&serde_json::json!({
+            "specimen": specimen, "material": material, "kind": "verification", "truth_mesh": options.truth_mesh,
+            "fit_mesh": options.fit_mesh, "max_iterations": options.fit.max_iterations,
+        }));
         let verified = checkpoint.get_or(&key, || {
             match verify_in_full(specimen, material, &study.scan, &options, &on_draw, is_stopped) {
                 Ok(found) => {
