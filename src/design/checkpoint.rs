@@ -44,6 +44,9 @@ pub enum CheckpointError {
     },
 }
 
+/// What the evaluations hold. Those of another meaning must not be read: their lists of derivatives are told apart by place alone.
+const FORMAT: &str = "evaluations/2";
+
 #[derive(Serialize, Deserialize)]
 struct Line {
     key: String,
@@ -71,6 +74,7 @@ impl Checkpoint {
     /// [`CheckpointError`].
     pub fn open(path: &Path, study_hash: &str) -> Result<Checkpoint, CheckpointError> {
         let fail = |source| CheckpointError::Io { path: path.into(), source };
+        let study_hash = format!("{study_hash}, {FORMAT}");
         let mut known = HashMap::new();
         let mut good_bytes = 0u64;
         // A header cut off by a crash has no line end; a whole line that is no header was written by something else.
@@ -87,11 +91,7 @@ impl Checkpoint {
                 if number == 0 {
                     let found = parsed.value.as_str().unwrap_or_default().to_string();
                     if found != study_hash {
-                        return Err(CheckpointError::OtherStudy {
-                            path: path.into(),
-                            found,
-                            expected: study_hash.into(),
-                        });
+                        return Err(CheckpointError::OtherStudy { path: path.into(), found, expected: study_hash });
                     }
                 } else {
                     known.insert(parsed.key, parsed.value);
@@ -105,7 +105,7 @@ impl Checkpoint {
         let mut file = OpenOptions::new().create(true).append(true).open(path).map_err(fail)?;
         file.set_len(good_bytes).map_err(fail)?;
         if good_bytes == 0 {
-            let header = Line { key: "study".into(), value: study_hash.into() };
+            let header = Line { key: "study".into(), value: study_hash.clone().into() };
             writeln!(file, "{}", serde_json::to_string(&header).unwrap_or_default()).map_err(fail)?;
         }
         Ok(Checkpoint {
