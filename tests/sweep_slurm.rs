@@ -115,7 +115,7 @@ fn ctrl_c_cancels_the_jobs() {
         return;
     }
     let folder = tempfile::tempdir().expect("a folder");
-    let study = write_study(folder.path(), 40, 8);
+    let study = write_study(folder.path(), 160, 8);
     let out = folder.path().join("out");
     let options = ["--slurm", "--tasks", "2", "--time", "30", "--poll", "0.3", "--cancel"];
     let mut child = start(&study, &out, &options);
