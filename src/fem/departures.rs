@@ -4,8 +4,8 @@
 //! x. Each departure here is at rest in its default; the element kernels, the factorisation and the derivatives are the
 //! same with and without.
 
+use super::element_data::{ElementOutput, MAX_GROUPS};
 use super::error::{SolveError, StepFailure};
-use super::kernel::{ElementOutput, MAX_GROUPS};
 use super::model::ForwardModel;
 use super::newton::Equilibrium;
 use crate::material::{LANES, Lanes, Ogden};

@@ -1,6 +1,6 @@
 //! Deformation and stress at the quadrature points.
 
-use super::kernel::ElementOutput;
+use super::element_data::ElementOutput;
 use super::model::ForwardModel;
 use super::newton::Equilibrium;
 use crate::material::{LANES, Ogden};

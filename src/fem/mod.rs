@@ -7,7 +7,9 @@
 mod adjoint;
 mod departures;
 mod derivatives;
+mod element_data;
 mod error;
+mod fibre_kernel;
 mod fields;
 mod kernel;
 mod linear;

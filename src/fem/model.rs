@@ -1,8 +1,9 @@
 //! The forward model: a mesh made ready for solving, and the loops over its elements.
 
 use super::departures::Prepared;
+use super::element_data::{Direction, ElementInput, ElementOutput, ElementTables, MAX_GROUPS, MAX_NODES};
 use super::error::{SolveError, StepFailure};
-use super::kernel::{Direction, ElementInput, ElementOutput, ElementTables, Kernels, MAX_GROUPS, MAX_NODES};
+use super::kernel::Kernels;
 use super::linear::LinearSystem;
 use super::nested::Guide;
 use super::topology::{NOT_FREE, Topology};

@@ -3,8 +3,8 @@
 //! A load step on a fine mesh costs five to twelve factorisations from rest; from the interpolated coarse solution it
 //! takes one to three. The coarse model costs a few percent of one fine factorisation.
 
+use super::element_data::ElementOutput;
 use super::error::SolveError;
-use super::kernel::ElementOutput;
 use super::model::ForwardModel;
 use super::newton::Equilibrium;
 use crate::material::{LANES, Ogden};

@@ -78,8 +78,3 @@ pub enum VoxelError {
         num_bins: usize,
     },
 }
-
-#[cfg(test)]
-pub(crate) mod tests {
-    pub(crate) use super::mask::tests::two_hole;
-}

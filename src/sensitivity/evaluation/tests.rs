@@ -3,8 +3,6 @@
 use super::super::continuum::tests::block;
 use super::super::information::tests::one_term;
 use super::*;
-use crate::mesh::mesh_specimen;
-use crate::voxel::VoxelOperator;
 
 fn scan() -> ScanSettings {
     serde_json::from_str(
@@ -175,37 +173,5 @@ fn comparison_at_equal_median_stretch() {
         for p in &e.promised_sd {
             println!("   {} relative sd {:?} {}", p.parameter, p.relative_sd, p.identifiable);
         }
-    }
-}
-
-/// Prints an evaluation of the published specimen (`cargo test -- --ignored --nocapture`).
-#[test]
-#[ignore = "timing"]
-fn timing() {
-    let specimen = crate::voxel::tests::two_hole();
-    for (name, mesh) in [
-        ("search", MeshOptions::search(&specimen)),
-        ("standard", MeshOptions::standard(&specimen)),
-        ("fine", MeshOptions::fine(&specimen)),
-    ] {
-        let options = EvaluationOptions { mesh, ..EvaluationOptions::standard(&specimen) };
-        let start = std::time::Instant::now();
-        let drives = DriveSelection::DriveMm(vec![5.0]);
-        let (evaluation, maps) = evaluate(&specimen, &one_term(), &scan(), &drives, &options, &|| false).unwrap();
-        println!("{name}: {:?}\n{}", start.elapsed(), serde_json::to_string(&evaluation).unwrap());
-        let mesh = mesh_specimen(&specimen, &mesh).unwrap();
-        let start = std::time::Instant::now();
-        let operator = VoxelOperator::new(&specimen, &mesh, &maps.mask, Sampling::default()).unwrap();
-        let built = start.elapsed();
-        let start = std::time::Instant::now();
-        operator.average(&maps.equilibria[0].displacement).unwrap();
-        let average = start.elapsed();
-        let start = std::time::Instant::now();
-        operator.deformation_gradients(&maps.equilibria[0].displacement).unwrap();
-        println!(
-            "operator: build {built:?}, average {average:?}, gradient {:?}, entries {}",
-            start.elapsed(),
-            operator.num_entries()
-        );
     }
 }

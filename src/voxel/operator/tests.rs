@@ -1,7 +1,7 @@
 //! Closed forms on hand-made meshes: affine and polynomial fields, mirrors, the transpose, timing.
 
 use super::super::VoxelGrid;
-use super::super::mask::tests::{PUBLISHED_VOXEL, solid, two_hole};
+use super::super::mask::tests::{solid, two_hole};
 use super::*;
 use crate::kinematics::decompose;
 use crate::mesh::{ElementKind, MeshOptions, Mirror, mesh_specimen};
@@ -239,32 +239,4 @@ fn mismatched_input_is_an_error() {
         VoxelOperator::new(&specimen, &mesh, &far, none),
         Err(VoxelError::InvalidSampling { value: 0, .. })
     ));
-}
-
-/// Prints build and apply times at the published grid (`cargo test -- --ignored --nocapture`).
-#[test]
-#[ignore = "timing"]
-fn timing() {
-    let specimen = two_hole();
-    let mesh = mesh_specimen(&specimen, &MeshOptions::standard(&specimen)).unwrap();
-    let start = std::time::Instant::now();
-    let mask = VoxelMask::covering(&specimen, PUBLISHED_VOXEL).unwrap();
-    let mask_time = start.elapsed();
-    let operator = VoxelOperator::new(&specimen, &mesh, &mask, Sampling::default()).unwrap();
-    let build_time = start.elapsed() - mask_time;
-    let u = vec![[0.1; 3]; mesh.nodes.len()];
-    let start = std::time::Instant::now();
-    operator.average(&u).unwrap();
-    let average_time = start.elapsed();
-    let gradients = operator.deformation_gradients(&u).unwrap();
-    let gradient_time = start.elapsed() - average_time;
-    let sum: f64 = gradients.iter().map(|f| decompose(f).stretch_amplitude).sum();
-    let all = start.elapsed() - average_time - gradient_time;
-    println!(
-        "{} voxels, {} points, {} entries: mask {mask_time:?}, build {build_time:?}, average {average_time:?}, \
-         gradients {gradient_time:?}, decompose {all:?} ({sum})",
-        mask.num_voxels(),
-        operator.num_points(),
-        operator.num_entries()
-    );
 }

@@ -1,0 +1,154 @@
+//! What goes into the element kernels and what comes out: tables of an element kind, the state of one element, its results.
+//!
+//! Quadrature points stand in lanes, eight to a group; nodes of the stiffness likewise.
+
+use super::departures::Fibre;
+use crate::material::{LANES, Lanes, Ogden, Parameter, Tensor};
+use crate::mesh::ElementKind;
+
+/// Most nodes (and quadrature points) of an element.
+pub const MAX_NODES: usize = 27;
+/// Groups of eight lanes that cover them.
+pub const MAX_GROUPS: usize = 4;
+
+/// Constant tables of an element kind.
+pub struct ElementTables {
+    /// Nodes, and equally quadrature points (27 or 21).
+    pub(super) num: usize,
+    pub(super) groups: usize,
+    /// `[node][group]`: N_a at the quadrature points.
+    pub(super) shape: Vec<[Lanes; MAX_GROUPS]>,
+    /// `[node][c][group]`: ∂N_a/∂ξ_c at the quadrature points.
+    pub(super) gradient_by_point: Vec<[[Lanes; MAX_GROUPS]; 3]>,
+    /// `[point][c][group of nodes]`: the same, nodes in lanes (zero past the last node).
+    pub(super) gradient_by_node: Vec<[[Lanes; MAX_GROUPS]; 3]>,
+    /// Quadrature weights; zero in padding lanes.
+    pub(super) weight: [Lanes; MAX_GROUPS],
+}
+
+impl ElementTables {
+    /// Tables of `kind`.
+    pub fn new(kind: ElementKind) -> ElementTables {
+        let points = kind.quadrature();
+        let num = kind.num_nodes();
+        let groups = num.div_ceil(LANES);
+        let zero = [Lanes::ZERO; MAX_GROUPS];
+        let mut tables = ElementTables {
+            num,
+            groups,
+            shape: vec![zero; num],
+            gradient_by_point: vec![[zero; 3]; num],
+            gradient_by_node: vec![[zero; 3]; num],
+            weight: zero,
+        };
+        for slot in 0..groups * LANES {
+            // Padding lanes repeat the first point with weight zero, so that nothing divides by zero there.
+            let q = if slot < num { slot } else { 0 };
+            let (x, w) = points[q];
+            let (n, g) = (kind.shape_functions(x), kind.shape_gradients(x));
+            let (group, lane) = (slot / LANES, slot % LANES);
+            tables.weight[group].0[lane] = if slot < num { w } else { 0.0 };
+            for a in 0..num {
+                tables.shape[a][group].0[lane] = n[a];
+                for c in 0..3 {
+                    tables.gradient_by_point[a][c][group].0[lane] = g[a][c];
+                    if slot < num {
+                        tables.gradient_by_node[q][c][a / LANES].0[a % LANES] = g[a][c];
+                    }
+                }
+            }
+        }
+        tables
+    }
+
+    /// Number of nodes and of quadrature points.
+    pub fn num_nodes(&self) -> usize {
+        self.num
+    }
+}
+
+/// The state of one element.
+pub struct ElementInput<'a> {
+    /// Reference positions of the nodes, mm.
+    pub positions: [[f64; 3]; MAX_NODES],
+    /// Displacements of the nodes, mm.
+    pub displacements: [[f64; 3]; MAX_NODES],
+    /// Pressure coefficients; `None` for the condensed ones.
+    pub pressure: Option<[f64; 4]>,
+    /// The material.
+    pub material: &'a Ogden,
+    /// Factor on the isochoric stiffness at the quadrature points; one if absent.
+    pub stiffness_factor: Option<&'a [Lanes; MAX_GROUPS]>,
+    /// ln of the volume ratio free of pressure at the quadrature points; zero if absent.
+    pub log_growth: Option<&'a [Lanes; MAX_GROUPS]>,
+    /// Fibres.
+    pub fibre: Option<Fibre>,
+}
+
+/// A direction in which the condensed residual is differentiated.
+pub struct Direction {
+    /// δu at the nodes; `None` where only the parameter moves.
+    pub displacements: Option<[[f64; 3]; MAX_NODES]>,
+    /// The parameter that moves by 1, if any.
+    pub parameter: Option<Parameter>,
+}
+
+/// What one element yields. Reused between elements.
+pub struct ElementOutput {
+    /// Condensed residual r, or its directional derivative, per node, kPa·mm².
+    pub residual: [[f64; 3]; MAX_NODES],
+    /// What the pressure iterate misses.
+    pub pressure_gap: [f64; 4],
+    /// D.
+    pub bulk: [[f64; 4]; 4],
+    /// Pressure coefficients used (condensed ones where none were given), or their directional derivative.
+    pub pressure: [f64; 4],
+    /// B: `[m][i][group of nodes]`.
+    pub divergence: [[[Lanes; MAX_GROUPS]; 3]; 4],
+    /// K: `[3 b + k][i][group of nodes a]`, valid for a ≥ 8⌊b/8⌋.
+    pub stiffness: Vec<[[Lanes; MAX_GROUPS]; 3]>,
+    /// Smallest det F over the quadrature points (the element is unusable where it is not positive).
+    pub min_jacobian: f64,
+    /// Smallest determinant of the geometry map.
+    pub min_geometry_jacobian: f64,
+    /// Deformation gradients at the quadrature points, `[group]`.
+    pub deformation_gradient: [Tensor; MAX_GROUPS],
+    /// First Piola–Kirchhoff stress at the quadrature points.
+    pub stress: [Tensor; MAX_GROUPS],
+    /// Quadrature weight × geometry determinant, mm³.
+    pub volume: [Lanes; MAX_GROUPS],
+    /// Reference positions of the quadrature points, `[i][group]`.
+    pub points: [[Lanes; MAX_GROUPS]; 3],
+    /// ∂ξ_c/∂X_J, `[c][J]`.
+    pub(super) inverse_map: [Tensor; MAX_GROUPS],
+    pub(super) cofactor: [Tensor; MAX_GROUPS],
+    pub(super) jacobian: [Lanes; MAX_GROUPS],
+    /// φ at the quadrature points, `[m][group]`.
+    pub basis: [[Lanes; MAX_GROUPS]; 4],
+    pub(super) tangent: Vec<[[Lanes; 9]; 9]>,
+}
+
+impl Default for ElementOutput {
+    fn default() -> Self {
+        let tensor = [[Lanes::ZERO; 3]; 3];
+        ElementOutput {
+            residual: [[0.0; 3]; MAX_NODES],
+            pressure_gap: [0.0; 4],
+            bulk: [[0.0; 4]; 4],
+            pressure: [0.0; 4],
+            divergence: [[[Lanes::ZERO; MAX_GROUPS]; 3]; 4],
+            stiffness: vec![[[Lanes::ZERO; MAX_GROUPS]; 3]; 3 * MAX_NODES],
+            min_jacobian: 0.0,
+            min_geometry_jacobian: 0.0,
+            deformation_gradient: [tensor; MAX_GROUPS],
+            stress: [tensor; MAX_GROUPS],
+            volume: [Lanes::ZERO; MAX_GROUPS],
+            points: [[Lanes::ZERO; MAX_GROUPS]; 3],
+            inverse_map: [tensor; MAX_GROUPS],
+            cofactor: [tensor; MAX_GROUPS],
+            jacobian: [Lanes::ZERO; MAX_GROUPS],
+            basis: [[Lanes::ZERO; MAX_GROUPS]; 4],
+            tangent: vec![[[Lanes::ZERO; 9]; 9]; MAX_GROUPS],
+        }
+    }
+}
