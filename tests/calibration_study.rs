@@ -21,15 +21,19 @@ fn published_scan() {
         ("one", ogden(2173.0, &[(17.0, 1.91)]), Filter::None),
         ("filtered", ogden(2173.0, &[(17.0, 1.91)]), Filter::Hamming2),
         ("two, stiffening", ogden(2200.0, &[(16.0, 1.9), (0.35, 8.0)]), Filter::None),
-        ("three", ogden(2200.0, &[(12.0, 2.0), (0.3, 9.0), (-6.0, -3.5)]), Filter::None),
-        ("weak", ogden(2173.0, &[(17.0, 1.91), (1.2e-3, 8.0)]), Filter::None),
+        // Strongly stiffening; three terms are only seen apart at strains that bring them out.
+        ("three", ogden(2200.0, &[(16.0, 2.0), (0.002, 14.0), (-0.3, -7.0)]), Filter::None),
+        // Second terms at the edge of what can be found.
+        ("weak 0.01", ogden(2173.0, &[(17.0, 1.91), (0.01, 8.0)]), Filter::None),
+        ("weak 0.02", ogden(2173.0, &[(17.0, 1.91), (0.02, 8.0)]), Filter::None),
+        ("weak 0.04", ogden(2173.0, &[(17.0, 1.91), (0.04, 8.0)]), Filter::None),
     ] {
         if only.as_ref().is_some_and(|o| !name.starts_with(o.as_str())) {
             continue;
         }
         let mut specimen = Specimen::from_json(text).unwrap();
-        specimen.drive_mm = vec![2.5, 7.0];
         let num_terms = truth.terms.len();
+        specimen.drive_mm = if num_terms < 3 { vec![2.5, 7.0] } else { vec![3.0, 6.0, 9.0] };
         let begin = std::time::Instant::now();
         let case = StudyCase {
             truth,

@@ -3,6 +3,7 @@
 use super::error::CalibrationError;
 use super::fit::FitOptions;
 use super::step::Constraints;
+use super::stress_path::StressPath;
 use super::system::{NormalSystem, Prediction, Work};
 use crate::fem::SolveError;
 use crate::material::Ogden;
@@ -47,6 +48,15 @@ impl Descent {
 /// Solves a material near given predictions.
 pub(super) type Predict<'a> = dyn FnMut(&Ogden, &[Prediction]) -> Result<Vec<Prediction>, CalibrationError> + 'a;
 
+/// Where a descent begins.
+#[derive(Clone, Debug)]
+pub(super) struct Start {
+    /// One per recording.
+    pub(super) predictions: Vec<Prediction>,
+    /// How steps are followed, from the states of the start.
+    pub(super) path: StressPath,
+}
+
 /// Descends until the optimum is reached or the iterations run out. `predict` solves a material near given predictions,
 /// `evaluate` compares with the data; `expected` is the objective of pure noise. Where the misfit is more than noise, so are
 /// the standard deviations in which the distance from the optimum counts.
@@ -56,12 +66,12 @@ pub(super) type Predict<'a> = dyn FnMut(&Ogden, &[Prediction]) -> Result<Vec<Pre
 pub(super) fn descend(
     constraints: &Constraints,
     options: &FitOptions,
-    start: Vec<Prediction>,
+    start: Start,
     expected: f64,
     predict: &mut Predict,
     evaluate: &dyn Fn(&[Prediction]) -> Result<NormalSystem, CalibrationError>,
 ) -> Result<Descent, CalibrationError> {
-    let mut predictions = start;
+    let Start { mut predictions, path } = start;
     let mut system = evaluate(&predictions)?;
     let mut history = vec![system.chi2];
     let mut work = Work::default();
@@ -91,7 +101,7 @@ pub(super) fn descend(
         let Some(present) = predictions.first() else {
             return Err(CalibrationError::NotConverged { iterations, distance, limit: options.tolerance });
         };
-        let trial = system.moved(&present.material, &step.change);
+        let trial = path.moved(&system, &present.material, &step.change);
         match predict(&trial, &predictions) {
             Ok(next) => {
                 failure = None;

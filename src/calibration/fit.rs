@@ -8,9 +8,10 @@
 //! standard deviation, in every combination of parameters. A small step alone proves nothing: damping makes steps small.
 //! Where the misfit is more than noise the standard deviation is that of the misfit.
 
-use super::descend::{Descent, descend};
+use super::descend::{Descent, Start, descend};
 use super::error::CalibrationError;
 use super::step::Constraints;
+use super::stress_path::StressPath;
 use super::synthetic::Measurement;
 use super::system::{NormalSystem, Prediction};
 use super::target::Target;
@@ -127,6 +128,7 @@ impl Fit {
 pub struct FitStart {
     constraints: Constraints,
     prediction: Prediction,
+    path: StressPath,
     options: FitOptions,
 }
 
@@ -146,7 +148,8 @@ impl FitStart {
         check_options(options)?;
         let constraints = Constraints::new(material, options)?;
         let prediction = Prediction::new(model, operator, drives_mm, material, None, &options.solve, is_cancelled)?;
-        Ok(FitStart { constraints, prediction, options: *options })
+        let path = StressPath::new(model, material, &prediction.states);
+        Ok(FitStart { constraints, prediction, path, options: *options })
     }
 
     /// The same start with another prior or none; κ is held or not as before.
@@ -176,7 +179,7 @@ impl FitStart {
             Ok(vec![Prediction::new(model, operator, &data.drives_mm, material, near, solve, is_cancelled)?])
         };
         let system = |p: &[Prediction]| NormalSystem::new(p, &targets, options.bulk, options.held);
-        let start = vec![self.prediction.clone()];
+        let start = Start { predictions: vec![self.prediction.clone()], path: self.path.clone() };
         let (expected, num_data) = targets[0].expectation();
         let Descent { mut predictions, system, iterations, distance, reached, .. } =
             descend(&self.constraints, options, start, expected, &mut predict, &system)?.converged(options)?;

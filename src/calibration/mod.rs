@@ -17,6 +17,7 @@ mod stability;
 mod stand_ins;
 mod starts;
 mod step;
+mod stress_path;
 mod study;
 mod synthetic;
 mod system;

@@ -1,10 +1,11 @@
 //! Recordings, the models of their specimens and how the scan saw them: what a fit to recordings needs.
 
-use super::descend::{Descent, descend};
+use super::descend::{Descent, Start, descend};
 use super::error::CalibrationError;
 use super::fit::{Bulk, FitOptions, Held, check_options};
 use super::observed::{Observed, View};
 use super::step::Constraints;
+use super::stress_path::StressPath;
 use super::system::{NormalSystem, Prediction, Work};
 use super::target::{Objective, Target};
 use crate::fem::{Equilibrium, ForwardModel, SolveOptions};
@@ -223,12 +224,18 @@ impl<'a> CalibrationProblem<'a> {
         let mut work = Work::default();
         first.iter().for_each(|p| work.add(p.work));
         let CalibrationProblem { observed, models, views, objective } = self;
+        let path = first
+            .iter()
+            .zip(models.iter())
+            .map(|(prediction, model)| StressPath::new(model, start, &prediction.states))
+            .fold(StressPath::default(), StressPath::join);
         let targets = Target::of_recordings(observed, views, *objective)?;
         let mut trial = |material: &Ogden, near: &[Prediction]| {
             predict(observed, models, views, material, Some(near), &options.solve, is_cancelled)
         };
         let evaluate = |p: &[Prediction]| NormalSystem::new(p, &targets, options.bulk, options.held);
         let (expected, _) = sum_of_expectations(&targets);
+        let first = Start { path, predictions: first };
         let descent = descend(&constraints, options, first, expected, &mut trial, &evaluate)?;
         work.add(descent.work);
         let mut fit = finished(descent, &targets, observed, views, options, *objective)?;

@@ -24,6 +24,8 @@ const RIDGE: f64 = 1e-12;
 const LARGER_RIDGES: [f64; 3] = [1e-9, 1e-7, 1e-5];
 /// A limit counts as reached where less than this is left of it (scaled parameters).
 const REACHED: f64 = 1e-6;
+/// An earlier estimate at the smallest distance of exponents may be a start: its distance is so accurate.
+const GAP_ROUNDING: f64 = 1e-6;
 /// A violation of a limit below this is rounding (scaled parameters).
 const ROUNDING: f64 = 1e-12;
 /// Largest violation of a limit that a solution of Clarabel's may have before it is drawn back (scaled parameters).
@@ -71,7 +73,7 @@ impl Constraints {
         let order: Vec<(usize, usize)> = by_exponent.windows(2).map(|w| (w[0], w[1])).collect();
         for &(a, b) in &order {
             let (larger, smaller) = (start.terms[a].alpha, start.terms[b].alpha);
-            if !(larger - smaller > options.min_alpha_gap) {
+            if !(larger - smaller > options.min_alpha_gap * (1.0 - GAP_ROUNDING)) {
                 return Err(CalibrationError::CloseExponents { larger, smaller, min_gap: options.min_alpha_gap });
             }
         }
@@ -241,7 +243,41 @@ fn polished(
     (is_feasible && has_signs).then_some(exact)
 }
 
+/// The optimum within `limits`. Limits enter as they are broken: an optimum within some
+/// of them that breaks none of the others is that of all, and limits far away, whose rooms are larger by decades, would
+/// spoil the interior point's accuracy.
 fn solve_limited(
+    matrix: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    limits: &[(Vec<f64>, f64, String)],
+) -> Result<DVector<f64>, CalibrationError> {
+    let Some(cholesky) = matrix.clone().cholesky() else {
+        return solve_among(matrix, gradient, limits);
+    };
+    let mut x = cholesky.solve(gradient);
+    let mut chosen: Vec<usize> = Vec::new();
+    loop {
+        let broken: Vec<usize> = (0..limits.len())
+            .filter(|r| !chosen.contains(r))
+            .filter(|&r| {
+                let (row, room, _) = &limits[r];
+                row.iter().zip(x.iter()).map(|(r, x)| r * x).sum::<f64>() > room + ROUNDING
+            })
+            .collect();
+        if broken.is_empty() {
+            return Ok(x);
+        }
+        chosen.extend(broken);
+        chosen.sort_unstable();
+        let some: Vec<_> = chosen.iter().map(|&r| limits[r].clone()).collect();
+        x = match solve_among(matrix, gradient, &some) {
+            Ok(x) => x,
+            Err(_) => return solve_among(matrix, gradient, limits),
+        };
+    }
+}
+
+fn solve_among(
     matrix: &DMatrix<f64>,
     gradient: &DVector<f64>,
     limits: &[(Vec<f64>, f64, String)],

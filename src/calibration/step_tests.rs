@@ -87,6 +87,47 @@ fn exponents_keep_their_distance() {
     assert!((step.change[4] - (-0.4 - 3.2 * violation)).abs() < 1e-6);
 }
 
+/// A second term that stands at the smallest distance of exponents and fades: other limits are farther away by seven decades.
+#[test]
+fn limits_far_away_do_not_spoil_the_step() {
+    let start = ogden(2173.0, &[[1.2, 8.0], [17.0, 1.9]]);
+    let constraints = Constraints::new(&start, &FitOptions::default()).unwrap();
+    let at = ogden(2110.0, &[[0.0012, 2.9], [17.16, 1.9]]);
+    // Correlations of 0.99 between parameters that are known to 26, 0.011, 0.022, 783 and 1107.
+    let roots = [0.038, 0.0114, 0.022, 783.0, 1107.0].map(|r: f64| 1.0 / r);
+    let correlation = [
+        [1.0, 0.087, 0.099, 0.076, 0.083],
+        [0.087, 1.0, 0.94, 0.965, 0.988],
+        [0.099, 0.94, 1.0, 0.82, 0.9765],
+        [0.076, 0.965, 0.82, 1.0, 0.916],
+        [0.083, 0.988, 0.9765, 0.916, 1.0],
+    ];
+    let root = |i: usize| 1.0 / roots[i];
+    let matrix = DMatrix::from_fn(5, 5, |i, j| correlation[i][j] * root(i) * root(j));
+    let gradient: Vec<f64> =
+        [-0.00098, -0.0565, -0.185, -0.011, -0.0113].iter().enumerate().map(|(i, g)| g * root(i)).collect();
+    let s = system(&at, matrix.clone(), &gradient);
+    let step = constraints.step(&s, 0.0, true).unwrap();
+    // No step within the limits does better: steps drawn around the found one, cut to the limits on the way from rest.
+    let value = |x: &DVector<f64>| 0.5 * x.dot(&(&matrix * x)) - s.gradient.dot(x);
+    let limits = constraints.limits(&s, true);
+    let used = |l: &Limit, x: &DVector<f64>| l.coefficients.iter().map(|&(i, c)| c * x[i]).sum::<f64>();
+    assert!(limits.iter().all(|l| used(l, &step.change) <= l.room + 1e-9), "{:?}", step.reached);
+    let mut state = 1u64;
+    let mut random = || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+    };
+    for n in 0..20_000 {
+        let size = 10f64.powi(-(n % 6));
+        let mut x = DVector::from_fn(5, |i, _| step.change[i] + size * random() / root(i));
+        let part =
+            limits.iter().filter(|l| used(l, &x) > l.room).map(|l| (l.room / used(l, &x)).max(0.0)).fold(1.0, f64::min);
+        x *= part;
+        assert!(value(&x) >= value(&step.change) - 1e-9, "{x} is better than {}", step.change);
+    }
+}
+
 /// Directions without any information stay; no panic, no huge step.
 #[test]
 fn singular_systems_have_a_step() {
