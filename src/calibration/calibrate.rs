@@ -441,6 +441,7 @@ impl<'a> Run<'a> {
             Objective::Paper { beta } => beta,
             Objective::Weighted => PAPER_BETA,
         };
+        let visited = problem.visited_stretches(fit)?;
         Ok(TermRow {
             num_terms: fit.material.terms.len(),
             chi2: fit.chi2,
@@ -456,8 +457,8 @@ impl<'a> Run<'a> {
             num_starts,
             num_agreeing,
             is_converged: fit.is_converged,
-            least_relative_stiffness: least_relative_stiffness(&fit.material, &problem.visited_stretches(fit)?),
-            degeneracies: degeneracies(fit),
+            least_relative_stiffness: least_relative_stiffness(&fit.material, &visited),
+            degeneracies: degeneracies(fit, &visited),
         })
     }
 

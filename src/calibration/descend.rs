@@ -57,6 +57,28 @@ pub(super) struct Start {
     pub(super) path: StressPath,
 }
 
+/// A step that gains less than this part of what it promised was poor.
+const GOOD_PART: f64 = 0.25;
+
+/// How steps are taken: along the stresses or straight. Stresses fail where two terms become one: the promised stress is then
+/// out of reach of any material.
+struct Way {
+    is_followed: bool,
+    num_poor: usize,
+}
+
+impl Way {
+    /// After a poor step the other way is tried; true where both were poor.
+    fn is_lost(&mut self, path: &StressPath) -> bool {
+        if path.is_straight() {
+            return true;
+        }
+        self.is_followed = !self.is_followed;
+        self.num_poor += 1;
+        self.num_poor.is_multiple_of(2)
+    }
+}
+
 /// Descends until the optimum is reached or the iterations run out. `predict` solves a material near given predictions,
 /// `evaluate` compares with the data; `expected` is the objective of pure noise. Where the misfit is more than noise, so are
 /// the standard deviations in which the distance from the optimum counts.
@@ -76,6 +98,7 @@ pub(super) fn descend(
     let mut history = vec![system.chi2];
     let mut work = Work::default();
     let mut damping = 0.0;
+    let mut way = Way { is_followed: true, num_poor: 0 };
     let mut failure = None;
     let mut iterations = 0;
     loop {
@@ -101,25 +124,34 @@ pub(super) fn descend(
         let Some(present) = predictions.first() else {
             return Err(CalibrationError::NotConverged { iterations, distance, limit: options.tolerance });
         };
-        let trial = path.moved(&system, &present.material, &step.change);
+        let trial = if way.is_followed {
+            path.moved(constraints, &system, &present.material, &step.change)?
+        } else {
+            system.moved(&present.material, &step.change)
+        };
         match predict(&trial, &predictions) {
             Ok(next) => {
                 failure = None;
                 next.iter().for_each(|p| work.add(p.work));
                 let next_system = evaluate(&next)?;
+                let is_good = system.chi2 - next_system.chi2 >= GOOD_PART * step.distance * step.distance;
                 // Equal up to the equilibria's accuracy counts: near the optimum nothing is gained any more.
                 if next_system.chi2 <= system.chi2 * (1.0 + 1e-9) {
                     predictions = next;
                     system = next_system;
                     history.push(system.chi2);
+                }
+                if is_good {
+                    way.num_poor = 0;
                     damping = if damping > 1e-6 { damping * 0.1 } else { 0.0 };
-                } else {
+                } else if way.is_lost(&path) {
                     damping = (damping * 10.0).max(1e-3);
                 }
             }
             Err(CalibrationError::Solve(cause @ SolveError::Cancelled { .. })) => return Err(cause.into()),
             Err(CalibrationError::Solve(cause)) => {
                 failure = Some(cause);
+                way.is_lost(&path);
                 damping = (damping * 10.0).max(1e-3);
             }
             Err(other) => return Err(other),

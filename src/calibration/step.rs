@@ -14,8 +14,11 @@ const MAX_CHANGE: f64 = 0.5;
 const MAX_LOG_CHANGE: f64 = 1.0;
 /// κ stays between these multiples of the start's shear modulus, between which the elements neither lock nor invert.
 const BULK_RATIO: [f64; 2] = [5.0, 1e4];
-/// μ and α come no nearer to zero than this fraction of the start's: a term that fades stops there and is reported.
-const SMALLEST_PART: f64 = 1e-3;
+/// μ comes no nearer to zero than this fraction of the start's: a term that fades stops there and is reported. The stress goes
+/// with μ λ^α: a start with another exponent may be wrong by decades.
+const SMALLEST_MODULUS: f64 = 1e-9;
+/// The same for α.
+const SMALLEST_EXPONENT: f64 = 1e-3;
 /// |α| stays a little below what a material may have.
 const LARGEST_EXPONENT: f64 = 0.99 * MAX_ALPHA;
 /// Added to the matrix scaled to a unit diagonal, so that directions without information stay where they are.
@@ -84,8 +87,11 @@ impl Constraints {
                 .parameters()
                 .iter()
                 .map(|p| {
-                    let least = if matches!(p, Parameter::Alpha(_)) { 1.01 * MIN_ALPHA } else { 0.0 };
-                    (SMALLEST_PART * start.value(*p).abs()).max(least)
+                    let value = start.value(*p).abs();
+                    match p {
+                        Parameter::Alpha(_) => (SMALLEST_EXPONENT * value).max(1.01 * MIN_ALPHA),
+                        _ => SMALLEST_MODULUS * value,
+                    }
                 })
                 .collect(),
             order,

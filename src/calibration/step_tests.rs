@@ -145,17 +145,17 @@ fn singular_systems_have_a_step() {
     assert!(step.change[0].abs() < 1e-9 && step.change[2].abs() < 1e-9);
 }
 
-/// A term that fades stops at a thousandth of its start.
+/// A term that fades stops at 10⁻⁹ of its start.
 #[test]
 fn fading_terms_stop() {
     let start = two_terms();
     let constraints = Constraints::new(&start, &FitOptions::default()).unwrap();
     let mut faded = start.clone();
-    faded.terms[1].mu_kpa = 0.35e-3 * 1.01;
+    faded.terms[1].mu_kpa = 0.35e-9 * 1.01;
     let s = system(&faded, DMatrix::identity(5, 5), &[0.0, 0.0, 0.0, -0.4, 0.0]);
     let step = constraints.step(&s, 0.0, true).unwrap();
     let moved = s.moved(&faded, &step.change);
-    assert!(moved.terms[1].mu_kpa >= 0.35e-3 * (1.0 - 1e-9) && moved.terms[1].mu_kpa < 0.35e-3 * 1.0001);
+    assert!(moved.terms[1].mu_kpa >= 0.35e-9 * (1.0 - 1e-9) && moved.terms[1].mu_kpa < 0.35e-9 * 1.0001);
     assert_eq!(step.reached, ["mu_2: smallest size"]);
 }
 

@@ -4,27 +4,27 @@
 //! than on parameters: a two-term fit has a valley, along which the stress at the largest stretches stays, and in the
 //! parameters that valley is curved. A step by the linear model leaves it soon. Here a step δ of the parameters is read as one
 //! of the stresses, t₀ + D δ with D = ∂t/∂ξ over the states that the specimen visits, and the parameters are moved to those
-//! whose stresses come nearest to it, in the least squares weighted by volume. To first order that is the step itself, so that
+//! whose stresses come nearest to it within the limits of a step, in the least squares weighted by volume. To first order that is the step itself, so that
 //! nothing changes at the optimum; it costs no equilibrium.
 
+use super::error::CalibrationError;
+use super::step::Constraints;
 use super::system::NormalSystem;
 use crate::fem::{Equilibrium, ForwardModel};
 use crate::kinematics::principal_stretches;
-use crate::material::{MAX_ALPHA, MIN_ALPHA, Ogden, OgdenTerm};
+use crate::material::Ogden;
 use nalgebra::{DMatrix, DVector};
 
 /// States kept of those visited: enough for a smooth family of functions with a handful of parameters.
 const NUM_STATES: usize = 256;
-/// Gauss–Newton iterations of the inner fit.
-const MAX_ITERATIONS: usize = 12;
-/// The inner fit has converged when it moves ln |μ| and α by less than this.
+/// Gauss–Newton iterations of the inner fit, and halvings of one's step.
+const MAX_ITERATIONS: usize = 20;
+const MAX_HALVINGS: usize = 6;
+/// The inner fit has converged when its squared misfit falls by less than this part.
 const TOLERANCE: f64 = 1e-6;
-/// Beyond this many times the length of the linear step (scaled parameters) the linear step is taken.
-const LARGEST_DETOUR: f64 = 3.0;
-/// Followed where the squared stresses still missing are less than this part of those promised; else the linear step is taken.
-const FOLLOWED: f64 = 0.25;
-/// Added to a scaled unit diagonal.
-const RIDGE: f64 = 1e-12;
+/// Beyond this many times the length of the linear step (ln |μ|, relative α) the linear step is taken: the promise is then
+/// met, if at all, by quite another material.
+const LARGEST_DETOUR: f64 = 2.0;
 
 /// Visited states: their traceless logarithmic principal strains and the root of their volume.
 #[derive(Clone, Debug, Default)]
@@ -60,96 +60,88 @@ impl StressPath {
         self
     }
 
-    /// `material` after the scaled change `step`. κ and what cannot be followed moves as in [`NormalSystem::moved`].
-    pub(super) fn moved(&self, system: &NormalSystem, material: &Ogden, step: &DVector<f64>) -> Ogden {
-        let linear = system.moved(material, step);
-        match self.followed(material, step) {
-            Some(terms) => Ogden { terms, ..linear },
-            None => linear,
-        }
+    /// Whether every step is the linear one.
+    pub(super) fn is_straight(&self) -> bool {
+        self.states.is_empty()
     }
 
-    /// Terms whose stresses come nearest to those promised by `step`.
-    fn followed(&self, material: &Ogden, step: &DVector<f64>) -> Option<Vec<OgdenTerm>> {
-        if self.states.is_empty() || step.len() != 2 * material.terms.len() + 1 {
-            return None;
+    /// `material` after the scaled change `step`, within `limits`. κ moves as in [`NormalSystem::moved`].
+    ///
+    /// # Errors
+    /// [`CalibrationError::Subproblem`].
+    pub(super) fn moved(
+        &self,
+        limits: &Constraints,
+        system: &NormalSystem,
+        material: &Ogden,
+        step: &DVector<f64>,
+    ) -> Result<Ogden, CalibrationError> {
+        let linear = system.moved(material, step);
+        if self.is_straight() {
+            return Ok(linear);
         }
-        // Coordinates ln |μ| and α; the scaled step of α is relative.
-        let n = 2 * material.terms.len();
-        let linear =
-            DVector::from_fn(
-                n,
-                |i, _| {
-                    if i % 2 == 0 { step[i + 1] } else { step[i + 1] * material.terms[i / 2].alpha }
-                },
-            );
-        let (stresses, slopes) = self.stresses(&material.terms);
-        let wanted = stresses + &slopes * &linear;
-        let mut terms = material.terms.clone();
-        let at = |terms: &[OgdenTerm]| {
-            let (stresses, slopes) = self.stresses(terms);
-            let misfit = &wanted - stresses;
-            (misfit.norm_squared(), misfit, slopes)
-        };
-        let (mut error, mut misfit, mut slopes) = at(&terms);
-        // Held parameters have no step.
-        let is_free: Vec<bool> = (0..n).map(|i| step[i + 1] != 0.0).collect();
-        let at_rest = error;
+        let (stresses, slopes) = self.stresses(material);
+        let wanted = stresses + slopes * step;
+        let missed = |m: &Ogden| (&wanted - self.stresses(m).0).norm_squared();
+        let mut near = Ogden { bulk_kpa: linear.bulk_kpa, ..material.clone() };
+        let mut error = missed(&near);
         for _ in 0..MAX_ITERATIONS {
-            let mut change = least_squares(&slopes, &misfit, &is_free)?;
-            let mut accepted = false;
-            for _ in 0..6 {
-                let trial: Vec<OgdenTerm> = terms
-                    .iter()
-                    .enumerate()
-                    .map(|(t, term)| OgdenTerm {
-                        mu_kpa: term.mu_kpa * change[2 * t].exp(),
-                        alpha: term.alpha + change[2 * t + 1],
-                    })
-                    .collect();
-                let is_material = trial
-                    .iter()
-                    .zip(&terms)
-                    .all(|(new, old)| new.alpha * old.alpha > 0.0 && (MIN_ALPHA..MAX_ALPHA).contains(&new.alpha.abs()));
-                if is_material {
-                    let next = at(&trial);
-                    if next.0 <= error * (1.0 + 1e-12) {
-                        terms = trial;
-                        (error, misfit, slopes) = next;
-                        accepted = true;
-                        break;
-                    }
-                }
+            let inner = self.system(system, &near, &wanted);
+            let mut change = limits.step(&inner, 0.0, true)?.change;
+            let better = (0..MAX_HALVINGS).find_map(|_| {
+                let trial = inner.moved(&near, &change);
+                let next = missed(&trial);
                 change *= 0.5;
-            }
-            if !accepted || change.amax() < TOLERANCE {
+                (next < error).then_some((trial, next))
+            });
+            let Some((trial, next)) = better else { break };
+            let is_done = error - next < TOLERANCE * error;
+            (near, error) = (trial, next);
+            if is_done {
                 break;
             }
         }
-        let moved = terms
-            .iter()
-            .zip(&material.terms)
-            .flat_map(|(new, old)| [(new.mu_kpa / old.mu_kpa).ln(), new.alpha / old.alpha - 1.0])
-            .map(|x| x * x)
-            .sum::<f64>();
-        let is_near = moved.sqrt() <= LARGEST_DETOUR * step.rows(1, n).norm();
-        (error < FOLLOWED * at_rest && is_near).then_some(terms)
+        let length = |m: &Ogden| {
+            let moved = m.terms.iter().zip(&material.terms);
+            moved
+                .map(|(new, old)| (new.mu_kpa / old.mu_kpa).ln().powi(2) + (new.alpha / old.alpha - 1.0).powi(2))
+                .sum::<f64>()
+                .sqrt()
+        };
+        let is_near = length(&near) < LARGEST_DETOUR * length(&linear);
+        Ok(if is_near && error < missed(&linear) { near } else { linear })
+    }
+
+    /// The normal equations of the fit of `material`'s stresses to `wanted`, in scaled parameters.
+    fn system(&self, outer: &NormalSystem, material: &Ogden, wanted: &DVector<f64>) -> NormalSystem {
+        let (stresses, slopes) = self.stresses(material);
+        let misfit = wanted - stresses;
+        let mut matrix = slopes.tr_mul(&slopes);
+        // κ has no part in these stresses and stays.
+        matrix[(0, 0)] = 1.0;
+        NormalSystem {
+            values: outer.parameters.iter().map(|p| material.value(*p)).collect(),
+            gradient: slopes.tr_mul(&misfit),
+            matrix,
+            chi2: misfit.norm_squared(),
+            ..outer.clone()
+        }
     }
 
     /// Traceless principal Kirchhoff stresses Σμ λ̄^α of all states (kPa, times the root of the volume), and their
-    /// derivatives with respect to ln |μ| and α.
-    fn stresses(&self, terms: &[OgdenTerm]) -> (DVector<f64>, DMatrix<f64>) {
+    /// derivatives with respect to the scaled parameters, κ first.
+    fn stresses(&self, material: &Ogden) -> (DVector<f64>, DMatrix<f64>) {
         let mut stresses = DVector::zeros(3 * self.states.len());
-        let mut slopes = DMatrix::zeros(3 * self.states.len(), 2 * terms.len());
+        let mut slopes = DMatrix::zeros(3 * self.states.len(), 2 * material.terms.len() + 1);
         for (s, (logs, root)) in self.states.iter().enumerate() {
-            for (t, term) in terms.iter().enumerate() {
+            for (t, term) in material.terms.iter().enumerate() {
                 let powers = logs.map(|e| root * term.mu_kpa * (term.alpha * e).exp());
-                let by_alpha = [0, 1, 2].map(|j| powers[j] * logs[j]);
+                let by_alpha = [0, 1, 2].map(|j| powers[j] * logs[j] * term.alpha);
                 let means = [powers, by_alpha].map(|v| v.iter().sum::<f64>() / 3.0);
                 for j in 0..3 {
                     stresses[3 * s + j] += powers[j] - means[0];
-                    slopes[(3 * s + j, 2 * t)] = powers[j] - means[0];
-                    slopes[(3 * s + j, 2 * t + 1)] = by_alpha[j] - means[1];
+                    slopes[(3 * s + j, 2 * t + 1)] = powers[j] - means[0];
+                    slopes[(3 * s + j, 2 * t + 2)] = by_alpha[j] - means[1];
                 }
             }
         }
@@ -157,23 +149,9 @@ impl StressPath {
     }
 }
 
-/// The change of the free parameters that takes most of `misfit` away.
-fn least_squares(slopes: &DMatrix<f64>, misfit: &DVector<f64>, is_free: &[bool]) -> Option<DVector<f64>> {
-    let free: Vec<usize> = (0..is_free.len()).filter(|&i| is_free[i]).collect();
-    let scale = |i: usize| Some(slopes.column(i).norm()).filter(|s| *s > 0.0).unwrap_or(1.0);
-    let scaled = DMatrix::from_fn(slopes.nrows(), free.len(), |r, a| slopes[(r, free[a])] / scale(free[a]));
-    let matrix = scaled.tr_mul(&scaled) + DMatrix::from_diagonal_element(free.len(), free.len(), RIDGE);
-    let x = matrix.cholesky()?.solve(&scaled.tr_mul(misfit));
-    let mut change = DVector::zeros(is_free.len());
-    for (a, &i) in free.iter().enumerate() {
-        change[i] = x[a] / scale(i);
-    }
-    change.iter().all(|v| v.is_finite()).then_some(change)
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::system::NormalSystem;
+    use super::super::fit::{FitOptions, Held};
     use super::super::test_problem::{block, coarse, ogden};
     use super::*;
     use crate::fem::SolveOptions;
@@ -192,6 +170,24 @@ mod tests {
             loss_u: 0.0,
             loss_f: 0.0,
         }
+    }
+
+    fn limits(material: &Ogden) -> Constraints {
+        Constraints::new(material, &FitOptions::default()).unwrap()
+    }
+
+    /// Exponents that a step draws together stop at the smallest distance.
+    #[test]
+    fn limits_hold_on_the_way() {
+        let material = ogden(200.0, &[[16.0, 1.9], [0.35, 3.2]]);
+        let (path, system) = (path(&material), system(&material));
+        let step = DVector::from_column_slice(&[0.0, 0.0, 0.08, 0.0, -0.04]);
+        let moved = path.moved(&limits(&material), &system, &material, &step).unwrap();
+        let gap = moved.terms[1].alpha - moved.terms[0].alpha;
+        assert!(gap >= 1.0 - 1e-9, "{gap}");
+        let far = DVector::from_column_slice(&[0.0, 0.0, 0.3, 0.0, -0.3]);
+        let moved = path.moved(&limits(&material), &system, &material, &far).unwrap();
+        assert!(moved.terms[1].alpha - moved.terms[0].alpha >= 1.0 - 1e-9 || moved == system.moved(&material, &far));
     }
 
     fn path(material: &Ogden) -> StressPath {
@@ -218,7 +214,10 @@ mod tests {
         let direction = DVector::from_column_slice(&[0.3, -0.05, 0.06, -0.4, 0.12]);
         let apart = [0.1, 0.05].map(|size| {
             let step = &direction * size;
-            distance(&path.moved(&system, &material, &step), &system.moved(&material, &step))
+            distance(
+                &path.moved(&limits(&material), &system, &material, &step).unwrap(),
+                &system.moved(&material, &step),
+            )
         });
         // Third-order terms are a tenth of the step's size.
         assert!((apart[0] / apart[1] - 4.0).abs() < 0.4, "{apart:?}");
@@ -230,16 +229,16 @@ mod tests {
     fn stresses_change_as_promised() {
         let material = two_terms();
         let path = path(&material);
-        let (stresses, slopes) = path.stresses(&material.terms);
+        let (stresses, slopes) = path.stresses(&material);
         // α₂ up by 15 %, the other parameters such that stresses change least.
-        let alone = slopes.column(3) * (0.15 * 8.0);
-        let rest = least_squares(&slopes, &-&alone, &[true, true, true, false]).unwrap();
-        let step = DVector::from_column_slice(&[0.0, rest[0], rest[1] / 1.9, rest[2], 0.15]);
+        let others = slopes.columns(1, 3).into_owned();
+        let rest = (others.tr_mul(&others)).cholesky().unwrap().solve(&others.tr_mul(&(slopes.column(4) * -0.15)));
+        let step = DVector::from_column_slice(&[0.0, rest[0], rest[1], rest[2], 0.15]);
         let system = system(&material);
-        let wanted = &stresses + &slopes * DVector::from_column_slice(&[rest[0], rest[1], rest[2], 1.2]);
-        let missed = |m: &Ogden| (path.stresses(&m.terms).0 - &wanted).norm() / stresses.norm();
-        let [followed, linear] =
-            [path.moved(&system, &material, &step), system.moved(&material, &step)].map(|m| missed(&m));
+        let wanted = &stresses + &slopes * &step;
+        let missed = |m: &Ogden| (path.stresses(m).0 - &wanted).norm() / stresses.norm();
+        let followed = missed(&path.moved(&limits(&material), &system, &material, &step).unwrap());
+        let linear = missed(&system.moved(&material, &step));
         assert!(followed < 0.1 * linear, "{followed} {linear}");
     }
 
@@ -248,12 +247,15 @@ mod tests {
         let material = two_terms();
         let (path_two, system_two) = (path(&material), system(&material));
         let step = DVector::from_column_slice(&[0.1, 0.0, 0.06, -0.2, 0.0]);
-        let moved = path_two.moved(&system_two, &material, &step);
+        let held = FitOptions { held: Held::default().with(1).with(4), ..FitOptions::default() };
+        let limits_two = Constraints::new(&material, &held).unwrap();
+        let moved = path_two.moved(&limits_two, &system_two, &material, &step).unwrap();
         assert_eq!(moved.terms[0].mu_kpa, 16.0);
         assert_eq!(moved.terms[1].alpha, 8.0);
         assert_eq!(moved.bulk_kpa, 200.0 * 0.1f64.exp());
         let one = ogden(200.0, &[[16.0, 1.9]]);
         let step = DVector::from_column_slice(&[0.1, 0.3, -0.2]);
-        assert_eq!(path(&one).moved(&system(&one), &one, &step), system(&one).moved(&one, &step));
+        let moved = path(&one).moved(&limits(&one), &system(&one), &one, &step).unwrap();
+        assert_eq!(moved, system(&one).moved(&one, &step));
     }
 }

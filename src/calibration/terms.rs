@@ -7,6 +7,7 @@
 //!   no noise level and, with n in the ten thousands, is the strictest.
 
 use super::problem::RecordingFit;
+use crate::material::{Ogden, OgdenTerm};
 use serde::{Deserialize, Serialize};
 
 /// Which rule decides.
@@ -26,7 +27,7 @@ pub enum Rule {
 pub const F_TEST_LEVEL: f64 = 0.01;
 /// Smallest decrement of ℓ that keeps a term: between those that the paper kept and those that it did not (its Table 2).
 pub const DECREMENT_THRESHOLD: f64 = 1e-5;
-/// A term with a smaller part of Σμα is faded.
+/// A term that nowhere makes a larger part of the stress is faded.
 const FADED_SHARE: f64 = 1e-3;
 /// |α| below which a term is μα ln λ: only the product is seen.
 const SMALL_EXPONENT: f64 = 0.1;
@@ -124,15 +125,30 @@ pub(super) fn choose(rows: &[TermRow], rule: Rule, threshold: f64) -> usize {
     1 + rows.iter().skip(1).take_while(|r| is_kept(r, rule, threshold)).count()
 }
 
-/// What is degenerate about a fit, in words.
-pub(super) fn degeneracies(fit: &RecordingFit) -> Vec<String> {
+/// The largest part that a term has of the stress, over the isochoric principal stretches `visited`: of a term with a large
+/// exponent μα may be nothing and the stress at large stretches much.
+fn largest_share(material: &Ogden, term: &OgdenTerm, visited: &[[f64; 3]]) -> f64 {
+    let size = |terms: &[OgdenTerm], stretches: &[f64; 3]| {
+        let stress = stretches.map(|s| terms.iter().map(|t| t.mu_kpa * s.powf(t.alpha)).sum::<f64>());
+        let mean = stress.iter().sum::<f64>() / 3.0;
+        stress.iter().map(|t| (t - mean).powi(2)).sum::<f64>().sqrt()
+    };
+    let at_rest = |terms: &[OgdenTerm]| terms.iter().map(|t| t.mu_kpa * t.alpha).sum::<f64>();
+    let one = std::slice::from_ref(term);
+    visited
+        .iter()
+        .map(|s| size(one, s) / size(&material.terms, s).max(f64::MIN_POSITIVE))
+        .fold((at_rest(one) / at_rest(&material.terms)).abs(), f64::max)
+}
+
+/// What is degenerate about a fit that visits these isochoric principal stretches, in words.
+pub(super) fn degeneracies(fit: &RecordingFit, visited: &[[f64; 3]]) -> Vec<String> {
     let terms = &fit.material.terms;
-    let total: f64 = terms.iter().map(|t| t.mu_kpa * t.alpha).sum();
     let mut found = Vec::new();
     for (n, term) in terms.iter().enumerate() {
-        let share = term.mu_kpa * term.alpha / total;
-        if share.abs() < FADED_SHARE {
-            found.push(format!("term {}: faded (μα is {:.1e} of the sum)", n + 1, share));
+        let share = largest_share(&fit.material, term, visited);
+        if share < FADED_SHARE {
+            found.push(format!("term {}: faded (nowhere more than {share:.1e} of the stress)", n + 1));
         }
         if term.alpha.abs() < SMALL_EXPONENT {
             found.push(format!("term {}: α is near zero, only μα is seen", n + 1));
