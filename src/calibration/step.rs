@@ -21,6 +21,8 @@ const SMALLEST_MODULUS: f64 = 1e-9;
 const SMALLEST_EXPONENT: f64 = 1e-3;
 /// |α| stays a little below what a material may have.
 const LARGEST_EXPONENT: f64 = 0.99 * MAX_ALPHA;
+/// Parameters that the data see less of than this part of the best seen one are scaled like it.
+const SMALLEST_SCALE: f64 = 1e-5;
 /// Added to the matrix scaled to a unit diagonal, so that directions without information stay where they are.
 const RIDGE: f64 = 1e-12;
 /// Tried in turn where the limited problem cannot be solved.
@@ -31,6 +33,8 @@ const REACHED: f64 = 1e-6;
 const GAP_ROUNDING: f64 = 1e-6;
 /// A violation of a limit below this is rounding (scaled parameters).
 const ROUNDING: f64 = 1e-12;
+/// An objective this little above that of rest is none: 10⁻⁹ is 4·10⁻⁵ standard deviations.
+const NO_ASCENT: f64 = 1e-9;
 /// Largest violation of a limit that a solution of Clarabel's may have before it is drawn back (scaled parameters).
 const FEASIBILITY: f64 = 1e-5;
 
@@ -154,9 +158,11 @@ impl Constraints {
         let n = system.values.len();
         let free: Vec<usize> = (0..n).filter(|&i| !self.held.contains(i)).collect();
         let m = free.len();
-        // Unit diagonal: the two-term matrix has entries over six decades.
-        let root: Vec<f64> =
-            free.iter().map(|&i| system.matrix[(i, i)].sqrt()).map(|r| if r > 0.0 { r } else { 1.0 }).collect();
+        // Unit diagonal: the two-term matrix has entries over six decades. What is hardly seen, as a faded term, is not
+        // scaled up to it: its limits would be those of huge variables.
+        let root: Vec<f64> = free.iter().map(|&i| system.matrix[(i, i)].sqrt()).collect();
+        let floor = SMALLEST_SCALE * root.iter().fold(0.0f64, |a, r| a.max(*r));
+        let root: Vec<f64> = root.into_iter().map(|r| if floor > 0.0 { r.max(floor) } else { 1.0 }).collect();
         let plain = DMatrix::from_fn(m, m, |a, b| system.matrix[(free[a], free[b])] / (root[a] * root[b]));
         let damped = &plain + DMatrix::from_diagonal_element(m, m, damping + RIDGE);
         let gradient = DVector::from_fn(m, |a, _| system.gradient[free[a]] / root[a]);
@@ -333,7 +339,7 @@ fn solve_among(
         .iter()
         .all(|(row, room, _)| row.iter().zip(x.iter()).map(|(r, x)| r * x).sum::<f64>() <= room + FEASIBILITY);
     let model = 0.5 * x.dot(&(matrix * &x)) - gradient.dot(&x);
-    let is_descent = model.is_finite() && model <= ROUNDING * size;
+    let is_descent = model.is_finite() && model <= NO_ASCENT * size;
     let status = solver.solution.status;
     let is_answer = match status {
         SolverStatus::Solved | SolverStatus::AlmostSolved => true,

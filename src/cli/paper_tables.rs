@@ -3,6 +3,7 @@
 use super::error::CliError;
 use super::{Common, input, interrupt, output};
 use crate::calibration::{Contour, Objective, PAPER_BETA, StandIn, StandInOptions, stand_ins};
+use crate::homogeneous::{UniaxialStandIn, UniaxialStandInOptions, uniaxial_stand_in};
 use crate::recording::Filter;
 use crate::report::{ContourPlot, contour_panels};
 use crate::sensitivity::{PartialVoxels, ScanSettings};
@@ -18,6 +19,9 @@ pub(super) struct PaperTablesArguments {
     /// Noise of the load cell in N, one standard deviation.
     #[arg(long, default_value_t = 0.02)]
     force_sd: f64,
+    /// Noise of the dumb-bell's load cell relative to its largest force, one standard deviation.
+    #[arg(long, default_value_t = 2e-3)]
+    dumbbell_noise: f64,
     /// Element size of the fits relative to standard.
     #[arg(long, default_value_t = 1.4)]
     mesh: f64,
@@ -39,6 +43,10 @@ pub(super) fn run(a: &PaperTablesArguments) -> Result<(), CliError> {
     if !(0.2..=5.0).contains(&a.mesh) {
         return Err(CliError::Option { option: "mesh", message: format!("{} is not from 0.2 to 5", a.mesh) });
     }
+    if !(0.0..=0.5).contains(&a.dumbbell_noise) {
+        let message = format!("{} is not from 0 to 0.5", a.dumbbell_noise);
+        return Err(CliError::Option { option: "dumbbell-noise", message });
+    }
     let options = StandInOptions {
         truth_factor: 0.75 * a.mesh,
         fit_factor: a.mesh,
@@ -59,6 +67,17 @@ pub(super) fn run(a: &PaperTablesArguments) -> Result<(), CliError> {
     };
     let (all, contours) = stand_ins(&specimen, &truth, &options, &on_stage, &interrupt::is_requested)
         .map_err(|e| CliError::Numerics(e.to_string()))?;
+    on_stage("dumb-bell");
+    let dumbbell = Specimen::from_json(include_str!("../../geometries/iso37-type4.json"))
+        .map_err(|e| CliError::Numerics(e.to_string()))?;
+    let uniaxial = UniaxialStandInOptions {
+        truth_factor: 0.75 * a.mesh,
+        fit_factor: a.mesh,
+        relative_noise: a.dumbbell_noise,
+        seed: a.seed,
+    };
+    let uniaxial = uniaxial_stand_in(&dumbbell, &uniaxial, &interrupt::is_requested)
+        .map_err(|e| CliError::Numerics(e.to_string()))?;
     let name = PathBuf::from("paper-tables");
     if let Some(folder) = output::folder(a.common.out.as_deref(), a.common.json, &name) {
         // The one-term fit stands in the middle of every axis.
@@ -76,10 +95,35 @@ pub(super) fn run(a: &PaperTablesArguments) -> Result<(), CliError> {
                 serde_json::json!({ "drive_mm": s.drive_mm, "filter": s.filter, "term_selection": s.calibration.selection })
             })
             .collect();
-        let result = serde_json::json!({ "schema": "paper-tables/1", "stand_ins": rows, "contours": contours });
+        let result = serde_json::json!({ "schema": "paper-tables/1", "uniaxial": uniaxial, "stand_ins": rows, "contours": contours });
         return output::print(&output::to_json(&result)?);
     }
-    output::print(&tables(&all))
+    output::print(&(uniaxial_table(&uniaxial) + &tables(&all)))
+}
+
+/// A table like the paper's 1.
+fn uniaxial_table(found: &UniaxialStandIn) -> String {
+    let mut text = format!(
+        "like Table 1: fits of a dumb-bell's curve (moduli in kPa; truth mu {:.2}; gauge stretches within {:.3})\n  stretch  terms  mu       terms (mu, alpha)                                              relative squares\n",
+        found.true_initial_shear_modulus_kpa, found.stretch_error
+    );
+    for row in &found.rows {
+        let terms: Vec<String> = row
+            .fit
+            .parameters
+            .chunks(2)
+            .map(|t| format!("({:.3e}, {:.2}{})", t[0].value, t[1].value, if t[1].held { " held" } else { "" }))
+            .collect();
+        text += &format!(
+            "  1-{:<6} {:<6} {:<8.2} {:<62} {:.1e}\n",
+            row.largest_stretch,
+            row.fit.num_terms,
+            row.fit.initial_shear_modulus_kpa.value,
+            terms.join(" "),
+            row.relative_squares
+        );
+    }
+    text + "\n"
 }
 
 /// Tables like the paper's 2 and 3.

@@ -15,6 +15,7 @@ mod least_squares;
 mod result;
 mod selection;
 mod stability;
+mod stand_in;
 mod starts;
 mod statistics;
 mod table;
@@ -33,5 +34,6 @@ pub use selection::{
     F_LEVEL, MIN_DECREMENT, ModelEvidence, Selection, bic, compare, independent_count, neighbour_correlation,
 };
 pub use stability::{is_stable, smallest_stiffness};
+pub use stand_in::{GAUGE_STRETCHES, TRUTH, UniaxialRow, UniaxialStandIn, UniaxialStandInOptions, uniaxial_stand_in};
 pub use statistics::{erf, f_exceedance, t_quantile};
 pub use table::{ForceTable, TableError};
