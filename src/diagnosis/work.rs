@@ -287,7 +287,14 @@ impl Work<'_, '_> {
         for (cause, paths) in list.iter().zip(&own) {
             let rest = directions.split_off(paths.len());
             let score = test.test(&directions);
+            let is_refuted = cause.is_of_the_scanner() && {
+                let growing: Vec<Trace> = directions.iter().map(|d| self.in_proportion_to_the_drive(d)).collect();
+                test.test(&growing).explained > score.explained + EVIDENCE
+            };
             directions = rest;
+            if is_refuted {
+                continue;
+            }
             let mut values = cause.start();
             for ((value, c), p) in values.iter_mut().zip(&score.coefficients).zip(cause.parameters()) {
                 // First order may overshoot: start a fit at most a few scales away.
@@ -319,6 +326,19 @@ impl Work<'_, '_> {
         }
         candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
         Ok(candidates)
+    }
+
+    /// A displacement that is alike at every drive, made to grow with the drive.
+    fn in_proportion_to_the_drive(&self, trace: &Trace) -> Trace {
+        let steps = &self.laboratory.observed().steps;
+        let largest = steps.iter().fold(f64::MIN_POSITIVE, |a, s| a.max(s.drive_mm.abs()));
+        let displacement = trace
+            .displacement
+            .iter()
+            .zip(steps)
+            .map(|(field, step)| field.iter().map(|u| u.map(|x| x * step.drive_mm / largest)).collect())
+            .collect();
+        Trace { displacement, force: trace.force.clone() }
     }
 
     /// Further steps that would tell two fits apart.

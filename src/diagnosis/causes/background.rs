@@ -42,4 +42,8 @@ impl Cause for Background {
     fn changes_sample(&self) -> bool {
         false
     }
+
+    fn is_of_the_scanner(&self) -> bool {
+        true
+    }
 }

@@ -95,6 +95,11 @@ pub trait Cause: Send + Sync {
     fn changes_sample(&self) -> bool {
         true
     }
+    /// Whether it is alike at every drive, as a scanner's own errors are: where the same pattern in proportion to the drive
+    /// explains more, this is not the cause.
+    fn is_of_the_scanner(&self) -> bool {
+        false
+    }
 }
 
 /// Causes that every recording is tested for by score tests. Those with a place or a direction to find (debonds, inclusions,
