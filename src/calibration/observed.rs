@@ -127,12 +127,29 @@ impl Observed {
     /// # Errors
     /// [`CalibrationError::Voxel`].
     pub fn view(&self, specimen: &Specimen, mesh: &Mesh) -> Result<View, CalibrationError> {
+        self.shifted_view(specimen, mesh, [0.0; 3])
+    }
+
+    /// As [`Self::view`] with the voxels where they would be if the image lay `shift_mm` further along than its header says.
+    ///
+    /// # Errors
+    /// As [`Self::view`].
+    pub fn shifted_view(
+        &self,
+        specimen: &Specimen,
+        mesh: &Mesh,
+        shift_mm: [f64; 3],
+    ) -> Result<View, CalibrationError> {
+        let mut grid = self.mask.grid.clone();
+        for (origin, shift) in grid.origin_mm.iter_mut().zip(shift_mm) {
+            *origin += shift;
+        }
         // Whatever part of a compared voxel the specimen still fills is what the scan averages over.
         let least = 1e-3;
         let (acquired, filter) = match self.filter {
-            Filter::None => (VoxelMask::from_flags(specimen, self.mask.grid.clone(), &self.flags, least)?, None),
+            Filter::None => (VoxelMask::from_flags(specimen, grid, &self.flags, least)?, None),
             Filter::Hamming2 => {
-                let (acquired, filter) = HammingFilter::for_recording(specimen, self.mask.grid.clone(), &self.flags)?;
+                let (acquired, filter) = HammingFilter::for_recording(specimen, grid, &self.flags)?;
                 (acquired, Some(filter))
             }
         };

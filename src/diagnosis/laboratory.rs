@@ -20,7 +20,9 @@ struct Station {
     holes: Vec<[f64; 3]>,
     releases: [bool; 2],
     model: ForwardModel,
+    /// Of the voxels moved by `shift_mm`.
     view: View,
+    shift_mm: [f64; 3],
     /// The last equilibria, from which the next start.
     states: Vec<Equilibrium>,
 }
@@ -343,7 +345,11 @@ impl<'a> Laboratory<'a> {
         seen: &[Vec<[f64; 3]>],
     ) -> Result<Trace, DiagnosisError> {
         let image = &scene.image;
-        let turns = image.shift_mm.iter().chain(&image.rotation_rad).any(|x| x.abs() > 0.0);
+        // The view holds the scene's own shift in full: walls cut other parts of the voxels then. What is left of it, as a
+        // derivative is taken, and rotations are to first order.
+        let viewed = self.stations[at].shift_mm;
+        let shift_mm = [0, 1, 2].map(|i| image.shift_mm[i] - viewed[i]);
+        let turns = shift_mm.iter().chain(&image.rotation_rad).any(|x| x.abs() > 0.0);
         let has_background = image.background_mm.iter().flatten().any(|x| x.abs() > 0.0);
         let mask = &self.observed.mask;
         let mut trace = Trace::default();
@@ -358,7 +364,7 @@ impl<'a> Laboratory<'a> {
                 for ((u, g), &voxel) in field.iter_mut().zip(&gradients).zip(&mask.voxels) {
                     let x = mask.grid.center_mm(voxel as usize);
                     let turned = cross(w, x);
-                    let shift = [0, 1, 2].map(|i| image.shift_mm[i] + turned[i]);
+                    let shift = [0, 1, 2].map(|i| shift_mm[i] + turned[i]);
                     let back = cross(w, *u);
                     for i in 0..3 {
                         u[i] += (0..3).map(|j| g[i][j] * shift[j]).sum::<f64>() - back[i];
@@ -408,10 +414,16 @@ impl<'a> Laboratory<'a> {
             let same = |a: &[f64; 3], b: &[f64; 3]| a.iter().zip(b).all(|(x, y)| x.to_bits() == y.to_bits());
             s.releases == releases && s.holes.iter().zip(&holes).all(|(a, b)| same(a, b))
         });
+        let made = scene.specimen(&self.observed.specimen);
+        let shift_mm = scene.image.shift_mm;
         if let Some(at) = found {
+            let station = &mut self.stations[at];
+            if station.shift_mm != shift_mm {
+                station.view = self.observed.shifted_view(&made, station.model.mesh(), shift_mm)?;
+                station.shift_mm = shift_mm;
+            }
             return Ok(at);
         }
-        let made = scene.specimen(&self.observed.specimen);
         made.validate().map_err(DiagnosisError::Specimen)?;
         let mut mesh = self.nominal.clone();
         for (hole, change) in holes.iter().enumerate() {
@@ -422,7 +434,7 @@ impl<'a> Laboratory<'a> {
                 }
             }
         }
-        let view = self.observed.view(&made, &mesh)?;
+        let view = self.observed.shifted_view(&made, &mesh, shift_mm)?;
         let model = ForwardModel::with_released(mesh, &made, &|_, is_moved| releases[usize::from(is_moved)])?;
         // The nodes of two morphed meshes correspond: equilibria of one start the other.
         let states = self.stations.iter().rev().find(|s| s.releases == releases).map(|s| s.states.clone());
@@ -430,7 +442,7 @@ impl<'a> Laboratory<'a> {
             // The nominal one stays.
             self.stations.remove(1);
         }
-        self.stations.push(Station { holes, releases, model, view, states: states.unwrap_or_default() });
+        self.stations.push(Station { holes, releases, model, view, shift_mm, states: states.unwrap_or_default() });
         Ok(self.stations.len() - 1)
     }
 }
