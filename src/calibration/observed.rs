@@ -134,12 +134,7 @@ impl Observed {
     ///
     /// # Errors
     /// As [`Self::view`].
-    pub fn shifted_view(
-        &self,
-        specimen: &Specimen,
-        mesh: &Mesh,
-        shift_mm: [f64; 3],
-    ) -> Result<View, CalibrationError> {
+    pub fn shifted_view(&self, specimen: &Specimen, mesh: &Mesh, shift_mm: [f64; 3]) -> Result<View, CalibrationError> {
         let mut grid = self.mask.grid.clone();
         for (origin, shift) in grid.origin_mm.iter_mut().zip(shift_mm) {
             *origin += shift;
@@ -248,5 +243,41 @@ impl View {
             f = filter.apply(&flat)?.iter().map(|g| [0, 1, 2].map(|i| [0, 1, 2].map(|j| g[3 * i + j]))).collect();
         }
         Ok(self.places.iter().map(|&p| f.get(p as usize).copied().unwrap_or([[f64::NAN; 3]; 3])).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_problem::{block, coarse, same_mesh, truth};
+    use super::*;
+
+    /// A linear field: whole voxels see its slope times the shift, voxels that leave the sample see what is left of them.
+    #[test]
+    fn shifted_voxels_see_what_lies_there() {
+        let specimen = block();
+        let (_, _, synthetic) = same_mesh(&truth());
+        let recording = synthetic.recording("shift", &specimen, synthetic.noiseless(), Filter::None).unwrap();
+        let observed = Observed::new(&recording, 0.01).unwrap();
+        let mesh = crate::mesh::mesh_specimen(&specimen, &coarse(&specimen)).unwrap();
+        let field: Vec<[f64; 3]> =
+            mesh.nodes.iter().map(|x| [0.3 * x[0] + 0.1 * x[1], 0.2 * x[1], -0.4 * x[2]]).collect();
+        let shift = [0.21, -0.13, 0.17];
+        let plain = observed.view(&specimen, &mesh).unwrap().average(&field).unwrap();
+        let moved = observed.shifted_view(&specimen, &mesh, shift).unwrap().average(&field).unwrap();
+        let expected = [0.3 * shift[0] + 0.1 * shift[1], 0.2 * shift[1], -0.4 * shift[2]];
+        let half = [0.5 * specimen.block.length_mm, 0.5 * specimen.block.thickness_mm, 0.5 * specimen.block.width_mm];
+        let mut num_inside = 0;
+        for ((a, b), &voxel) in moved.iter().zip(&plain).zip(&observed.mask.voxels) {
+            let x = observed.mask.grid.center_mm(voxel as usize);
+            // Half a voxel (1 × 0.5 × 1 mm) and the shift away from every face; the drawn half of a mirrored sample.
+            if (0..3).all(|i| x[i].abs() < half[i] - 0.8) && (0..3).all(|i| a[i].is_finite()) {
+                num_inside += 1;
+                for i in 0..3 {
+                    // Rounding: averages of linear fields are exact.
+                    assert!((a[i] - b[i] - expected[i]).abs() < 1e-9, "{x:?} {a:?} {b:?}");
+                }
+            }
+        }
+        assert!(num_inside > 100, "{num_inside}");
     }
 }
