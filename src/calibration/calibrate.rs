@@ -15,7 +15,9 @@ use super::stability::least_relative_stiffness;
 use super::starts::{Candidates, first_starts, further_starts};
 use super::system::Work;
 use super::target::{Objective, PAPER_BETA};
-use super::terms::{DECREMENT_THRESHOLD, Rule, TermRow, TermSelection, choose, compare, degeneracies, is_kept};
+use super::terms::{
+    DECREMENT_THRESHOLD, Rule, SETTLED, TermRow, TermSelection, choose, compare, degeneracies, is_kept,
+};
 use crate::material::{MAX_TERMS, Ogden, Parameter};
 use crate::mesh::MeshOptions;
 use crate::sensitivity::IDENTIFIABILITY_LIMIT;
@@ -232,7 +234,13 @@ pub fn calibrate(
     } else {
         fit = run.fit(&mut problem, &falling(&fit.material), None)?;
     }
-    if !fit.is_converged {
+    if !fit.is_converged && fit.distance < SETTLED {
+        run.notes.push(format!(
+            "the fit was not at the optimum after {} iterations, {:.2} standard deviations away by the linear model: the data \
+             hardly tell its terms apart",
+            fit.iterations, fit.distance
+        ));
+    } else if !fit.is_converged {
         let (iterations, distance, limit) = (fit.iterations, fit.distance, options.fit.tolerance);
         return Err(CalibrationError::NotConverged { iterations, distance, limit });
     }
@@ -457,6 +465,7 @@ impl<'a> Run<'a> {
             num_starts,
             num_agreeing,
             is_converged: fit.is_converged,
+            distance_sd: fit.distance,
             least_relative_stiffness: least_relative_stiffness(&fit.material, &visited),
             degeneracies: degeneracies(fit, &visited),
         })

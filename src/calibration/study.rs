@@ -19,7 +19,7 @@ use super::problem::{CalibrationProblem, RecordingFit};
 use super::profile::TWO_SIDED_95;
 use super::starts::Candidates;
 use super::synthetic::SyntheticScan;
-use super::terms::{Rule, choose, compare};
+use super::terms::{Rule, SETTLED, choose, compare};
 use crate::material::Ogden;
 use crate::mesh::MeshOptions;
 use crate::recording::Filter;
@@ -261,7 +261,7 @@ fn one_draw(
     }
     compare(&mut rows, fits[0].num_data);
     let chosen = [Rule::Bic, Rule::FTest, Rule::Decrement].map(|r| choose(&rows, r, case.options.decrement_threshold));
-    let fit = fits.pop().filter(|f| f.is_converged);
+    let fit = fits.pop().filter(|f| f.is_converged || f.distance < SETTLED);
     let mut is_alike = None;
     if is_blind {
         let blind = match run.select(problem) {

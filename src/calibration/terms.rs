@@ -66,6 +66,8 @@ pub struct TermRow {
     pub num_agreeing: usize,
     /// Whether the best fit converged.
     pub is_converged: bool,
+    /// What the linear model at the estimate promises still, in standard deviations.
+    pub distance_sd: f64,
     /// Smallest stiffness over the visited states relative to that at rest: positive is stable.
     pub least_relative_stiffness: f64,
     /// Degeneracies: faded terms, exponents near zero, terms that are one.
@@ -109,9 +111,14 @@ pub(super) fn compare(rows: &mut [TermRow], num_data: usize) {
     }
 }
 
-/// Whether `row` is worth its last term by a rule; a faded or unconverged term never is.
+/// Within this many standard deviations of the optimum of the linear model a fit has settled: what it may still gain, at most
+/// one in χ², is within the noise, and could only add to the evidence for its terms.
+pub(super) const SETTLED: f64 = 1.0;
+
+/// Whether `row` is worth its last term by a rule; an unstable or unsettled term never is.
 pub(super) fn is_kept(row: &TermRow, rule: Rule, threshold: f64) -> bool {
-    let is_sound = row.is_converged && row.least_relative_stiffness > 0.0;
+    let is_settled = row.is_converged || row.distance_sd < SETTLED;
+    let is_sound = is_settled && row.least_relative_stiffness > 0.0;
     is_sound
         && match rule {
             Rule::Bic => row.bic_change.is_some_and(|c| c < 0.0),
@@ -162,6 +169,9 @@ pub(super) fn degeneracies(fit: &RecordingFit, visited: &[[f64; 3]]) -> Vec<Stri
             }
         }
     }
+    if !fit.is_converged {
+        found.push(format!("not at the optimum: {:.2} standard deviations away by the linear model", fit.distance));
+    }
     found.extend(fit.reached_limits.iter().map(|l| format!("at a limit: {l}")));
     found
 }
@@ -186,6 +196,7 @@ mod tests {
             num_starts: 1,
             num_agreeing: 1,
             is_converged: true,
+            distance_sd: 0.0,
             least_relative_stiffness: 1.0,
             degeneracies: vec![],
         }
@@ -203,6 +214,8 @@ mod tests {
         assert_eq!(choose(&rows, Rule::FTest, 1e-5), 2);
         assert_eq!(choose(&rows, Rule::Decrement, 1e-5), 2);
         rows[1].is_converged = false;
+        assert_eq!(choose(&rows, Rule::FTest, 1e-5), 2);
+        rows[1].distance_sd = 1.5;
         assert_eq!(choose(&rows, Rule::FTest, 1e-5), 1);
     }
 }
