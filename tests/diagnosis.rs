@@ -25,7 +25,8 @@ fn recorded(scene: &Scene, seed: u64) -> Recording {
     let mask = VoxelMask::covering(&specimen, [1.5, 0.4, 1.2]).unwrap();
     let empty = |drive_mm| RecordedStep {
         drive_mm,
-        force_n: Some(1.0),
+        // About what this block takes; a load train gives by it.
+        force_n: Some(2.0 * drive_mm),
         force_sd_n: Some(FORCE_SD_N),
         window_s: None,
         displacement: vec![[0.0; 3]; mask.grid.num_voxels()],
@@ -121,6 +122,64 @@ fn a_shifted_image_is_named() {
     assert_eq!(result.causes[0].name, "registration", "{:?}", result.causes);
     // The meshes' difference of 0.01 mm against slopes of some tenths along z.
     assert!((value(&result, "shift_z_mm") - 0.6).abs() < 0.06, "{:?}", result.causes[0]);
+}
+
+/// Slack takes as much off every drive; a load train that gives takes what the force takes.
+#[test]
+fn slack_is_told_from_a_load_train_that_gives() {
+    let mut scene = Scene::default();
+    scene.plates[1].translation_mm[0] = -0.2;
+    let result = diagnosed(&recorded(&scene, 10));
+    assert_eq!(result.causes[0].name, "slack", "{:?}", result.causes);
+    // 4,700 voxels of 0.03 mm average to far less; the meshes differ by 0.01 mm.
+    assert!((value(&result, "slack_mm") - 0.2).abs() < 0.02, "{:?}", result.causes[0]);
+
+    let result = diagnosed(&recorded(&Scene { compliance_mm_per_n: -0.04, ..Scene::default() }, 11));
+    assert_eq!(result.causes[0].name, "compliance", "{:?}", result.causes);
+}
+
+/// The gap closes by 0.3 mm before the first step.
+#[test]
+fn a_plate_out_of_place_is_named() {
+    let mut scene = Scene::default();
+    scene.plates[1].translation_mm[1] = -0.3;
+    let result = diagnosed(&recorded(&scene, 12));
+    assert_eq!(result.causes[0].name, "mount", "{:?}", result.causes);
+    // As for slack.
+    assert!((value(&result, "y_mm") + 0.3).abs() < 0.03, "{:?}", result.causes[0]);
+}
+
+/// Layers of 0.01 mm/kPa: a tenth of a millimetre of slip under the largest tractions, of 4 mm of drive.
+#[test]
+fn soft_bonds_are_named() {
+    let result = diagnosed(&recorded(&Scene { bond_mm_per_kpa: [0.01, 0.01], ..Scene::default() }, 13));
+    assert_eq!(result.causes[0].name, "bond", "{:?}", result.causes);
+    for name in ["fixed_plate_mm_per_kpa", "moved_plate_mm_per_kpa"] {
+        // The meshes' 0.01 mm of some 0.1 mm of slip.
+        assert!((value(&result, name) - 0.01).abs() < 0.001, "{:?}", result.causes[0]);
+    }
+}
+
+/// A stiffer sample and a load cell that reads too much look alike: both are said, no cause is named.
+#[test]
+fn a_sample_stiffer_than_believed_is_said() {
+    let recording = recorded(&Scene::default(), 14);
+    let mut believed = material();
+    believed.bulk_kpa /= 1.1;
+    believed.terms[0].mu_kpa /= 1.1;
+    let options = DiagnosisOptions {
+        mesh_factor: 2.0,
+        allowance_mm: Some(0.01),
+        prior: Some(believed),
+        ..DiagnosisOptions::default()
+    };
+    let found = diagnose(&recording, &options, &|_| {}, &|| false).unwrap();
+    let result = DiagnosisResult::new(&found, "", String::new());
+    assert_eq!(result.verdict, Verdict::NoMismatch, "{:?}", result.causes);
+    let against = result.modulus_against_belief.unwrap();
+    // Coarse meshes agree in the force to 1 %.
+    assert!((against.as_relative_cell_gain_error - 0.1).abs() < 0.015, "{against:?}");
+    assert!(against.in_words().contains("stiffer"));
 }
 
 #[test]

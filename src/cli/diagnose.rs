@@ -178,6 +178,9 @@ fn summary(r: &DiagnosisResult, d: &Diagnosis) -> String {
         r.kept_back_rms_mm.before,
         r.kept_back_rms_mm.after
     );
+    if let Some(m) = &r.modulus_against_belief {
+        text += &format!("\n{}\n", m.in_words());
+    }
     text += "\nmaterial            nominal model -> with the causes\n";
     for p in d.corrected.material.parameters() {
         let before = if d.nominal.material.parameters().contains(&p) {

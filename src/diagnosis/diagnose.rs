@@ -111,6 +111,8 @@ pub struct Diagnosis {
     pub load: Option<LoadHistoryFit>,
     /// Maps of the nominal misfit.
     pub maps: Vec<(String, ScoreMap)>,
+    /// The material as believed.
+    pub believed: Option<Ogden>,
     /// The recording as compared.
     pub observed: Observed,
     /// Displacement unknowns of the model.
@@ -340,6 +342,7 @@ pub fn diagnose(
         ranked,
         load,
         maps,
+        believed: options.prior.clone(),
         num_unknowns,
         num_solves,
         allowance_mm,

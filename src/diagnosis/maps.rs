@@ -113,6 +113,16 @@ struct Block {
     ranges: [[usize; 2]; 3],
 }
 
+/// Map of the compliance of a bonded face.
+pub struct BondMap {
+    /// The map.
+    pub map: ScoreMap,
+    /// The debond that explains most, and its deviance.
+    pub debond: Option<(f64, Debond)>,
+    /// Change of the recording with the compliance (mm/kPa) of the whole face.
+    pub whole: Trace,
+}
+
 /// Map of the compliance of a bonded face, and the debond that explains most.
 ///
 /// # Errors
@@ -123,7 +133,7 @@ pub fn debond_map(
     prediction: &Prediction,
     test: &ScoreTest,
     is_moved_face: bool,
-) -> Result<(ScoreMap, Option<(f64, Debond)>), DiagnosisError> {
+) -> Result<BondMap, DiagnosisError> {
     let specimen = laboratory.observed().specimen.clone();
     let (counts, face_axis, axes) = match specimen.test {
         TestKind::DoubleLapShear => ([FACE_PARTS[0], 1, FACE_PARTS[1]], 1, [0, 2]),
@@ -132,8 +142,9 @@ pub fn debond_map(
     let division = Division::of(&specimen, counts);
     let directions = laboratory
         .bond_derivatives(material, prediction, is_moved_face, division.num_parts(), &|x| division.part_of(x))?;
+    let whole = directions[1..].iter().fold(directions[0].clone(), |sum, part| sum.plus(1.0, part));
     let map = ScoreMap::new(division, test, &directions);
-    let found = map.best_block(|compliance| compliance > 0.0).map(|block| {
+    let debond = map.best_block(|compliance| compliance > 0.0).map(|block| {
         let side = if is_moved_face { 1.0 } else { -1.0 };
         let cause = Debond {
             is_moved_face,
@@ -152,7 +163,7 @@ pub fn debond_map(
         };
         (block.explained, cause)
     });
-    Ok((map, found))
+    Ok(BondMap { map, debond, whole })
 }
 
 /// Map of modulus changes, and the inclusion that explains most.

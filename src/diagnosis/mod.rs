@@ -35,7 +35,7 @@ pub use load_history::{ElasticTable, FittedEffect, LoadEffect, LoadHistoryFit, f
 pub use maps::{Division, ScoreMap};
 pub use memory_kernel::{KernelState, MemoryKernel};
 pub use metric::Metric;
-pub use result::{BeforeAfter, CauseResult, DiagnosisResult, ParameterResult, RankedResult};
+pub use result::{BeforeAfter, CauseResult, DiagnosisResult, ModulusAgainstBelief, ParameterResult, RankedResult};
 pub use scene::{ImageChange, Jump, Scene};
 pub use score::{Score, ScoreTest};
 pub use trace::Trace;

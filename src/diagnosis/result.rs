@@ -3,7 +3,7 @@
 use super::causes::{Category, Location};
 use super::diagnose::{Diagnosis, Verdict};
 use super::experiment::Experiment;
-use super::fit::Fitted;
+use super::fit::{Fitted, shear_modulus};
 use super::found::FoundCause;
 use crate::material::{Ogden, Parameter};
 use serde::{Deserialize, Serialize};
@@ -41,6 +41,49 @@ pub struct CauseResult {
     /// Of an alternative: further steps that would tell it apart, most telling first.
     #[serde(default)]
     pub experiments: Vec<Experiment>,
+}
+
+/// A sample stiffer or softer than believed. A load cell that reads too much or too little would look the same: displacements know
+/// ratios of moduli, not their size.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModulusAgainstBelief {
+    /// Initial shear modulus of the material as believed, kPa.
+    pub believed_kpa: f64,
+    /// That found, with the causes, kPa.
+    pub found_kpa: f64,
+    /// The relative gain error of the load cell that would make the one of the other.
+    pub as_relative_cell_gain_error: f64,
+}
+
+/// Smallest relative difference of moduli that is stated: five times what meshes do to the force.
+const SMALLEST_DIFFERENCE: f64 = 0.02;
+
+impl ModulusAgainstBelief {
+    /// Of `found` against `believed`; none where they agree.
+    pub fn new(believed: &Ogden, found: &Ogden) -> Option<ModulusAgainstBelief> {
+        let (believed_kpa, found_kpa) = (shear_modulus(believed), shear_modulus(found));
+        let as_relative_cell_gain_error = found_kpa / believed_kpa - 1.0;
+        (as_relative_cell_gain_error.abs() > SMALLEST_DIFFERENCE).then_some(ModulusAgainstBelief {
+            believed_kpa,
+            found_kpa,
+            as_relative_cell_gain_error,
+        })
+    }
+
+    /// In words, with the experiment that tells the two apart.
+    pub fn in_words(&self) -> String {
+        let percent = 100.0 * self.as_relative_cell_gain_error;
+        let (stiffer, much) = if percent > 0.0 { ("stiffer", "much") } else { ("softer", "little") };
+        format!(
+            "the sample is {:.1} % {stiffer} than believed ({:.3} against {:.3} kPa); a load cell that reads {:.1} % too {much} \
+             would look the same: a known weight hung on it tells",
+            percent.abs(),
+            self.found_kpa,
+            self.believed_kpa,
+            percent.abs()
+        )
+    }
 }
 
 /// A number before and after.
@@ -85,6 +128,9 @@ pub struct DiagnosisResult {
     pub material_parameters: Vec<ParameterResult>,
     /// The material that the nominal model gives.
     pub nominal_material: Ogden,
+    /// Where a material was believed, a force was recorded and the moduli differ.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub modulus_against_belief: Option<ModulusAgainstBelief>,
     /// Causes, most telling first.
     pub causes: Vec<CauseResult>,
     /// What the data cannot tell apart from the last cause; where the verdict is unexplained, what was tried and explains less
@@ -127,6 +173,11 @@ impl DiagnosisResult {
             material: d.corrected.material.clone(),
             material_parameters: material_parameters(&d.corrected),
             nominal_material: d.nominal.material.clone(),
+            modulus_against_belief: d
+                .believed
+                .as_ref()
+                .filter(|_| d.observed.steps.iter().any(|s| s.force.is_some()))
+                .and_then(|believed| ModulusAgainstBelief::new(believed, &d.corrected.material)),
             causes: d.causes.iter().map(cause).collect(),
             alternatives: d.alternatives.iter().map(cause).collect(),
             chi2_per_datum: BeforeAfter { before: d.left[0].chi2_per_datum, after: d.left[1].chi2_per_datum },

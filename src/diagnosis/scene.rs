@@ -20,6 +20,8 @@ pub struct Scene {
     pub compliance_mm_per_n: f64,
     /// How loose the bond is on the fixed and the moved face: 0 firm, 1 gone; the loosest counts.
     pub looseness: [Vec<Field>; 2],
+    /// Compliance of the whole bond, fixed and moved face, mm/kPa.
+    pub bond_mm_per_kpa: [f64; 2],
     /// The image.
     pub image: ImageChange,
     /// Added to the load cell's reading, N.
@@ -67,11 +69,14 @@ impl Scene {
         let mut moved_plate = self.plates[1];
         moved_plate.translation_mm[0] += self.compliance_mm_per_n * force_n;
         let [fixed, moved] = self.looseness.clone();
-        let bond = (!fixed.is_empty() || !moved.is_empty()).then(|| {
+        let soft = self.bond_mm_per_kpa;
+        let bond = self.releases().contains(&true).then(|| {
             Field::new(move |x| {
-                let list = if x[face_axis] > 0.0 { &moved } else { &fixed };
+                let (list, compliance) = if x[face_axis] > 0.0 { (&moved, soft[1]) } else { (&fixed, soft[0]) };
                 let loose = list.iter().map(|f| f.at(x)).fold(0.0, f64::max);
-                bond_of(loose, bond_scale_kpa_per_mm)
+                let held = bond_of(loose, bond_scale_kpa_per_mm);
+                // One after the other: compliances add.
+                held / (1.0 + compliance.max(0.0) * held)
             })
         });
         Departures {
@@ -86,7 +91,7 @@ impl Scene {
 
     /// Whether nodes of the bonded faces must be free: fixed, moved.
     pub fn releases(&self) -> [bool; 2] {
-        [0, 1].map(|face| !self.looseness[face].is_empty())
+        [0, 1].map(|face| !self.looseness[face].is_empty() || self.bond_mm_per_kpa[face].abs() > 0.0)
     }
 
     /// The specimen as made.

@@ -1,6 +1,6 @@
 //! The steps of a diagnosis: fits, tests of candidates, what is kept back.
 
-use super::causes::{Cause, registry};
+use super::causes::{Cause, Course, SoftBond, registry};
 use super::diagnose::DiagnosisOptions;
 use super::error::DiagnosisError;
 use super::experiment::{Experiment, experiments};
@@ -81,6 +81,23 @@ pub(super) struct Candidate {
     pub(super) cause: Arc<dyn Cause>,
     pub(super) values: Vec<f64>,
     pub(super) score: f64,
+}
+
+/// Soft bonds of the whole faces (`directions`: fixed, moved), where no compliance must be negative to explain most.
+fn soft_bond(test: &ScoreTest, directions: &[Trace]) -> Option<Candidate> {
+    let both = test.test(directions);
+    let (score, start) = if both.coefficients.iter().all(|c| *c > 0.0) {
+        (both.explained, [both.coefficients[0], both.coefficients[1]])
+    } else {
+        let alone = [0, 1].map(|face| test.test(&directions[face..=face]));
+        let explained = |face: usize| if alone[face].coefficients[0] > 0.0 { alone[face].explained } else { 0.0 };
+        let face = usize::from(explained(1) > explained(0));
+        let mut start = [0.0; 2];
+        start[face] = alone[face].coefficients[0].max(0.0);
+        (explained(face), start)
+    };
+    let cause = SoftBond { start_mm_per_kpa: start };
+    (score > 0.0).then(|| Candidate { values: cause.start(), cause: Arc::new(cause), score })
 }
 
 /// The candidates worth a full fit: the best of each name, most explaining first.
@@ -249,9 +266,12 @@ impl Work<'_, '_> {
     ) -> Result<Vec<Candidate>, DiagnosisError> {
         let specimen = self.laboratory.observed().specimen.clone();
         let scene = current.scene();
+        let drives: Vec<f64> = self.laboratory.observed().steps.iter().map(|s| s.drive_mm).collect();
+        let has_several_drives = drives.iter().any(|d| (d - drives[0]).abs() > 0.0);
         let list: Vec<Arc<dyn Cause>> = registry(&specimen)
             .into_iter()
             .filter(|c| !(has_curve && c.name() == "cell"))
+            .filter(|c| has_several_drives || !c.needs_several_drives())
             .filter(|c| !self.is_left_out(c.name()))
             // One of a kind: what is in the fit already is free there.
             .filter(|c| !current.causes.iter().any(|s| s.cause.description() == c.description()))
@@ -287,9 +307,14 @@ impl Work<'_, '_> {
         for (cause, paths) in list.iter().zip(&own) {
             let rest = directions.split_off(paths.len());
             let score = test.test(&directions);
-            let is_refuted = cause.is_of_the_scanner() && {
-                let growing: Vec<Trace> = directions.iter().map(|d| self.in_proportion_to_the_drive(d)).collect();
-                test.test(&growing).explained > score.explained + EVIDENCE
+            let otherwise = match cause.course() {
+                Course::Alike => 1,
+                Course::InProportion => -1,
+                Course::ItsOwn => 0,
+            };
+            let is_refuted = has_several_drives && otherwise != 0 && {
+                let changed: Vec<Trace> = directions.iter().map(|d| self.over_the_drive(d, otherwise)).collect();
+                test.test(&changed).explained > score.explained + EVIDENCE
             };
             directions = rest;
             if is_refuted {
@@ -310,13 +335,17 @@ impl Work<'_, '_> {
             }
         }
         if round == 1 || current.causes.is_empty() {
+            let mut whole = Vec::new();
             for is_moved in [false, true] {
-                let (map, found) =
-                    debond_map(self.laboratory, &current.material, &current.prediction, &test, is_moved)?;
-                maps.push((format!("bond of the {} plate", if is_moved { "moved" } else { "fixed" }), map));
-                if let Some((score, cause)) = found.filter(|_| !self.is_left_out("debond")) {
+                let found = debond_map(self.laboratory, &current.material, &current.prediction, &test, is_moved)?;
+                maps.push((format!("bond of the {} plate", if is_moved { "moved" } else { "fixed" }), found.map));
+                if let Some((score, cause)) = found.debond.filter(|_| !self.is_left_out("debond")) {
                     candidates.push(Candidate { values: cause.start(), cause: Arc::new(cause), score });
                 }
+                whole.push(found.whole);
+            }
+            if !self.is_left_out("bond") {
+                candidates.extend(soft_bond(&test, &whole));
             }
             let (map, found) = inclusion_map(self.laboratory, &current.material, &current.prediction, &test)?;
             maps.push(("stiffness of the sample".into(), map));
@@ -328,17 +357,24 @@ impl Work<'_, '_> {
         Ok(candidates)
     }
 
-    /// A displacement that is alike at every drive, made to grow with the drive.
-    fn in_proportion_to_the_drive(&self, trace: &Trace) -> Trace {
+    /// A change times a power of the drive: what is alike at every drive is made to grow with it (1), or what grows is made alike
+    /// (−1).
+    fn over_the_drive(&self, trace: &Trace, power: i32) -> Trace {
         let steps = &self.laboratory.observed().steps;
         let largest = steps.iter().fold(f64::MIN_POSITIVE, |a, s| a.max(s.drive_mm.abs()));
+        // A step near rest tells neither from the other.
+        let factor = |drive_mm: f64| {
+            let part = drive_mm / largest;
+            if part.abs() > 1e-3 { part.powi(power) } else { 0.0 }
+        };
         let displacement = trace
             .displacement
             .iter()
             .zip(steps)
-            .map(|(field, step)| field.iter().map(|u| u.map(|x| x * step.drive_mm / largest)).collect())
+            .map(|(field, step)| field.iter().map(|u| u.map(|x| x * factor(step.drive_mm))).collect())
             .collect();
-        Trace { displacement, force: trace.force.clone() }
+        let force = trace.force.iter().zip(steps).map(|(f, step)| f * factor(step.drive_mm)).collect();
+        Trace { displacement, force }
     }
 
     /// Further steps that would tell two fits apart.

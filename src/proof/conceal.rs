@@ -153,9 +153,10 @@ fn model_of(made: &Specimen, hidden: &Hidden) -> Result<ForwardModel, ConcealErr
     let options = MeshOptions { use_mirror: false, force_prisms: true, ..MeshOptions::scaled(made, MESH_FACTOR) };
     let mesh = mesh_specimen(made, &options).map_err(PrepareError::from)?;
     let is_free = |x: [f64; 3], is_moved: bool| {
-        hidden.cause == HiddenCause::Debond
-            && is_moved == (hidden.which == 1)
-            && [0, 2].into_iter().all(|a| (x[a] - hidden.center_mm[a]).abs() < 0.5 * hidden.extent_mm[a] + 1e-6)
+        hidden.cause == HiddenCause::Bond && hidden.which != usize::from(!is_moved)
+            || hidden.cause == HiddenCause::Debond
+                && is_moved == (hidden.which == 1)
+                && [0, 2].into_iter().all(|a| (x[a] - hidden.center_mm[a]).abs() < 0.5 * hidden.extent_mm[a] + 1e-6)
     };
     let mut model = ForwardModel::with_released(mesh, made, &is_free)?;
     model.set_departures(&departures(made, hidden));
@@ -195,6 +196,10 @@ fn departures(made: &Specimen, hidden: &Hidden) -> Departures {
             d.moved_plate = shift;
         }
         HiddenCause::Debond => d.bond_kpa_per_mm = Some(Field::new(|_| 0.0)),
+        HiddenCause::Bond => d.bond_kpa_per_mm = Some(Field::new(move |_| 1.0 / strength)),
+        HiddenCause::Slack => d.moved_plate.translation_mm[0] = -strength,
+        HiddenCause::Mount if which < 2 => d.moved_plate.translation_mm[1 + which] = strength,
+        HiddenCause::Mount => d.moved_plate.rotation_rad[which - 2] = strength.to_radians(),
         _ => {}
     }
     d

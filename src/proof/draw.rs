@@ -45,11 +45,17 @@ pub enum HiddenCause {
     Wrap,
     /// The image is shifted.
     Registration,
+    /// The drive's zero is off.
+    Slack,
+    /// The moved plate sits out of place, alike at every step.
+    Mount,
+    /// The bonds of the faces give way.
+    Bond,
 }
 
 impl HiddenCause {
     /// All but [`Self::None`].
-    pub const ALL: [HiddenCause; 17] = [
+    pub const ALL: [HiddenCause; 20] = [
         HiddenCause::Relaxation,
         HiddenCause::Mullins,
         HiddenCause::Compressibility,
@@ -67,6 +73,9 @@ impl HiddenCause {
         HiddenCause::Background,
         HiddenCause::Wrap,
         HiddenCause::Registration,
+        HiddenCause::Slack,
+        HiddenCause::Mount,
+        HiddenCause::Bond,
     ];
 
     /// Whether it is to be seen in the displacement.
@@ -95,6 +104,9 @@ impl HiddenCause {
             HiddenCause::Background => "background",
             HiddenCause::Wrap => "wrap",
             HiddenCause::Registration => "registration",
+            HiddenCause::Slack => "slack",
+            HiddenCause::Mount => "mount",
+            HiddenCause::Bond => "bond",
         }
     }
 }
@@ -162,7 +174,7 @@ impl Draw {
 /// what is plain. `strength` is: g of a relaxation; ρ of softening; κ/μ; fibre modulus / shear modulus; relative change from the
 /// centre to a face; ln of an inclusion's stiffness factor; ln of the swelling's volume ratio; 1 for a debond; degrees of tilt at
 /// full drive; mm off axis at full drive; mm/N; N; mm of a hole's diameter or place; relative gain error; mm of background; mm of
-/// a jump; mm of shift.
+/// a jump; mm of shift; mm of slack; mm or degrees of the plate (along y, z; about x, y, z); mm/kPa of the bonds (fixed, moved, both).
 pub fn draw_cause(cause: HiddenCause, seed: u64) -> Hidden {
     let mut d = Draw::new(seed, 1);
     let mu_kpa = d.within(12.0, 22.0);
@@ -254,6 +266,16 @@ pub fn draw_cause(cause: HiddenCause, seed: u64) -> Hidden {
         HiddenCause::Registration => {
             hidden.strength = d.sign() * d.log_within(0.05, 0.8);
             hidden.which = [0, 2][d.below(2)];
+        }
+        HiddenCause::Slack => hidden.strength = d.sign() * d.log_within(0.02, 0.4),
+        HiddenCause::Mount => {
+            hidden.which = d.below(5);
+            hidden.strength =
+                d.sign() * if hidden.which < 2 { d.log_within(0.03, 0.5) } else { d.log_within(0.3, 4.0) };
+        }
+        HiddenCause::Bond => {
+            hidden.which = d.below(3);
+            hidden.strength = d.log_within(1e-3, 3e-2);
         }
     }
     hidden

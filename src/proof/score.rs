@@ -326,6 +326,18 @@ fn truths(specimen: &Specimen, h: &Hidden) -> Vec<(String, f64)> {
         HiddenCause::Registration => {
             (0..3).map(|a| (format!("shift_{}_mm", axis(a)), if a == h.which { h.strength } else { 0.0 })).collect()
         }
+        HiddenCause::Slack => one("slack_mm"),
+        HiddenCause::Mount => ["y_mm", "z_mm", "degrees_about_x", "degrees_about_y", "degrees_about_z"]
+            .into_iter()
+            .enumerate()
+            .map(|(n, name)| (name.to_string(), if n == h.which { h.strength } else { 0.0 }))
+            .collect(),
+        // A firm bond is the end of the range.
+        HiddenCause::Bond => [(0, "fixed"), (1, "moved")]
+            .into_iter()
+            .filter(|(face, _)| h.which == *face || h.which == 2)
+            .map(|(_, name)| (format!("{name}_plate_mm_per_kpa"), h.strength))
+            .collect(),
         HiddenCause::Compressibility => one("bulk_over_shear_modulus"),
         _ => Vec::new(),
     }

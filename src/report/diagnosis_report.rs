@@ -95,6 +95,9 @@ pub fn diagnosis_report(d: &Diagnosis, r: &DiagnosisResult) -> Report {
             ),
         ),
     };
+    if let Some(m) = &r.modulus_against_belief {
+        page.callout(CalloutKind::Caution, "Not as stiff as believed", &format!("It seems that {}.", m.in_words()));
+    }
     for cause in &r.causes {
         page.subsection(&format!("{}: {}", cause.name, cause.description));
         if let Some(l) = &cause.location {

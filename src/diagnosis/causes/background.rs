@@ -1,6 +1,6 @@
 //! A background phase that has nothing to do with the drive.
 
-use super::{Category, Cause, CauseParameter, Location};
+use super::{Category, Cause, CauseParameter, Course, Location};
 use crate::diagnosis::scene::Scene;
 use crate::specimen::Specimen;
 
@@ -43,7 +43,7 @@ impl Cause for Background {
         false
     }
 
-    fn is_of_the_scanner(&self) -> bool {
-        true
+    fn course(&self) -> Course {
+        Course::Alike
     }
 }

@@ -1,6 +1,6 @@
 //! The load train gives: the plate moves less than the actuator was told.
 
-use super::{Category, Cause, CauseParameter, Location};
+use super::{Category, Cause, CauseParameter, Course, Location};
 use crate::diagnosis::scene::Scene;
 use crate::specimen::Specimen;
 
@@ -30,5 +30,9 @@ impl Cause for Compliance {
 
     fn location(&self, _: &[f64], _: &Specimen) -> Option<Location> {
         None
+    }
+
+    fn course(&self) -> Course {
+        Course::InProportion
     }
 }

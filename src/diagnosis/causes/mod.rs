@@ -4,6 +4,7 @@
 //! [`registry`].
 
 mod background;
+mod bond;
 mod cell;
 mod compliance;
 mod debond;
@@ -12,12 +13,15 @@ mod gain;
 mod gradient;
 mod hole;
 mod inclusion;
+mod mount;
 mod offaxis;
 mod registration;
+mod slack;
 mod swelling;
 mod tilt;
 mod wrap;
 
+pub use bond::SoftBond;
 pub use debond::Debond;
 pub use fibre::Fibres;
 pub use inclusion::Inclusion;
@@ -61,6 +65,17 @@ impl CauseParameter {
     }
 }
 
+/// How the effect of a cause goes with the drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Course {
+    /// Alike at every drive.
+    Alike,
+    /// In proportion to the drive.
+    InProportion,
+    /// As its own model says.
+    ItsOwn,
+}
+
 /// Where something is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -95,22 +110,27 @@ pub trait Cause: Send + Sync {
     fn changes_sample(&self) -> bool {
         true
     }
-    /// Whether it is alike at every drive, as a scanner's own errors are: where the same pattern in proportion to the drive
-    /// explains more, this is not the cause.
-    fn is_of_the_scanner(&self) -> bool {
+    /// How it goes with the drive: where the same pattern explains more if it goes otherwise, this is not the cause.
+    fn course(&self) -> Course {
+        Course::ItsOwn
+    }
+    /// Whether one drive alone could not tell it from what grows with the drive.
+    fn needs_several_drives(&self) -> bool {
         false
     }
 }
 
-/// Causes that every recording is tested for by score tests. Those with a place or a direction to find (debonds, inclusions,
-/// jumps, fibres) are made from maps instead.
+/// Causes that every recording is tested for by score tests. Those with a place or a direction to find (debonds, soft
+/// bonds, inclusions, jumps, fibres) are made from maps instead.
 pub fn registry(specimen: &Specimen) -> Vec<Arc<dyn Cause>> {
     let mut all: Vec<Arc<dyn Cause>> = vec![
         Arc::new(gradient::Gradient::of(specimen)),
         Arc::new(swelling::Swelling),
         Arc::new(tilt::Tilt::of(specimen)),
         Arc::new(offaxis::OffAxis::of(specimen)),
+        Arc::new(mount::Mount),
         Arc::new(compliance::Compliance),
+        Arc::new(slack::Slack),
         Arc::new(gain::Gain),
         Arc::new(background::Background),
         Arc::new(registration::Registration),

@@ -1,7 +1,7 @@
 //! The moved plate leaves its axis.
 
 use super::tilt::moved_plate;
-use super::{Category, Cause, CauseParameter, Location};
+use super::{Category, Cause, CauseParameter, Course, Location};
 use crate::diagnosis::scene::Scene;
 use crate::specimen::Specimen;
 
@@ -42,5 +42,9 @@ impl Cause for OffAxis {
 
     fn location(&self, _: &[f64], specimen: &Specimen) -> Option<Location> {
         Some(moved_plate(specimen))
+    }
+
+    fn course(&self) -> Course {
+        Course::InProportion
     }
 }

@@ -1,6 +1,6 @@
 //! The moved plate turns as it moves.
 
-use super::{Category, Cause, CauseParameter, Location};
+use super::{Category, Cause, CauseParameter, Course, Location};
 use crate::diagnosis::scene::Scene;
 use crate::specimen::{Specimen, TestKind};
 
@@ -43,6 +43,10 @@ impl Cause for Tilt {
 
     fn location(&self, _: &[f64], specimen: &Specimen) -> Option<Location> {
         Some(moved_plate(specimen))
+    }
+
+    fn course(&self) -> Course {
+        Course::InProportion
     }
 }
 
