@@ -1,7 +1,9 @@
 //! Diagnosis on recordings made with known causes: another mesh than fitted, noise, coarse voxels.
 
 use lambdak::calibration::Observed;
-use lambdak::diagnosis::{DiagnosisOptions, DiagnosisResult, Laboratory, Scene, Verdict, diagnose};
+use lambdak::diagnosis::{
+    Diagnosis, DiagnosisOptions, DiagnosisResult, Laboratory, Scene, Verdict, diagnose, together,
+};
 use lambdak::fem::{Field, PlateMotion};
 use lambdak::material::Ogden;
 use lambdak::mesh::MeshOptions;
@@ -20,6 +22,10 @@ fn material() -> Ogden {
 
 /// A recording of `scene` at 2 and 4 mm, made on a mesh of other element sizes than the diagnosis uses.
 fn recorded(scene: &Scene, seed: u64) -> Recording {
+    recorded_of(&material(), scene, seed)
+}
+
+fn recorded_of(material: &Ogden, scene: &Scene, seed: u64) -> Recording {
     let mut specimen = Specimen::from_json(include_str!("../geometries/two-hole-shear.json")).unwrap();
     specimen.drive_mm = vec![2.0, 4.0];
     let mask = VoxelMask::covering(&specimen, [1.5, 0.4, 1.2]).unwrap();
@@ -44,7 +50,7 @@ fn recorded(scene: &Scene, seed: u64) -> Recording {
     };
     let observed = Observed::new(&recording, FORCE_SD_N).unwrap();
     let mut laboratory = Laboratory::new(&observed, &MeshOptions::scaled(&observed.specimen, 1.6)).unwrap();
-    let prediction = laboratory.predict(&material(), scene, &|| false).unwrap();
+    let prediction = laboratory.predict(material, scene, &|| false).unwrap();
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     let mut normal = |sd: f64| {
         let x: f64 = StandardNormal.sample(&mut rng);
@@ -61,6 +67,12 @@ fn recorded(scene: &Scene, seed: u64) -> Recording {
 
 fn diagnosed(recording: &Recording) -> DiagnosisResult {
     diagnosed_without(recording, &[])
+}
+
+fn found_in(recording: &Recording) -> Diagnosis {
+    // The coarse mesh errs by some 0.01 mm at 4 mm of drive.
+    let options = DiagnosisOptions { mesh_factor: 2.0, allowance_mm: Some(0.01), ..DiagnosisOptions::default() };
+    diagnose(recording, &options, &|_| {}, &|| false).unwrap()
 }
 
 /// With causes that the diagnosis is not told of.
@@ -190,6 +202,43 @@ fn a_wrong_encoding_is_named() {
     assert_eq!(result.causes[0].name, "gain", "{:?}", result.causes);
     // 4,700 voxels of up to 4 mm with 0.03 mm of noise: 10⁻⁴, and the meshes' difference.
     assert!((value(&result, "relative_gain_error_x") - 0.05).abs() < 0.005, "{:?}", result.causes[0]);
+}
+
+/// One material and one scanner: the wrong encoding of both recordings is one, and each recording's model predicts the other.
+#[test]
+fn two_recordings_agree_on_material_and_encoding() {
+    let mut scene = Scene::default();
+    scene.image.gain = [0.05, 0.0, 0.0];
+    let [a, b] = [15, 16].map(|seed| found_in(&recorded(&scene, seed)));
+    let found = together(&[("a", &a), ("b", &b)], 2.0, &|_| {}, &|| false).unwrap();
+    assert!(found.one_material.agrees, "{:?}", found.one_material);
+    // κ, μ and α once instead of twice.
+    assert_eq!(found.one_material.parameters_saved, 3);
+    assert_eq!(found.common_causes.len(), 1, "{:?}", found.common_causes);
+    let common = &found.common_causes[0];
+    assert!(common.name == "gain" && common.agreement.agrees, "{common:?}");
+    assert!((common.parameters[0].value - 0.05).abs() < 0.005, "{common:?}");
+    for p in &found.predictions {
+        let rms = p.displacement_rms_mm.unwrap();
+        // The noise, and the meshes' difference of 0.01 mm.
+        assert!(rms.after < 1.1 * NOISE_MM && rms.before > 1.5 * NOISE_MM, "{p:?}");
+    }
+}
+
+/// Two materials, one a tenth stiffer: no one material, and the one predicts the other's force ten percent off.
+#[test]
+fn two_materials_do_not_agree() {
+    let mut stiffer = material();
+    stiffer.bulk_kpa *= 1.1;
+    stiffer.terms[0].mu_kpa *= 1.1;
+    let a = found_in(&recorded(&Scene::default(), 17));
+    let b = found_in(&recorded_of(&stiffer, &Scene::default(), 18));
+    let found = together(&[("a", &a), ("b", &b)], 2.0, &|_| {}, &|| false).unwrap();
+    assert!(!found.one_material.agrees, "{:?}", found.one_material);
+    let crossed = found.predictions.iter().find(|p| p.from == "a" && p.to == "b").unwrap();
+    let force = crossed.force_relative.unwrap();
+    assert!((force.after - 0.1 / 1.1).abs() < 0.01, "{crossed:?}");
+    assert!(together(&[("a", &a)], 2.0, &|_| {}, &|| false).is_err());
 }
 
 #[test]

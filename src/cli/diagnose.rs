@@ -3,17 +3,19 @@
 use super::curve_input::ColumnArguments;
 use super::error::CliError;
 use super::{Common, diagnose_curves, input, interrupt, output};
-use crate::diagnosis::{Diagnosis, DiagnosisError, DiagnosisOptions, DiagnosisResult, Verdict, diagnose};
+use crate::diagnosis::{
+    Diagnosis, DiagnosisError, DiagnosisOptions, DiagnosisResult, TogetherResult, Verdict, diagnose, together,
+};
 use crate::provenance::input_hash;
 use crate::recording::{ReadLimits, Recording, write_vectors};
-use crate::report::{diagnosis_pictures, diagnosis_report};
+use crate::report::{diagnosis_pictures, diagnosis_report, in_words, together_pictures, together_report};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 #[derive(Args)]
 pub(super) struct DiagnoseArguments {
-    /// Folders of recordings (mru-recording/1). Several are diagnosed one after the other and compared.
+    /// Folders of recordings (mru-recording/1). Several are diagnosed one after the other and then looked at together.
     #[arg(required_unless_present = "curve")]
     recordings: Vec<PathBuf>,
     /// A load curve (CSV) of a homogeneous test in place of recordings: uniaxial=FILE, simple-shear=FILE, …; may be repeated.
@@ -50,27 +52,55 @@ pub(super) fn run(a: &DiagnoseArguments) -> Result<(), CliError> {
         let columns = a.columns.options()?;
         return diagnose_curves::run(&a.curve, &a.keep_back, a.shape_factor, &columns, out, a.common.json, stopped);
     }
-    let mut results: Vec<(DiagnosisResult, String)> = Vec::new();
+    let mut results: Vec<(DiagnosisResult, String, Diagnosis)> = Vec::new();
+    let several = output::folder(a.common.out.as_deref(), a.common.json, Path::new("diagnoses"));
     for path in &a.recordings {
-        let folder = output::folder(a.common.out.as_deref(), a.common.json, path)
-            .map(|f| if a.recordings.len() > 1 { f.join(path.file_name().unwrap_or_default()) } else { f });
+        let folder = if a.recordings.len() > 1 {
+            several.as_ref().map(|f| f.join(path.file_name().unwrap_or_default()))
+        } else {
+            output::folder(a.common.out.as_deref(), a.common.json, path)
+        };
         results.push(one(a, path, folder)?);
     }
-    if let [(result, text)] = &results[..] {
+    if let [(result, text, _)] = &results[..] {
         return output::print(&if a.common.json { output::to_json(result)? } else { text.clone() });
     }
-    if a.common.json {
-        let list: Vec<&DiagnosisResult> = results.iter().map(|(r, _)| r).collect();
-        return output::print(&output::to_json(&serde_json::json!({ "schema": "diagnoses/1", "diagnoses": list }))?);
+    let list: Vec<&DiagnosisResult> = results.iter().map(|(r, _, _)| r).collect();
+    let begin = Instant::now();
+    let progress = |text: &str| eprintln!("{:7.1} s  all: {text}", begin.elapsed().as_secs_f64());
+    let cases: Vec<(&str, &Diagnosis)> = results.iter().map(|(r, _, d)| (&*r.recording, d)).collect();
+    let found = match together(&cases, a.mesh, &progress, &interrupt::is_requested) {
+        Ok(found) => Some(found),
+        Err(DiagnosisError::Solve(e)) if interrupt::is_requested() => return Err(super::solve::solve_error(e)),
+        Err(error) => {
+            // What each recording told stands.
+            eprintln!("the recordings cannot be looked at together: {error}");
+            None
+        }
+    };
+    let all = serde_json::json!({ "schema": "diagnoses/1", "diagnoses": list, "together": found });
+    if let Some(folder) = several {
+        output::write_file(&folder, "diagnoses.json", output::to_json(&all)?.as_bytes())?;
+        if let Some(found) = &found {
+            let specimen = &cases[0].1.observed.specimen;
+            let page = together_report(found, &list, specimen).to_html();
+            output::write_file(&folder, "together.html", page.as_bytes())?;
+            for (name, svg) in together_pictures(found, &list, specimen) {
+                output::write_file(&folder, &format!("{name}.svg"), svg.as_bytes())?;
+            }
+        }
     }
-    let texts: Vec<&str> = results.iter().map(|(_, t)| &**t).collect();
-    output::print(&format!("{}\n{}", texts.join("\n"), together(&results)))
+    if a.common.json {
+        return output::print(&output::to_json(&all)?);
+    }
+    let texts: Vec<&str> = results.iter().map(|(_, t, _)| &**t).collect();
+    output::print(&format!("{}\n{}", texts.join("\n"), together_text(&list, found.as_ref())))
 }
 
-/// Whether the recordings agree: causes of each, and materials side by side.
-fn together(results: &[(DiagnosisResult, String)]) -> String {
+/// Whether the recordings agree: causes of each, materials side by side, the one material, and what each says of the others.
+fn together_text(results: &[&DiagnosisResult], found: Option<&TogetherResult>) -> String {
     let mut text = String::from("all recordings        verdict, causes; material with the causes\n");
-    for (r, _) in results {
+    for r in results {
         let causes: Vec<&str> = r.causes.iter().map(|c| &*c.name).collect();
         let parameters: Vec<String> = r
             .material_parameters
@@ -82,11 +112,37 @@ fn together(results: &[(DiagnosisResult, String)]) -> String {
             .collect();
         text += &format!("  {:<18} {:?} [{}]; {}\n", r.recording, r.verdict, causes.join(", "), parameters.join(", "));
     }
+    let Some(found) = found else { return text };
+    text += &format!("\none material for all: {}\n", in_words(&found.one_material));
+    for p in &found.material_parameters {
+        let interval = p.interval_95.map_or("not bounded by the data".into(), |[a, b]| format!("{a:.4} to {b:.4}"));
+        text += &format!("  {:<40} {:>10.4}   {interval}\n", p.name, p.value);
+    }
+    for c in &found.common_causes {
+        text += &format!("\none size for all of '{}': {}\n", c.description, in_words(&c.agreement));
+        for p in &c.parameters {
+            let interval = p.interval_95.map_or("not bounded by the data".into(), |[a, b]| format!("{a:.4} to {b:.4}"));
+            text += &format!("  {:<40} {:>10.4}   {interval}\n", p.name, p.value);
+        }
+    }
+    text += "\npredicted by each other  mm rms and largest error of a force: nominal -> with the causes\n";
+    for p in &found.predictions {
+        let displacement =
+            p.displacement_rms_mm.map_or("no equilibrium".into(), |b| format!("{:.4} -> {:.4}", b.before, b.after));
+        let force = p
+            .force_relative
+            .map_or("no force".into(), |b| format!("{:.2} -> {:.2} %", 100.0 * b.before, 100.0 * b.after));
+        text += &format!("  {:<18} by {:<18} {displacement}; {force}\n", p.to, p.from);
+    }
     text
 }
 
 /// Diagnoses one recording, writes its files, and gives its result and a summary.
-fn one(a: &DiagnoseArguments, path: &Path, folder: Option<PathBuf>) -> Result<(DiagnosisResult, String), CliError> {
+fn one(
+    a: &DiagnoseArguments,
+    path: &Path,
+    folder: Option<PathBuf>,
+) -> Result<(DiagnosisResult, String, Diagnosis), CliError> {
     let bad = |message: String| CliError::Input { path: path.into(), message };
     let recording = Recording::read(path, &ReadLimits::default()).map_err(|e| bad(e.to_string()))?;
     let prior = match &a.material {
@@ -135,7 +191,7 @@ fn one(a: &DiagnoseArguments, path: &Path, folder: Option<PathBuf>) -> Result<(D
         }
     }
     let text = summary(&result, &found);
-    Ok((result, text))
+    Ok((result, text, found))
 }
 
 fn summary(r: &DiagnosisResult, d: &Diagnosis) -> String {

@@ -113,6 +113,8 @@ pub struct Diagnosis {
     pub maps: Vec<(String, ScoreMap)>,
     /// The material as believed.
     pub believed: Option<Ogden>,
+    /// Priors and stops of the last fits.
+    pub settings: FitSettings,
     /// The recording as compared.
     pub observed: Observed,
     /// Displacement unknowns of the model.
@@ -330,6 +332,7 @@ pub fn diagnose(
     if verdict == Verdict::Unexplained && after > UNEXPLAINED_SHARE * before {
         alternatives.splice(0..0, causes.drain(..));
     }
+    let last_settings = work.settings;
     let num_solves = laboratory.num_solves;
     Ok(Diagnosis {
         verdict,
@@ -343,6 +346,7 @@ pub fn diagnose(
         load,
         maps,
         believed: options.prior.clone(),
+        settings: last_settings,
         num_unknowns,
         num_solves,
         allowance_mm,

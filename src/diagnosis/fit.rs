@@ -171,61 +171,101 @@ pub fn fit(
     settings: &FitSettings,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Fitted, DiagnosisError> {
-    let mut material = material.clone();
-    let mut causes = causes.to_vec();
-    let mut prediction = laboratory.predict(&material, &scene_of(&causes), is_cancelled)?;
-    let mut deviance = deviance_of(metric, measured, &prediction, &material, &causes, settings);
-    let mut damping = 0.0f64;
-    let mut iterations = 0;
-    let columns = match derivatives(laboratory, &material, &causes, &prediction) {
+    let own = material.parameters().len() + causes.iter().map(|c| c.values.len()).sum::<usize>();
+    let member = Member {
+        laboratory,
+        metric,
+        measured,
+        causes: causes.to_vec(),
+        settings: *settings,
+        places: (0..own).collect(),
+    };
+    let mut found = fit_members(&mut [member], material, is_cancelled)?;
+    // One member, one fit.
+    Ok(found.swap_remove(0))
+}
+
+/// A recording in a fit of several with one material.
+pub struct Member<'a, 'b> {
+    /// What predicts it.
+    pub laboratory: &'a mut Laboratory<'b>,
+    /// What its misfit weighs.
+    pub metric: &'a Metric,
+    /// What was recorded.
+    pub measured: &'a Trace,
+    /// Its causes.
+    pub causes: Vec<Supposed>,
+    /// Priors; iterations and tolerance are those of the first member.
+    pub settings: FitSettings,
+    /// Of each of its parameters (the material's, then the causes'): the parameter of the whole fit. Members that share one
+    /// have it at the same place; together the places are 0, 1, … without a gap.
+    pub places: Vec<usize>,
+}
+
+/// Where a fit stands: the material, and of each member its causes, what they predict and the deviance.
+struct Point {
+    material: Ogden,
+    causes: Vec<Vec<Supposed>>,
+    predictions: Vec<Prediction>,
+    deviances: Vec<f64>,
+}
+
+impl Point {
+    fn deviance(&self) -> f64 {
+        self.deviances.iter().sum()
+    }
+}
+
+/// Fits one material to all members, each with its own causes but for parameters that they share; one result per member.
+///
+/// # Errors
+/// As [`fit`].
+pub fn fit_members(
+    members: &mut [Member],
+    material: &Ogden,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Vec<Fitted>, DiagnosisError> {
+    let Some(settings) = members.first().map(|m| m.settings) else { return Ok(Vec::new()) };
+    let num = members.iter().flat_map(|m| &m.places).max().map_or(0, |last| last + 1);
+    let causes: Vec<Vec<Supposed>> = members.iter().map(|m| m.causes.clone()).collect();
+    let mut at = evaluate(members, material.clone(), causes, is_cancelled)?;
+    let columns = match columns_at(members, &at) {
         Ok(columns) => columns,
         // A state reached from another material's may be an unstable one; from rest the stable branch is followed.
         Err(_) if !is_cancelled() => {
-            laboratory.forget();
-            prediction = laboratory.predict(&material, &scene_of(&causes), is_cancelled)?;
-            deviance = deviance_of(metric, measured, &prediction, &material, &causes, settings);
-            derivatives(laboratory, &material, &causes, &prediction)?
+            members.iter_mut().for_each(|m| m.laboratory.forget());
+            at = evaluate(members, at.material, at.causes, is_cancelled)?;
+            columns_at(members, &at)?
         }
         Err(error) => return Err(error),
     };
-    let (mut matrix, mut gradient) =
-        normal_system(metric, measured, &prediction, &material, &causes, settings, &columns);
+    let (mut matrix, mut gradient) = whole_system(members, &at, &columns, num);
+    let mut damping = 0.0f64;
+    let mut iterations = 0;
     loop {
-        let n = gradient.len();
         let mut damped = matrix.clone();
-        for i in 0..n {
+        for i in 0..num {
             damped[(i, i)] += damping * matrix[(i, i)].max(1e-12);
         }
-        let step = damped.clone().cholesky().map(|c| c.solve(&gradient)).unwrap_or_else(|| DVector::zeros(n));
+        let step = damped.clone().cholesky().map(|c| c.solve(&gradient)).unwrap_or_else(|| DVector::zeros(num));
         let promised = 2.0 * gradient.dot(&step) - step.dot(&(&matrix * &step));
         if promised < settings.tolerance || iterations >= settings.max_iterations {
-            let sd = standard_deviations(&matrix, &material, &causes);
-            let residual = measured.plus(-1.0, &prediction.trace);
-            return Ok(Fitted { material, causes, deviance, residual, prediction, sd, iterations });
+            return Ok(fitted_members(members, at, &matrix, iterations));
         }
         iterations += 1;
-        let (next_material, next_causes) = moved(&material, &causes, &step);
-        let trial = laboratory.predict(&next_material, &scene_of(&next_causes), is_cancelled);
-        let better = match trial {
-            Ok(next) => {
-                let next_deviance = deviance_of(metric, measured, &next, &next_material, &next_causes, settings);
-                // A state without a definite tangent is on the verge of instability: no better place to be.
-                let columns = if next_deviance < deviance {
-                    derivatives(laboratory, &next_material, &next_causes, &next).ok()
-                } else {
-                    None
-                };
-                columns.map(|columns| (next, next_deviance, columns))
-            }
+        let (next_material, next_causes) = moved(members, &at, &step);
+        let better = match evaluate(members, next_material, next_causes, is_cancelled) {
+            // A state without a definite tangent is on the verge of instability: no better place to be.
+            Ok(next) if next.deviance() < at.deviance() => columns_at(members, &next).ok().map(|c| (next, c)),
+            Ok(_) => None,
             Err(_) if !is_cancelled() => None,
             Err(error) => return Err(error),
         };
         match better {
-            Some((next, next_deviance, columns)) => {
-                let gained = deviance - next_deviance;
-                (material, causes, prediction, deviance) = (next_material, next_causes, next, next_deviance);
-                (matrix, gradient) =
-                    normal_system(metric, measured, &prediction, &material, &causes, settings, &columns);
+            Some((next, columns)) => {
+                let gained = at.deviance() - next.deviance();
+                at = next;
+                (matrix, gradient) = whole_system(members, &at, &columns, num);
                 damping = if damping > 1e-3 { damping * 0.1 } else { 0.0 };
                 if gained < 0.2 * settings.tolerance {
                     damping = 0.0;
@@ -240,6 +280,74 @@ pub fn fit(
             }
         }
     }
+}
+
+fn evaluate(
+    members: &mut [Member],
+    material: Ogden,
+    causes: Vec<Vec<Supposed>>,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Point, DiagnosisError> {
+    let (mut predictions, mut deviances) = (Vec::new(), Vec::new());
+    for (m, causes) in members.iter_mut().zip(&causes) {
+        let prediction = m.laboratory.predict(&material, &scene_of(causes), is_cancelled)?;
+        deviances.push(deviance_of(m.metric, m.measured, &prediction, &material, causes, &m.settings));
+        predictions.push(prediction);
+    }
+    Ok(Point { material, causes, predictions, deviances })
+}
+
+fn columns_at(members: &mut [Member], at: &Point) -> Result<Vec<Vec<Trace>>, DiagnosisError> {
+    members
+        .iter_mut()
+        .zip(at.causes.iter().zip(&at.predictions))
+        .map(|(m, (causes, prediction))| derivatives(m.laboratory, &at.material, causes, prediction))
+        .collect()
+}
+
+/// The sum of the members' normal systems, each parameter at its place.
+fn whole_system(members: &[Member], at: &Point, columns: &[Vec<Trace>], num: usize) -> (DMatrix<f64>, DVector<f64>) {
+    let (mut matrix, mut gradient) = (DMatrix::zeros(num, num), DVector::zeros(num));
+    for (n, m) in members.iter().enumerate() {
+        let (own, slope) = normal_system(
+            m.metric,
+            m.measured,
+            &at.predictions[n],
+            &at.material,
+            &at.causes[n],
+            &m.settings,
+            &columns[n],
+        );
+        for (i, &p) in m.places.iter().enumerate() {
+            gradient[p] += slope[i];
+            for (j, &q) in m.places.iter().enumerate() {
+                matrix[(p, q)] += own[(i, j)];
+            }
+        }
+    }
+    (matrix, gradient)
+}
+
+fn fitted_members(members: &[Member], at: Point, matrix: &DMatrix<f64>, iterations: usize) -> Vec<Fitted> {
+    let covariance = matrix.clone().try_inverse();
+    let Point { material, causes, predictions, deviances } = at;
+    members
+        .iter()
+        .zip(causes.into_iter().zip(predictions).zip(deviances))
+        .map(|(m, ((causes, prediction), deviance))| {
+            let variance = |place: usize| covariance.as_ref().map_or(f64::INFINITY, |c| c[(place, place)]);
+            let sd = scales(&material, &causes)
+                .into_iter()
+                .zip(&m.places)
+                .map(|(scale, &place)| {
+                    let v = variance(place);
+                    if v > 0.0 { scale * v.sqrt() } else { f64::INFINITY }
+                })
+                .collect();
+            let residual = m.measured.plus(-1.0, &prediction.trace);
+            Fitted { material: material.clone(), causes, deviance, residual, prediction, sd, iterations }
+        })
+        .collect()
 }
 
 fn normal_system(
@@ -329,55 +437,51 @@ fn deviance_of(
     sum
 }
 
-/// The material and the causes after a scaled step, shortened to the largest allowed and cut to the ranges.
-fn moved(material: &Ogden, causes: &[Supposed], step: &DVector<f64>) -> (Ogden, Vec<Supposed>) {
-    let parameters = material.parameters();
+/// The material and the members' causes after a scaled step, shortened to the largest allowed and cut to the ranges.
+fn moved(members: &[Member], at: &Point, step: &DVector<f64>) -> (Ogden, Vec<Vec<Supposed>>) {
+    let parameters = at.material.parameters();
     let mut part = 1.0f64;
-    for (i, s) in step.iter().enumerate() {
-        let largest = if i == 0 {
-            1.0
-        } else if i < parameters.len() {
-            LARGEST_STEP
-        } else {
-            LARGEST_CAUSE_STEP
-        };
-        part = part.min(largest / s.abs().max(1e-12));
+    for m in members {
+        for (i, &place) in m.places.iter().enumerate() {
+            let largest = if i == 0 {
+                1.0
+            } else if i < parameters.len() {
+                LARGEST_STEP
+            } else {
+                LARGEST_CAUSE_STEP
+            };
+            part = part.min(largest / step[place].abs().max(1e-12));
+        }
     }
-    let mut next = material.clone();
-    for (i, &parameter) in parameters.iter().enumerate() {
-        let value = material.value(parameter);
-        let s = part * step[i];
+    let mut next = at.material.clone();
+    // The material is every member's.
+    let places = members.first().map_or(&[][..], |m| &m.places);
+    for (&parameter, &place) in parameters.iter().zip(places) {
+        let value = at.material.value(parameter);
+        let s = part * step[place];
         let moved = if parameter == Parameter::Kappa { value * s.exp() } else { value * (1.0 + s) };
         // Below κ/μ of about five the elements and the theory of a soft solid both end.
-        let floor = if parameter == Parameter::Kappa { 5.0 * shear_modulus(material) } else { f64::NEG_INFINITY };
+        let floor = if parameter == Parameter::Kappa { 5.0 * shear_modulus(&at.material) } else { f64::NEG_INFINITY };
         next.set(parameter, moved.max(floor));
     }
-    let mut i = parameters.len();
-    let causes = causes
+    let causes = members
         .iter()
-        .map(|c| {
-            let mut values = c.values.clone();
-            for (value, p) in values.iter_mut().zip(c.cause.parameters()) {
-                *value = (*value + part * step[i] * p.scale).clamp(p.range[0], p.range[1]);
-                i += 1;
-            }
-            Supposed { cause: c.cause.clone(), values }
+        .zip(&at.causes)
+        .map(|(m, causes)| {
+            let mut places = m.places[parameters.len()..].iter();
+            causes
+                .iter()
+                .map(|c| {
+                    let mut values = c.values.clone();
+                    for ((value, p), &place) in values.iter_mut().zip(c.cause.parameters()).zip(&mut places) {
+                        *value = (*value + part * step[place] * p.scale).clamp(p.range[0], p.range[1]);
+                    }
+                    Supposed { cause: c.cause.clone(), values }
+                })
+                .collect()
         })
         .collect();
     (next, causes)
-}
-
-fn standard_deviations(matrix: &DMatrix<f64>, material: &Ogden, causes: &[Supposed]) -> Vec<f64> {
-    let covariance = matrix.clone().try_inverse();
-    scales(material, causes)
-        .into_iter()
-        .enumerate()
-        .map(|(i, scale)| {
-            covariance
-                .as_ref()
-                .map_or(f64::INFINITY, |c| if c[(i, i)] > 0.0 { scale * c[(i, i)].sqrt() } else { f64::INFINITY })
-        })
-        .collect()
 }
 
 /// What one unit of each scaled parameter is in its own units (of ln κ: κ).

@@ -219,12 +219,12 @@ fn cause(c: &FoundCause) -> CauseResult {
     }
 }
 
-fn parameter(name: &str, value: f64, interval: [f64; 2]) -> ParameterResult {
+pub(super) fn parameter(name: &str, value: f64, interval: [f64; 2]) -> ParameterResult {
     let is_bounded = interval.iter().all(|x| x.is_finite());
     ParameterResult { name: name.into(), value, interval_95: is_bounded.then_some(interval) }
 }
 
-fn material_parameters(fitted: &Fitted) -> Vec<ParameterResult> {
+pub(super) fn material_parameters(fitted: &Fitted) -> Vec<ParameterResult> {
     fitted
         .material
         .parameters()

@@ -60,6 +60,7 @@ mod surface;
 mod svg;
 mod sweep_report;
 mod text;
+mod together_report;
 mod vtu;
 mod vtu_cells;
 
@@ -97,4 +98,5 @@ pub use specimen_pictures::{bar_pictures, deformed_picture, histogram_picture, m
 pub use spread::{SpreadPlot, SpreadRow};
 pub use surface::{nodal_values, surface_quads};
 pub use sweep_report::sweep_report;
+pub use together_report::{in_words, together_pictures, together_report};
 pub use vtu::{Vtu, element_means};

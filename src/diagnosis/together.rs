@@ -1,0 +1,323 @@
+//! Several recordings together: does one material serve them all, do causes named in each have the same size, and does what one
+//! recording taught predict the others?
+
+use super::causes::Category;
+use super::diagnose::Diagnosis;
+use super::error::DiagnosisError;
+use super::fit::{BulkPrior, FitSettings, Fitted, Member, Supposed, fit_members, scene_of};
+use super::laboratory::{Laboratory, Prediction};
+use super::mesh_error::widen;
+use super::metric::Metric;
+use super::result::{BeforeAfter, ParameterResult, material_parameters, parameter};
+use super::trace::Trace;
+use super::work::EVIDENCE;
+use crate::calibration::Observed;
+use crate::material::Ogden;
+use crate::mesh::MeshOptions;
+use serde::{Deserialize, Serialize};
+
+/// A supposition that saves parameters, against every recording for itself.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Agreement {
+    /// Rise of the deviance.
+    pub deviance_rise: f64,
+    /// Parameters saved.
+    pub parameters_saved: usize,
+    /// The rise that it would take to refuse it: ln n per parameter, and 30 (as for a cause).
+    pub deviance_limit: f64,
+    /// Whether the recordings agree.
+    pub agrees: bool,
+}
+
+/// A cause that is named in every recording.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CommonCause {
+    /// Name.
+    pub name: String,
+    /// In words.
+    pub description: String,
+    /// Its parameters where it is the same in all.
+    pub parameters: Vec<ParameterResult>,
+    /// Whether one size serves all, beyond one material.
+    pub agreement: Agreement,
+}
+
+/// What one recording's model says of another recording.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CrossPrediction {
+    /// The recording that was fitted.
+    pub from: String,
+    /// The recording that is predicted; `from` itself is what its own fit leaves.
+    pub to: String,
+    /// Misfit, mm rms over all drives, noise included: by the nominal material; with the causes too. Null where that model has no
+    /// equilibrium.
+    pub displacement_rms_mm: Option<BeforeAfter>,
+    /// Largest misfit of a force relative to it; null where there is none.
+    pub force_relative: Option<BeforeAfter>,
+}
+
+/// Several recordings together (part of `diagnoses/1`).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TogetherResult {
+    /// Their one material, each recording with its own causes.
+    pub material: Ogden,
+    /// Its parameters.
+    pub material_parameters: Vec<ParameterResult>,
+    /// Whether one material serves all.
+    pub one_material: Agreement,
+    /// Causes that are named in every recording.
+    pub common_causes: Vec<CommonCause>,
+    /// Every recording by every other.
+    pub predictions: Vec<CrossPrediction>,
+}
+
+/// One diagnosed recording.
+struct Case<'a> {
+    name: &'a str,
+    found: &'a Diagnosis,
+    laboratory: Laboratory<'a>,
+    metric: Metric,
+    measured: Trace,
+}
+
+/// Looks at diagnosed recordings together: at least two.
+///
+/// # Errors
+/// [`DiagnosisError`]: fewer than two, or the work was cancelled.
+pub fn together(
+    diagnoses: &[(&str, &Diagnosis)],
+    mesh_factor: f64,
+    progress: &dyn Fn(&str),
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<TogetherResult, DiagnosisError> {
+    if diagnoses.len() < 2 {
+        return Err(DiagnosisError::Setting {
+            name: "the number of recordings",
+            value: diagnoses.len() as f64,
+            requirement: "at least two, to be looked at together",
+        });
+    }
+    let mut cases = Vec::new();
+    for &(name, found) in diagnoses {
+        let mesh = MeshOptions::scaled(&found.observed.specimen, mesh_factor);
+        let laboratory = Laboratory::new(&found.observed, &mesh)?;
+        let mut measured = laboratory.measured();
+        // As in the diagnosis: what the load curve explained is taken off.
+        if let Some(load) = found.load.as_ref().filter(|l| !l.effects.is_empty()) {
+            for (force, excess) in measured.force.iter_mut().zip(&load.window_excess_n) {
+                *force -= excess;
+            }
+        }
+        let metric = Metric::new(&found.observed, found.allowance_mm, &|_| true);
+        cases.push(Case { name, found, laboratory, metric, measured });
+    }
+    // The richest material serves all, or none does.
+    let start = diagnoses.iter().map(|(_, d)| &d.corrected.material).max_by_key(|m| m.terms.len());
+    let Some(start) = start.cloned() else { unreachable!("two diagnoses at least") };
+
+    progress("fitting one material to all recordings");
+    let num_material = start.parameters().len();
+    let apart: f64 = cases.iter().map(|c| c.found.corrected.deviance).sum();
+    let num_apart: usize = cases.iter().map(|c| c.found.corrected.num_parameters()).sum();
+    let ln_n = (cases.iter().map(|c| c.metric.num_data()).sum::<usize>() as f64).ln();
+    let agreement = |rise: f64, saved: usize| {
+        let deviance_limit = EVIDENCE + ln_n * saved as f64;
+        Agreement { deviance_rise: rise, parameters_saved: saved, deviance_limit, agrees: rise < deviance_limit }
+    };
+    let own: Vec<Vec<Supposed>> = cases.iter().map(|c| c.found.corrected.causes.clone()).collect();
+    let mut shared = fit_cases(&mut cases, &start, &own, num_material, None, is_cancelled)?;
+    let deviance: f64 = shared.iter().map(|f| f.deviance).sum();
+    let num_shared = num_material + own.iter().flatten().map(|c| c.values.len()).sum::<usize>();
+    let one_material = agreement(deviance - apart, num_apart.saturating_sub(num_shared));
+
+    let mut common_causes = Vec::new();
+    for cause in own[0].iter().filter(|c| c.cause.name() != "wrap") {
+        let description = cause.cause.description();
+        let place = |causes: &[Supposed]| causes.iter().position(|c| c.cause.description() == description);
+        let Some(places) = own.iter().map(|causes| place(causes)).collect::<Option<Vec<usize>>>() else { continue };
+        progress(&format!("fitting one size of '{description}' to all recordings"));
+        let size = cause.values.len();
+        let mean: Vec<f64> = (0..size)
+            .map(|i| {
+                let sum: f64 = shared.iter().zip(&places).map(|(f, &at)| f.causes[at].values[i]).sum();
+                sum / cases.len() as f64
+            })
+            .collect();
+        let mut same = own.clone();
+        for (causes, &at) in same.iter_mut().zip(&places) {
+            causes[at].values.clone_from(&mean);
+        }
+        let material = shared[0].material.clone();
+        let found = fit_cases(&mut cases, &material, &same, num_material, Some(&places), is_cancelled)?;
+        let rise = found.iter().map(|f| f.deviance).sum::<f64>() - deviance;
+        let (at, first) = (places[0], &found[0]);
+        let parameters = first.causes[at].cause.parameters();
+        common_causes.push(CommonCause {
+            name: cause.cause.name().into(),
+            description,
+            parameters: parameters
+                .iter()
+                .zip(first.causes[at].values.iter().zip(first.sd_of(at)))
+                .map(|(p, (value, sd))| parameter(&p.name, *value, [value - 1.96 * sd, value + 1.96 * sd]))
+                .collect(),
+            agreement: agreement(rise, size * (cases.len() - 1)),
+        });
+    }
+
+    progress("estimating what the mesh does to the common material");
+    widen_all(&mut cases, mesh_factor, &mut shared, is_cancelled)?;
+    progress("predicting every recording by every other");
+    let mut predictions = Vec::new();
+    for to in 0..cases.len() {
+        for from in 0..cases.len() {
+            predictions.push(cross_prediction(&mut cases, from, to, is_cancelled)?);
+        }
+    }
+    Ok(TogetherResult {
+        material: shared[0].material.clone(),
+        material_parameters: material_parameters(&shared[0]),
+        one_material,
+        common_causes,
+        predictions,
+    })
+}
+
+/// Fits one material to all cases with `causes`; those at the places of `common` (one per case) are one.
+fn fit_cases(
+    cases: &mut [Case],
+    start: &Ogden,
+    causes: &[Vec<Supposed>],
+    num_material: usize,
+    common: Option<&[usize]>,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Vec<Fitted>, DiagnosisError> {
+    let num_cases = cases.len() as f64;
+    let num_common = common.map_or(0, |places| causes[0][places[0]].values.len());
+    let mut next = num_material + num_common;
+    let mut members: Vec<Member> = Vec::new();
+    for (n, (case, causes)) in cases.iter_mut().zip(causes).enumerate() {
+        let mut places: Vec<usize> = (0..num_material).collect();
+        for (index, c) in causes.iter().enumerate() {
+            if common.is_some_and(|places| places[n] == index) {
+                places.extend(num_material..num_material + num_common);
+            } else {
+                places.extend(next..next + c.values.len());
+                next += c.values.len();
+            }
+        }
+        members.push(Member {
+            laboratory: &mut case.laboratory,
+            metric: &case.metric,
+            measured: &case.measured,
+            causes: causes.clone(),
+            settings: shared_prior(case.found.settings, num_cases),
+            places,
+        });
+    }
+    fit_members(&mut members, start, is_cancelled)
+}
+
+/// Priors of the material count once for all recordings, not once for each.
+fn shared_prior(settings: FitSettings, num_cases: f64) -> FitSettings {
+    let wide = num_cases.sqrt();
+    FitSettings {
+        bulk: BulkPrior { log_sd: settings.bulk.log_sd * wide, ..settings.bulk },
+        shear: settings.shear.map(|s| super::fit::ShearPrior { log_sd: s.log_sd * wide, ..s }),
+        ..settings
+    }
+}
+
+/// Adds to the material's standard deviations what the mesh does in each recording: like meshes err alike, so that more
+/// recordings do not lessen it. The mean square counts.
+fn widen_all(
+    cases: &mut [Case],
+    mesh_factor: f64,
+    shared: &mut [Fitted],
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<(), DiagnosisError> {
+    let num_material = shared[0].material.parameters().len();
+    let noise: Vec<f64> = shared[0].sd[..num_material].to_vec();
+    let mut squares = vec![0.0; num_material];
+    let num_cases = cases.len() as f64;
+    for (case, fitted) in cases.iter_mut().zip(shared.iter_mut()) {
+        let observed: &Observed = &case.found.observed;
+        let settings = case.found.settings;
+        match widen(&mut case.laboratory, observed, mesh_factor, &case.metric, &settings, fitted, is_cancelled) {
+            Err(error) if is_cancelled() => return Err(error),
+            // A coarser model without an equilibrium: the noise alone, as in the diagnosis.
+            Err(_) | Ok(()) => {}
+        }
+        for ((sum, sd), noise) in squares.iter_mut().zip(&fitted.sd).zip(&noise) {
+            *sum += (sd * sd - noise * noise).max(0.0) / num_cases;
+        }
+    }
+    for ((sd, noise), square) in shared[0].sd.iter_mut().zip(&noise).zip(&squares) {
+        *sd = noise.hypot(square.sqrt());
+    }
+    Ok(())
+}
+
+/// What the models of case `from` say of case `to`.
+fn cross_prediction(
+    cases: &mut [Case],
+    from: usize,
+    to: usize,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<CrossPrediction, DiagnosisError> {
+    let teacher = cases[from].found;
+    let is_same_sample = {
+        let [a, b] = [from, to].map(|n| &cases[n].found.observed.specimen);
+        a.block == b.block && a.holes == b.holes
+    };
+    // Another sample shares no places, no plates and no jumps; another recording of one sample no jumps.
+    let causes: Vec<Supposed> = teacher
+        .corrected
+        .causes
+        .iter()
+        .filter(|c| from == to || c.cause.name() != "wrap")
+        .filter(|c| {
+            let located = c.cause.location(&c.values, &teacher.observed.specimen).is_some();
+            is_same_sample || c.cause.category() == Category::Material && !located
+        })
+        .cloned()
+        .collect();
+    let case = &mut cases[to];
+    case.laboratory.forget();
+    let mut predict = |material: &Ogden, causes: &[Supposed]| -> Result<Option<Prediction>, DiagnosisError> {
+        match case.laboratory.predict(material, &scene_of(causes), is_cancelled) {
+            Ok(prediction) => Ok(Some(prediction)),
+            Err(error) if is_cancelled() => Err(error),
+            Err(_) => Ok(None),
+        }
+    };
+    let before = predict(&teacher.nominal.material, &[])?;
+    let after = predict(&teacher.corrected.material, &causes)?;
+    let misfits = before.zip(after).map(|(b, a)| [b, a].map(|p| misfit(case, &p.trace)));
+    Ok(CrossPrediction {
+        from: cases[from].name.into(),
+        to: cases[to].name.into(),
+        displacement_rms_mm: misfits.map(|m| BeforeAfter { before: m[0].0, after: m[1].0 }),
+        force_relative: misfits.and_then(|[b, a]| Some(BeforeAfter { before: b.1?, after: a.1? })),
+    })
+}
+
+/// Displacement misfit (mm rms) and the largest relative misfit of a force.
+fn misfit(case: &Case, predicted: &Trace) -> (f64, Option<f64>) {
+    let left = case.measured.plus(-1.0, predicted);
+    let finite = left.displacement.iter().flatten().flatten().filter(|x| x.is_finite());
+    let (sum, count) = finite.fold((0.0, 0usize), |(s, n), x| (s + x * x, n + 1));
+    let force = case
+        .found
+        .observed
+        .steps
+        .iter()
+        .zip(left.force.iter().zip(&case.measured.force))
+        .filter(|(step, (_, f))| step.force.is_some() && f.abs() > 0.0)
+        .map(|(_, (l, f))| (l / f).abs())
+        .reduce(f64::max);
+    ((sum / count.max(1) as f64).sqrt(), force)
+}
