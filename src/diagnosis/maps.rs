@@ -16,7 +16,16 @@ use std::sync::Arc;
 /// Parts of a bonded face along its longer and its shorter axis.
 const FACE_PARTS: [usize; 2] = [8, 4];
 /// Boxes of the sample along x, y, z.
-const BOXES: [usize; 3] = [6, 2, 5];
+const BOXES: [usize; 3] = [7, 3, 6];
+/// Radii of the balls that are tried, as parts of the sample's smallest extent.
+const BALL_RADII: [f64; 3] = [0.25, 0.35, 0.5];
+/// Points per edge of a box that say which part of it lies in a ball.
+const POINTS_PER_EDGE: usize = 3;
+/// Most stiff and most soft balls from which a fit may start; each explains at least this part of what the best does.
+const MAX_STARTS: usize = 4;
+const LEAST_OF_BEST: f64 = 0.3;
+/// Factors of a ball at the start, ln.
+const LARGEST_START: f64 = 1.8;
 
 /// A regular division of the block.
 #[derive(Clone, Copy, Debug)]
@@ -47,6 +56,45 @@ impl Division {
         n[0] + self.counts[0] * (n[1] + self.counts[1] * n[2])
     }
 
+    /// Parts that a ball meets, each with the part of it that lies in the ball.
+    fn parts_in_ball(&self, center_mm: [f64; 3], radius_mm: f64) -> Vec<(usize, f64)> {
+        let size = [0, 1, 2].map(|a| 2.0 * self.half_mm[a] / self.counts[a] as f64);
+        let range = [0, 1, 2].map(|a| {
+            let low = ((center_mm[a] - radius_mm + self.half_mm[a]) / size[a]).floor().max(0.0) as usize;
+            let high = ((center_mm[a] + radius_mm + self.half_mm[a]) / size[a]).ceil().max(0.0) as usize;
+            low..high.min(self.counts[a])
+        });
+        let mut found = Vec::new();
+        let points = POINTS_PER_EDGE.pow(3);
+        for k in range[2].clone() {
+            for j in range[1].clone() {
+                for i in range[0].clone() {
+                    let inside = (0..points)
+                        .filter(|p| {
+                            let n = [
+                                p % POINTS_PER_EDGE,
+                                p / POINTS_PER_EDGE % POINTS_PER_EDGE,
+                                p / POINTS_PER_EDGE.pow(2),
+                            ];
+                            let square: f64 = (0..3)
+                                .map(|a| {
+                                    let part = (n[a] as f64 + 0.5) / POINTS_PER_EDGE as f64;
+                                    let x = ([i, j, k][a] as f64 + part) * size[a] - self.half_mm[a];
+                                    (x - center_mm[a]).powi(2)
+                                })
+                                .sum();
+                            square < radius_mm * radius_mm
+                        })
+                        .count();
+                    if inside > 0 {
+                        found.push((i + self.counts[0] * (j + self.counts[1] * k), inside as f64 / points as f64));
+                    }
+                }
+            }
+        }
+        found
+    }
+
     /// Low and high edges (mm) of parts `first` to `last` along axis `a`.
     fn edges(&self, a: usize, first: usize, last: usize) -> [f64; 2] {
         let width = 2.0 * self.half_mm[a] / self.counts[a] as f64;
@@ -75,7 +123,7 @@ impl ScoreMap {
         ScoreMap { division, significance, prepared }
     }
 
-    /// The block of parts whose sum explains most: deviance, coefficient, first and last part along each axis.
+    /// The block of parts whose sum explains most.
     fn best_block(&self, is_allowed: impl Fn(f64) -> bool) -> Option<Block> {
         let counts = self.division.counts;
         let mut best: Option<Block> = None;
@@ -98,7 +146,7 @@ impl ScoreMap {
                     }
                     let (explained, coefficient) = self.prepared.of_sum(&members);
                     if is_allowed(coefficient) && best.as_ref().is_none_or(|b| explained > b.explained) {
-                        best = Some(Block { explained, coefficient, ranges: [x, y, z] });
+                        best = Some(Block { explained, ranges: [x, y, z] });
                     }
                 }
             }
@@ -109,7 +157,6 @@ impl ScoreMap {
 
 struct Block {
     explained: f64,
-    coefficient: f64,
     ranges: [[usize; 2]; 3],
 }
 
@@ -166,7 +213,7 @@ pub fn debond_map(
     Ok(BondMap { map, debond, whole })
 }
 
-/// Map of modulus changes, and the inclusion that explains most.
+/// Map of modulus changes, and inclusions that explain much: the best first, apart from each other, with what each explains.
 ///
 /// # Errors
 /// [`DiagnosisError`].
@@ -175,7 +222,7 @@ pub fn inclusion_map(
     material: &Ogden,
     prediction: &Prediction,
     test: &ScoreTest,
-) -> Result<(ScoreMap, Option<(f64, Inclusion)>), DiagnosisError> {
+) -> Result<(ScoreMap, Vec<(f64, Inclusion)>), DiagnosisError> {
     let specimen = laboratory.observed().specimen.clone();
     let division = Division::of(&specimen, BOXES);
     let paths: Vec<Box<dyn Fn(f64) -> Scene>> = (0..division.num_parts())
@@ -189,19 +236,58 @@ pub fn inclusion_map(
     let paths: Vec<(&dyn Fn(f64) -> Scene, bool)> = paths.iter().map(|p| (&**p, true)).collect();
     let directions = laboratory.derivatives(material, &Scene::default(), prediction, false, &paths, 0.02)?;
     let map = ScoreMap::new(division, test, &directions);
-    let found = map.best_block(|_| true).map(|block| {
-        let edges = [0, 1, 2].map(|a| division.edges(a, block.ranges[a][0], block.ranges[a][1]));
-        let volume: f64 = edges.iter().map(|e| e[1] - e[0]).product();
-        let cause = Inclusion {
-            center_mm: edges.map(|e| 0.5 * (e[0] + e[1])),
-            // A ball of the same volume.
-            radius_mm: (0.75 * volume / std::f64::consts::PI).cbrt(),
-            log_factor: (1.0 + block.coefficient).clamp(0.2, 5.0).ln(),
-            half_mm: division.half_mm,
-        };
-        (block.explained, cause)
-    });
-    Ok((map, found))
+    let balls = best_balls(&map);
+    Ok((map, balls))
+}
+
+/// Balls by what they explain to first order, the modulus of each box changed in proportion to its part in the ball.
+fn best_balls(map: &ScoreMap) -> Vec<(f64, Inclusion)> {
+    let division = map.division;
+    let half = division.half_mm;
+    let smallest = half.iter().fold(f64::INFINITY, |s, h| s.min(2.0 * h));
+    let mut all: Vec<(f64, Inclusion)> = Vec::new();
+    for radius in BALL_RADII.map(|part| part * smallest) {
+        let steps = half.map(|h| (4.0 * h / radius).ceil() as usize);
+        let at = |a: usize, i: usize| half[a] * ((2 * i + 1) as f64 / steps[a] as f64 - 1.0);
+        for k in 0..steps[2] {
+            for j in 0..steps[1] {
+                for i in 0..steps[0] {
+                    let center_mm = [at(0, i), at(1, j), at(2, k)];
+                    let members = division.parts_in_ball(center_mm, radius);
+                    let (explained, coefficient) = map.prepared.of_weighted(&members);
+                    let log_factor = log_factor_of_ball(coefficient);
+                    all.push((explained, Inclusion { center_mm, radius_mm: radius, log_factor, half_mm: half }));
+                }
+            }
+        }
+    }
+    all.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut chosen: Vec<(f64, Inclusion)> = Vec::new();
+    for (explained, ball) in all {
+        let is_new = chosen.iter().all(|(_, o)| {
+            let distance: f64 = (0..3).map(|a| (o.center_mm[a] - ball.center_mm[a]).powi(2)).sum::<f64>().sqrt();
+            distance > o.radius_mm.max(ball.radius_mm) || o.log_factor * ball.log_factor < 0.0
+        });
+        let best = chosen.first().map_or(0.0, |c| c.0);
+        let alike = chosen.iter().filter(|(_, o)| o.log_factor * ball.log_factor > 0.0).count();
+        if explained > 0.0 && explained >= LEAST_OF_BEST * best && is_new && alike < MAX_STARTS {
+            chosen.push((explained, ball));
+        }
+    }
+    chosen
+}
+
+/// ln of the stiffness factor f of a ball whose first-order change is `change`: a ball of an incompressible solid takes
+/// 5/(3 + 2 f) of the strain around it (Eshelby 1957), so that its effect is 5 (f − 1)/(3 + 2 f) and no more than 5/2.
+pub(super) fn log_factor_of_ball(change: f64) -> f64 {
+    let change = change.clamp(-1.6, 2.4);
+    ((5.0 + 3.0 * change) / (5.0 - 2.0 * change)).ln().clamp(-LARGEST_START, LARGEST_START)
+}
+
+/// The other way round.
+pub(super) fn change_of_ball(log_factor: f64) -> f64 {
+    let f = log_factor.exp();
+    5.0 * (f - 1.0) / (3.0 + 2.0 * f)
 }
 
 /// Smallest number of connected voxels that make a jump.

@@ -12,11 +12,17 @@ use crate::calibration::Observed;
 use crate::mesh::MeshOptions;
 use nalgebra::DVector;
 
-/// Element size of the coarser mesh as a factor on ours.
-const COARSER: f64 = 1.4;
-/// Standard deviation of an error over the shift between the two meshes: 1/(1.4^1.4 − 1) at the order 1.4 that singular edges
-/// leave is our own error; data that come from a mesh have another of the kind, hence √2 times that.
-const SD_OVER_SHIFT: f64 = 2.35;
+/// Element sizes of the coarser meshes as factors on ours. One alone may shift a parameter by little where it happens to err as
+/// ours does; the mean square of two counts.
+const COARSER: [f64; 2] = [1.25, 1.6];
+/// The order of convergence that singular edges leave.
+const ORDER: f64 = 1.4;
+
+/// Standard deviation of an error over the shift between our mesh and one `coarser` times as coarse: 1/(coarser^order − 1) is our
+/// own error; data that come from a mesh have another of the kind, hence √2 times that.
+fn sd_over_shift(coarser: f64) -> f64 {
+    std::f64::consts::SQRT_2 / (coarser.powf(ORDER) - 1.0)
+}
 
 /// Adds the meshes' share to the standard deviations of `fitted`, found by `laboratory` on a mesh of `mesh_factor`.
 ///
@@ -31,19 +37,23 @@ pub fn widen(
     fitted: &mut Fitted,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<(), DiagnosisError> {
-    let mesh = MeshOptions::scaled(&observed.specimen, COARSER * mesh_factor);
-    let mut coarser = Laboratory::new(observed, &mesh)?;
-    let theirs = coarser.predict(&fitted.material, &fitted.scene(), is_cancelled)?;
-    let change = metric.weigh(&fitted.prediction.trace.plus(-1.0, &theirs.trace));
     let columns = derivatives(laboratory, &fitted.material, &fitted.causes, &fitted.prediction)?;
     let weighed: Vec<_> = columns.iter().map(|c| metric.weigh(c)).collect();
     let matrix = normal_matrix(metric, &weighed, &fitted.material, &fitted.causes, settings);
-    let gradient = DVector::from_iterator(weighed.len(), weighed.iter().map(|c| metric.inner(c, &change)));
     let Some(factor) = matrix.cholesky() else { return Ok(()) };
-    let shift = factor.solve(&gradient);
+    let mut square = DVector::<f64>::zeros(weighed.len());
+    for coarser in COARSER {
+        let mesh = MeshOptions::scaled(&observed.specimen, coarser * mesh_factor);
+        let mut other = Laboratory::new(observed, &mesh)?;
+        let theirs = other.predict(&fitted.material, &fitted.scene(), is_cancelled)?;
+        let change = metric.weigh(&fitted.prediction.trace.plus(-1.0, &theirs.trace));
+        let gradient = DVector::from_iterator(weighed.len(), weighed.iter().map(|c| metric.inner(c, &change)));
+        let shift = factor.solve(&gradient) * sd_over_shift(coarser);
+        square += shift.component_mul(&shift) / COARSER.len() as f64;
+    }
     let scales = scales(&fitted.material, &fitted.causes);
-    for ((sd, shift), scale) in fitted.sd.iter_mut().zip(shift.iter()).zip(scales) {
-        *sd = sd.hypot(SD_OVER_SHIFT * scale * shift);
+    for ((sd, square), scale) in fitted.sd.iter_mut().zip(square.iter()).zip(scales) {
+        *sd = sd.hypot(scale * square.sqrt());
     }
     Ok(())
 }

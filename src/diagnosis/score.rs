@@ -90,16 +90,22 @@ impl Prepared {
         (right.dot(&solution), solution.component_mul(&scale).iter().copied().collect())
     }
 
-    /// Deviance explained by the sum of some directions, and its coefficient.
-    pub fn of_sum(&self, members: &[usize]) -> (f64, f64) {
+    /// Deviance explained by a sum of some directions with weights, and its coefficient.
+    pub fn of_weighted(&self, members: &[(usize, f64)]) -> (f64, f64) {
         let mut g = 0.0;
         let mut h = 0.0;
-        for &i in members {
-            g += self.gradient[i];
-            for &j in members {
-                h += self.gram[(i, j)];
+        for &(i, a) in members {
+            g += a * self.gradient[i];
+            for &(j, b) in members {
+                h += a * b * self.gram[(i, j)];
             }
         }
         if h > 0.0 { (g * g / h, g / h) } else { (0.0, 0.0) }
+    }
+
+    /// Deviance explained by the sum of some directions, and its coefficient.
+    pub fn of_sum(&self, members: &[usize]) -> (f64, f64) {
+        let weighted: Vec<(usize, f64)> = members.iter().map(|&i| (i, 1.0)).collect();
+        self.of_weighted(&weighted)
     }
 }

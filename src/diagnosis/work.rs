@@ -1,14 +1,14 @@
 //! The steps of a diagnosis: fits, tests of candidates, what is kept back.
 
-use super::causes::{Cause, Course, SoftBond, registry};
+use super::causes::{Cause, Course, Inclusion, SoftBond, registry};
 use super::diagnose::DiagnosisOptions;
 use super::error::DiagnosisError;
 use super::experiment::{Experiment, experiments};
 use super::fibre_map::fibre_directions;
-use super::fit::{BulkPrior, FitSettings, Fitted, STEP, Supposed, fit, paths_of, shear_modulus};
+use super::fit::{BulkPrior, FitSettings, Fitted, STEP, Supposed, fit, paths_of, scene_of, shear_modulus};
 use super::laboratory::Laboratory;
 use super::load_history::ElasticTable;
-use super::maps::{ScoreMap, debond_map, inclusion_map};
+use super::maps::{ScoreMap, change_of_ball, debond_map, inclusion_map, log_factor_of_ball};
 use super::memory_kernel::{KernelState, MemoryKernel};
 use super::metric::Metric;
 use super::scene::Scene;
@@ -21,7 +21,9 @@ use std::sync::Arc;
 /// Exponents tried for a further Ogden term.
 const EXPONENTS: [f64; 5] = [-6.0, -2.0, 5.0, 9.0, 14.0];
 /// Fits of leading causes per round.
-const MAX_FITS: usize = 4;
+const MAX_FITS: usize = 5;
+/// A cause is fitted where it explains more than this part of what the leading one does, to first order.
+const WORTH_A_FIT: f64 = 0.1;
 /// An effect is physics where its displacement exceeds this part of the allowance (rms), or its force its own allowance.
 const SMALLEST_EFFECT: f64 = 1.0;
 /// Drives of the load curve's table.
@@ -77,6 +79,7 @@ pub(super) fn first_guess(
 }
 
 /// A cause to fit, its start, and what it explains to first order.
+#[derive(Clone)]
 pub(super) struct Candidate {
     pub(super) cause: Arc<dyn Cause>,
     pub(super) values: Vec<f64>,
@@ -105,10 +108,10 @@ pub(super) fn leading(candidates: &[Candidate]) -> Vec<&Candidate> {
     let mut chosen: Vec<&Candidate> = Vec::new();
     let top = candidates.first().map_or(0.0, |c| c.score);
     for c in candidates {
-        let is_worth = c.score > EVIDENCE && c.score > 0.1 * top;
+        let is_worth = c.score > EVIDENCE && c.score > WORTH_A_FIT * top;
         // Two holes, faces or directions are different suspects of one name.
         let is_new = chosen.iter().filter(|o| o.cause.name() == c.cause.name()).count()
-            < if matches!(c.cause.name(), "debond" | "hole" | "fibre") { 2 } else { 1 };
+            < if matches!(c.cause.name(), "debond" | "hole" | "fibre" | "inclusion") { 2 } else { 1 };
         if is_worth && is_new && chosen.len() < MAX_FITS {
             chosen.push(c);
         }
@@ -347,14 +350,56 @@ impl Work<'_, '_> {
             if !self.is_left_out("bond") {
                 candidates.extend(soft_bond(&test, &whole));
             }
-            let (map, found) = inclusion_map(self.laboratory, &current.material, &current.prediction, &test)?;
+            let (map, balls) = inclusion_map(self.laboratory, &current.material, &current.prediction, &test)?;
             maps.push(("stiffness of the sample".into(), map));
-            if let Some((score, cause)) = found.filter(|_| !self.is_left_out("inclusion")) {
-                candidates.push(Candidate { values: cause.start(), cause: Arc::new(cause), score });
+            if !self.is_left_out("inclusion") {
+                let top = candidates.iter().fold(0.0, |top: f64, c| top.max(c.score));
+                candidates.extend(self.inclusions(current, &test, top, balls)?);
             }
         }
         candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
         Ok(candidates)
+    }
+
+    /// The inclusions worth a full fit, of `balls` that explain much to first order. Where one may lead, each is tried with its
+    /// full stiffness, which first order tells badly; the best stiff and the best soft one are taken, because one above the
+    /// middle and its opposite below look alike.
+    fn inclusions(
+        &mut self,
+        current: &Fitted,
+        test: &ScoreTest,
+        top: f64,
+        balls: Vec<(f64, Inclusion)>,
+    ) -> Result<Vec<Candidate>, DiagnosisError> {
+        let best = balls.first().map_or(0.0, |b| b.0);
+        let is_worth = best > EVIDENCE && best > WORTH_A_FIT * top;
+        let mut tried: Vec<(f64, Candidate)> = Vec::new();
+        for (score, ball) in balls.into_iter().take(if is_worth { usize::MAX } else { 1 }) {
+            let log_factor = ball.log_factor;
+            let (mut values, cause) = (ball.start(), Arc::new(ball) as Arc<dyn Cause>);
+            let mut explained = score;
+            if is_worth {
+                let supposed = [Supposed { cause: cause.clone(), values: values.clone() }];
+                match self.laboratory.predict(&current.material, &scene_of(&supposed), self.is_cancelled) {
+                    Ok(found) => {
+                        let change = found.trace.plus(-1.0, &current.prediction.trace);
+                        let shape = test.test(std::slice::from_ref(&change));
+                        // More or less of the same shape; the other sign is another ball's.
+                        let part = shape.coefficients[0];
+                        explained = if part > 0.0 { shape.explained } else { 0.0 };
+                        values[0] = log_factor_of_ball(part.max(0.1) * change_of_ball(log_factor));
+                    }
+                    Err(error) if (self.is_cancelled)() => return Err(error),
+                    Err(_) => continue,
+                }
+            }
+            tried.push((explained, Candidate { cause, values, score }));
+        }
+        tried.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let first = |is_stiff: bool| tried.iter().position(|(_, c)| (c.values[0] > 0.0) == is_stiff);
+        let mut places: Vec<usize> = [first(true), first(false)].into_iter().flatten().collect();
+        places.sort_unstable();
+        Ok(places.into_iter().map(|n| Candidate { score: best, ..tried[n].1.clone() }).collect())
     }
 
     /// A change times a power of the drive: what is alike at every drive is made to grow with it (1), or what grows is made alike
