@@ -1,4 +1,5 @@
-//! What meshes do to estimates: the shift that a coarser mesh makes, added to the standard deviations.
+//! What meshes and soft edges do to estimates: the shifts that coarser meshes and wider edges of a cause make, added to the
+//! standard deviations.
 //!
 //! Noise alone gives intervals that are far too narrow: 20,000 voxels average it out, and what is left is the error of the mesh,
 //! ours and that of whoever made synthetic data. The prediction of a coarser mesh differs from ours by a multiple of our error;
@@ -8,6 +9,7 @@ use super::error::DiagnosisError;
 use super::fit::{FitSettings, Fitted, derivatives, normal_matrix, scales};
 use super::laboratory::Laboratory;
 use super::metric::Metric;
+use super::scene::Scene;
 use crate::calibration::Observed;
 use crate::mesh::MeshOptions;
 use nalgebra::DVector;
@@ -23,6 +25,9 @@ const ORDER: f64 = 1.4;
 fn sd_over_shift(coarser: f64) -> f64 {
     std::f64::consts::SQRT_2 / (coarser.powf(ORDER) - 1.0)
 }
+
+/// Standard deviation over the shift to an edge twice as wide: an edge is anything from sharp to that, evenly.
+const SD_OVER_EDGE: f64 = 0.58;
 
 /// Adds the meshes' share to the standard deviations of `fitted`, found by `laboratory` on a mesh of `mesh_factor`.
 ///
@@ -50,6 +55,22 @@ pub fn widen(
         let gradient = DVector::from_iterator(weighed.len(), weighed.iter().map(|c| metric.inner(c, &change)));
         let shift = factor.solve(&gradient) * sd_over_shift(coarser);
         square += shift.component_mul(&shift) / COARSER.len() as f64;
+    }
+    let mut wider = Scene::default();
+    let mut has_edge = false;
+    for c in &fitted.causes {
+        if c.cause.apply_wider(&c.values, &mut wider) {
+            has_edge = true;
+        } else {
+            c.cause.apply(&c.values, &mut wider);
+        }
+    }
+    if has_edge {
+        let theirs = laboratory.predict(&fitted.material, &wider, is_cancelled)?;
+        let change = metric.weigh(&fitted.prediction.trace.plus(-1.0, &theirs.trace));
+        let gradient = DVector::from_iterator(weighed.len(), weighed.iter().map(|c| metric.inner(c, &change)));
+        let shift = factor.solve(&gradient) * SD_OVER_EDGE;
+        square += shift.component_mul(&shift);
     }
     let scales = scales(&fitted.material, &fitted.causes);
     for ((sd, square), scale) in fitted.sd.iter_mut().zip(square.iter()).zip(scales) {

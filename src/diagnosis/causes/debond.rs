@@ -31,6 +31,28 @@ impl Debond {
         ["x", "y", "z"][axis]
     }
 
+    /// How loose the bond is with an edge of the patch `edge_mm` wide.
+    fn patch(&self, values: &[f64], edge_mm: f64) -> Field {
+        let (axes, half) = (self.axes, self.half_mm);
+        let edges = [[values[0], values[1]], [values[2], values[3]]];
+        Field::new(move |x| {
+            // Distance into the patch from its nearest edge; edges on the face's own boundary do not count.
+            let mut inside = f64::INFINITY;
+            for a in 0..2 {
+                let p = x[axes[a]];
+                if edges[a][0] > -half[a] {
+                    inside = inside.min(p - edges[a][0]);
+                }
+                if edges[a][1] < half[a] {
+                    inside = inside.min(edges[a][1] - p);
+                }
+            }
+            let s = 1.0 / (1.0 + (-(inside / edge_mm)).clamp(-60.0, 60.0).exp());
+            // Loose to one half at the edge; below a thousandth it is firm.
+            if s < 1e-3 { 0.0 } else { LOOSE * s }
+        })
+    }
+
     fn clipped(&self, values: &[f64]) -> [[f64; 2]; 2] {
         [0, 1].map(|a| [values[2 * a].max(-self.half_mm[a]), values[2 * a + 1].min(self.half_mm[a])])
     }
@@ -67,25 +89,12 @@ impl Cause for Debond {
     }
 
     fn apply(&self, values: &[f64], scene: &mut Scene) {
-        let (axes, half) = (self.axes, self.half_mm);
-        let edges = [[values[0], values[1]], [values[2], values[3]]];
-        let field = Field::new(move |x| {
-            // Distance into the patch from its nearest edge; edges on the face's own boundary do not count.
-            let mut inside = f64::INFINITY;
-            for a in 0..2 {
-                let p = x[axes[a]];
-                if edges[a][0] > -half[a] {
-                    inside = inside.min(p - edges[a][0]);
-                }
-                if edges[a][1] < half[a] {
-                    inside = inside.min(edges[a][1] - p);
-                }
-            }
-            let s = 1.0 / (1.0 + (-(inside / EDGE_MM)).clamp(-60.0, 60.0).exp());
-            // Loose to one half at the edge; below a thousandth it is firm.
-            if s < 1e-3 { 0.0 } else { LOOSE * s }
-        });
-        scene.looseness[usize::from(self.is_moved_face)].push(field);
+        scene.looseness[usize::from(self.is_moved_face)].push(self.patch(values, EDGE_MM));
+    }
+
+    fn apply_wider(&self, values: &[f64], scene: &mut Scene) -> bool {
+        scene.looseness[usize::from(self.is_moved_face)].push(self.patch(values, 2.0 * EDGE_MM));
+        true
     }
 
     fn location(&self, values: &[f64], _: &Specimen) -> Option<Location> {

@@ -110,6 +110,11 @@ pub trait Cause: Send + Sync {
     fn changes_sample(&self) -> bool {
         true
     }
+    /// Changes the scene by the same cause with an edge twice as wide, which the data would hardly tell from the first: what that
+    /// moves, parameters are not known better than. `false`: it has no edge.
+    fn apply_wider(&self, _values: &[f64], _scene: &mut Scene) -> bool {
+        false
+    }
     /// How it goes with the drive: where the same pattern explains more if it goes otherwise, this is not the cause.
     fn course(&self) -> Course {
         Course::ItsOwn
