@@ -243,7 +243,7 @@ pub fn diagnose(
             progress(&format!("round {round}: fitting '{}'", c.cause.description()));
             let mut supposed = current.causes.clone();
             supposed.push(Supposed { cause: c.cause.clone(), values: c.values.clone() });
-            let Ok(found) = work.fit(&measured, &current.material, &supposed) else { continue };
+            let Ok(found) = work.fit_with_leaps(&measured, &current.material, &supposed) else { continue };
             let gain = current.deviance - found.deviance - penalty(&metric, c.values.len());
             if let Some(r) = ranked.iter_mut().rev().find(|r| r.description == c.cause.description()) {
                 r.fitted = Some(gain);

@@ -282,6 +282,23 @@ pub fn fit_members(
     }
 }
 
+/// The deviance of a material and causes as they are.
+///
+/// # Errors
+/// As [`fit`].
+pub(super) fn deviance_at(
+    laboratory: &mut Laboratory,
+    metric: &Metric,
+    measured: &Trace,
+    material: &Ogden,
+    causes: &[Supposed],
+    settings: &FitSettings,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<f64, DiagnosisError> {
+    let prediction = laboratory.predict(material, &scene_of(causes), is_cancelled)?;
+    Ok(deviance_of(metric, measured, &prediction, material, causes, settings))
+}
+
 fn evaluate(
     members: &mut [Member],
     material: Ogden,

@@ -5,7 +5,7 @@ use super::diagnose::DiagnosisOptions;
 use super::error::DiagnosisError;
 use super::experiment::{Experiment, experiments};
 use super::fibre_map::fibre_directions;
-use super::fit::{BulkPrior, FitSettings, Fitted, STEP, Supposed, fit, paths_of, scene_of, shear_modulus};
+use super::fit::{BulkPrior, FitSettings, Fitted, STEP, Supposed, deviance_at, fit, paths_of, scene_of, shear_modulus};
 use super::laboratory::Laboratory;
 use super::load_history::ElasticTable;
 use super::maps::{ScoreMap, change_of_ball, debond_map, inclusion_map, log_factor_of_ball};
@@ -20,6 +20,9 @@ use std::sync::Arc;
 
 /// Exponents tried for a further Ogden term.
 const EXPONENTS: [f64; 5] = [-6.0, -2.0, 5.0, 9.0, 14.0];
+/// Leaps of a cause after its fit, and how much worse than the fit (in deviance) the start of a further one may be.
+const MAX_LEAPS: usize = 3;
+const WORSE_BEFORE_BETTER: f64 = 1.5;
 /// Fits of leading causes per round.
 const MAX_FITS: usize = 5;
 /// A cause is fitted where it explains more than this part of what the leading one does, to first order.
@@ -171,6 +174,48 @@ impl Work<'_, '_> {
         causes: &[Supposed],
     ) -> Result<Fitted, DiagnosisError> {
         fit(self.laboratory, self.metric, measured, material, causes, &self.settings, self.is_cancelled)
+    }
+
+    /// As [`Self::fit`], and then from where the last cause could leap to, as long as that explains more.
+    pub(super) fn fit_with_leaps(
+        &mut self,
+        measured: &Trace,
+        material: &Ogden,
+        causes: &[Supposed],
+    ) -> Result<Fitted, DiagnosisError> {
+        let mut found = self.fit(measured, material, causes)?;
+        for _ in 0..MAX_LEAPS {
+            let Some(last) = found.causes.last() else { break };
+            let mut best: Option<(f64, Vec<Supposed>)> = None;
+            for values in last.cause.leaps(&last.values) {
+                let mut leapt = found.causes.clone();
+                if let Some(last) = leapt.last_mut() {
+                    last.values = values;
+                }
+                let deviance = deviance_at(
+                    self.laboratory,
+                    self.metric,
+                    measured,
+                    &found.material,
+                    &leapt,
+                    &self.settings,
+                    self.is_cancelled,
+                );
+                match deviance {
+                    Ok(deviance) if best.as_ref().is_none_or(|b| deviance < b.0) => best = Some((deviance, leapt)),
+                    Err(error) if (self.is_cancelled)() => return Err(error),
+                    _ => {}
+                }
+            }
+            // The material has not followed yet: somewhat worse may become better.
+            let Some((_, leapt)) = best.filter(|b| b.0 < WORSE_BEFORE_BETTER * found.deviance) else { break };
+            match self.fit(measured, &found.material, &leapt) {
+                Ok(other) if other.deviance < found.deviance - EVIDENCE => found = other,
+                Err(error) if (self.is_cancelled)() => return Err(error),
+                _ => break,
+            }
+        }
+        Ok(found)
     }
 
     /// The nominal model: as many terms as the prior material, or one or two as the data call for.

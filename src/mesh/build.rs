@@ -31,6 +31,24 @@ pub fn mesh_specimen(specimen: &Specimen, options: &MeshOptions) -> Result<Mesh,
     extrude(&domain, options, &section)
 }
 
+/// As [`mesh_specimen`], of triangles whose edges follow straight `lines` of the section (x and z of both ends, mm; for holes
+/// along z: x and y), through the whole extrusion: a patch of a bonded face ends at element edges. Lines may meet at their
+/// ends and end on the outline, and must keep clear of the holes.
+///
+/// # Errors
+/// As [`mesh_specimen`]; [`MeshError::Triangulation`] where parts of lines cross each other or a hole.
+pub fn mesh_specimen_along(
+    specimen: &Specimen,
+    options: &MeshOptions,
+    lines: &[[[f64; 2]; 2]],
+) -> Result<Mesh, MeshError> {
+    let mut domain = Domain::new(specimen, &MeshOptions { use_mirror: false, ..*options })?;
+    domain.lines = lines.to_vec();
+    let section = triangle_section(&domain, options)?;
+    orient_and_limit(&section, options)?;
+    extrude(&domain, options, &section)
+}
+
 fn extrude(domain: &Domain, options: &MeshOptions, section: &Section) -> Result<Mesh, MeshError> {
     let half = domain.extrusion_half;
     let ratio = domain.grading.extrusion;
@@ -104,4 +122,51 @@ pub(super) fn pull_axis(test: TestKind) -> usize {
 /// Nodes whose coordinate `axis` is `position`.
 pub(super) fn nodes_on_plane(mesh: &Mesh, axis: usize, position: f64, tolerance: f64) -> Vec<u32> {
     (0..mesh.nodes.len() as u32).filter(|&n| (mesh.nodes[n as usize][axis] - position).abs() < tolerance).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::test_specimens::two_holes;
+
+    /// A corner patch: the mesh is one of the specimen, and element edges without a gap follow both lines.
+    #[test]
+    fn elements_end_at_lines() {
+        let specimen = two_holes();
+        let half = [0.5 * specimen.block.length_mm, 0.5 * specimen.block.width_mm];
+        let lines = [[[9.1, 2.3], [9.1, half[1]]], [[9.1, 2.3], [half[0], 2.3]]];
+        let mesh = mesh_specimen_along(&specimen, &MeshOptions::search(&specimen), &lines).unwrap();
+        mesh.check(&specimen).unwrap();
+        let top = 0.5 * specimen.block.thickness_mm;
+        for (along, across, at, from) in [(2, 0, 9.1, 2.3), (0, 2, 2.3, 9.1)] {
+            let end = [half[0], 0.0, half[1]][along];
+            let mut covered = 0.0;
+            for e in 0..mesh.num_elements() {
+                for face in mesh.element_kind.faces().iter().filter(|f| f.len() == 7) {
+                    let corners: Vec<[f64; 3]> =
+                        face[..3].iter().map(|&a| mesh.nodes[mesh.element(e)[a] as usize]).collect();
+                    if corners.iter().any(|x| (x[1] - top).abs() > 1e-9) {
+                        continue;
+                    }
+                    for k in 0..3 {
+                        let (p, q) = (corners[k], corners[(k + 1) % 3]);
+                        let is_on = |x: [f64; 3]| (x[across] - at).abs() < 1e-9 && x[along] > from - 1e-9;
+                        if is_on(p) && is_on(q) {
+                            covered += (p[along] - q[along]).abs();
+                        }
+                    }
+                }
+            }
+            // An edge inside the face belongs to two triangles.
+            assert!((covered - 2.0 * (end - from)).abs() < 1e-9, "{covered} of {}", 2.0 * (end - from));
+        }
+    }
+
+    #[test]
+    fn crossing_lines_are_refused() {
+        let specimen = two_holes();
+        let lines = [[[9.0, -3.0], [9.0, 3.0]], [[8.1, 0.13], [10.7, 0.17]]];
+        let made = mesh_specimen_along(&specimen, &MeshOptions::search(&specimen), &lines);
+        assert!(matches!(made, Err(MeshError::Triangulation { .. })), "{:?}", made.map(|m| m.num_elements()));
+    }
 }

@@ -40,6 +40,8 @@ pub(super) struct Domain {
     pub bottom: f64,
     pub is_dumbbell: bool,
     pub discs: Vec<Disc>,
+    /// Straight lines inside the section that element edges follow; each may end on the outline.
+    pub lines: Vec<[[f64; 2]; 2]>,
     /// Coordinate index of b: 2 (z) or 1 (y).
     pub b_axis: usize,
     /// Coordinate index of the extrusion: 1 (y) or 2 (z).
@@ -121,6 +123,7 @@ impl Domain {
             bottom: if section_mirrored { 0.0 } else { -domain_half[1] },
             is_dumbbell,
             discs: Vec::new(),
+            lines: Vec::new(),
             b_axis,
             extrusion_axis,
             extrusion_half: 0.5 * extents[extrusion_axis],

@@ -32,7 +32,7 @@ mod layout_tests;
 #[cfg(test)]
 mod test_specimens;
 
-pub use build::mesh_specimen;
+pub use build::{mesh_specimen, mesh_specimen_along};
 pub use check::MeshQuality;
 pub use element::ElementKind;
 pub use error::{LigamentEnd, MeshError};

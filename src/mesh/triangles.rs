@@ -101,7 +101,7 @@ pub(super) fn triangle_section(domain: &Domain, options: &MeshOptions) -> Result
 }
 
 fn triangulate(domain: &Domain, options: &MeshOptions, fineness: f64) -> Result<Section, MeshError> {
-    let (points, edges) = divide_boundary(domain, options, fineness)?;
+    let (points, edges, holes) = divide_boundary(domain, options, fineness)?;
     let limit = options.max_elements / options.levels.div_ceil(2);
     let area = 0.5 * options.section_size_mm.powi(2);
     if domain.area() / area > limit as f64 {
@@ -124,8 +124,10 @@ fn triangulate(domain: &Domain, options: &MeshOptions, fineness: f64) -> Result<
         triangulation.add_constraint(handles[u], handles[v]);
     }
     let vertices = 20 * points.len() + 4 * limit.min((domain.area() / area) as usize + 100);
+    // Lines inside would confuse which side of a constraint is outside: there the holes are taken out afterwards.
+    let has_lines = !domain.lines.is_empty();
     let parameters = RefinementParameters::<f64>::new()
-        .exclude_outer_faces(true)
+        .exclude_outer_faces(!has_lines)
         .keep_constraint_edges()
         .with_angle_limit(AngleLimit::from_deg(ANGLE_LIMIT_DEG))
         .with_max_allowed_area(area)
@@ -146,6 +148,10 @@ fn triangulate(domain: &Domain, options: &MeshOptions, fineness: f64) -> Result<
             continue;
         }
         let corners = face.vertices().map(|v| (v.fix().index(), [v.position().x, v.position().y]));
+        let center = [0, 1].map(|c| corners.iter().map(|(_, p)| p[c]).sum::<f64>() / 3.0);
+        if has_lines && holes.iter().any(|hole| is_in_polygon(center, hole)) {
+            continue;
+        }
         let mut cell = [0u32; 7];
         for (k, &(vertex, p)) in corners.iter().enumerate() {
             cell[k] = *corner_of.entry(vertex).or_insert_with(|| push(&mut section.points, p));
@@ -188,14 +194,29 @@ fn boundary_loops(domain: &Domain) -> Vec<Vec<Curve>> {
     let mut outline = Vec::new();
     let mut halves: Vec<usize> = (0..domain.discs.len()).filter(|&i| domain.discs[i].is_half).collect();
     halves.sort_by(|&i, &j| domain.discs[i].center[0].total_cmp(&domain.discs[j].center[0]));
+    // Where lines end on a side parallel to axis `c`, on the given side of the section.
+    let ends_on = |c: usize, value: f64| -> Vec<f64> {
+        let tolerance = 1e-9 * domain.scale();
+        let on = domain.lines.iter().flatten().filter(|p| (p[1 - c] - value).abs() < tolerance).map(|p| p[c]);
+        let half = domain.half[c];
+        let mut found: Vec<f64> = on.filter(|x| x.abs() < half - tolerance).collect();
+        found.sort_by(f64::total_cmp);
+        found.dedup_by(|x, y| (*x - *y).abs() < tolerance);
+        found
+    };
     let knots = if domain.is_dumbbell {
         let [x0, x1, x2] = domain.arc_ends();
         vec![-a, -x2, -x1, -x0, x0, x1, x2, a]
     } else {
         vec![-a, a]
     };
+    let with_ends = |ends: Vec<f64>| -> Vec<f64> {
+        let mut all: Vec<f64> = knots.iter().copied().chain(ends).collect();
+        all.sort_by(f64::total_cmp);
+        all
+    };
     if bottom < 0.0 {
-        outline.extend(knots.windows(2).map(|w| side(domain, false, w[0], w[1])));
+        outline.extend(with_ends(ends_on(0, -b)).windows(2).map(|w| side(domain, false, w[0], w[1])));
     } else {
         let mut from = -a;
         for disc in halves {
@@ -206,9 +227,12 @@ fn boundary_loops(domain: &Domain) -> Vec<Vec<Curve>> {
         }
         outline.push(Curve::Line([from, 0.0], [a, 0.0]));
     }
-    outline.push(Curve::Line([a, bottom], [a, b]));
-    outline.extend(knots.windows(2).rev().map(|w| side(domain, true, w[1], w[0])));
-    outline.push(Curve::Line([-a, b], [-a, bottom]));
+    let upright = |x: f64| -> Vec<f64> {
+        std::iter::once(bottom).chain(ends_on(1, x).into_iter().filter(|z| *z > bottom)).chain([b]).collect()
+    };
+    outline.extend(upright(a).windows(2).map(|w| Curve::Line([a, w[0]], [a, w[1]])));
+    outline.extend(with_ends(ends_on(0, b)).windows(2).rev().map(|w| side(domain, true, w[1], w[0])));
+    outline.extend(upright(-a).windows(2).rev().map(|w| Curve::Line([-a, w[1]], [-a, w[0]])));
     let mut loops = vec![outline];
     for (disc, d) in domain.discs.iter().enumerate() {
         if !d.is_half {
@@ -228,14 +252,26 @@ fn side(domain: &Domain, upper: bool, from: f64, to: f64) -> Curve {
     }
 }
 
+/// Whether a point lies in a polygon: a ray from it crosses its sides an odd number of times.
+fn is_in_polygon(p: [f64; 2], polygon: &[[f64; 2]]) -> bool {
+    let mut is_in = false;
+    for (i, a) in polygon.iter().enumerate() {
+        let b = polygon[(i + 1) % polygon.len()];
+        if (a[1] > p[1]) != (b[1] > p[1]) && p[0] < a[0] + (p[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0]) {
+            is_in = !is_in;
+        }
+    }
+    is_in
+}
+
+/// Points of the boundary and the lines, the parts between them, and the polygons of whole holes.
+type Division = (Vec<[f64; 2]>, BoundaryEdges, Vec<Vec<[f64; 2]>>);
+
 /// Boundary points and the parts between them; each part remembers its curve and the parameter of its middle.
-fn divide_boundary(
-    domain: &Domain,
-    options: &MeshOptions,
-    fineness: f64,
-) -> Result<(Vec<[f64; 2]>, BoundaryEdges), MeshError> {
+fn divide_boundary(domain: &Domain, options: &MeshOptions, fineness: f64) -> Result<Division, MeshError> {
     let (mut points, mut edges) = (Vec::new(), BoundaryEdges::new());
-    for curves in boundary_loops(domain) {
+    let mut holes = Vec::new();
+    for (n, curves) in boundary_loops(domain).into_iter().enumerate() {
         let first = points.len();
         for &curve in &curves {
             for pair in parameters(domain, options, fineness, curve)?.windows(2) {
@@ -248,8 +284,35 @@ fn divide_boundary(
         if let Some(closing) = edges.remove(&(last, last + 1)) {
             edges.insert((first, last), closing);
         }
+        // The outline comes first.
+        if n > 0 {
+            holes.push(points[first..].to_vec());
+        }
     }
-    Ok((points, edges))
+    for &[from, to] in &domain.lines {
+        let line = Curve::Line(from, to);
+        let mut last = place_of(&mut points, from, domain);
+        for pair in parameters(domain, options, fineness, line)?.windows(2) {
+            // Half the size: what ends at a line is singular there.
+            let middle = 0.5 * (pair[0] + pair[1]);
+            for [start, end] in [[pair[0], middle], [middle, pair[1]]] {
+                let next = place_of(&mut points, line.at(domain, end), domain);
+                edges.insert((last, next), (line, 0.5 * (start + end)));
+                last = next;
+            }
+        }
+    }
+    Ok((points, edges, holes))
+}
+
+/// The place of a point that may be there already: lines start and end on the outline or on each other.
+fn place_of(points: &mut Vec<[f64; 2]>, p: [f64; 2], domain: &Domain) -> usize {
+    let tolerance = 1e-9 * domain.scale();
+    let known = points.iter().position(|q| (q[0] - p[0]).hypot(q[1] - p[1]) < tolerance);
+    known.unwrap_or_else(|| {
+        points.push(p);
+        points.len() - 1
+    })
 }
 
 /// Parameters that divide a curve into parts of the local size, by equal shares of ∫ ds / size.

@@ -4,11 +4,13 @@ use super::draw::{Draw, Hidden, HiddenCause};
 use crate::fem::{
     Departures, Equilibrium, Fibre, Field, ForwardModel, PlateMotion, PrepareError, SolveError, SolveOptions,
 };
-use crate::mesh::{MeshOptions, mesh_specimen};
+use crate::mesh::{MeshOptions, mesh_specimen, mesh_specimen_along};
 use crate::recording::{Filter, LoadCurve, RecordedStep, Recording};
 use crate::specimen::Specimen;
 use crate::voxel::{Sampling, VoxelError, VoxelGrid, VoxelMask, VoxelOperator};
 
+/// Strips thinner than this are not meshed, mm.
+const LEAST_STRIP_MM: f64 = 0.3;
 /// κ over the shear modulus of a rubber.
 const RUBBER: f64 = 130.0;
 /// Element size as a factor on the standard one.
@@ -148,19 +150,54 @@ fn made_specimen(specimen: &Specimen, hidden: &Hidden) -> Specimen {
     made
 }
 
-/// Prisms; a free patch is made of free nodes.
+/// Prisms; a free patch is made of free nodes, whose elements end at its edges unless these come too near to a hole.
 fn model_of(made: &Specimen, hidden: &Hidden) -> Result<ForwardModel, ConcealError> {
     let options = MeshOptions { use_mirror: false, force_prisms: true, ..MeshOptions::scaled(made, MESH_FACTOR) };
-    let mesh = mesh_specimen(made, &options).map_err(PrepareError::from)?;
+    let lines = if hidden.cause == HiddenCause::Debond { patch_lines(made, hidden) } else { Vec::new() };
+    let mesh =
+        if lines.is_empty() { mesh_specimen(made, &options) } else { mesh_specimen_along(made, &options, &lines) };
+    let mesh = mesh.map_err(PrepareError::from)?;
+    let half = [0.5 * made.block.length_mm, 0.0, 0.5 * made.block.width_mm];
     let is_free = |x: [f64; 3], is_moved: bool| {
         hidden.cause == HiddenCause::Bond && hidden.which != usize::from(!is_moved)
             || hidden.cause == HiddenCause::Debond
                 && is_moved == (hidden.which == 1)
-                && [0, 2].into_iter().all(|a| (x[a] - hidden.center_mm[a]).abs() < 0.5 * hidden.extent_mm[a] + 1e-6)
+                && [0, 2].into_iter().all(|a| is_inside(x[a], hidden, a, half[a]))
     };
     let mut model = ForwardModel::with_released(mesh, made, &is_free)?;
     model.set_departures(&departures(made, hidden));
     Ok(model)
+}
+
+/// Whether a node is in the patch along an axis: its edges hold, but for those that are the face's own.
+fn is_inside(x: f64, hidden: &Hidden, axis: usize, half: f64) -> bool {
+    let away = x - hidden.center_mm[axis];
+    let edge = hidden.center_mm[axis] + away.signum() * 0.5 * hidden.extent_mm[axis];
+    let is_own = edge.abs() > half - LEAST_STRIP_MM;
+    is_own || away.abs() < 0.5 * hidden.extent_mm[axis] - 1e-6
+}
+
+/// Edges of the patch inside the section; none where an element between them and a hole or a side would be a sliver.
+fn patch_lines(made: &Specimen, hidden: &Hidden) -> Vec<[[f64; 2]; 2]> {
+    let half = [0.5 * made.block.length_mm, 0.5 * made.block.width_mm];
+    let edges = [(0, half[0]), (2, half[1])].map(|(axis, half)| {
+        // An edge nearly on the face's own is the face's own.
+        [-0.5, 0.5]
+            .map(|s| hidden.center_mm[axis] + s * hidden.extent_mm[axis])
+            .map(|edge| if edge.abs() > half - LEAST_STRIP_MM { half * edge.signum() } else { edge })
+    });
+    let ([x0, x1], [z0, z1]) = (edges[0], edges[1]);
+    let sides = [[[x0, z0], [x0, z1]], [[x1, z0], [x1, z1]], [[x0, z0], [x1, z0]], [[x0, z1], [x1, z1]]];
+    let is_own = |l: &[[f64; 2]; 2]| (0..2).any(|c| l.iter().all(|p| p[c].abs() >= half[c] - 1e-9));
+    let lines: Vec<[[f64; 2]; 2]> = sides.into_iter().filter(|l| !is_own(l)).collect();
+    let is_near_hole = |l: &[[f64; 2]; 2]| {
+        made.holes.iter().any(|h| {
+            let nearest = [0, 1].map(|c| h.center_mm[c].clamp(l[0][c].min(l[1][c]), l[0][c].max(l[1][c])));
+            let distance = (nearest[0] - h.center_mm[0]).hypot(nearest[1] - h.center_mm[1]);
+            distance < 0.5 * h.diameter_mm + LEAST_STRIP_MM
+        })
+    };
+    if lines.iter().any(is_near_hole) { Vec::new() } else { lines }
 }
 
 fn departures(made: &Specimen, hidden: &Hidden) -> Departures {

@@ -8,6 +8,8 @@ use crate::specimen::Specimen;
 /// Width of the edge of a debonded patch, mm: a third of the spacing of nodes on the face, so that the bond changes smoothly as
 /// the edge passes from node to node.
 const EDGE_MM: f64 = 0.35;
+/// Strips of bond beside a patch that are tried, mm.
+const STRIPS_MM: [f64; 3] = [0.6, 1.3, 2.6];
 /// How loose the inside of the patch is: free but for 1/1000 of the sample's own stiffness, which keeps the patch in place.
 const LOOSE: f64 = 0.999;
 
@@ -86,6 +88,31 @@ impl Cause for Debond {
 
     fn start(&self) -> Vec<f64> {
         self.edges_mm.iter().flatten().copied().collect()
+    }
+
+    /// An edge past the face's own feels no slope: whether a strip of bond holds beside it must be tried, and the other way round.
+    fn leaps(&self, values: &[f64]) -> Vec<Vec<f64>> {
+        let mut all = Vec::new();
+        for (i, &edge) in values.iter().enumerate() {
+            let side = if i % 2 == 0 { -1.0 } else { 1.0 };
+            let half = self.half_mm[i / 2];
+            // Depth of the edge inside the face.
+            let depth = half - side * edge;
+            let mut put = |depth: f64| {
+                let mut other = values.to_vec();
+                other[i] = side * (half - depth);
+                // Some patch must be left.
+                if other[2 * (i / 2) + 1] - other[2 * (i / 2)] > 1.0 {
+                    all.push(other);
+                }
+            };
+            if depth <= 0.0 {
+                STRIPS_MM.into_iter().for_each(&mut put);
+            } else if depth < 2.0 * STRIPS_MM[0] {
+                put(-0.4);
+            }
+        }
+        all
     }
 
     fn apply(&self, values: &[f64], scene: &mut Scene) {

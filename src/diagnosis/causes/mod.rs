@@ -102,6 +102,10 @@ pub trait Cause: Send + Sync {
     fn start(&self) -> Vec<f64> {
         vec![0.0; self.parameters().len()]
     }
+    /// Values that a fit which ended at `values` could not come to by small steps, and that may explain more.
+    fn leaps(&self, _values: &[f64]) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
     /// Changes the scene.
     fn apply(&self, values: &[f64], scene: &mut Scene);
     /// Where it is, if it is somewhere.
