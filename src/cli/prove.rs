@@ -3,6 +3,7 @@
 use super::error::CliError;
 use super::{Common, interrupt, output};
 use crate::proof::{CauseSummary, HiddenCause, Proof, ProofOptions, Scored, prove};
+use crate::provenance::build_id;
 use crate::report::confusion_picture;
 use crate::specimen::Specimen;
 use clap::Args;
@@ -61,11 +62,11 @@ pub(super) fn run(a: &ProveArguments) -> Result<(), CliError> {
         only,
     };
     let folder = output::folder(a.common.out.as_deref(), a.common.json, std::path::Path::new("prove-diagnosis"));
-    // Results are kept as they come: a stopped proof goes on where it was.
+    // Results are kept as they come: a stopped proof goes on where it was. Those of another build are not mixed in.
     let mut done: Vec<Scored> = Vec::new();
     let mut log = None;
     if let Some(folder) = &folder {
-        let path = folder.join(format!("scored-{}-{}.jsonl", a.seed, a.mesh));
+        let path = folder.join(format!("scored-{}-{}-{}.jsonl", a.seed, a.mesh, build_id()));
         let fail = |e: std::io::Error| CliError::Write { path: path.clone(), source: e };
         std::fs::create_dir_all(folder).map_err(fail)?;
         if let Ok(text) = std::fs::read_to_string(&path) {

@@ -76,5 +76,9 @@ pub fn widen(
     for ((sd, square), scale) in fitted.sd.iter_mut().zip(square.iter()).zip(scales) {
         *sd = sd.hypot(scale * square.sqrt());
     }
+    // The bulk modulus, the first, is not known less than it was beforehand.
+    if let Some(sd) = fitted.sd.first_mut() {
+        *sd = sd.min(settings.bulk.log_sd * fitted.material.bulk_kpa);
+    }
     Ok(())
 }

@@ -111,6 +111,8 @@ pub struct Proof {
     pub interval_coverage: f64,
     /// Program version.
     pub version: String,
+    /// The build (see [`crate::provenance::build_id`]).
+    pub build: String,
     /// Hash of the settings.
     pub input_hash: String,
 }
@@ -407,6 +409,7 @@ fn sum_up(scored: Vec<Scored>, options: &ProofOptions) -> Proof {
         known,
         unknown,
         version: crate::provenance::VERSION.into(),
+        build: crate::provenance::build_id(),
         input_hash: crate::provenance::input_hash(&inputs),
     }
 }
