@@ -12,8 +12,6 @@ use crate::specimen::{Specimen, TestKind};
 
 /// Points per curve.
 const NUM_POINTS: usize = 41;
-/// How far beyond the mean strain of the largest drive curves go: strain concentrates.
-const BEYOND: f64 = 1.5;
 
 /// Pictures of several diagnoses: file name without ending, SVG.
 pub fn together_pictures(t: &TogetherResult, all: &[&DiagnosisResult], specimen: &Specimen) -> Vec<(String, String)> {
@@ -63,7 +61,10 @@ pub fn together_report(t: &TogetherResult, all: &[&DiagnosisResult], specimen: &
         ..Table::default()
     });
     let pictures = together_pictures(t, all, specimen);
-    page.figure(&pictures[0].1, "Shear or tension of the materials (incompressible), up to beyond the largest drive.");
+    page.figure(
+        &pictures[0].1,
+        "Shear or tension of the materials (incompressible), up to the mean strain of the largest drive.",
+    );
     if !t.common_causes.is_empty() {
         page.table(&Table {
             caption: "Causes named in every recording".into(),
@@ -84,8 +85,8 @@ pub fn together_report(t: &TogetherResult, all: &[&DiagnosisResult], specimen: &
         &pictures[1].1,
         "Every recording predicted by every other: nominal model and with the causes. Noise is included.",
     );
-    let pair = |b: Option<BeforeAfter>, scale: f64| {
-        b.map_or("no equilibrium or no force".into(), |b| {
+    let pair = |b: Option<BeforeAfter>, scale: f64, missing: &str| {
+        b.map_or(missing.into(), |b| {
             format!("{} to {}", significant(scale * b.before, 3), significant(scale * b.after, 3))
         })
     };
@@ -100,7 +101,12 @@ pub fn together_report(t: &TogetherResult, all: &[&DiagnosisResult], specimen: &
             .predictions
             .iter()
             .map(|p| {
-                vec![p.to.clone(), p.from.clone(), pair(p.displacement_rms_mm, 1.0), pair(p.force_relative, 100.0)]
+                vec![
+                    p.to.clone(),
+                    p.from.clone(),
+                    pair(p.displacement_rms_mm, 1.0, "no equilibrium"),
+                    pair(p.force_relative, 100.0, "none"),
+                ]
             })
             .collect(),
         ..Table::default()
@@ -130,14 +136,14 @@ fn materials(t: &TogetherResult, all: &[&DiagnosisResult], specimen: &Specimen) 
             material.terms.iter().map(|t| ShearTerm { modulus_kpa: t.mu_kpa * t.alpha, alpha: t.alpha }).collect();
         (0..NUM_POINTS)
             .map(|i| {
-                let at = test.rest() + BEYOND * strain * i as f64 / (NUM_POINTS - 1) as f64;
+                let at = test.rest() + strain * i as f64 / (NUM_POINTS - 1) as f64;
                 [at, incompressible_stress(&terms, &test.at(at))]
             })
             .collect()
     };
     let line = |name: &str, material: &Ogden| Line { name: name.into(), points: curve(material), has_marks: false };
     let mut lines: Vec<Line> = all.iter().map(|r| line(&r.recording, &r.material)).collect();
-    lines.push(line("one material for all", &t.material));
+    lines.push(line("one for all", &t.material));
     LinePlot {
         title: "Materials with the causes taken into account".into(),
         x_label: x_label.into(),
@@ -148,12 +154,23 @@ fn materials(t: &TogetherResult, all: &[&DiagnosisResult], specimen: &Specimen) 
     .to_svg()
 }
 
+/// How many bytes all names start with alike; a few are not worth cutting off.
+fn common_start(names: &[&str]) -> usize {
+    let Some(first) = names.first() else { return 0 };
+    let ends = first.char_indices().map(|(i, c)| i + c.len_utf8());
+    let alike = ends.filter(|&end| names.iter().all(|n| n.get(..end) == first.get(..end) && n.len() > end)).last();
+    alike.filter(|end| *end > 4).unwrap_or(0)
+}
+
 fn predictions(t: &TogetherResult) -> String {
+    let names: Vec<&str> = t.predictions.iter().flat_map(|p| [&*p.from, &*p.to]).collect();
+    let start = common_start(&names);
     let groups = t
         .predictions
         .iter()
         .map(|p| {
-            let label = if p.from == p.to { format!("{}, own fit", p.to) } else { format!("{} by {}", p.to, p.from) };
+            let [to, from] = [&p.to, &p.from].map(|name| &name[start..]);
+            let label = if p.from == p.to { format!("{to}, own fit") } else { format!("{to} by {from}") };
             let values = p.displacement_rms_mm.map_or(vec![f64::NAN; 2], |b| vec![b.before, b.after]);
             BarGroup { label, values }
         })
@@ -168,4 +185,19 @@ fn predictions(t: &TogetherResult) -> String {
         missing_label: "no equilibrium".into(),
     }
     .to_svg()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::common_start;
+
+    #[test]
+    fn names_are_cut_where_they_differ() {
+        assert_eq!(common_start(&["block-5mm-a", "block-5mm-b"]), 10);
+        // One name starts as the other: something must be left of it.
+        assert_eq!(common_start(&["block-5mm", "block-5mm-b"]), 8);
+        assert_eq!(common_start(&["ab1", "ab2"]), 0);
+        assert_eq!(common_start(&["Größe-α", "Größe-β"]), 8);
+        assert_eq!(common_start(&[]), 0);
+    }
 }
