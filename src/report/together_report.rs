@@ -157,8 +157,8 @@ fn materials(t: &TogetherResult, all: &[&DiagnosisResult], specimen: &Specimen) 
 /// How many bytes all names start with alike; a few are not worth cutting off.
 fn common_start(names: &[&str]) -> usize {
     let Some(first) = names.first() else { return 0 };
-    let ends = first.char_indices().map(|(i, c)| i + c.len_utf8());
-    let alike = ends.filter(|&end| names.iter().all(|n| n.get(..end) == first.get(..end) && n.len() > end)).next_back();
+    let mut ends = first.char_indices().map(|(i, c)| i + c.len_utf8());
+    let alike = ends.rfind(|&end| names.iter().all(|n| n.get(..end) == first.get(..end) && n.len() > end));
     alike.filter(|end| *end > 4).unwrap_or(0)
 }
 
