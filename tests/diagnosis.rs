@@ -70,18 +70,17 @@ fn diagnosed(recording: &Recording) -> DiagnosisResult {
 }
 
 fn found_in(recording: &Recording) -> Diagnosis {
-    diagnose(recording, &options(), &|_| {}, &|| false).unwrap()
-}
-
-/// One cause is hidden, one is looked for. The coarse mesh errs by some 0.01 mm at 4 mm of drive.
-fn options() -> DiagnosisOptions {
-    DiagnosisOptions { mesh_factor: 2.0, allowance_mm: Some(0.01), max_causes: 1, ..DiagnosisOptions::default() }
+    // The coarse mesh errs by some 0.01 mm at 4 mm of drive.
+    let options = DiagnosisOptions { mesh_factor: 2.0, allowance_mm: Some(0.01), ..DiagnosisOptions::default() };
+    diagnose(recording, &options, &|_| {}, &|| false).unwrap()
 }
 
 /// With causes that the diagnosis is not told of.
 fn diagnosed_without(recording: &Recording, left_out: &[&str]) -> DiagnosisResult {
     let left_out = left_out.iter().map(|n| n.to_string()).collect();
-    let options = DiagnosisOptions { left_out, ..options() };
+    // The coarse mesh errs by some 0.01 mm at 4 mm of drive.
+    let options =
+        DiagnosisOptions { mesh_factor: 2.0, allowance_mm: Some(0.01), left_out, ..DiagnosisOptions::default() };
     let found = diagnose(recording, &options, &|_| {}, &|| false).unwrap();
     DiagnosisResult::new(&found, &recording.id, String::new())
 }
@@ -180,7 +179,12 @@ fn a_sample_stiffer_than_believed_is_said() {
     let mut believed = material();
     believed.bulk_kpa /= 1.1;
     believed.terms[0].mu_kpa /= 1.1;
-    let options = DiagnosisOptions { prior: Some(believed), ..options() };
+    let options = DiagnosisOptions {
+        mesh_factor: 2.0,
+        allowance_mm: Some(0.01),
+        prior: Some(believed),
+        ..DiagnosisOptions::default()
+    };
     let found = diagnose(&recording, &options, &|_| {}, &|| false).unwrap();
     let result = DiagnosisResult::new(&found, "", String::new());
     assert_eq!(result.verdict, Verdict::NoMismatch, "{:?}", result.causes);
