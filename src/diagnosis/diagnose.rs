@@ -8,7 +8,7 @@ use super::laboratory::Laboratory;
 use super::leftover::{Leftover, leftover};
 use super::load_history::{LoadHistoryFit, fit_load_history};
 use super::maps::{ScoreMap, jumps};
-use super::mesh_error::widen;
+use super::mesh_error::{Finer, MeshDefect, widen};
 use super::metric::Metric;
 use super::scene::Scene;
 use super::work::{EVIDENCE, FREE_BULK, KNOWN_BULK, Work, first_guess, is_large, leading, penalty};
@@ -123,6 +123,8 @@ pub struct Diagnosis {
     pub num_solves: usize,
     /// The allowance in use, mm.
     pub allowance_mm: f64,
+    /// What a finer mesh predicts beyond the mesh of the diagnosis, the causes included.
+    pub mesh_defect: Option<MeshDefect>,
 }
 
 /// Diagnoses `recording`; `progress` is told what is being done.
@@ -298,17 +300,44 @@ pub fn diagnose(
         let _ = c;
         causes.push(found_cause(&current, index, &observed, nominal.deviance - current.deviance, 0.0));
     }
-    progress("estimating what the mesh does to the parameters");
+    progress("correcting by a finer mesh");
+    let mut finer = Finer::new(&observed, options.mesh_factor);
     let free_settings = work.settings;
-    for (fitted, settings) in
-        [(&mut nominal, FitSettings { bulk: work.nominal_bulk, ..free_settings }), (&mut current, free_settings)]
-    {
-        let widened = widen(work.laboratory, &observed, options.mesh_factor, &metric, &settings, fitted, is_cancelled);
+    let mut seen = [measured.clone(), measured.clone()];
+    let mut mesh_defect = None;
+    let corrected_settings = [FitSettings { bulk: work.nominal_bulk, ..free_settings }, free_settings];
+    for (n, fitted) in [&mut nominal, &mut current].into_iter().enumerate() {
+        let settings = corrected_settings[n];
+        let correction =
+            finer.as_mut().map(|f| f.correct(work.laboratory, &metric, &measured, &settings, fitted, is_cancelled));
+        let defect = match correction {
+            Some(Err(error)) if is_cancelled() => return Err(error),
+            Some(Err(_)) => {
+                progress("a finer model has no equilibrium: estimates are those of this mesh");
+                None
+            }
+            Some(Ok(defect)) => Some(defect),
+            None => None,
+        };
+        if let Some(defect) = &defect {
+            seen[n] = measured.plus(-1.0, &defect.trace);
+        }
+        let widened = widen(
+            work.laboratory,
+            &observed,
+            options.mesh_factor,
+            &metric,
+            &settings,
+            fitted,
+            defect.as_ref(),
+            is_cancelled,
+        );
         match widened {
             Err(error) if is_cancelled() => return Err(error),
             Err(_) => progress("a coarser model has no equilibrium: the intervals are those of the noise"),
             Ok(()) => {}
         }
+        mesh_defect = defect;
     }
     // Parameters as in the last fit, all causes together.
     for c in &mut causes {
@@ -317,7 +346,7 @@ pub fn diagnose(
     causes.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
     let left = [leftover(&observed, &nominal.residual, &metric), leftover(&observed, &current.residual, &metric)];
     progress("predicting voxel blocks that were kept back");
-    let kept_back_rms_mm = work.kept_back(&measured, &nominal, &current)?;
+    let kept_back_rms_mm = work.kept_back(&seen, &nominal, &current)?;
     let verdict = if left[1].structured_rms_mm > UNEXPLAINED * allowance_mm {
         Verdict::Unexplained
     } else if causes.is_empty() {
@@ -350,6 +379,7 @@ pub fn diagnose(
         num_unknowns,
         num_solves,
         allowance_mm,
+        mesh_defect,
         observed,
     })
 }

@@ -1,38 +1,93 @@
-//! What meshes and soft edges do to estimates: the shifts that coarser meshes and wider edges of a cause make, added to the
-//! standard deviations.
+//! What meshes and soft edges do to estimates: fits are corrected by a finer mesh's prediction, and the shifts that other meshes
+//! and wider edges of a cause make are added to the standard deviations.
 //!
 //! Noise alone gives intervals that are far too narrow: 20,000 voxels average it out, and what is left is the error of the mesh,
-//! ours and that of whoever made synthetic data. The prediction of a coarser mesh differs from ours by a multiple of our error;
+//! ours and that of whoever made synthetic data. The prediction of another mesh differs from ours by a multiple of our error;
 //! fitted as if it were a misfit, to first order, it says how far our error moves each parameter.
 
 use super::error::DiagnosisError;
-use super::fit::{FitSettings, Fitted, derivatives, normal_matrix, scales};
+use super::fit::{FitSettings, Fitted, derivatives, fit, normal_matrix, scales};
 use super::laboratory::Laboratory;
 use super::metric::Metric;
 use super::scene::Scene;
+use super::trace::Trace;
 use crate::calibration::Observed;
 use crate::mesh::MeshOptions;
 use nalgebra::DVector;
 
-/// Element sizes of the coarser meshes as factors on ours. One alone may shift a parameter by little where it happens to err as
-/// ours does; the mean square of two counts.
-const COARSER: [f64; 2] = [1.25, 1.6];
+/// Element size of the finer mesh as a factor on ours, and the finest it is made, as a factor on the standard one: beyond, the
+/// error is smaller than what a recording shows.
+const FINER: f64 = 0.6;
+const FINEST: f64 = 0.45;
+/// With a factor nearer to one than this a finer mesh says nothing.
+const HARDLY_FINER: f64 = 0.9;
+/// Element size of the coarser mesh. It is of prisms: where ours is of hexahedra its errors have another pattern, so that a
+/// parameter that ours leaves alone by its symmetry is not thought free of error.
+const COARSER: f64 = 1.6;
 /// The order of convergence that singular edges leave.
 const ORDER: f64 = 1.4;
-
-/// Standard deviation of an error over the shift between our mesh and one `coarser` times as coarse: 1/(coarser^order − 1) is our
-/// own error; data that come from a mesh have another of the kind, hence √2 times that.
-fn sd_over_shift(coarser: f64) -> f64 {
-    std::f64::consts::SQRT_2 / (coarser.powf(ORDER) - 1.0)
-}
+/// Data that come from a mesh have an error of the same kind as ours.
+const BOTH: f64 = std::f64::consts::SQRT_2;
 
 /// Standard deviation over the shift to an edge twice as wide: an edge is anything from sharp to that, evenly.
 const SD_OVER_EDGE: f64 = 0.58;
 
-/// Adds the meshes' share to the standard deviations of `fitted`, found by `laboratory` on a mesh of `mesh_factor`.
+/// The finer mesh of a recording, on which what was found with ours is corrected.
+pub struct Finer<'a> {
+    laboratory: Laboratory<'a>,
+    /// Element size as a factor on ours.
+    ratio: f64,
+}
+
+/// What a finer mesh does to a fit's prediction.
+#[derive(Clone)]
+pub struct MeshDefect {
+    /// Predicted on the finer mesh minus predicted on ours.
+    pub trace: Trace,
+    /// Element size of the finer mesh as a factor on ours.
+    pub ratio: f64,
+}
+
+impl<'a> Finer<'a> {
+    /// `None` where ours is fine already, or the finer one cannot be meshed.
+    pub fn new(observed: &'a Observed, mesh_factor: f64) -> Option<Finer<'a>> {
+        let ratio = FINER.max(FINEST / mesh_factor);
+        let mesh = MeshOptions::scaled(&observed.specimen, ratio * mesh_factor);
+        if ratio > HARDLY_FINER {
+            return None;
+        }
+        Laboratory::new(observed, &mesh).ok().map(|laboratory| Finer { laboratory, ratio })
+    }
+
+    /// Corrects a fit by the finer mesh's prediction (deferred correction: what the finer mesh predicts beyond ours is taken off
+    /// the measured, and the fit repeated on ours from where it ended). `fitted.residual` is then against the finer mesh to first
+    /// order.
+    ///
+    /// # Errors
+    /// [`DiagnosisError`]: the finer model has no equilibrium, or the work was cancelled.
+    pub fn correct(
+        &mut self,
+        laboratory: &mut Laboratory,
+        metric: &Metric,
+        measured: &Trace,
+        settings: &FitSettings,
+        fitted: &mut Fitted,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<MeshDefect, DiagnosisError> {
+        let theirs = self.laboratory.predict(&fitted.material, &fitted.scene(), is_cancelled)?;
+        let trace = theirs.trace.plus(-1.0, &fitted.prediction.trace);
+        let seen = measured.plus(-1.0, &trace);
+        *fitted = fit(laboratory, metric, &seen, &fitted.material, &fitted.causes, settings, is_cancelled)?;
+        Ok(MeshDefect { trace, ratio: self.ratio })
+    }
+}
+
+/// Adds the meshes' share to the standard deviations of `fitted`, found by `laboratory` on a mesh of `mesh_factor` and corrected
+/// by `defect`.
 ///
 /// # Errors
 /// [`DiagnosisError`]: the coarser model has no equilibrium, or the work was cancelled.
+#[allow(clippy::too_many_arguments)]
 pub fn widen(
     laboratory: &mut Laboratory,
     observed: &Observed,
@@ -40,22 +95,28 @@ pub fn widen(
     metric: &Metric,
     settings: &FitSettings,
     fitted: &mut Fitted,
+    defect: Option<&MeshDefect>,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<(), DiagnosisError> {
     let columns = derivatives(laboratory, &fitted.material, &fitted.causes, &fitted.prediction)?;
     let weighed: Vec<_> = columns.iter().map(|c| metric.weigh(c)).collect();
     let matrix = normal_matrix(metric, &weighed, &fitted.material, &fitted.causes, settings);
     let Some(factor) = matrix.cholesky() else { return Ok(()) };
-    let mut square = DVector::<f64>::zeros(weighed.len());
-    for coarser in COARSER {
-        let mesh = MeshOptions::scaled(&observed.specimen, coarser * mesh_factor);
-        let mut other = Laboratory::new(observed, &mesh)?;
-        let theirs = other.predict(&fitted.material, &fitted.scene(), is_cancelled)?;
-        let change = metric.weigh(&fitted.prediction.trace.plus(-1.0, &theirs.trace));
-        let gradient = DVector::from_iterator(weighed.len(), weighed.iter().map(|c| metric.inner(c, &change)));
-        let shift = factor.solve(&gradient) * sd_over_shift(coarser);
-        square += shift.component_mul(&shift) / COARSER.len() as f64;
+    let shift_by = |change: &Trace| {
+        let change = metric.weigh(change);
+        factor.solve(&DVector::from_iterator(weighed.len(), weighed.iter().map(|c| metric.inner(c, &change))))
+    };
+    // Errors of our mesh and of the finer one, relative to the difference of the two; of ours to that with the coarser one.
+    let left = defect.map_or(1.0, |d| d.ratio.powf(ORDER));
+    let mesh = MeshOptions { force_prisms: true, ..MeshOptions::scaled(&observed.specimen, COARSER * mesh_factor) };
+    let theirs = Laboratory::new(observed, &mesh)?.predict(&fitted.material, &fitted.scene(), is_cancelled)?;
+    let coarser = shift_by(&fitted.prediction.trace.plus(-1.0, &theirs.trace)) * (left / (COARSER.powf(ORDER) - 1.0));
+    let mut square = coarser.component_mul(&coarser);
+    if let Some(defect) = defect {
+        let finer = shift_by(&defect.trace) * (left / (1.0 - left));
+        square = (square + finer.component_mul(&finer)) * 0.5;
     }
+    square *= BOTH * BOTH;
     let mut wider = Scene::default();
     let mut has_edge = false;
     for c in &fitted.causes {
@@ -67,9 +128,7 @@ pub fn widen(
     }
     if has_edge {
         let theirs = laboratory.predict(&fitted.material, &wider, is_cancelled)?;
-        let change = metric.weigh(&fitted.prediction.trace.plus(-1.0, &theirs.trace));
-        let gradient = DVector::from_iterator(weighed.len(), weighed.iter().map(|c| metric.inner(c, &change)));
-        let shift = factor.solve(&gradient) * SD_OVER_EDGE;
+        let shift = shift_by(&fitted.prediction.trace.plus(-1.0, &theirs.trace)) * SD_OVER_EDGE;
         square += shift.component_mul(&shift);
     }
     let scales = scales(&fitted.material, &fitted.causes);

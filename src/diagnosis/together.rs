@@ -112,6 +112,9 @@ pub fn together(
                 *force -= excess;
             }
         }
+        if let Some(defect) = &found.mesh_defect {
+            measured = measured.plus(-1.0, &defect.trace);
+        }
         let metric = Metric::new(&found.observed, found.allowance_mm, &|_| true);
         cases.push(Case { name, found, laboratory, metric, measured });
     }
@@ -246,7 +249,9 @@ fn widen_all(
     for (case, fitted) in cases.iter_mut().zip(shared.iter_mut()) {
         let observed: &Observed = &case.found.observed;
         let settings = case.found.settings;
-        match widen(&mut case.laboratory, observed, mesh_factor, &case.metric, &settings, fitted, is_cancelled) {
+        let defect = case.found.mesh_defect.as_ref();
+        match widen(&mut case.laboratory, observed, mesh_factor, &case.metric, &settings, fitted, defect, is_cancelled)
+        {
             Err(error) if is_cancelled() => return Err(error),
             // A coarser model without an equilibrium: the noise alone, as in the diagnosis.
             Err(_) | Ok(()) => {}

@@ -480,7 +480,7 @@ impl Work<'_, '_> {
     /// Rms misfit on blocks of voxels that the fits did not see, without and with the causes: two halves in turn.
     pub(super) fn kept_back(
         &mut self,
-        measured: &Trace,
+        seen: &[Trace; 2],
         nominal: &Fitted,
         corrected: &Fitted,
     ) -> Result<[f64; 2], DiagnosisError> {
@@ -496,7 +496,7 @@ impl Work<'_, '_> {
                 let found = fit(
                     self.laboratory,
                     &metric,
-                    measured,
+                    &seen[n],
                     &fitted.material,
                     &fitted.causes,
                     &settings,
