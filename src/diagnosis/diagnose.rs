@@ -11,6 +11,7 @@ use super::maps::{ScoreMap, jumps};
 use super::mesh_error::{Finer, MeshDefect, widen};
 use super::metric::Metric;
 use super::scene::Scene;
+use super::trace::Trace;
 use super::work::{EVIDENCE, FREE_BULK, KNOWN_BULK, Work, first_guess, is_large, leading, penalty};
 use crate::calibration::Observed;
 use crate::material::Ogden;
@@ -148,7 +149,7 @@ pub fn diagnose(
     let mesh = MeshOptions::scaled(&observed.specimen, options.mesh_factor);
     let mut laboratory = Laboratory::new(&observed, &mesh)?;
     let num_unknowns = laboratory.num_unknowns()?;
-    let mut measured = laboratory.measured();
+    let mut recorded = laboratory.measured();
     let start = first_guess(&mut laboratory, options, is_cancelled)?;
     // Without a force the modulus is that of the first guess; what is fitted are ratios and shapes.
     let has_force = observed.steps.iter().any(|s| s.force.is_some());
@@ -169,7 +170,7 @@ pub fn diagnose(
         allowance_mm,
         left_out: &options.left_out,
     };
-    let mut nominal = work.nominal(&measured, &start, options.prior.is_some())?;
+    let mut nominal = work.nominal(&recorded, &start, options.prior.is_some())?;
 
     // The load curve first: what time and the load cell add is taken off before the model is compared.
     progress("reading the load curve");
@@ -184,13 +185,28 @@ pub fn diagnose(
     let has_curve = load.is_some();
     let mut causes: Vec<FoundCause> = Vec::new();
     if let Some(found) = load.as_ref().filter(|l| !l.effects.is_empty()) {
-        for (force, excess) in measured.force.iter_mut().zip(&found.window_excess_n) {
+        for (force, excess) in recorded.force.iter_mut().zip(&found.window_excess_n) {
             *force -= excess;
         }
         causes.extend(load_causes(&found.effects));
         progress("refitting with the load curve's effects taken off");
-        nominal = work.nominal(&measured, &start, options.prior.is_some())?;
+        nominal = work.nominal(&recorded, &start, options.prior.is_some())?;
     }
+    // What our mesh gets wrong of the nominal model is taken off before a misfit is looked for.
+    let mut finer = Finer::new(&observed, options.mesh_factor);
+    let mut mesh_defect: Option<MeshDefect> = None;
+    if let Some(finer) = finer.as_mut() {
+        progress("predicting on a finer mesh");
+        match finer.defect(&nominal, is_cancelled) {
+            Ok(found) => {
+                mesh_defect = Some(found);
+                nominal = work.nominal(&less(&recorded, &mesh_defect), &nominal.material, options.prior.is_some())?;
+            }
+            Err(error) if is_cancelled() => return Err(error),
+            Err(_) => progress("a finer model has no equilibrium: the mismatch is that against this mesh"),
+        }
+    }
+    let measured = less(&recorded, &mesh_defect);
     let mut ranked = Vec::new();
     let mut maps = Vec::new();
     let mut alternatives = Vec::new();
@@ -301,15 +317,13 @@ pub fn diagnose(
         causes.push(found_cause(&current, index, &observed, nominal.deviance - current.deviance, 0.0));
     }
     progress("correcting by a finer mesh");
-    let mut finer = Finer::new(&observed, options.mesh_factor);
     let free_settings = work.settings;
     let mut seen = [measured.clone(), measured.clone()];
-    let mut mesh_defect = None;
     let corrected_settings = [FitSettings { bulk: work.nominal_bulk, ..free_settings }, free_settings];
     for (n, fitted) in [&mut nominal, &mut current].into_iter().enumerate() {
         let settings = corrected_settings[n];
         let correction =
-            finer.as_mut().map(|f| f.correct(work.laboratory, &metric, &measured, &settings, fitted, is_cancelled));
+            finer.as_mut().map(|f| f.correct(work.laboratory, &metric, &recorded, &settings, fitted, is_cancelled));
         let defect = match correction {
             Some(Err(error)) if is_cancelled() => return Err(error),
             Some(Err(_)) => {
@@ -319,8 +333,8 @@ pub fn diagnose(
             Some(Ok(defect)) => Some(defect),
             None => None,
         };
-        if let Some(defect) = &defect {
-            seen[n] = measured.plus(-1.0, &defect.trace);
+        if defect.is_some() {
+            seen[n] = less(&recorded, &defect);
         }
         let widened = widen(
             work.laboratory,
@@ -337,7 +351,7 @@ pub fn diagnose(
             Err(_) => progress("a coarser model has no equilibrium: the intervals are those of the noise"),
             Ok(()) => {}
         }
-        mesh_defect = defect;
+        mesh_defect = defect.or(mesh_defect);
     }
     // Parameters as in the last fit, all causes together.
     for c in &mut causes {
@@ -382,6 +396,11 @@ pub fn diagnose(
         mesh_defect,
         observed,
     })
+}
+
+/// What our mesh would have shown of `recorded`, were it not for its own error.
+fn less(recorded: &Trace, defect: &Option<MeshDefect>) -> Trace {
+    defect.as_ref().map_or_else(|| recorded.clone(), |d| recorded.plus(-1.0, &d.trace))
 }
 
 /// The scene of a diagnosis' causes, for pictures.

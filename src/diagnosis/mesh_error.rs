@@ -74,11 +74,19 @@ impl<'a> Finer<'a> {
         fitted: &mut Fitted,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<MeshDefect, DiagnosisError> {
-        let theirs = self.laboratory.predict(&fitted.material, &fitted.scene(), is_cancelled)?;
-        let trace = theirs.trace.plus(-1.0, &fitted.prediction.trace);
-        let seen = measured.plus(-1.0, &trace);
+        let defect = self.defect(fitted, is_cancelled)?;
+        let seen = measured.plus(-1.0, &defect.trace);
         *fitted = fit(laboratory, metric, &seen, &fitted.material, &fitted.causes, settings, is_cancelled)?;
-        Ok(MeshDefect { trace, ratio: self.ratio })
+        Ok(defect)
+    }
+
+    /// What the finer mesh predicts beyond ours.
+    ///
+    /// # Errors
+    /// As [`Self::correct`].
+    pub fn defect(&mut self, fitted: &Fitted, is_cancelled: &dyn Fn() -> bool) -> Result<MeshDefect, DiagnosisError> {
+        let theirs = self.laboratory.predict(&fitted.material, &fitted.scene(), is_cancelled)?;
+        Ok(MeshDefect { trace: theirs.trace.plus(-1.0, &fitted.prediction.trace), ratio: self.ratio })
     }
 }
 
