@@ -149,3 +149,7 @@ pub fn widen(
     }
     Ok(())
 }
+
+#[cfg(test)]
+#[path = "mesh_error_tests.rs"]
+mod tests;
