@@ -336,16 +336,8 @@ pub fn diagnose(
         if defect.is_some() {
             seen[n] = less(&recorded, &defect);
         }
-        let widened = widen(
-            work.laboratory,
-            &observed,
-            options.mesh_factor,
-            &metric,
-            &settings,
-            fitted,
-            defect.as_ref(),
-            is_cancelled,
-        );
+        let widened =
+            widen(work.laboratory, options.mesh_factor, &metric, &settings, fitted, defect.as_ref(), is_cancelled);
         match widened {
             Err(error) if is_cancelled() => return Err(error),
             Err(_) => progress("a coarser model has no equilibrium: the intervals are those of the noise"),

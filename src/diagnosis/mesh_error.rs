@@ -95,10 +95,8 @@ impl<'a> Finer<'a> {
 ///
 /// # Errors
 /// [`DiagnosisError`]: the coarser model has no equilibrium, or the work was cancelled.
-#[allow(clippy::too_many_arguments)]
 pub fn widen(
     laboratory: &mut Laboratory,
-    observed: &Observed,
     mesh_factor: f64,
     metric: &Metric,
     settings: &FitSettings,
@@ -106,6 +104,7 @@ pub fn widen(
     defect: Option<&MeshDefect>,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<(), DiagnosisError> {
+    let observed = laboratory.observed();
     let columns = derivatives(laboratory, &fitted.material, &fitted.causes, &fitted.prediction)?;
     let weighed: Vec<_> = columns.iter().map(|c| metric.weigh(c)).collect();
     let matrix = normal_matrix(metric, &weighed, &fitted.material, &fitted.causes, settings);

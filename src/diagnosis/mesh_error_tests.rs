@@ -65,7 +65,7 @@ fn a_finer_mesh_corrects_estimates() {
     assert!(after.abs() < 0.5 * before.abs(), "{before} {after}");
 
     let noise = fitted.sd_of(0)[0];
-    widen(&mut laboratory, &observed, mesh_factor, &metric, &settings, &mut fitted, Some(&defect), &never).unwrap();
+    widen(&mut laboratory, mesh_factor, &metric, &settings, &mut fitted, Some(&defect), &never).unwrap();
     let wider = fitted.sd_of(0)[0];
     assert!(wider > noise && after.abs() < 1.96 * wider, "{noise} {wider} {after}");
     // Far from everything fits into it: the correction itself is not lost in the interval.

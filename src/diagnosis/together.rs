@@ -11,7 +11,6 @@ use super::metric::Metric;
 use super::result::{BeforeAfter, ParameterResult, material_parameters, parameter};
 use super::trace::Trace;
 use super::work::EVIDENCE;
-use crate::calibration::Observed;
 use crate::material::Ogden;
 use crate::mesh::MeshOptions;
 use serde::{Deserialize, Serialize};
@@ -247,11 +246,9 @@ fn widen_all(
     let mut squares = vec![0.0; num_material];
     let num_cases = cases.len() as f64;
     for (case, fitted) in cases.iter_mut().zip(shared.iter_mut()) {
-        let observed: &Observed = &case.found.observed;
         let settings = case.found.settings;
         let defect = case.found.mesh_defect.as_ref();
-        match widen(&mut case.laboratory, observed, mesh_factor, &case.metric, &settings, fitted, defect, is_cancelled)
-        {
+        match widen(&mut case.laboratory, mesh_factor, &case.metric, &settings, fitted, defect, is_cancelled) {
             Err(error) if is_cancelled() => return Err(error),
             // A coarser model without an equilibrium: the noise alone, as in the diagnosis.
             Err(_) | Ok(()) => {}
