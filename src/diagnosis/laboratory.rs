@@ -121,7 +121,16 @@ impl<'a> Laboratory<'a> {
                     match cold {
                         Ok(state) => state,
                         Err(cause @ SolveError::Cancelled { .. }) => return Err(cause.into()),
-                        Err(_) => station.model.solve(material, step.drive_mm, None, &self.solve, is_cancelled)?,
+                        // From rest; plates far out of place are brought there by parts.
+                        Err(_) => {
+                            let model = &mut station.model;
+                            match model.solve(material, step.drive_mm, None, &self.solve, is_cancelled) {
+                                Err(_) if departures.moves_plates() && !is_cancelled() => {
+                                    model.solve_by_parts(material, step.drive_mm, &self.solve, is_cancelled)?
+                                }
+                                found => found?,
+                            }
+                        }
                     }
                 }
             };

@@ -7,7 +7,7 @@
 use super::element_data::{ElementOutput, MAX_GROUPS};
 use super::error::{SolveError, StepFailure};
 use super::model::ForwardModel;
-use super::newton::Equilibrium;
+use super::newton::{Equilibrium, SolveOptions};
 use crate::material::{LANES, Lanes, Ogden};
 use std::fmt;
 use std::sync::Arc;
@@ -78,7 +78,20 @@ impl PlateMotion {
         let twice = cross(w, once);
         [0, 1, 2].map(|i| t[i] + a * once[i] + b * twice[i])
     }
+
+    fn scaled(&self, factor: f64) -> PlateMotion {
+        let times = |v: [f64; 3]| v.map(|x| factor * x);
+        PlateMotion {
+            translation_mm: times(self.translation_mm),
+            translation_per_mm: times(self.translation_per_mm),
+            rotation_rad: times(self.rotation_rad),
+            rotation_rad_per_mm: times(self.rotation_rad_per_mm),
+        }
+    }
 }
+
+/// In how many parts plates are brought to where they are by [`ForwardModel::solve_by_parts`].
+const PARTS: i32 = 8;
 
 /// All departures of one experiment.
 #[derive(Clone, Debug, Default)]
@@ -100,13 +113,16 @@ pub struct Departures {
 impl Departures {
     /// Whether nothing departs.
     pub fn is_none(&self) -> bool {
-        let rest = PlateMotion::default();
         self.stiffness_factor.is_none()
             && self.log_growth.is_none()
             && self.fibre.is_none()
-            && self.fixed_plate == rest
-            && self.moved_plate == rest
+            && !self.moves_plates()
             && self.bond_kpa_per_mm.is_none()
+    }
+
+    /// Whether a plate departs from its nominal motion.
+    pub fn moves_plates(&self) -> bool {
+        [self.fixed_plate, self.moved_plate] != [PlateMotion::default(); 2]
     }
 }
 
@@ -138,6 +154,36 @@ impl ForwardModel {
         self.prepared = self.prepare(departures);
         self.is_nominal = departures.is_none();
         self.tangent_at = 0;
+    }
+
+    /// As [`ForwardModel::solve`] from rest, the plates' departures growing in eight parts at the drive asked for: a plate that is
+    /// far out of place without any drive is a step that Newton's method does not take from rest at once.
+    ///
+    /// # Errors
+    /// As [`ForwardModel::solve`].
+    pub fn solve_by_parts(
+        &mut self,
+        material: &Ogden,
+        drive_mm: f64,
+        options: &SolveOptions,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Equilibrium, SolveError> {
+        let whole = self.departures().clone();
+        let mut state = None;
+        for part in 0..PARTS {
+            let grown = f64::from(part) / f64::from(PARTS);
+            let (fixed_plate, moved_plate) = (whole.fixed_plate.scaled(grown), whole.moved_plate.scaled(grown));
+            self.set_departures(&Departures { fixed_plate, moved_plate, ..whole.clone() });
+            match self.solve(material, drive_mm, state.as_ref(), options, is_cancelled) {
+                Ok(found) => state = Some(found),
+                Err(error) => {
+                    self.set_departures(&whole);
+                    return Err(error);
+                }
+            }
+        }
+        self.set_departures(&whole);
+        self.solve(material, drive_mm, state.as_ref(), options, is_cancelled)
     }
 
     /// The departures in force.

@@ -65,7 +65,7 @@ pub fn conceal(specimen: &Specimen, hidden: &Hidden) -> Result<Concealed, Concea
     let mut drives = specimen.drive_mm.clone();
     drives.push(BEYOND * largest);
     let mut model = model_of(&made, hidden)?;
-    let states = path(&mut model, &made, hidden, &drives)?;
+    let states = path(&mut model, hidden, &drives)?;
     let mut grid = VoxelGrid::covering(specimen, VOXEL_MM)?;
     let drawn = grid.clone();
     if hidden.cause == HiddenCause::Registration {
@@ -80,7 +80,7 @@ pub fn conceal(specimen: &Specimen, hidden: &Hidden) -> Result<Concealed, Concea
         nominal.material.bulk_kpa = RUBBER * shear_modulus;
     }
     let mut reference = model_of(specimen, &nominal)?;
-    let plain = path(&mut reference, specimen, &nominal, &drives)?;
+    let plain = path(&mut reference, &nominal, &drives)?;
     let plain_mask = VoxelMask::of_specimen(specimen, drawn.clone())?;
     let plain_operator = VoxelOperator::new(specimen, reference.mesh(), &plain_mask, Sampling::default())?;
 
@@ -243,19 +243,15 @@ fn departures(made: &Specimen, hidden: &Hidden) -> Departures {
 }
 
 /// Equilibria at the commanded drives.
-fn path(
-    model: &mut ForwardModel,
-    made: &Specimen,
-    hidden: &Hidden,
-    drives: &[f64],
-) -> Result<Vec<Equilibrium>, ConcealError> {
+fn path(model: &mut ForwardModel, hidden: &Hidden, drives: &[f64]) -> Result<Vec<Equilibrium>, ConcealError> {
     let options = SolveOptions::default();
     let never = || false;
     let mut found: Vec<Equilibrium> = Vec::new();
     for &drive in drives {
         let mut state = match model.solve(&hidden.material, drive, found.last(), &options, &never) {
-            // A plate far out of place at rest already is brought there little by little.
-            Err(_) if hidden.cause == HiddenCause::Mount => put_in_place(model, made, hidden, drive)?,
+            Err(_) if hidden.cause == HiddenCause::Mount => {
+                model.solve_by_parts(&hidden.material, drive, &options, &never)?
+            }
             found => found?,
         };
         if hidden.cause == HiddenCause::Compliance {
@@ -275,26 +271,6 @@ fn path(
         found.push(state);
     }
     Ok(found)
-}
-
-/// The equilibrium at `drive` by way of smaller strengths.
-fn put_in_place(
-    model: &mut ForwardModel,
-    made: &Specimen,
-    hidden: &Hidden,
-    drive: f64,
-) -> Result<Equilibrium, ConcealError> {
-    const PARTS: i32 = 8;
-    let mut at = |part: i32, from: Option<&Equilibrium>| {
-        let strength = hidden.strength * f64::from(part) / f64::from(PARTS);
-        model.set_departures(&departures(made, &Hidden { strength, ..hidden.clone() }));
-        model.solve(&hidden.material, drive, from, &SolveOptions::default(), &|| false)
-    };
-    let mut state = at(0, None)?;
-    for part in 1..=PARTS {
-        state = at(part, Some(&state))?;
-    }
-    Ok(state)
 }
 
 /// What the scan makes of a displacement.
