@@ -21,14 +21,12 @@ const FINER: f64 = 0.6;
 const FINEST: f64 = 0.45;
 /// With a factor nearer to one than this a finer mesh says nothing.
 const HARDLY_FINER: f64 = 0.9;
-/// Element size of the coarser mesh. It is of prisms: where ours is of hexahedra its errors have another pattern, so that a
-/// parameter that ours leaves alone by its symmetry is not thought free of error.
-const COARSER: f64 = 1.6;
+/// Other meshes: element size as a factor on ours, and whether they are of prisms. Where ours is of hexahedra these err in another
+/// pattern: a parameter that ours leaves alone by its symmetry is not thought free of error. One alone may shift a parameter by
+/// little where it happens to err as ours does; the mean square of all counts.
+const COARSER: [(f64, bool); 3] = [(1.25, false), (1.6, false), (1.6, true)];
 /// The order of convergence that singular edges leave.
 const ORDER: f64 = 1.4;
-/// Data that come from a mesh have an error of the same kind as ours.
-const BOTH: f64 = std::f64::consts::SQRT_2;
-
 /// Standard deviation over the shift to an edge twice as wide: an edge is anything from sharp to that, evenly.
 const SD_OVER_EDGE: f64 = 0.58;
 
@@ -113,17 +111,22 @@ pub fn widen(
         let change = metric.weigh(change);
         factor.solve(&DVector::from_iterator(weighed.len(), weighed.iter().map(|c| metric.inner(c, &change))))
     };
-    // Errors of our mesh and of the finer one, relative to the difference of the two; of ours to that with the coarser one.
-    let left = defect.map_or(1.0, |d| d.ratio.powf(ORDER));
-    let mesh = MeshOptions { force_prisms: true, ..MeshOptions::scaled(&observed.specimen, COARSER * mesh_factor) };
-    let theirs = Laboratory::new(observed, &mesh)?.predict(&fitted.material, &fitted.scene(), is_cancelled)?;
-    let coarser = shift_by(&fitted.prediction.trace.plus(-1.0, &theirs.trace)) * (left / (COARSER.powf(ORDER) - 1.0));
-    let mut square = coarser.component_mul(&coarser);
-    if let Some(defect) = defect {
-        let finer = shift_by(&defect.trace) * (left / (1.0 - left));
-        square = (square + finer.component_mul(&finer)) * 0.5;
+    // By every other mesh, what the error of ours does.
+    let mut shifts = Vec::new();
+    for (coarser, force_prisms) in COARSER {
+        let mesh = MeshOptions { force_prisms, ..MeshOptions::scaled(&observed.specimen, coarser * mesh_factor) };
+        let theirs = Laboratory::new(observed, &mesh)?.predict(&fitted.material, &fitted.scene(), is_cancelled)?;
+        shifts.push(shift_by(&fitted.prediction.trace.plus(-1.0, &theirs.trace)) / (coarser.powf(ORDER) - 1.0));
     }
-    square *= BOTH * BOTH;
+    // What a correction by the finer mesh leaves of it.
+    let left = defect.map_or(1.0, |d| d.ratio.powf(ORDER));
+    shifts.extend(defect.map(|d| shift_by(&d.trace) / (1.0 - left)));
+    let mut square = DVector::<f64>::zeros(weighed.len());
+    for shift in &shifts {
+        square += shift.component_mul(shift) / shifts.len() as f64;
+    }
+    // Data that come from a mesh have an error like that of ours, and it is not known whose they are.
+    square *= 1.0 + left * left;
     let mut wider = Scene::default();
     let mut has_edge = false;
     for c in &fitted.causes {
