@@ -54,11 +54,11 @@ fn an_unknown_cause_is_not_named_no_mismatch() {
     assert!(!found.named.iter().any(|n| n == "debond"), "{found:?}");
 }
 
-/// A load train that gives way a little looks like a gain error: both are named, with a further step that would tell them apart.
+/// A gain error of 1 % looks like a load train that gives way: both are named, with a further step that would tell them apart.
 #[test]
 fn an_ambiguous_cause_comes_with_the_experiment() {
     use lambdak::diagnosis::{DiagnosisOptions, diagnose};
-    let made = conceal(&specimen(), &draw_cause(HiddenCause::Compliance, 1_004_013)).unwrap();
+    let made = conceal(&specimen(), &draw_cause(HiddenCause::Gain, 1_010_016)).unwrap();
     let options = DiagnosisOptions { mesh_factor: 2.2, ..DiagnosisOptions::default() };
     let found = diagnose(&made.recording, &options, &|_| {}, &common::never).unwrap();
     assert_eq!(found.verdict, Verdict::ExplainedAmbiguously);
