@@ -81,7 +81,9 @@ pub(super) fn run(a: &ProveArguments) -> Result<(), CliError> {
     let report = |s: &Scored, _: usize, total: usize| {
         let n = count.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
         let first = s.named.first().map_or("none", |n| n);
-        let mark = if s.is_right {
+        let mark = if let Some(failure) = &s.failure {
+            failure
+        } else if s.is_right {
             "right"
         } else if s.is_detectable || !s.named.is_empty() {
             "WRONG"
@@ -104,8 +106,7 @@ pub(super) fn run(a: &ProveArguments) -> Result<(), CliError> {
             eprintln!("a result could not be kept: {error}");
         }
     };
-    let proof =
-        prove(&specimen, &options, &done, &report, &interrupt::is_requested).map_err(|e| input(e.to_string()))?;
+    let proof = prove(&specimen, &options, &done, &report, &interrupt::is_requested);
     if let Some(folder) = &folder {
         output::write_file(folder, "proof.json", output::to_json(&proof)?.as_bytes())?;
         output::write_file(folder, "proof.md", table(&proof).as_bytes())?;

@@ -28,6 +28,9 @@ const AMBIGUITY: f64 = 15.0;
 const SMALLEST_SHARE: f64 = 0.02;
 /// Structured misfit that is left counts as unexplained above this multiple of the allowance (rms).
 const UNEXPLAINED: f64 = 2.0;
+/// Causes of a misfit above that limit explain it where they leave less than this part of it (rms), or no more than the allowance:
+/// the right cause leaves a tenth at most (of debonds), another one in its place about a third.
+const EXPLAINED_LEAVES: f64 = 0.25;
 /// Where causes leave more than this part of the squares unexplained, they are not named but listed as tried.
 const UNEXPLAINED_SHARE: f64 = 0.5;
 
@@ -353,7 +356,10 @@ pub fn diagnose(
     let left = [leftover(&observed, &nominal.residual, &metric), leftover(&observed, &current.residual, &metric)];
     progress("predicting voxel blocks that were kept back");
     let kept_back_rms_mm = work.kept_back(&seen, &nominal, &current)?;
-    let verdict = if left[1].structured_rms_mm > UNEXPLAINED * allowance_mm {
+    let [before, after] = [0, 1].map(|n: usize| left[n].structured_rms_mm);
+    let limit = UNEXPLAINED * allowance_mm;
+    let is_half_done = before > limit && after > allowance_mm.max(EXPLAINED_LEAVES * before);
+    let verdict = if after > limit || is_half_done {
         Verdict::Unexplained
     } else if causes.is_empty() {
         Verdict::NoMismatch
@@ -363,8 +369,7 @@ pub fn diagnose(
         Verdict::ExplainedAmbiguously
     };
     // Causes that take away the smaller part of what is there are no explanation of it.
-    let [before, after] = [0, 1].map(|n: usize| left[n].structured_rms_mm.powi(2));
-    if verdict == Verdict::Unexplained && after > UNEXPLAINED_SHARE * before {
+    if verdict == Verdict::Unexplained && after.powi(2) > UNEXPLAINED_SHARE * before.powi(2) {
         alternatives.splice(0..0, causes.drain(..));
     }
     let last_settings = work.settings;

@@ -57,10 +57,32 @@ pub struct Scored {
     pub location_size_mm: Option<f64>,
     /// Parameters of the hidden cause: name, and estimate minus truth in half widths of the 95 % interval.
     pub deviations: Vec<(String, f64)>,
-    /// χ² per datum before and after.
-    pub chi2: [f64; 2],
-    /// Why the diagnosis failed, if it did.
+    /// χ² per datum before and after; null where there is no diagnosis.
+    pub chi2: Option<[f64; 2]>,
+    /// Why there is no diagnosis: it failed, or the recording could not be made.
     pub failure: Option<String>,
+}
+
+impl Scored {
+    /// As long as nothing is known of the diagnosis.
+    fn undiagnosed(hidden: &Hidden, is_known: bool) -> Scored {
+        Scored {
+            hidden: hidden.clone(),
+            is_known,
+            verdict: None,
+            named: Vec::new(),
+            effect_rms_mm: 0.0,
+            effect_force_relative: 0.0,
+            is_detectable: false,
+            is_right: false,
+            is_explained: false,
+            location_error_mm: None,
+            location_size_mm: None,
+            deviations: Vec::new(),
+            chi2: None,
+            failure: None,
+        }
+    }
 }
 
 /// Sums over one hidden cause.
@@ -143,17 +165,14 @@ fn tasks(options: &ProofOptions) -> Vec<(HiddenCause, u64, bool)> {
 }
 
 /// Conceals and diagnoses all of `options`; `done` are results of an earlier, stopped run with the same options; `report` is told
-/// of each result as it comes.
-///
-/// # Errors
-/// [`ConcealError`] where a recording cannot be made.
+/// of each result as it comes. A recording that cannot be made counts as one in which nothing was found.
 pub fn prove(
     specimen: &Specimen,
     options: &ProofOptions,
     done: &[Scored],
     report: &(dyn Fn(&Scored, usize, usize) + Sync),
     is_cancelled: &(dyn Fn() -> bool + Sync),
-) -> Result<Proof, ConcealError> {
+) -> Proof {
     use rayon::prelude::*;
     let tasks = tasks(options);
     let scored: Vec<Option<Scored>> = tasks
@@ -164,20 +183,22 @@ pub fn prove(
         .map(|(n, &(cause, seed, is_known))| {
             let same = |s: &&Scored| s.hidden.cause == cause && s.hidden.seed == seed && s.is_known == is_known;
             if let Some(found) = done.iter().find(same) {
-                return Ok(Some(found.clone()));
+                return Some(found.clone());
             }
             if is_cancelled() {
-                return Ok(None);
+                return None;
             }
-            let found = score_one(specimen, &draw_cause(cause, seed), is_known, options.mesh_factor, is_cancelled)?;
+            let hidden = draw_cause(cause, seed);
+            let found = score_one(specimen, &hidden, is_known, options.mesh_factor, is_cancelled)
+                .unwrap_or_else(|e| Scored { failure: Some(e.to_string()), ..Scored::undiagnosed(&hidden, is_known) });
             if is_cancelled() {
-                return Ok(None);
+                return None;
             }
             report(&found, n, tasks.len());
-            Ok(Some(found))
+            Some(found)
         })
-        .collect::<Result<_, ConcealError>>()?;
-    Ok(sum_up(scored.into_iter().flatten().collect(), options))
+        .collect();
+    sum_up(scored.into_iter().flatten().collect(), options)
 }
 
 /// Conceals and diagnoses one cause.
@@ -216,20 +237,10 @@ fn scored(
         && (made.effect_rms_mm > DETECTABLE_ALLOWANCES * 1e-3 * largest
             || acts_on_force && made.effect_force_relative > DETECTABLE_FORCE);
     let mut s = Scored {
-        hidden: hidden.clone(),
-        is_known,
-        verdict: None,
-        named: Vec::new(),
         effect_rms_mm: made.effect_rms_mm,
         effect_force_relative: made.effect_force_relative,
         is_detectable,
-        is_right: false,
-        is_explained: false,
-        location_error_mm: None,
-        location_size_mm: None,
-        deviations: Vec::new(),
-        chi2: [f64::NAN; 2],
-        failure: None,
+        ..Scored::undiagnosed(hidden, is_known)
     };
     let result = match found {
         Ok(result) => result,
@@ -241,7 +252,7 @@ fn scored(
     s.verdict = Some(result.verdict);
     s.is_explained = result.verdict != Verdict::Unexplained;
     s.named = result.causes.iter().chain(&result.alternatives).map(|c| c.name.clone()).collect();
-    s.chi2 = [result.chi2_per_datum.before, result.chi2_per_datum.after];
+    s.chi2 = Some([result.chi2_per_datum.before, result.chi2_per_datum.after]);
     s.is_right = match (hidden.cause, is_known) {
         (HiddenCause::None, _) => result.verdict == Verdict::NoMismatch,
         (_, false) => result.verdict == Verdict::Unexplained,
