@@ -54,6 +54,15 @@ fn an_unknown_cause_is_not_named_no_mismatch() {
     assert!(!found.named.iter().any(|n| n == "debond"), "{found:?}");
 }
 
+/// Without gradients to suppose, an inclusion and a shift of the image take most of this one away and leave a third: no explanation.
+#[test]
+fn a_third_left_is_no_explanation() {
+    let found =
+        score_one(&specimen(), &draw_cause(HiddenCause::Gradient, 1_003_506), false, 2.2, &common::never).unwrap();
+    assert!(!found.named.is_empty(), "{found:?}");
+    assert_eq!(found.verdict, Some(Verdict::Unexplained), "{found:?}");
+}
+
 /// A gain error of 1 % looks like a load train that gives way: both are named, with a further step that would tell them apart.
 #[test]
 fn an_ambiguous_cause_comes_with_the_experiment() {
