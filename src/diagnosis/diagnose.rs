@@ -29,7 +29,7 @@ const SMALLEST_SHARE: f64 = 0.02;
 /// Structured misfit that is left counts as unexplained above this multiple of the allowance (rms).
 const UNEXPLAINED: f64 = 2.0;
 /// Causes of a misfit above that limit explain it where they leave less than this part of it (rms), or no more than the allowance:
-/// the right cause leaves a tenth at most (of debonds), another one in its place about a third.
+/// the right cause leaves a tenth or less, but for the odd debond; another one in its place about a third.
 const EXPLAINED_LEAVES: f64 = 0.25;
 /// Where causes leave more than this part of the squares unexplained, they are not named but listed as tried.
 const UNEXPLAINED_SHARE: f64 = 0.5;
