@@ -4,7 +4,7 @@
 mod common;
 
 use lambdak::diagnosis::Verdict;
-use lambdak::proof::{HiddenCause, conceal, draw_cause, score_one};
+use lambdak::proof::{HiddenCause, ProofOptions, conceal, draw_cause, prove, score_one};
 use lambdak::specimen::Specimen;
 
 fn specimen() -> Specimen {
@@ -52,6 +52,28 @@ fn an_unknown_cause_is_not_named_no_mismatch() {
     let found = score_one(&specimen(), &hidden, false, 2.2, &common::never).unwrap();
     assert_ne!(found.verdict, Some(Verdict::NoMismatch), "{found:?}");
     assert!(!found.named.iter().any(|n| n == "debond"), "{found:?}");
+}
+
+/// A specimen that cannot be meshed ends no proof; what is kept of it can be read again.
+#[test]
+fn a_recording_that_cannot_be_made_is_a_result() {
+    let mut unmade = specimen();
+    let half = 0.5 * unmade.block.length_mm;
+    unmade.holes[0].center_mm[0] = half;
+    let options = ProofOptions {
+        per_cause: 1,
+        controls: 0,
+        unknown: 0,
+        seed: 1,
+        mesh_factor: 2.2,
+        only: vec![HiddenCause::Tilt],
+    };
+    let proof = prove(&unmade, &options, &[], &|_, _, _| {}, &common::never);
+    let [scored] = &proof.scored[..] else { panic!("{proof:?}") };
+    assert!(scored.failure.is_some() && !scored.is_right && !scored.is_detectable, "{scored:?}");
+    assert_eq!((proof.known[0].num_recordings, proof.known[0].num_right), (1, 0));
+    let kept = serde_json::to_string(scored).unwrap();
+    assert_eq!(*scored, serde_json::from_str::<lambdak::proof::Scored>(&kept).unwrap());
 }
 
 /// Without gradients to suppose, an inclusion and a shift of the image take most of this one away and leave a third: no explanation.

@@ -165,7 +165,8 @@ fn tasks(options: &ProofOptions) -> Vec<(HiddenCause, u64, bool)> {
 }
 
 /// Conceals and diagnoses all of `options`; `done` are results of an earlier, stopped run with the same options; `report` is told
-/// of each result as it comes. A recording that cannot be made counts as one in which nothing was found.
+/// of each result as it comes. A recording that cannot be made counts as one in which nothing was found,
+/// and not as detectable: how large its effect is, is not known.
 pub fn prove(
     specimen: &Specimen,
     options: &ProofOptions,
