@@ -14,6 +14,7 @@ pub mod compare;
 pub mod design;
 pub mod diagnosis;
 pub mod fem;
+pub mod field;
 pub mod homogeneous;
 pub mod kinematics;
 pub mod material;
