@@ -1,8 +1,11 @@
 //! The discrete adjoint: the gradient of a function of displacements and force from one linear solve.
 //!
 //! For J(u, F) with u and F of an equilibrium of the material ξ, r(u, ξ) = 0 and F = m Σ_plate r_x(u, ξ):
-//! K z = ∂J/∂u + ∂J/∂F ∂F/∂u, dJ/dξ = −z·∂r/∂ξ + ∂J/∂F ∂F/∂ξ. K is symmetric, so ∂F/∂u is K times the unit motion of the
-//! plate.
+//!
+//! * K z = ∂J/∂u + ∂J/∂F ∂F/∂u,
+//! * dJ/dξ = −z·∂r/∂ξ + ∂J/∂F ∂F/∂ξ.
+//!
+//! K is symmetric, so ∂F/∂u is K times the unit motion of the plate.
 
 use super::error::SolveError;
 use super::tangent::Tangent;

@@ -1,7 +1,7 @@
 //! The assembler: what turns a state of a mesh into a residual, a tangent and their derivatives.
 //!
-//! It owns no matrix and remembers no state. Copies share the mesh, the topology and the departures, so that an assembler
-//! of other departures ([`Assembler::departed`]) is a value beside the first one.
+//! It owns no matrix and remembers no state. Copies share the mesh, the topology and the departures, so that an
+//! assembler of other departures ([`Assembler::departed`]) is a value beside the first one.
 
 use super::condensation::Condensation;
 use super::departures::Departures;
@@ -55,8 +55,8 @@ fn any_material() -> Ogden {
 }
 
 impl Assembler {
-    /// For `mesh` of `specimen` without departures; `is_released`(position, whether on the moved face) says which nodes of
-    /// the bonded faces are held by springs.
+    /// For `mesh` of `specimen` without departures; `is_released`(position, whether on the moved face) says which nodes
+    /// of the bonded faces are held by springs.
     ///
     /// # Errors
     /// [`SolveError::InvalidMesh`].
@@ -209,8 +209,8 @@ impl Assembler {
         })
     }
 
-    /// Sums the nodal vectors that `evaluate` leaves in the output of each element; it returns false where the element is
-    /// inverted.
+    /// Sums the nodal vectors that `evaluate` leaves in the output of each element; it returns false where the element
+    /// is inverted.
     fn sum_over_elements(
         &self,
         elements: Option<&[u32]>,

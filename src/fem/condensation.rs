@@ -1,4 +1,4 @@
-//! The pressures of the elements, which the linear system does not contain: condensed before a solve, recovered after it.
+//! The pressures of the elements: condensed before a linear solve, which does not contain them, and recovered after it.
 
 use super::element_data::{ElementOutput, MAX_GROUPS};
 use crate::material::{LANES, Lanes};

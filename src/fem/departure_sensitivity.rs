@@ -25,11 +25,12 @@ struct Ends<'a> {
 }
 
 impl Tangent<'_> {
-    /// Derivative of the equilibrium along t ↦ `path`(t) at t = 0, which must be the departures of the model that made the
-    /// tangent; differences of the residual over ±`step`, in units of t.
+    /// Derivative of the equilibrium along t ↦ `path`(t) at t = 0, which must be the departures of the model that made
+    /// the tangent; differences of the residual over ±`step`, in units of t.
     ///
     /// # Errors
-    /// [`SolveError::Linear`] if the tangent is not positive definite, [`SolveError::Diverged`] if `step` inverts an element.
+    /// [`SolveError::Linear`] if the tangent is not positive definite, [`SolveError::Diverged`] if `step` inverts an
+    /// element.
     pub fn departure_sensitivity(
         &mut self,
         path: &dyn Fn(f64) -> Departures,
@@ -45,7 +46,8 @@ impl Tangent<'_> {
         self.sensitivity_between(&Ends { ahead: &ahead, behind: &behind, step }, imposed_rate)
     }
 
-    /// Derivative of the equilibrium as the held nodes move by `rate` (mm per unit of t; other nodes' entries are ignored).
+    /// Derivative of the equilibrium as the held nodes move by `rate` (mm per unit of t; other nodes' entries are
+    /// ignored).
     ///
     /// # Errors
     /// As [`Self::departure_sensitivity`].

@@ -1,8 +1,8 @@
 //! What a sample, its bonds or its loading departs from the nominal experiment in.
 //!
-//! The nominal experiment is one material everywhere, plates that hold every point of the bonded faces, and a drive along
-//! x. Each departure here is at rest in its default; the element kernels, the factorisation and the derivatives are the
-//! same with and without.
+//! The nominal experiment is one material everywhere, plates that hold every point of the bonded faces, and a drive
+//! along x. Each departure here is at rest in its default; the element kernels, the factorisation and the derivatives
+//! are the same with and without.
 
 use std::fmt;
 use std::sync::Arc;
@@ -38,8 +38,8 @@ pub struct Fibre {
     pub modulus_kpa: f64,
 }
 
-/// How a plate departs from its nominal motion: a rigid motion about the centre of its bonded face, a constant part and one
-/// in proportion to the drive.
+/// How a plate departs from its nominal motion: a rigid motion about the centre of its bonded face, a constant part and
+/// one in proportion to the drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PlateMotion {
     /// Translation, mm.
@@ -91,7 +91,8 @@ impl PlateMotion {
 pub struct Departures {
     /// Factor on the isochoric stiffness at a reference position; one where none is given. The volumetric part stays.
     pub stiffness_factor: Option<Field>,
-    /// Logarithm of the volume ratio at which the sample would be free of pressure (swelling); zero where none is given.
+    /// Logarithm of the volume ratio at which the sample would be free of pressure (swelling); zero where none is
+    /// given.
     pub log_growth: Option<Field>,
     /// Fibres.
     pub fibre: Option<Fibre>,

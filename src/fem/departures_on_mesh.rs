@@ -22,8 +22,8 @@ pub(super) struct DeparturesOnMesh {
 }
 
 impl DeparturesOnMesh {
-    /// `departures` on `mesh`; `points` gives the quadrature points of every element and is only asked where a field needs
-    /// them.
+    /// `departures` on `mesh`; `points` gives the quadrature points of every element and is only asked where a field
+    /// needs them.
     pub(super) fn new<'p>(
         departures: &Departures,
         mesh: &Mesh,

@@ -79,8 +79,9 @@ impl Tangent<'_> {
         Ok(all)
     }
 
-    /// Derivatives along t ↦ (node positions X + t `velocity`, drive + t `drive_rate`) at t = 0; `sensitivities` are those
-    /// of the same equilibrium (may be empty). `velocity` in mm per unit of t at each node (`None`: the mesh stays).
+    /// Derivatives along t ↦ (node positions X + t `velocity`, drive + t `drive_rate`) at t = 0; `sensitivities` are
+    /// those of the same equilibrium (may be empty). `velocity` in mm per unit of t at each node (`None`: the mesh
+    /// stays).
     ///
     /// # Errors
     /// [`SolveError::Linear`] if the tangent is not positive definite.
@@ -179,8 +180,8 @@ fn difference_step(mesh: &Mesh, velocity: &[[f64; 3]], rate: &[[f64; 3]]) -> f64
     difference_length(mesh) / speed.max(1e-12)
 }
 
-/// A 1/250 of the smallest distance of two nodes that follow each other in an element, mm: a 1/500 of the shortest element
-/// edge, roughly.
+/// A 1/500 of the shortest element edge, mm. An edge is twice the smallest distance of two nodes that follow each other
+/// in an element.
 fn difference_length(mesh: &Mesh) -> f64 {
     let mut shortest = f64::INFINITY;
     for e in 0..mesh.num_elements() {

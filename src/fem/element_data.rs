@@ -1,4 +1,5 @@
-//! What goes into the element kernels and what comes out: tables of an element kind, the state of one element, its results.
+//! What goes into the element kernels and what comes out: tables of an element kind, the state of one element, its
+//! results.
 //!
 //! Quadrature points stand in lanes, eight to a group; nodes of the stiffness likewise.
 

@@ -39,8 +39,8 @@ impl ForwardModel {
         Self::with_released(mesh, specimen, &|_, _| false)
     }
 
-    /// As [`Self::new`], with the nodes of the bonded faces for which `is_released`(position, whether on the moved face)
-    /// held by springs, whose stiffness is [`Departures::bond_kpa_per_mm`].
+    /// As [`Self::new`], with the nodes of the bonded faces for which `is_released`(position, whether on the moved
+    /// face) held by springs, whose stiffness is [`Departures::bond_kpa_per_mm`].
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -79,9 +79,9 @@ impl ForwardModel {
         Ok(ForwardModel { guide: Some(Guide::new(coarse, refinement.nodes, refinement.parents)), ..fine })
     }
 
-    /// A model of the same mesh that departs from the nominal experiment in `departures`, and in nothing else (departures of
-    /// this model are not kept). Mesh, elimination order and symbolic factorisation are shared; both models may solve
-    /// without regard to each other.
+    /// A model of the same mesh that departs from the nominal experiment in `departures`, and in nothing else
+    /// (departures of this model are not kept). Mesh, elimination order and symbolic factorisation are shared; both
+    /// models may solve without regard to each other.
     pub fn departed(&self, departures: &Departures) -> ForwardModel {
         ForwardModel {
             fine: self.fine.departed(departures),
@@ -174,8 +174,8 @@ impl ForwardModel {
         Ok(path)
     }
 
-    /// As [`ForwardModel::solve`] from rest, the plates' departures growing in eight parts at the drive asked for: a plate
-    /// that is far out of place without any drive is a step that Newton's method does not take from rest at once.
+    /// As [`ForwardModel::solve`] from rest, the plates' departures growing in eight parts at the drive asked for: a
+    /// plate that is far out of place without any drive is a step that Newton's method does not take from rest at once.
     ///
     /// # Errors
     /// As [`ForwardModel::solve`].
@@ -200,12 +200,12 @@ impl ForwardModel {
         self.solve(material, drive_mm, state.as_ref(), options, is_cancelled)
     }
 
-    /// The tangent of an equilibrium of `material` of this mesh, with the departures of this model. Just after the solve
-    /// that found the equilibrium it costs nothing; else one assembly and one factorisation.
+    /// The tangent of an equilibrium of `material` of this mesh, with the departures of this model. Just after the
+    /// solve that found the equilibrium it costs nothing; else one assembly and one factorisation.
     ///
     /// # Errors
-    /// [`SolveError::Diverged`] where the state inverts an element, [`SolveError::Linear`] if the tangent is not positive
-    /// definite.
+    /// [`SolveError::Diverged`] where the state inverts an element, [`SolveError::Linear`] if the tangent is not
+    /// positive definite.
     pub fn tangent<'a>(
         &mut self,
         material: &'a Ogden,
@@ -221,8 +221,8 @@ impl ForwardModel {
         self.fine.assembler.quadrature_fields(&at, Some(&equilibrium.pressure))
     }
 
-    /// As [`Self::quadrature_fields`] with the nodes at other `positions` and any displacement (both mm at each node); the
-    /// pressure is the condensed one.
+    /// As [`Self::quadrature_fields`] with the nodes at other `positions` and any displacement (both mm at each node);
+    /// the pressure is the condensed one.
     pub fn quadrature_fields_at(
         &self,
         material: &Ogden,

@@ -115,7 +115,8 @@ impl Guide {
         (0..coarse.mesh().num_elements())
             .map(|e| {
                 coarse.kernels().residual(coarse.tables(), &coarse.input(e, &at, None), &mut out);
-                // The basis is orthonormal and spans 1, x, y, z: monomial_n = Σ_m M_mn φ_m with M_mn = ∫ φ_m monomial_n.
+                // The basis is orthonormal and spans 1, x, y, z:
+                // monomial_n = Σ_m M_mn φ_m with M_mn = ∫ φ_m monomial_n.
                 let mut moments = nalgebra::Matrix4::<f64>::zeros();
                 for q in 0..coarse.tables().num_nodes() {
                     let (g, l) = (q / LANES, q % LANES);

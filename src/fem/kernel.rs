@@ -333,7 +333,8 @@ fn stiffness<const FMA: bool>(tables: &ElementTables, out: &mut ElementOutput) {
             }
         }
     }
-    // For eight columns b and one component k: traction[q][J][i] = Σ_L A_iJkL ∂N_b/∂X_L, then K_ab = Σ_qJ ∂N_a/∂X_J · it.
+    // For eight columns b and one component k: traction[q][J][i] = Σ_L A_iJkL ∂N_b/∂X_L,
+    // then K_ab = Σ_qJ ∂N_a/∂X_J · traction[q][J][i].
     let mut traction = [[[Lanes::ZERO; 3]; 3]; MAX_NODES];
     for block in 0..tables.groups {
         for k in 0..3 {

@@ -59,8 +59,8 @@ impl MeshModel {
         }
     }
 
-    /// The tangent of an equilibrium of `material`: the one just solved with where it is that equilibrium's, else assembled
-    /// and factorised.
+    /// The tangent of an equilibrium of `material`: the one just solved with where it is that equilibrium's, else
+    /// assembled and factorised.
     ///
     /// # Errors
     /// [`SolveError::Diverged`] where an element is inverted, [`SolveError::Linear`] where there is no factor.

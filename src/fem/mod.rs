@@ -4,9 +4,9 @@
 //! mixed Newton iterations, sparse Cholesky factors, and derivatives with respect to material, shape and drive from the
 //! factorised tangent.
 //!
-//! Four things build on each other. The *assembler* turns a state into residual and tangent. A *mesh model* is an assembler
-//! with a linear system and solves by Newton's method. The [`ForwardModel`] is a mesh model that a coarse one may guide. A
-//! [`Tangent`] is the factorised matrix of one equilibrium; every derivative is solved with one.
+//! Four things build on each other. The *assembler* turns a state into residual and tangent. A *mesh model* is an
+//! assembler with a linear system and solves by Newton's method. The [`ForwardModel`] is a mesh model that a coarse one
+//! may guide. A [`Tangent`] is the factorised matrix of one equilibrium; every derivative is solved with one.
 
 mod adjoint;
 mod assembler;

@@ -122,7 +122,8 @@ impl Newton<'_> {
             worst = worst.min(last);
             iteration += 1;
             self.statistics.newton_iterations += 1;
-            // Near the solution the factor of an earlier iterate is as good a preconditioner as a new one is, and cheaper.
+            // Near the solution the factor of an earlier iterate is as good a preconditioner as a new one is, and
+            // cheaper.
             let is_near = iteration > 1 && last < REUSE_BELOW;
             let delta = self.assembler.spread(&self.newton_step(right, last, is_near)?);
             let delta_pressure = pressure_update(self.assembler.mesh(), &self.linearisation.condensation, &delta);
@@ -170,7 +171,8 @@ impl Newton<'_> {
             Some(x) => x,
             None => {
                 system.factorise().map_err(StepFailure::Linear)?;
-                // Quadratic convergence leaves residual² at best: the linear solve need not be better than a tenth of it.
+                // Quadratic convergence leaves residual² at best: the linear solve need not be better than a tenth of
+                // it.
                 let accuracy = (0.1 * residual).clamp(1e-9, 1e-3);
                 system.solve(&right, accuracy).map_err(StepFailure::Linear)?
             }

@@ -19,8 +19,8 @@ pub fn elimination_order(graph: &Graph) -> Vec<u32> {
     order
 }
 
-/// METIS draws from the C library's `rand`, whose state is the process's: calls at the same time would disturb each other's
-/// orders, and with them the last digits of every solution. One at a time each call seeds it anew.
+/// METIS draws from the C library's `rand`, whose state is the process's: calls at the same time would disturb each
+/// other's orders, and with them the last digits of every solution. One at a time each call seeds it anew.
 static METIS: std::sync::Mutex<()> = std::sync::Mutex::new(());
 
 /// METIS_NodeND; `None` where the library refuses (empty graph, no memory), in which case any order is correct.

@@ -25,8 +25,8 @@ pub(super) struct Plates {
 }
 
 impl Plates {
-    /// The plates of `specimen` on its `mesh`; `is_released`(position, whether on the moved face) says which nodes of the
-    /// faces are held by springs.
+    /// The plates of `specimen` on its `mesh`; `is_released`(position, whether on the moved face) says which nodes of
+    /// the faces are held by springs.
     pub(super) fn new(mesh: &Mesh, specimen: &Specimen, is_released: &dyn Fn([f64; 3], bool) -> bool) -> Plates {
         let areas = mesh.face_areas();
         let mut released = Vec::new();

@@ -6,7 +6,8 @@ use crate::material::{LANES, Lanes};
 
 impl Topology {
     /// Adds the stiffness of element `e` with these nodes, in the layout of
-    /// [`ElementOutput::stiffness`](super::element_data::ElementOutput::stiffness), to the blocks of the lower triangle.
+    /// [`ElementOutput::stiffness`](super::element_data::ElementOutput::stiffness), to the blocks of the lower
+    /// triangle.
     pub(super) fn add_element(
         &self,
         e: usize,

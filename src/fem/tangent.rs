@@ -8,10 +8,10 @@ use crate::material::Ogden;
 
 /// The tangent stiffness K of one equilibrium with a factor: what every derivative of that equilibrium is solved with.
 ///
-/// Made by [`ForwardModel::tangent`](super::ForwardModel::tangent). It holds the matrix, the factor and the departures of
-/// the model that made it, shared and not copied; that model may go on solving while a tangent is held, and takes other
-/// memory for that. Derivatives of one equilibrium are cheapest from one tangent. To save memory, drop it before the model
-/// solves again.
+/// Made by [`ForwardModel::tangent`](super::ForwardModel::tangent). It holds the matrix, the factor and the departures
+/// of the model that made it, shared and not copied; that model may go on solving while a tangent is held, and takes
+/// other memory for that. Derivatives of one equilibrium are cheapest from one tangent. To save memory, drop it before
+/// the model solves again.
 pub struct Tangent<'a> {
     pub(super) assembler: Assembler,
     pub(super) material: &'a Ogden,

@@ -1,7 +1,8 @@
 //! Unknowns, their elimination order and the sparsity pattern of the tangent stiffness.
 //!
 //! Nodes on the plates are known and left out. Every other node carries three unknowns, numbered in elimination order;
-//! a component that a mirror plane fixes keeps its number, with an identity row, so that the pattern stays in 3×3 blocks.
+//! a component that a mirror plane fixes keeps its number, with an identity row, so that the pattern stays in 3×3
+//! blocks.
 
 use super::ordering::{Graph, elimination_order};
 use crate::mesh::Mesh;

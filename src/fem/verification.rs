@@ -14,7 +14,8 @@ use super::options::SolveOptions;
 use crate::material::Ogden;
 
 impl ForwardModel {
-    /// Solves with the nodes of `fixed_nodes` and `moved_nodes` kept at their values in `guess`, under nodal dead loads.
+    /// Solves with the nodes of `fixed_nodes` and `moved_nodes` kept at their values in `guess`, under nodal dead
+    /// loads.
     ///
     /// `guess`: displacement of every node, mm; it is also where Newton's method starts, in one load step and without
     /// line search. `load`: force on every node, kPa·mm² (= 10⁻³ N), ignored at kept nodes; `None` for zero. The forces
