@@ -16,6 +16,7 @@ pub mod diagnosis;
 pub mod fem;
 pub mod field;
 pub mod homogeneous;
+pub mod job;
 pub mod kinematics;
 pub mod material;
 pub mod mesh;

@@ -14,5 +14,5 @@ pub use error::CompareError;
 pub use figure::{Direction, Figure, Judgement, Line};
 pub use files::{Pair, pairs};
 pub use output::{to_junit, to_markdown, to_text};
-pub use read::{Subject, read};
+pub use read::{Subject, read, subject_of};
 pub use verdict::{CompareOptions, Comparison, compare};

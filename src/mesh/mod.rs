@@ -25,6 +25,7 @@ mod power;
 mod quads;
 mod refine;
 mod section;
+mod size;
 mod triangles;
 
 #[cfg(test)]
@@ -40,6 +41,7 @@ pub use locator::{Column, Location, Locator};
 pub use morph::{DesignVariable, morphed, shape_velocity};
 pub use options::MeshOptions;
 pub use refine::{Refinement, refined};
+pub use size::{MeshSize, SIZE_FACTORS};
 
 /// Which mirror planes through the origin the mesh uses. A mirrored mesh covers the half with the positive
 /// coordinate only; normal displacement is zero on the plane.
