@@ -193,20 +193,20 @@ impl Job {
     /// # Errors
     /// [`JobError`].
     pub fn gather(&self, results: Vec<Result<Value, Failure>>) -> Result<Outcome, JobError> {
-        let input_hash = input_hash(&json!({ "kind": self.kind.command, "request": self.request }));
-        Ok(Outcome { input_hash, ..self.run.gather(results)? })
+        Ok(Outcome { input_hash: self.hash_of(&self.request), ..self.run.gather(results)? })
     }
 
-    /// Reads the recordings, hashes what goes in, and does the work.
+    /// SHA-256 of the kind, the canonical request and the content of every file that the job reads, hexadecimal.
     ///
     /// # Errors
-    /// [`JobError`].
-    pub fn run(&self, surroundings: &dyn Surroundings) -> Result<Outcome, JobError> {
-        let parts = self.run.parts();
-        if !parts.is_empty() {
-            return self.run_parts(&parts, surroundings);
-        }
-        // What is read is known by its content, not by where it lies: its name gives way to its digest.
+    /// [`JobError`] where a file cannot be read.
+    pub fn input_hash(&self, surroundings: &dyn Surroundings) -> Result<String, JobError> {
+        Ok(self.context(surroundings)?.input_hash)
+    }
+
+    /// Reads what the request names. It is known by its content, not by where it lies: in the hash its name gives way to its
+    /// digest.
+    fn context<'a>(&self, surroundings: &'a dyn Surroundings) -> Result<Context<'a>, JobError> {
         let mut canonical = self.request.clone();
         let (mut recordings, mut raw_recordings, mut files) = (Vec::new(), Vec::new(), Vec::new());
         for wanted in self.run.inputs() {
@@ -232,10 +232,26 @@ impl Job {
                 *slot = digest.into();
             }
         }
-        let input_hash = input_hash(&json!({ "kind": self.kind.command, "request": canonical }));
-        let context =
-            Context { surroundings, input_hash: input_hash.clone(), recordings, raw_recordings, files };
-        Ok(Outcome { input_hash, ..self.run.run(&context)? })
+        let input_hash = self.hash_of(&canonical);
+        Ok(Context { surroundings, input_hash, recordings, raw_recordings, files })
+    }
+
+    fn hash_of(&self, canonical: &Value) -> String {
+        input_hash(&json!({ "kind": self.kind.command, "request": canonical }))
+    }
+
+    /// Reads what the request names, hashes what goes in, and does the work.
+    ///
+    /// # Errors
+    /// [`JobError`].
+    pub fn run(&self, surroundings: &dyn Surroundings) -> Result<Outcome, JobError> {
+        let parts = self.run.parts();
+        if !parts.is_empty() {
+            return self.run_parts(&parts, surroundings);
+        }
+        let context = self.context(surroundings)?;
+        let outcome = self.run.run(&context)?;
+        Ok(Outcome { input_hash: context.input_hash, ..outcome })
     }
 
     /// Runs all parts on all threads and gathers their results.

@@ -7,6 +7,23 @@ use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+/// Where in the request something is wrong.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct FieldProblem {
+    /// The field.
+    #[serde(flatten)]
+    pub error: FieldError,
+    /// What is wrong and what to change, in a sentence.
+    pub detail: String,
+}
+
+impl From<FieldError> for FieldProblem {
+    fn from(error: FieldError) -> Self {
+        let detail = error.to_string();
+        FieldProblem { detail, error }
+    }
+}
+
 /// A problem (RFC 9457).
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct Problem {
@@ -22,7 +39,7 @@ pub struct Problem {
     pub detail: String,
     /// Offending fields.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub errors: Vec<FieldError>,
+    pub errors: Vec<FieldProblem>,
     /// Seconds after which to try again.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub retry_after_s: Option<u32>,
@@ -74,7 +91,8 @@ impl Problem {
 
     /// `invalid-input` with all offending fields.
     pub fn invalid(errors: Vec<FieldError>) -> Self {
-        Problem { errors: errors.clone(), ..Problem::new("invalid-input", in_lines(&errors)) }
+        let detail = in_lines(&errors);
+        Problem { errors: errors.into_iter().map(Into::into).collect(), ..Problem::new("invalid-input", detail) }
     }
 
     /// With a time after which to try again.
@@ -125,7 +143,7 @@ impl From<JobError> for Problem {
         match error {
             JobError::Invalid(errors) => Problem::invalid(errors),
             JobError::TooBig(error) => {
-                Problem { errors: vec![error.clone()], ..Problem::new("too-big-a-problem", error.to_string()) }
+                Problem { errors: vec![error.clone().into()], ..Problem::new("too-big-a-problem", error.to_string()) }
             }
             JobError::Unreadable { .. } => Problem::new("not-found", error.to_string()),
             JobError::NoSolution(message) => Problem::new("no-solution", message),
@@ -136,7 +154,7 @@ impl From<JobError> for Problem {
 
 impl From<&Problem> for Failure {
     fn from(problem: &Problem) -> Self {
-        Failure { detail: problem.detail.clone(), errors: problem.errors.clone() }
+        Failure { detail: problem.detail.clone(), errors: problem.errors.iter().map(|e| e.error.clone()).collect() }
     }
 }
 

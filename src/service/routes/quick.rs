@@ -6,7 +6,7 @@ use crate::job::defaults;
 use crate::mesh::{MeshSize, mesh_specimen};
 use crate::service::access::{Caller, Role};
 use crate::service::app::App;
-use crate::service::problem::Problem;
+use crate::service::problem::{FieldProblem, Problem};
 use crate::specimen::{LimitMargin, ManufacturingLimits, Specimen, to_svg};
 use axum::Json;
 use axum::body::Bytes;
@@ -83,7 +83,7 @@ pub(super) struct Checked {
     /// Whether it can be evaluated and keeps every limit.
     is_valid: bool,
     /// What keeps it from being evaluated.
-    errors: Vec<FieldError>,
+    errors: Vec<FieldProblem>,
     /// The limits, closest first.
     margins: Vec<Margin>,
     /// Volume of material, mm³.
@@ -120,7 +120,7 @@ fn check(request: &CheckRequest) -> Result<Checked, Problem> {
             return Err(Problem::invalid(errors));
         }
     }
-    checked.errors = below(specimen.field_errors(), "/specimen");
+    checked.errors = below(specimen.field_errors(), "/specimen").into_iter().map(Into::into).collect();
     if !checked.errors.is_empty() {
         return Ok(checked);
     }
@@ -142,7 +142,7 @@ fn check(request: &CheckRequest) -> Result<Checked, Problem> {
             checked.cost = Some(Cost { num_elements, num_nodes, num_voxels, seconds_per_drive });
             checked.is_valid = checked.margins.iter().all(|m| m.is_satisfied);
         }
-        Err(error) => checked.errors.push(crate::job::unmeshable("/specimen", &error)),
+        Err(error) => checked.errors.push(crate::job::unmeshable("/specimen", &error).into()),
     }
     checked.volume_mm3 = Some(specimen.volume_mm3());
     Ok(checked)
