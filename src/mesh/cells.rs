@@ -6,9 +6,9 @@ use std::f64::consts::TAU;
 use super::domain::{Disc, Domain};
 use super::error::MeshError;
 use super::grading::{divide, with_middles};
+use super::grid::{Builder, count, limit_cells, line};
 use super::options::MeshOptions;
 use super::power::{PowerDiagram, Rectangle};
-use super::quads::{Builder, count, limit_cells, line};
 use super::section::{Section, dot, sub};
 
 /// Points of each edge by its vertices, the smaller index first.

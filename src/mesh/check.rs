@@ -4,9 +4,9 @@ use std::collections::HashMap;
 
 use serde::Serialize;
 
-use super::build::{nodes_on_plane, pull_axis};
 use super::domain::Domain;
 use super::error::MeshError;
+use super::node_sets::{nodes_on_plane, pull_axis};
 use super::options::MeshOptions;
 use super::section::{Section, scaled_jacobian};
 use super::{ElementKind, Mesh};

@@ -5,6 +5,7 @@
 //! of the set of results in the order of the tasks, so that a killed and resumed sweep, shards, a cluster and an undisturbed
 //! run give the same bytes.
 
+mod column_names;
 mod error;
 mod parquet;
 mod points;
