@@ -21,8 +21,6 @@ mod signal;
 pub mod unwrap;
 
 #[cfg(test)]
-mod real_tests;
-#[cfg(test)]
 mod scan_tests;
 
 pub use anchor::{Anchor, AnchorReport};
