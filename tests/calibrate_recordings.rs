@@ -1,7 +1,7 @@
 //! Calibration of recordings: the control recording of an independent code, and real MR-u measurements where present.
 //!
-//! `LAMBDAK_RECORDINGS` is the folder with `open-control`, `LAMBDAK_REAL_DATA` that with `mru/solid-5mm-a` and `-b`. Without
-//! them the tests are ignored.
+//! `LAMBDAK_RECORDINGS` is the folder with `open-control`, `LAMBDAK_REAL_DATA` that with `mru/solid-5mm-a` and `-b`.
+//! Without them the tests are ignored.
 
 #[path = "common/prerequisites.rs"]
 mod prerequisites;
@@ -50,8 +50,8 @@ fn control_is_within_its_intervals() -> Result<(), Missing> {
     Ok(())
 }
 
-/// Two real blocks without a force: each is calibrated, and the other's displacements are predicted with its material. The
-/// prediction must not be worse than the other's own fit by more than a tenth: the blocks are of one material.
+/// Two real blocks without a force: each is calibrated, and the other's displacements are predicted with its material.
+/// The prediction must not be worse than the other's own fit by more than a tenth: the blocks are of one material.
 fn real_blocks_predict_one_another() -> Result<(), Missing> {
     let (a, b) = (prerequisites::real_data("mru/solid-5mm-a")?, prerequisites::real_data("mru/solid-5mm-b")?);
     let data = [[observed(&a)], [observed(&b)]];

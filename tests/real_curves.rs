@@ -2,8 +2,9 @@
 //!
 //! The data are not part of the project. Set `LAMBDAK_REAL_DATA` to the folder that holds `classical`,
 //! `soft_robotics_db_tension`, `ecoflex_compression`, `vhb4910_load_unload` and `oca_shear`; without it every test is
-//! ignored. Sources: Treloar 1944 (Trans. Faraday Soc. 40), Meunier et al. 2008 (Polymer Testing 27, 765), Marechal et al.
-//! 2020 (doi 10.1089/soro.2019.0115), Dawood et al. 2026, Liu et al. 2024 (Comput. Methods Appl. Mech. Eng. 430, 117248).
+//! ignored. Sources: Treloar 1944 (Trans. Faraday Soc. 40), Meunier et al. 2008 (Polymer Testing 27, 765), Marechal et
+//! al. 2020 (doi 10.1089/soro.2019.0115), Dawood et al. 2026, Liu et al. 2024 (Comput. Methods Appl. Mech. Eng.
+//! 430, 117248).
 
 #[path = "common/prerequisites.rs"]
 mod prerequisites;
@@ -71,8 +72,8 @@ fn meunier_equibiaxial_is_predicted() -> Result<(), Missing> {
     }
     let kept = matches_of(&sequence.chosen().terms(), None, &[equibiaxial]).unwrap();
     println!("chosen {} terms", sequence.chosen().num_terms);
-    // The bulge test turns up beyond a stretch of 1.8, which the other two tests do not show: the prediction misses it (an error
-    // of about a fifth). What is asked is the curve below that.
+    // The bulge test turns up beyond a stretch of 1.8, which the other two tests do not show: the prediction misses it
+    // (an error of about a fifth). What is asked is the curve below that.
     assert!(kept[0].r_squared > 0.8, "{kept:?}");
     Ok(())
 }

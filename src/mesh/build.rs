@@ -14,9 +14,9 @@ use crate::specimen::Specimen;
 
 /// Meshes `specimen` (the half or quarter with positive coordinates where it is mirrored).
 ///
-/// The section is a structured grid (no holes), or O-grids in the holes' power-diagram cells, or triangles where neither
-/// suits; it is extruded in levels. Curved walls carry exact nodes at element corners and middles. Equal input gives
-/// equal bits.
+/// The section is a structured grid (no holes), or O-grids in the holes' power-diagram cells, or triangles where
+/// neither suits; it is extruded in levels. Curved walls carry exact nodes at element corners and middles. Equal input
+/// gives equal bits.
 ///
 /// # Errors
 /// Any [`MeshError`]; in particular [`MeshError::LigamentTooThin`] for holes that touch, and [`MeshError::PoorElement`]
@@ -32,9 +32,9 @@ pub fn mesh_specimen(specimen: &Specimen, options: &MeshOptions) -> Result<Mesh,
     extrude(&domain, options, &section)
 }
 
-/// As [`mesh_specimen`], of triangles whose edges follow straight `lines` of the section (x and z of both ends, mm; for holes
-/// along z: x and y), through the whole extrusion: a patch of a bonded face ends at element edges. Lines may meet at their
-/// ends and end on the outline, and must keep clear of the holes.
+/// As [`mesh_specimen`], of triangles whose edges follow straight `lines` of the section (x and z of both ends, mm; for
+/// holes along z: x and y), through the whole extrusion: a patch of a bonded face ends at element edges. Lines may meet
+/// at their ends and end on the outline, and must keep clear of the holes.
 ///
 /// # Errors
 /// As [`mesh_specimen`]; [`MeshError::Triangulation`] where parts of lines cross each other or a hole.

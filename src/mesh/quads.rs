@@ -10,9 +10,9 @@ use super::section::Section;
 
 /// The best section of quadrilaterals for `domain`, or `None` where quadrilaterals are no use.
 ///
-/// With holes, several inner rectangles around them (what is outside becomes structured strips) and several ways to make
-/// cells in them are ranked on a coarse section by shape and number of cells; the first that is good enough at the size
-/// asked for is taken. So the layout of cells hardly depends on the size.
+/// With holes, several inner rectangles around them (what is outside becomes structured strips) and several ways to
+/// make cells in them are ranked on a coarse section by shape and number of cells; the first that is good enough at the
+/// size asked for is taken. So the layout of cells hardly depends on the size.
 ///
 /// # Errors
 /// [`MeshError::TooManyElements`].
@@ -62,8 +62,8 @@ pub(super) fn quad_section(domain: &Domain, options: &MeshOptions) -> Result<Opt
 const RANKING_CELLS: f64 = 60.0;
 /// So many layouts are tried at the size asked for.
 const MAX_ATTEMPTS: usize = 8;
-/// Ways to make cells: edges shorter than this many element sizes are collapsed, and the lines to the cells' corners bend
-/// by this fraction.
+/// Ways to make cells: edges shorter than this many element sizes are collapsed, and the lines to the cells' corners
+/// bend by this fraction.
 const STYLES: [(f64, f64); 4] = [(0.45, 0.0), (0.15, 0.0), (0.45, 0.7), (0.15, 0.7)];
 
 /// Block or dumb-bell without holes.

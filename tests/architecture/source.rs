@@ -29,7 +29,8 @@ pub fn text_of(path: &str) -> String {
     std::fs::read_to_string(project().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
 }
 
-/// All files of the library, found as the compiler finds them: from `lib.rs` along its `mod` items, test modules left out.
+/// All files of the library, found as the compiler finds them: from `lib.rs` along its `mod` items, test modules left
+/// out.
 pub fn library() -> Vec<SourceFile> {
     let mut files = Vec::new();
     read(PathBuf::from("src/lib.rs"), Vec::new(), &mut files);

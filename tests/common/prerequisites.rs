@@ -1,9 +1,9 @@
 //! What some tests need of the machine: a database, a scheduler, data that are no part of the project.
 //!
-//! A test without its prerequisite is reported as ignored, with the reason. `LAMBDAK_REQUIRE` names prerequisites, separated by
-//! commas ([`Prerequisite::name`]), that must be there: without one of those the test fails. The standard harness cannot
-//! ignore a test that runs already, so these tests' binaries bring their own (`harness = false`), which takes the same
-//! options, runs the tests in parallel and prints the same lines.
+//! A test without its prerequisite is reported as ignored, with the reason. `LAMBDAK_REQUIRE` names prerequisites,
+//! separated by commas ([`Prerequisite::name`]), that must be there: without one of those the test fails. The standard
+//! harness cannot ignore a test that runs already, so these tests' binaries bring their own (`harness = false`), which
+//! takes the same options, runs the tests in parallel and prints the same lines.
 
 #![allow(dead_code)] // Each test binary uses a part.
 
