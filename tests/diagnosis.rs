@@ -204,7 +204,8 @@ fn a_wrong_encoding_is_named() {
     assert!((value(&result, "relative_gain_error_x") - 0.05).abs() < 0.005, "{:?}", result.causes[0]);
 }
 
-/// One material and one scanner: the wrong encoding of both recordings is one, and each recording's model predicts the other.
+/// One material and one scanner: the wrong encoding of both recordings is one, and each recording's model predicts the
+/// other.
 #[test]
 fn two_recordings_agree_on_material_and_encoding() {
     let mut scene = Scene::default();

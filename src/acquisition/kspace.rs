@@ -38,10 +38,11 @@ impl KSpace {
         Ok(())
     }
 
-    /// Applies the window to an image (x fastest). The image is taken as periodic, as the discrete Fourier transform does.
+    /// Applies the window to an image (x fastest). The image is taken as periodic, as the discrete Fourier transform
+    /// does.
     ///
-    /// A window that is a product over the axes is a circular convolution along each of them, done directly: n kernel values
-    /// per voxel and axis.
+    /// A window that is a product over the axes is a circular convolution along each of them, done directly: n kernel
+    /// values per voxel and axis.
     pub fn apply(&self, image: &mut [Complex], shape: [usize; 3]) {
         let strides = [1, shape[0], shape[0] * shape[1]];
         for axis in 0..3 {

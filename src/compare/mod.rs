@@ -1,7 +1,8 @@
 //! Compares two results of the same kind: evaluations, sweeps or design searches.
 //!
 //! First whether they can be compared at all (same schema, inputs, scan, mesh, normalisation), then figure by figure:
-//! integrated sensitivities should not fall, promised standard deviations should not grow, forces and stretches should stay.
+//! integrated sensitivities should not fall, promised standard deviations should not grow, forces and stretches should
+//! stay.
 
 mod error;
 mod figure;

@@ -7,8 +7,8 @@ use crate::specimen::Specimen;
 
 /// Settings of [`super::mesh_specimen`].
 ///
-/// The constructors [`search`](Self::search), [`standard`](Self::standard) and [`fine`](Self::fine) derive the sizes from
-/// the specimen's block, so that the number of unknowns is about the same for every specimen of the same shape.
+/// The constructors [`search`](Self::search), [`standard`](Self::standard) and [`fine`](Self::fine) derive the sizes
+/// from the specimen's block, so that the number of unknowns is about the same for every specimen of the same shape.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MeshOptions {

@@ -53,7 +53,8 @@ impl RawRecording {
     /// Reads the raw recording in `path`: a folder with a `recording.json`, or such a JSON file under another name.
     ///
     /// # Errors
-    /// [`RecordingError`], as for [`super::Recording::read`]; [`RecordingError::NotRaw`] where a step holds displacements.
+    /// [`RecordingError`], as for [`super::Recording::read`]; [`RecordingError::NotRaw`] where a step holds
+    /// displacements.
     pub fn read(path: &Path, limits: &ReadLimits) -> Result<RawRecording, RecordingError> {
         let head = Head::read(path, limits)?;
         let mut steps = Vec::with_capacity(head.json.steps.len());

@@ -1,5 +1,5 @@
-//! The report of a diagnosis: verdict, causes, what was left before and after, what was tested, the load curve, where a misfit
-//! may come from.
+//! The report of a diagnosis: verdict, causes, what was left before and after, what was tested, the load curve, where a
+//! misfit may come from.
 
 use super::bars::{BarGroup, GroupedBars};
 use super::color::ColorMap;

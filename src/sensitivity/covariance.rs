@@ -54,6 +54,13 @@ pub struct Covariance {
     is_determined: Vec<bool>,
 }
 
+impl FisherInformation {
+    /// The covariance that the data promise (Cramér–Rao).
+    pub fn covariance(&self) -> Covariance {
+        Covariance::of(self)
+    }
+}
+
 impl Covariance {
     pub(super) fn of(information: &FisherInformation) -> Self {
         let n = information.parameters().len();

@@ -7,7 +7,6 @@
 //!
 //! Not included: the correlation of the noise of filtered scans, and errors of the model.
 
-use super::covariance::Covariance;
 use crate::material::{Ogden, Parameter};
 use crate::voxel::VoxelMask;
 use nalgebra::DMatrix;
@@ -296,11 +295,6 @@ impl FisherInformation {
         check_sd("prior standard deviation of the logarithm", log_sd)?;
         let i = self.index_of(parameter)?;
         self.add_prior(parameter, log_sd * self.values[i].abs())
-    }
-
-    /// The covariance that the data promise (Cramér–Rao).
-    pub fn covariance(&self) -> Covariance {
-        Covariance::of(self)
     }
 }
 

@@ -3,6 +3,7 @@
 mod continuum;
 mod covariance;
 mod drives;
+mod error;
 mod evaluation;
 mod information;
 mod integrated;
@@ -15,9 +16,9 @@ pub use continuum::{
 };
 pub use covariance::{Covariance, Criterion, IDENTIFIABILITY_LIMIT, PromisedSd};
 pub use drives::DriveSelection;
+pub use error::EvaluationError;
 pub use evaluation::{
-    Evaluation, EvaluationError, EvaluationMaps, EvaluationNotes, EvaluationOptions, EvaluationStatistics, evaluate,
-    evaluate_model,
+    Evaluation, EvaluationMaps, EvaluationNotes, EvaluationOptions, EvaluationStatistics, evaluate, evaluate_model,
 };
 pub use information::{FisherInformation, InformationError, MeasurementNoise, PartialVoxels, ScanSettings};
 pub use integrated::{IntegratedSensitivity, integrate_over_voxels, parameter_sensitivity, sensitivity_map};

@@ -1,7 +1,7 @@
 //! What the scan sees at one drive: voxel states, sensitivities and information of one equilibrium.
 
 use super::covariance::PromisedSd;
-use super::evaluation::EvaluationError;
+use super::error::EvaluationError;
 use super::information::{FisherInformation, MeasurementNoise, ScanSettings};
 use super::integrated::{IntegratedSensitivity, integrate_over_voxels, sensitivity_map, shear_parameters};
 use crate::fem::ParameterSensitivity;

@@ -61,7 +61,8 @@ pub enum Following<'a> {
     Progress(TaskProgress),
 }
 
-/// Looks, half a second apart, at cancelled jobs that have not ended yet. (Slurm's grace before it kills is 30 s by default.)
+/// Looks, half a second apart, at cancelled jobs that have not ended yet. (Slurm's grace before it kills is 30 s by
+/// default.)
 const MAX_LOOKS_AT_CANCELLED: usize = 120;
 
 /// The jobs submitted for an array, kept beside the script so that the command can be run again and go on.
@@ -78,8 +79,8 @@ struct Watched {
     done_at_start: usize,
 }
 
-/// Submits the tasks that are not finished, unless an earlier run's jobs are at them, and waits until `progress_of` says that
-/// every task has all its results. `pause` sleeps.
+/// Submits the tasks that are not finished, unless an earlier run's jobs are at them, and waits until `progress_of`
+/// says that every task has all its results. `pause` sleeps.
 ///
 /// # Errors
 /// [`SlurmError`].

@@ -1,10 +1,11 @@
 //! Batch sweeps: many designs evaluated, one typed result each, on one machine or many.
 //!
-//! A study (`sweep-study/1`) is a base specimen, named variables with their sampling, materials, a scan and a mesh. A task is
-//! one design with one material. Every finished task is one checksummed line of a shard's file; the table is a pure function
-//! of the set of results in the order of the tasks, so that a killed and resumed sweep, shards, a cluster and an undisturbed
-//! run give the same bytes.
+//! A study (`sweep-study/1`) is a base specimen, named variables with their sampling, materials, a scan and a mesh. A
+//! task is one design with one material. Every finished task is one checksummed line of a shard's file; the table is a
+//! pure function of the set of results in the order of the tasks, so that a killed and resumed sweep, shards, a cluster
+//! and an undisturbed run give the same bytes.
 
+mod column_names;
 mod error;
 mod parquet;
 mod points;

@@ -1,8 +1,8 @@
 //! The results on disk: one append-only file of JSON lines per shard.
 //!
-//! A line is `{"sha256":"<16 digits>","record":…}`; the digits are the start of the SHA-256 of the record's text. The first
-//! record is the header with the study's hash, each other one a task with its outcome. A line is written at once and synced
-//! before the next. A torn last line (a kill, a crash, a full disk) is dropped; its task is computed again.
+//! A line is `{"sha256":"<16 digits>","record":…}`; the digits are the start of the SHA-256 of the record's text. The
+//! first record is the header with the study's hash, each other one a task with its outcome. A line is written at once
+//! and synced before the next. A torn last line (a kill, a crash, a full disk) is dropped; its task is computed again.
 
 use super::error::StoreError;
 use super::shard::Shard;
@@ -93,8 +93,8 @@ fn record_of(line: &[u8]) -> Result<&str, &'static str> {
 /// Reads a shard's file.
 ///
 /// # Errors
-/// [`StoreError::Read`], [`StoreError::NotAShard`], [`StoreError::OtherStudy`], [`StoreError::Damaged`] for a line that is not the last
-/// one.
+/// [`StoreError::Read`], [`StoreError::NotAShard`], [`StoreError::OtherStudy`], [`StoreError::Damaged`] for a line that
+/// is not the last one.
 pub fn read_shard(path: &Path, study_hash: &str) -> Result<ShardContents, StoreError> {
     let mut bytes = Vec::new();
     File::open(path)

@@ -1,5 +1,6 @@
 //! The sweep study (`sweep-study/1`).
 
+use super::column_names::is_reserved;
 use super::error::SweepStudyError;
 use super::target::Target;
 use crate::design::{Inline, resolve};
@@ -287,7 +288,7 @@ impl SweepStudy {
         if v.name.is_empty() || !v.name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
             return bad("a name consists of letters, digits and underscores");
         }
-        if super::table::is_reserved(&v.name) {
+        if is_reserved(&v.name) {
             return bad("the table has a column of this name already");
         }
         if v.sets.is_empty() {

@@ -1,13 +1,14 @@
 //! Unwrapping a phase image in three dimensions.
 //!
-//! Neighbouring voxels are taken to differ by less than half a turn; where noise, dephasing or a strong gradient breaks this,
-//! the answer depends on the path, and the methods differ in which neighbours they trust ([`Method`]). A phase that changes
-//! by many turns along a line of voxels is no difficulty as such.
+//! Neighbouring voxels are taken to differ by less than half a turn; where noise, dephasing or a strong gradient breaks
+//! this, the answer depends on the path, and the methods differ in which neighbours they trust ([`Method`]). A phase
+//! that changes by many turns along a line of voxels is no difficulty as such.
 //!
-//! Whatever the method, a voxel is kept only where its multiple of 2π agrees with all its kept neighbours and where it is
-//! joined to the largest region through differences that the noise cannot have turned ([`UnwrapOptions::min_margin`]); two
-//! methods of different kind must agree about it ([`UnwrapOptions::needs_agreement`]).
-//! Voxels that are not kept are counted by cause. The multiple of 2π of the whole region stays open.
+//! Whatever the method, a voxel is kept only where its multiple of 2π agrees with all its kept neighbours and where it
+//! is joined to the largest region through differences that the noise cannot have turned
+//! ([`UnwrapOptions::min_margin`]); two methods of different kind must agree about it
+//! ([`UnwrapOptions::needs_agreement`]). Voxels that are not kept are counted by cause. The multiple of 2π of the whole
+//! region stays open.
 
 mod graph;
 mod least_squares;
@@ -30,8 +31,8 @@ pub enum Method {
     Margin,
     /// Quality-guided by second differences (Abdul-Rahman et al. 2007, Applied Optics 46, 6623).
     SecondDifference,
-    /// Weighted least squares on the differences, reweighted towards least absolute deviations, then made congruent: the
-    /// smooth solution picks each voxel's multiple of 2π.
+    /// Weighted least squares on the differences, reweighted towards least absolute deviations, then made congruent:
+    /// the smooth solution picks each voxel's multiple of 2π.
     LeastSquares,
 }
 
@@ -40,13 +41,13 @@ pub enum Method {
 pub struct UnwrapOptions {
     /// How to decide which differences to trust.
     pub method: Method,
-    /// Voxels whose phase has a larger standard deviation are left out, rad. At 0.7 two neighbours differ by noise alone
-    /// with a standard deviation of one radian.
+    /// Voxels whose phase has a larger standard deviation are left out, rad. At 0.7 two neighbours differ by noise
+    /// alone with a standard deviation of one radian.
     pub max_phase_sd: f64,
     /// Regions are joined only through differences at least this many standard deviations away from half a turn.
     pub min_margin: f64,
-    /// A second method of the other kind (least squares beside a quality-guided one, [`Method::Margin`] beside least squares)
-    /// must find the same turns; voxels where it does not are left out.
+    /// A second method of the other kind (least squares beside a quality-guided one, [`Method::Margin`] beside least
+    /// squares) must find the same turns; voxels where it does not are left out.
     pub needs_agreement: bool,
 }
 

@@ -157,8 +157,8 @@ fn islands_are_left_out() {
     assert_eq!(unwrap(&none, &UnwrapOptions::default()).num_kept, 0);
 }
 
-/// A dislocation: the phase winds once around a line, so no unwrapping is right everywhere. The kept voxels still agree with
-/// all their kept neighbours.
+/// A dislocation: the phase winds once around a line, so no unwrapping is right everywhere. The kept voxels still agree
+/// with all their kept neighbours.
 #[test]
 fn dislocations_are_cut_open() {
     let shape = [16, 16, 3];

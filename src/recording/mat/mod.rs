@@ -1,7 +1,7 @@
 //! MATLAB data files: versions 5 to 7.2, and 7.3, which is HDF5.
 //!
-//! Read are numeric, logical and character arrays, cells and structures. The version 5 reader is our own: the crates at hand
-//! read no cells, in which MR-u laboratories keep their fields, or bound no decompression.
+//! Read are numeric, logical and character arrays, cells and structures. The version 5 reader is our own: the crates at
+//! hand read no cells, in which MR-u laboratories keep their fields, or bound no decompression.
 
 mod v5;
 mod v73;

@@ -1,23 +1,17 @@
 //! Real raw recordings, where they are at hand: `LAMBDAK_REAL_DATA` names the folder that holds `mru`.
 
-use super::{ReconstructOptions, reconstruct, unwrap};
-use crate::recording::{Image, RawRecording, ReadLimits, Recording};
-use std::path::PathBuf;
+#[path = "common/prerequisites.rs"]
+mod prerequisites;
+
+use lambdak::acquisition::{ReconstructOptions, reconstruct, unwrap};
+use lambdak::recording::{Image, RawRecording, ReadLimits, Recording};
+use prerequisites::Missing;
 
 /// The unwrapped phases give the displacements published beside them, up to one constant per component (the publication
 /// moved the fixed face to zero), but for few voxels, nearly all of them marked there as unreliable.
-#[test]
-fn real_phases_give_the_published_displacements() {
-    let Some(folder) = std::env::var_os("LAMBDAK_REAL_DATA").map(PathBuf::from) else {
-        eprintln!("SKIPPED real_phases_give_the_published_displacements: LAMBDAK_REAL_DATA is not set");
-        return;
-    };
+fn real_phases_give_the_published_displacements() -> Result<(), Missing> {
     for name in ["solid-5mm-a", "solid-5mm-b"] {
-        let path = folder.join("mru").join(name);
-        if !path.exists() {
-            eprintln!("SKIPPED {name}: {} is absent", path.display());
-            continue;
-        }
+        let path = prerequisites::real_data(&format!("mru/{name}"))?;
         let raw = RawRecording::read(&path.join("recording-raw.json"), &ReadLimits::default()).unwrap();
         let reliable = std::fs::File::open(path.join("mask_reliable.nii.gz")).unwrap();
         let reliable = Image::read(reliable, 1 << 20).unwrap().values;
@@ -70,4 +64,7 @@ fn real_phases_give_the_published_displacements() {
             }
         }
     }
+    Ok(())
 }
+
+prerequisites::test_binary!(real_phases_give_the_published_displacements);
