@@ -269,9 +269,7 @@ fn diagnosed(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliErro
     let fields = kind_of_command(LOAD_CURVES_KIND).map(|kind| kind.fields()).unwrap_or_default();
     for flag in LOAD_CURVES {
         asked.sources.push((format!("/{}", flag.field), format!("--{}", flag.name)));
-        if let Some(field) = fields.iter().find(|f| f.name == flag.field) {
-            flag.apply(field, matches, &mut asked.request)?;
-        }
+        flag.apply(&fields, matches, &mut asked.request)?;
     }
     Ok(first)
 }

@@ -53,9 +53,7 @@ pub(super) fn run(matches: &ArgMatches) -> Result<(), CliError> {
     let fields = kind_of(COMMAND).fields();
     for flag in FLAGS {
         asked.sources.push((format!("/{}", flag.field), format!("--{}", flag.name)));
-        if let Some(field) = fields.iter().find(|f| f.name == flag.field) {
-            flag.apply(field, matches, &mut asked.request)?;
-        }
+        flag.apply(&fields, matches, &mut asked.request)?;
     }
     let outcome = asked.job()?.run(&Terminal::new(None, None)).map_err(|e| asked.failure(e, None))?;
     for (option, name) in [("junit", "comparison.xml"), ("markdown", "comparison.md")] {

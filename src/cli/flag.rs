@@ -86,13 +86,15 @@ impl Flag {
     /// Sets the field of `request` to what the command line says, where it says anything.
     pub(super) fn apply(
         self,
-        field: &RequestField,
+        fields: &[RequestField],
         matches: &ArgMatches,
         request: &mut Value,
     ) -> Result<(), CliError> {
+        let named = |name: &str| fields.iter().find(|f| f.name == name);
+        let Some(field) = named(self.field) else { return Ok(()) };
         if self.is_switch(field) {
             if matches.get_flag(self.name) {
-                set(request, self.field, (self.written != Written::Off).into());
+                self.set_within(named, request, (self.written != Written::Off).into());
             }
             return Ok(());
         }
@@ -108,14 +110,19 @@ impl Flag {
             }
             _ => self.value(field, text)?,
         };
-        // A field within a field that is left out begins with that field's default.
+        self.set_within(named, request, value);
+        Ok(())
+    }
+
+    /// Sets the field. A field within a field that is left out begins with that field's default.
+    fn set_within<'a>(self, named: impl Fn(&str) -> Option<&'a RequestField>, request: &mut Value, value: Value) {
         if let Some((outer, _)) = self.field.split_once('/')
             && request.get(outer).is_none()
         {
-            set(request, outer, Value::Object(Map::new()));
+            let default = named(outer).and_then(|f| f.default.clone());
+            set(request, outer, default.unwrap_or_else(|| Value::Object(Map::new())));
         }
         set(request, self.field, value);
-        Ok(())
     }
 
     fn wrong(self, text: &str, allowed: &str) -> CliError {

@@ -133,9 +133,7 @@ impl JobCommand {
     fn apply_flags(&self, matches: &ArgMatches, asked: &mut Asked) -> Result<(), CliError> {
         let fields = kind_of(self.name).fields();
         for flag in self.flags {
-            if let Some(field) = fields.iter().find(|f| f.name == flag.field) {
-                flag.apply(field, matches, &mut asked.request)?;
-            }
+            flag.apply(&fields, matches, &mut asked.request)?;
         }
         Ok(())
     }

@@ -72,7 +72,7 @@ pub struct ScanRequest {
     pub voxel_mm: [f64; 3],
     /// Offset of the grid from the specimen's centre in voxels, each from −1 to 1.
     #[serde(default)]
-    #[schema(min_items = 3, max_items = 3, default = <[f64; 3]>::default)]
+    #[schema(min_items = 3, max_items = 3, default = no_offset)]
     pub offset_voxels: [f64; 3],
     /// Signal-to-noise ratio of a full voxel along x, y, z; from the noise where it is left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -104,6 +104,10 @@ pub struct ScanRequest {
     #[serde(default = "seed")]
     #[schema(default = seed)]
     pub seed: u64,
+}
+
+fn no_offset() -> [f64; 3] {
+    [0.0; 3]
 }
 
 fn mm_per_radian() -> [f64; 3] {
