@@ -16,7 +16,7 @@ struct State {
 
 fn state(model: &mut ForwardModel, material: &Ogden, drive: f64, start: Option<&Equilibrium>) -> State {
     let equilibrium = model.solve(material, drive, start, &tight(), &never).unwrap();
-    let sensitivities = model.material_sensitivities(material, &equilibrium).unwrap();
+    let sensitivities = model.tangent(material, &equilibrium).unwrap().material_sensitivities().unwrap();
     State { equilibrium, sensitivities }
 }
 
@@ -48,7 +48,8 @@ fn check_path(
     let velocity = path.map(|variable| shape_velocity(base_model.mesh(), specimen, variable));
     let rate = if path.is_none() { 1.0 } else { 0.0 };
     let derivative = base_model
-        .path_sensitivity(&material, &base.equilibrium, &base.sensitivities, velocity.as_deref(), rate)
+        .tangent(&material, &base.equilibrium)
+        .and_then(|mut tangent| tangent.path_sensitivity(&base.sensitivities, velocity.as_deref(), rate))
         .unwrap();
     let steps = [step, 0.5 * step];
     let states = steps.map(|t| match &velocity {
@@ -88,7 +89,7 @@ fn check_material(name: &str, specimen: &Specimen, drive: f64, failures: &mut Ve
     let material = two_terms();
     let mut model = model(specimen, 2.5);
     let base = solve(&mut model, &material, drive).unwrap();
-    for sensitivity in model.material_sensitivities(&material, &base).unwrap() {
+    for sensitivity in model.tangent(&material, &base).unwrap().material_sensitivities().unwrap() {
         let value = material.value(sensitivity.parameter);
         let steps = [0.04 * value, 0.02 * value];
         let states = steps.map(|t| {

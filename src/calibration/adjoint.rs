@@ -41,7 +41,8 @@ impl CalibrationProblem<'_> {
                     2.0 * f.weight * (state.force_n - f.value_n)
                 });
                 let nodal = view.average_transposed(&load)?;
-                for (g, d) in gradient.iter_mut().zip(model.adjoint_gradient(material, &state, &nodal, by_force)?) {
+                let of_step = model.tangent(material, &state)?.adjoint_gradient(&nodal, by_force)?;
+                for (g, d) in gradient.iter_mut().zip(of_step) {
                     *g += d;
                 }
                 last = Some(state);

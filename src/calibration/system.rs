@@ -90,7 +90,7 @@ impl Prediction {
             force_sensitivities: Vec::new(),
             work: Work::default(),
         };
-        let [before, _] = model.linear_work();
+        let before = model.num_factorisations();
         for (index, &drive) in drives_mm.iter().enumerate() {
             let start = near.and_then(|n| n.get(index)).or(prediction.states.last());
             let warm = model.solve(material, drive, start, solve, is_cancelled);
@@ -106,8 +106,8 @@ impl Prediction {
                 other => other?,
             };
             prediction.work.equilibria += 1;
-            // At once, while the tangent of this state stands.
-            let sensitivities = model.material_sensitivities(material, &state)?;
+            // At once: the tangent of a state just found costs nothing.
+            let sensitivities = model.tangent(material, &state)?.material_sensitivities()?;
             prediction.displacements.push(seen.averages(&state.displacement)?);
             prediction
                 .sensitivities
@@ -115,7 +115,7 @@ impl Prediction {
             prediction.force_sensitivities.push(sensitivities.iter().map(|s| s.force_n).collect());
             prediction.states.push(state);
         }
-        prediction.work.factorisations = model.linear_work()[0] - before;
+        prediction.work.factorisations = model.num_factorisations() - before;
         Ok(prediction)
     }
 

@@ -114,7 +114,8 @@ pub fn confirm(
         if study.objective.kind == ObjectiveKind::TellApart
             && let Some(state) = maps.equilibria.last()
         {
-            solved.push((state_of(&mut model, &prior.material, state)?, state.clone()));
+            let mut tangent = model.tangent(&prior.material, state)?;
+            solved.push((state_of(state, &mut tangent)?, state.clone()));
         }
         by_material.push(of_material(&model, &prior.name, &prior.material, evaluation, &maps));
     }

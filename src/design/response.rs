@@ -10,7 +10,7 @@ use super::space::{Subspace, Variable};
 use super::study::{MaterialPrior, Study};
 use super::tell_apart::{log_separation, nearest, separation, state_of};
 use crate::fem::{
-    Equilibrium, ForwardModel, ParameterSensitivity, PathSensitivity, PrepareError, SolveError, SolveOptions,
+    Equilibrium, ForwardModel, ParameterSensitivity, PathSensitivity, PrepareError, SolveError, SolveOptions, Tangent,
 };
 use crate::kinematics::principal_stretches;
 use crate::material::Ogden;
@@ -301,8 +301,8 @@ impl<'a> Evaluator<'a> {
     ) -> Result<Solved, EvaluationFailure> {
         let mut solved = Solved { states: Vec::new(), fitted: Vec::new(), paths: Vec::new() };
         let mut equilibria: Vec<Equilibrium> = Vec::new();
-        let along_moves = |model: &mut ForwardModel, material: &Ogden, at: &Equilibrium, state: &MaterialState| {
-            let along = |m: &Move| model.path_sensitivity(material, at, &state.sensitivities, m.0.as_deref(), m.1);
+        let along_moves = |tangent: &mut Tangent, state: &MaterialState| {
+            let along = |m: &Move| tangent.path_sensitivity(&state.sensitivities, m.0.as_deref(), m.1);
             moves.iter().map(along).collect::<Result<Vec<_>, _>>()
         };
         for sample in &self.samples {
@@ -314,8 +314,9 @@ impl<'a> Evaluator<'a> {
                     .or_else(|_| model.solve(material, drive, None, &self.solve, is_cancelled))?,
                 None => model.solve(material, drive, None, &self.solve, is_cancelled)?,
             };
-            let state = state_of(model, material, &found)?;
-            solved.paths.push(along_moves(model, material, &found, &state)?);
+            let mut tangent = model.tangent(material, &found)?;
+            let state = state_of(&found, &mut tangent)?;
+            solved.paths.push(along_moves(&mut tangent, &state)?);
             solved.states.push(state);
             equilibria.push(found);
         }
@@ -326,7 +327,8 @@ impl<'a> Evaluator<'a> {
                     let (start, material) = (&equilibria[other], &self.samples[other].material);
                     let theirs = &solved.states[of];
                     let fit = nearest(self.study, model, material, start, drive, theirs, &self.solve, is_cancelled)?;
-                    solved.paths.push(along_moves(model, &fit.material, &fit.equilibrium, &fit.state)?);
+                    let mut tangent = model.tangent(&fit.material, &fit.equilibrium)?;
+                    solved.paths.push(along_moves(&mut tangent, &fit.state)?);
                     solved.fitted.push(Fitted { of, material: fit.material, state: fit.state });
                 }
             }

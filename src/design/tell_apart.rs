@@ -5,7 +5,7 @@
 
 use super::response::EvaluationFailure;
 use super::study::Study;
-use crate::fem::{Equilibrium, ForwardModel, SolveOptions};
+use crate::fem::{Equilibrium, ForwardModel, SolveOptions, Tangent};
 use crate::material::{Ogden, Parameter};
 use crate::sensitivity::{InformationError, MaterialState, Separation, separation_over_quadrature};
 
@@ -31,15 +31,11 @@ pub(super) struct Nearest {
 }
 
 /// What a solved material does.
-pub(super) fn state_of(
-    model: &mut ForwardModel,
-    material: &Ogden,
-    equilibrium: &Equilibrium,
-) -> Result<MaterialState, EvaluationFailure> {
+pub(super) fn state_of(equilibrium: &Equilibrium, tangent: &mut Tangent) -> Result<MaterialState, EvaluationFailure> {
     Ok(MaterialState {
         displacement: equilibrium.displacement.clone(),
         force_n: equilibrium.force_n,
-        sensitivities: model.material_sensitivities(material, equilibrium)?,
+        sensitivities: tangent.material_sensitivities()?,
     })
 }
 
@@ -71,7 +67,7 @@ pub(super) fn nearest(
 ) -> Result<Nearest, EvaluationFailure> {
     let positions = model.mesh().nodes.clone();
     let (mut material, mut equilibrium) = (material.clone(), start.clone());
-    let mut state = state_of(model, &material, &equilibrium)?;
+    let mut state = state_of(&equilibrium, &mut model.tangent(&material, &equilibrium)?)?;
     let mut from_here = separation(study, model, &positions, &material, &state, theirs)?;
     for _ in 0..MAX_STEPS {
         if from_here.gained < SMALLEST_GAIN + GAIN * from_here.distance_sd.powi(2) {
@@ -90,7 +86,7 @@ pub(super) fn nearest(
                 return Err(EvaluationFailure::Cancelled);
             }
             if let Some(found) = solved {
-                let reached = state_of(model, &next, &found)?;
+                let reached = state_of(&found, &mut model.tangent(&next, &found)?)?;
                 let there = separation(study, model, &positions, &next, &reached, theirs)?;
                 if there.distance_sd.powi(2) + there.gained < misfit {
                     break Some((next, found, reached, there));

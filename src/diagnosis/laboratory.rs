@@ -107,30 +107,27 @@ impl<'a> Laboratory<'a> {
         let mut seen = Vec::with_capacity(states.capacity());
         for (n, step) in self.observed.steps.iter().enumerate() {
             let departures = self.departures(material, scene, n);
-            let station = &mut self.stations[at];
-            station.model.set_departures(&departures);
-            let near = station.states.get(n).cloned();
+            let station = &self.stations[at];
+            let mut model = station.model.departed(&departures);
             self.num_solves += 1;
-            let warm = near.map(|s| station.model.solve(material, step.drive_mm, Some(&s), &self.solve, is_cancelled));
+            let near = station.states.get(n);
+            let warm = near.map(|s| model.solve(material, step.drive_mm, Some(s), &self.solve, is_cancelled));
             let state = match warm {
                 Some(Ok(state)) => state,
                 Some(Err(cause @ SolveError::Cancelled { .. })) => return Err(cause.into()),
                 _ => {
                     let last = states.last();
-                    let cold = station.model.solve(material, step.drive_mm, last, &self.solve, is_cancelled);
+                    let cold = model.solve(material, step.drive_mm, last, &self.solve, is_cancelled);
                     match cold {
                         Ok(state) => state,
                         Err(cause @ SolveError::Cancelled { .. }) => return Err(cause.into()),
                         // From rest; plates far out of place are brought there by parts.
-                        Err(_) => {
-                            let model = &mut station.model;
-                            match model.solve(material, step.drive_mm, None, &self.solve, is_cancelled) {
-                                Err(_) if departures.moves_plates() && !is_cancelled() => {
-                                    model.solve_by_parts(material, step.drive_mm, &self.solve, is_cancelled)?
-                                }
-                                found => found?,
+                        Err(_) => match model.solve(material, step.drive_mm, None, &self.solve, is_cancelled) {
+                            Err(_) if departures.moves_plates() && !is_cancelled() => {
+                                model.solve_by_parts(material, step.drive_mm, &self.solve, is_cancelled)?
                             }
-                        }
+                            found => found?,
+                        },
                     }
                 }
             };
@@ -164,15 +161,15 @@ impl<'a> Laboratory<'a> {
     ) -> Result<Vec<(f64, Vec<f64>, KernelState)>, DiagnosisError> {
         let at = self.station(scene)?;
         let departures = self.departures(material, scene, 0);
-        let station = &mut self.stations[at];
-        station.model.set_departures(&departures);
+        let mut model = self.stations[at].model.departed(&departures);
         let mut last: Option<Equilibrium> = None;
         let mut table = Vec::with_capacity(drives_mm.len());
         for &drive in drives_mm {
             self.num_solves += 1;
-            let state = station.model.solve(material, drive, last.as_ref(), &self.solve, is_cancelled)?;
-            let sensitivities = station.model.material_sensitivities(material, &state)?;
-            let remembered = KernelState::of(&mut station.model, material, &state)?;
+            let state = model.solve(material, drive, last.as_ref(), &self.solve, is_cancelled)?;
+            let mut tangent = model.tangent(material, &state)?;
+            let sensitivities = tangent.material_sensitivities()?;
+            let remembered = KernelState::of(&model, material, &state, &mut tangent)?;
             table.push((state.force_n, sensitivities.iter().map(|s| s.force_n).collect(), remembered));
             last = Some(state);
         }
@@ -207,11 +204,10 @@ impl<'a> Laboratory<'a> {
             let (face_axis, scale) = (self.face_axis, bond_scale(material));
             let measured = self.observed.steps[n].force.map_or(0.0, |f| f.value_n);
             let has_force = self.observed.steps[n].force.is_some();
-            let station = &mut self.stations[at];
-            // Once per step: what follows shares one factor.
-            station.model.set_departures(&now);
+            let station = &self.stations[at];
+            let mut tangent = station.model.departed(&now).tangent(material, state)?;
             if with_material {
-                for (s, trace) in station.model.material_sensitivities(material, state)?.iter().zip(&mut of_material) {
+                for (s, trace) in tangent.material_sensitivities()?.iter().zip(&mut of_material) {
                     let mut field = station.view.average(&s.displacement)?;
                     for u in &mut field {
                         for c in 0..3 {
@@ -225,7 +221,7 @@ impl<'a> Laboratory<'a> {
             for (index, (path, changes_sample)) in paths.iter().enumerate() {
                 let (field, force) = match &velocities[index] {
                     Some(velocity) => {
-                        let s = station.model.path_sensitivity(material, state, &[], Some(velocity), 0.0)?;
+                        let s = tangent.path_sensitivity(&[], Some(velocity), 0.0)?;
                         // The derivative follows the nodes; the scan's voxels stay: u′ − ∇u V.
                         let mut field = station.view.average(&s.displacement)?;
                         let (moved, gradients) =
@@ -239,7 +235,7 @@ impl<'a> Laboratory<'a> {
                     }
                     None if *changes_sample => {
                         let at_t = |t: f64| path(t).departures(measured, scale, face_axis);
-                        let s = station.model.departure_sensitivity(material, state, &at_t, step)?;
+                        let s = tangent.departure_sensitivity(&at_t, step)?;
                         (station.view.average(&s.displacement)?, s.force_n)
                     }
                     None => (vec![[0.0; 3]; prediction.seen[n].len()], 0.0),
@@ -317,10 +313,11 @@ impl<'a> Laboratory<'a> {
         let mut all = vec![Trace::default(); num_parts];
         for (n, state) in prediction.states.iter().enumerate() {
             let departures = self.departures(material, &scene, n);
-            let station = &mut self.stations[at];
-            station.model.set_departures(&departures);
-            let tractions = station.model.plate_tractions(material, state)?;
-            let mesh = station.model.mesh();
+            let station = &self.stations[at];
+            let mut model = station.model.departed(&departures);
+            let tractions = model.plate_tractions(material, state)?;
+            let mut tangent = model.tangent(material, state)?;
+            let mesh = model.mesh();
             let face = if is_moved_face { &mesh.moved_nodes } else { &mesh.fixed_nodes };
             let parts: Vec<(u32, usize)> = face.iter().map(|&v| (v, part_of(mesh.nodes[v as usize]))).collect();
             for (part, trace) in all.iter_mut().enumerate() {
@@ -329,7 +326,7 @@ impl<'a> Laboratory<'a> {
                     // The sample lags behind what pulls it.
                     rate[*v as usize] = tractions[*v as usize].map(|t| -t);
                 }
-                let s = station.model.imposed_sensitivity(material, state, &rate)?;
+                let s = tangent.imposed_sensitivity(&rate)?;
                 trace.displacement.push(station.view.average(&s.displacement)?);
                 let has_force = self.observed.steps[n].force.is_some();
                 trace.force.push(if has_force { s.force_n } else { 0.0 });

@@ -9,7 +9,7 @@
 //! since F_H(t) = Σ g ∫ e^{−(t−s)/τ} ∂K(d(s); d(t))/∂s ds. K comes from finite elements, holes and all. K(b; b) is the elastic force but
 //! for what pressure adds.
 
-use crate::fem::{Equilibrium, ForwardModel, SolveError};
+use crate::fem::{Equilibrium, ForwardModel, SolveError, Tangent};
 use crate::material::{Ogden, first_piola_kirchhoff_stress};
 use crate::rate::ForceTable;
 use nalgebra::Matrix3;
@@ -39,16 +39,17 @@ fn matrix(a: &[[f64; 3]; 3]) -> Matrix3<f64> {
 }
 
 impl KernelState {
-    /// Of an equilibrium.
+    /// Of an equilibrium of `model` and its tangent.
     ///
     /// # Errors
-    /// [`SolveError`]: its tangent cannot be factorised.
+    /// [`SolveError`]: the tangent is not positive definite.
     pub fn of(
-        model: &mut ForwardModel,
+        model: &ForwardModel,
         material: &Ogden,
         equilibrium: &Equilibrium,
+        tangent: &mut Tangent,
     ) -> Result<KernelState, SolveError> {
-        let rate = model.path_sensitivity(material, equilibrium, &[], None, 1.0)?;
+        let rate = tangent.path_sensitivity(&[], None, 1.0)?;
         let isochoric = Ogden { bulk_kpa: 0.0, ..material.clone() };
         let here = model.quadrature_fields(material, equilibrium);
         // The deformation gradient of the rate alone is I + dF/dd.
@@ -144,7 +145,8 @@ mod tests {
         for &d in drives {
             let found = model.solve(&material, d, last.as_ref(), &SolveOptions::default(), &|| false).unwrap();
             forces.push((d, found.force_n));
-            all.push(KernelState::of(&mut model, &material, &found).unwrap());
+            let mut tangent = model.tangent(&material, &found).unwrap();
+            all.push(KernelState::of(&model, &material, &found, &mut tangent).unwrap());
             last = Some(found);
         }
         (all, forces)

@@ -4,11 +4,6 @@
 //! x. Each departure here is at rest in its default; the element kernels, the factorisation and the derivatives are the
 //! same with and without.
 
-use super::element_data::{ElementOutput, MAX_GROUPS};
-use super::error::{SolveError, StepFailure};
-use super::model::ForwardModel;
-use super::newton::{Equilibrium, SolveOptions};
-use crate::material::{LANES, Lanes, Ogden};
 use std::fmt;
 use std::sync::Arc;
 
@@ -79,7 +74,8 @@ impl PlateMotion {
         [0, 1, 2].map(|i| t[i] + a * once[i] + b * twice[i])
     }
 
-    fn scaled(&self, factor: f64) -> PlateMotion {
+    /// The motion times a factor.
+    pub(super) fn scaled(&self, factor: f64) -> PlateMotion {
         let times = |v: [f64; 3]| v.map(|x| factor * x);
         PlateMotion {
             translation_mm: times(self.translation_mm),
@@ -89,9 +85,6 @@ impl PlateMotion {
         }
     }
 }
-
-/// In how many parts plates are brought to where they are by [`ForwardModel::solve_by_parts`].
-const PARTS: i32 = 8;
 
 /// All departures of one experiment.
 #[derive(Clone, Debug, Default)]
@@ -106,7 +99,8 @@ pub struct Departures {
     pub fixed_plate: PlateMotion,
     /// The moved plate or grip (+y or +x).
     pub moved_plate: PlateMotion,
-    /// Stiffness of the bond, kPa/mm, on faces that were released (see [`ForwardModel::with_released`]).
+    /// Stiffness of the bond, kPa/mm, on faces that were released (see
+    /// [`ForwardModel::with_released`](super::ForwardModel::with_released)).
     pub bond_kpa_per_mm: Option<Field>,
 }
 
@@ -120,6 +114,15 @@ impl Departures {
             && self.bond_kpa_per_mm.is_none()
     }
 
+    /// The same with the departures of both plates times a factor.
+    pub(super) fn with_plates_scaled(&self, factor: f64) -> Departures {
+        Departures {
+            fixed_plate: self.fixed_plate.scaled(factor),
+            moved_plate: self.moved_plate.scaled(factor),
+            ..self.clone()
+        }
+    }
+
     /// Whether a plate departs from its nominal motion.
     pub fn moves_plates(&self) -> bool {
         [self.fixed_plate, self.moved_plate] != [PlateMotion::default(); 2]
@@ -128,307 +131,3 @@ impl Departures {
 
 /// A bond this stiff (kPa/mm) holds: a traction of 100 kPa slips 10⁻⁴ mm.
 pub const FIRM_BOND_KPA_PER_MM: f64 = 1e6;
-
-/// Departures, ready for a mesh.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Prepared {
-    pub(super) departures: Departures,
-    pub(super) factor: Vec<[Lanes; MAX_GROUPS]>,
-    pub(super) growth: Vec<[Lanes; MAX_GROUPS]>,
-    /// Stiffness of the spring at each released node, kPa·mm.
-    pub(super) springs: Vec<(u32, f64)>,
-}
-
-/// Derivative of an equilibrium along a path of departures.
-#[derive(Clone, Debug)]
-pub struct DepartureSensitivity {
-    /// du/dt at each node, mm per unit of t.
-    pub displacement: Vec<[f64; 3]>,
-    /// dF/dt, N per unit of t.
-    pub force_n: f64,
-}
-
-impl ForwardModel {
-    /// Sets what the model departs from the nominal experiment in, for all that follows.
-    pub fn set_departures(&mut self, departures: &Departures) {
-        self.prepared = self.prepare(departures);
-        self.is_nominal = departures.is_none();
-        self.tangent_at = 0;
-    }
-
-    /// As [`ForwardModel::solve`] from rest, the plates' departures growing in eight parts at the drive asked for: a plate that is
-    /// far out of place without any drive is a step that Newton's method does not take from rest at once.
-    ///
-    /// # Errors
-    /// As [`ForwardModel::solve`].
-    pub fn solve_by_parts(
-        &mut self,
-        material: &Ogden,
-        drive_mm: f64,
-        options: &SolveOptions,
-        is_cancelled: &dyn Fn() -> bool,
-    ) -> Result<Equilibrium, SolveError> {
-        let whole = self.departures().clone();
-        let mut state = None;
-        for part in 0..PARTS {
-            let grown = f64::from(part) / f64::from(PARTS);
-            let (fixed_plate, moved_plate) = (whole.fixed_plate.scaled(grown), whole.moved_plate.scaled(grown));
-            self.set_departures(&Departures { fixed_plate, moved_plate, ..whole.clone() });
-            match self.solve(material, drive_mm, state.as_ref(), options, is_cancelled) {
-                Ok(found) => state = Some(found),
-                Err(error) => {
-                    self.set_departures(&whole);
-                    return Err(error);
-                }
-            }
-        }
-        self.set_departures(&whole);
-        self.solve(material, drive_mm, state.as_ref(), options, is_cancelled)
-    }
-
-    /// The departures in force.
-    pub fn departures(&self) -> &Departures {
-        &self.prepared.departures
-    }
-
-    fn prepare(&mut self, departures: &Departures) -> Prepared {
-        let needs_points = departures.stiffness_factor.is_some() || departures.log_growth.is_some();
-        if needs_points && self.point_positions.is_empty() {
-            self.point_positions = self.quadrature_positions();
-        }
-        let on_points = |field: &Option<Field>| -> Vec<[Lanes; MAX_GROUPS]> {
-            let Some(field) = field else { return Vec::new() };
-            self.point_positions
-                .iter()
-                .map(|points| {
-                    let mut values = [Lanes::ZERO; MAX_GROUPS];
-                    for (g, value) in values.iter_mut().enumerate() {
-                        for l in 0..LANES {
-                            value.0[l] = field.at([0, 1, 2].map(|i| points[i][g].0[l]));
-                        }
-                    }
-                    values
-                })
-                .collect()
-        };
-        let springs = self
-            .released
-            .iter()
-            .map(|&(v, area)| {
-                let firm = FIRM_BOND_KPA_PER_MM;
-                let bond = departures.bond_kpa_per_mm.as_ref().map_or(firm, |b| b.at(self.mesh.nodes[v as usize]));
-                (v, bond.clamp(0.0, firm) * area)
-            })
-            .collect();
-        Prepared {
-            factor: on_points(&departures.stiffness_factor),
-            growth: on_points(&departures.log_growth),
-            springs,
-            departures: departures.clone(),
-        }
-    }
-
-    fn quadrature_positions(&self) -> Vec<[[Lanes; MAX_GROUPS]; 3]> {
-        let rest = vec![[0.0; 3]; self.mesh.nodes.len()];
-        let material = Ogden { schema: String::new(), bulk_kpa: 1.0, terms: Vec::new() };
-        let mut out = ElementOutput::default();
-        (0..self.mesh.num_elements())
-            .map(|e| {
-                let input = self.nominal_input(e, &self.mesh.nodes, &rest, None, &material);
-                self.kernels.residual(&self.tables, &input, &mut out);
-                out.points
-            })
-            .collect()
-    }
-
-    /// Displacement that the plates impose on node `v`; the node must be on a plate.
-    pub(super) fn imposed(&self, v: usize, drive_mm: f64) -> [f64; 3] {
-        self.imposed_by(&self.prepared.departures, v, drive_mm)
-    }
-
-    fn imposed_by(&self, departures: &Departures, v: usize, drive_mm: f64) -> [f64; 3] {
-        let (motion, center, along) = if self.is_moved[v] {
-            (&departures.moved_plate, self.face_centers[1], drive_mm)
-        } else {
-            (&departures.fixed_plate, self.face_centers[0], 0.0)
-        };
-        let x = self.mesh.nodes[v];
-        let mut u = motion.displacement([0, 1, 2].map(|i| x[i] - center[i]), drive_mm);
-        u[0] += along;
-        u
-    }
-
-    /// Adds the springs of released nodes to a residual; returns their forces, node by node.
-    pub(super) fn add_spring_forces(
-        &self,
-        drive_mm: f64,
-        displacement: &[[f64; 3]],
-        residual: &mut [[f64; 3]],
-    ) -> Vec<(u32, [f64; 3])> {
-        self.prepared
-            .springs
-            .iter()
-            .map(|&(v, stiffness)| {
-                let v_index = v as usize;
-                let imposed = self.imposed(v_index, drive_mm);
-                let force = [0, 1, 2].map(|i| stiffness * (displacement[v_index][i] - imposed[i]));
-                for i in 0..3 {
-                    residual[v_index][i] += force[i];
-                }
-                (v, force)
-            })
-            .collect()
-    }
-
-    /// Adds the springs to the diagonal of the assembled tangent.
-    pub(super) fn add_spring_stiffness(&mut self) {
-        for &(v, stiffness) in &self.prepared.springs {
-            let place = self.topology.place[v as usize];
-            let Some(&block) = self.topology.block_pointers.get(place as usize) else { continue };
-            // The diagonal block comes first in its column.
-            let target = &mut self.system.blocks[block as usize];
-            for i in 0..3 {
-                target[4 * i] += stiffness;
-            }
-        }
-    }
-
-    /// Derivative of `equilibrium` along t ↦ `path`(t) at t = 0, which must be the departures in force; differences of the
-    /// residual over ±`step`, in units of t.
-    ///
-    /// # Errors
-    /// [`SolveError::Linear`] if the tangent is not positive definite, [`SolveError::Diverged`] if `step` inverts an element.
-    pub fn departure_sensitivity(
-        &mut self,
-        material: &Ogden,
-        equilibrium: &Equilibrium,
-        path: &dyn Fn(f64) -> Departures,
-        step: f64,
-    ) -> Result<DepartureSensitivity, SolveError> {
-        self.ensure_tangent(material, equilibrium)?;
-        let drive = equilibrium.drive_mm;
-        let (ahead, behind) = (path(step), path(-step));
-        let num_nodes = self.mesh.nodes.len();
-        let mut imposed_rate = vec![[0.0; 3]; num_nodes];
-        for v in self.held_nodes() {
-            let (a, b) = (self.imposed_by(&ahead, v, drive), self.imposed_by(&behind, v, drive));
-            imposed_rate[v] = [0, 1, 2].map(|i| (a[i] - b[i]) / (2.0 * step));
-        }
-        let (ahead, behind) = (self.prepare(&ahead), self.prepare(&behind));
-        let present = std::mem::take(&mut self.prepared);
-        let result = self.difference_along(material, equilibrium, [&ahead, &behind], &mut imposed_rate, step, &present);
-        self.prepared = present;
-        result
-    }
-
-    /// Derivative of `equilibrium` as the held nodes move by `rate` (mm per unit of t; other nodes' entries are ignored).
-    ///
-    /// # Errors
-    /// As [`Self::departure_sensitivity`].
-    pub fn imposed_sensitivity(
-        &mut self,
-        material: &Ogden,
-        equilibrium: &Equilibrium,
-        rate: &[[f64; 3]],
-    ) -> Result<DepartureSensitivity, SolveError> {
-        self.ensure_tangent(material, equilibrium)?;
-        let mut imposed = vec![[0.0; 3]; self.mesh.nodes.len()];
-        let mut largest = 1e-12f64;
-        for v in self.held_nodes() {
-            imposed[v] = rate[v];
-            largest = rate[v].iter().fold(largest, |s, x| s.max(x.abs()));
-        }
-        // Differences over a micrometre: elements are some hundred times larger, their vectors smooth.
-        let step = 1e-3 / largest;
-        let present = std::mem::take(&mut self.prepared);
-        let result = self.difference_along(material, equilibrium, [&present, &present], &mut imposed, step, &present);
-        self.prepared = present;
-        result
-    }
-
-    /// Traction (kPa) of the plates on the sample at each node of the bonded faces, zero elsewhere: nodal force / area.
-    ///
-    /// # Errors
-    /// [`SolveError::Diverged`] where the state is not one of this mesh.
-    pub fn plate_tractions(
-        &mut self,
-        material: &Ogden,
-        equilibrium: &Equilibrium,
-    ) -> Result<Vec<[f64; 3]>, SolveError> {
-        let areas = self.mesh.face_areas();
-        let positions = self.mesh.nodes.clone();
-        let mut residual = vec![[0.0; 3]; positions.len()];
-        self.assemble_residual_at(material, &positions, &equilibrium.displacement, None, &mut residual).map_err(
-            |cause| SolveError::Diverged { reached_mm: equilibrium.drive_mm, asked_mm: equilibrium.drive_mm, cause },
-        )?;
-        Ok(residual
-            .iter()
-            .zip(&areas)
-            .map(|(r, area)| if *area > 0.0 { r.map(|f| f / area) } else { [0.0; 3] })
-            .collect())
-    }
-
-    /// Mesh nodes that move with a plate.
-    fn held_nodes(&self) -> Vec<usize> {
-        (0..self.is_held.len()).filter(|&v| self.is_held[v]).collect()
-    }
-
-    fn difference_along(
-        &mut self,
-        material: &Ogden,
-        equilibrium: &Equilibrium,
-        ends: [&Prepared; 2],
-        rate: &mut [[f64; 3]],
-        step: f64,
-        present: &Prepared,
-    ) -> Result<DepartureSensitivity, SolveError> {
-        let diverged = |cause: StepFailure| SolveError::Diverged {
-            reached_mm: equilibrium.drive_mm,
-            asked_mm: equilibrium.drive_mm,
-            cause,
-        };
-        let num_nodes = self.mesh.nodes.len();
-        let positions = self.mesh.nodes.clone();
-        let driven = self.driven_elements.clone();
-        // d/dt of the residual along (u + t rate, path(t)); the plate's part without the springs.
-        let difference = |model: &mut Self, rate: &[[f64; 3]], elements: Option<&[u32]>, with_springs: bool| {
-            let mut sum = vec![[0.0; 3]; num_nodes];
-            let mut value = vec![[0.0; 3]; num_nodes];
-            for (prepared, sign) in [(ends[0], 1.0), (ends[1], -1.0)] {
-                model.prepared = prepared.clone();
-                let u: Vec<[f64; 3]> = equilibrium
-                    .displacement
-                    .iter()
-                    .zip(rate)
-                    .map(|(u, r)| [0, 1, 2].map(|i| u[i] + sign * step * r[i]))
-                    .collect();
-                model.assemble_residual_at(material, &positions, &u, elements, &mut value).map_err(diverged)?;
-                if with_springs {
-                    model.add_spring_forces(equilibrium.drive_mm, &u, &mut value);
-                }
-                for (s, v) in sum.iter_mut().zip(&value) {
-                    for i in 0..3 {
-                        s[i] += sign * v[i] / (2.0 * step);
-                    }
-                }
-            }
-            Ok::<_, SolveError>(sum)
-        };
-        let residual = difference(self, rate, None, true)?;
-        self.prepared = present.clone();
-        let right = self.collect(&residual, -1.0);
-        let x = self.system.solve(&self.topology, &[right], 1e-7)?;
-        for (r, d) in rate.iter_mut().zip(self.spread(&x[0])) {
-            for i in 0..3 {
-                r[i] += d[i];
-            }
-        }
-        let on_plate = difference(self, rate, Some(&driven), false)?;
-        let force_n = self.reaction(&on_plate)[0] * self.multiplicity * 1e-3;
-        Ok(DepartureSensitivity { displacement: rate.to_vec(), force_n })
-    }
-}
-
-#[cfg(test)]
-#[path = "departures_tests.rs"]
-mod tests;

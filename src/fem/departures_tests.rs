@@ -1,5 +1,7 @@
+//! Departures against closed forms and Taylor's theorem.
+
 use super::*;
-use crate::fem::SolveOptions;
+use crate::material::Ogden;
 use crate::mesh::{MeshOptions, mesh_specimen};
 use crate::specimen::Specimen;
 
@@ -57,13 +59,12 @@ fn derivatives_pass_the_taylor_test() {
     for (name, path) in paths() {
         let (mut model, material) = model();
         let at_rest = solve(&mut model, &material, None);
-        model.set_departures(&path(0.0));
-        let base = solve(&mut model, &material, Some(&at_rest));
-        let slope = model.departure_sensitivity(&material, &base, &path, 1e-3).unwrap();
+        let mut departed = model.departed(&path(0.0));
+        let base = solve(&mut departed, &material, Some(&at_rest));
+        let slope = departed.tangent(&material, &base).unwrap().departure_sensitivity(&path, 1e-3).unwrap();
         let mut errors = Vec::new();
         for t in [0.2, 0.1] {
-            model.set_departures(&path(t));
-            let moved = solve(&mut model, &material, Some(&base));
+            let moved = solve(&mut model.departed(&path(t)), &material, Some(&base));
             let linear: Vec<[f64; 3]> = base
                 .displacement
                 .iter()
@@ -90,8 +91,8 @@ fn uniform_factor_is_a_stiffer_material() {
     let mut stiffer = material.clone();
     stiffer.terms[0].mu_kpa *= factor;
     let expected = solve(&mut model, &stiffer, None);
-    model.set_departures(&Departures { stiffness_factor: Some(Field::new(move |_| factor)), ..Departures::default() });
-    let found = solve(&mut model, &material, None);
+    let everywhere = Departures { stiffness_factor: Some(Field::new(move |_| factor)), ..Departures::default() };
+    let found = solve(&mut model.departed(&everywhere), &material, None);
     // The solver's tolerance.
     assert!((found.force_n / expected.force_n - 1.0).abs() < 1e-8, "{} {}", found.force_n, expected.force_n);
     assert!(largest_difference(&found.displacement, &expected.displacement) < 1e-7);
@@ -103,8 +104,8 @@ fn rigid_motions_of_both_plates_cost_nothing() {
     let (mut model, material) = model();
     let nominal = solve(&mut model, &material, None);
     let shift = PlateMotion { translation_mm: [0.3, -0.2, 0.5], ..PlateMotion::default() };
-    model.set_departures(&Departures { fixed_plate: shift, moved_plate: shift, ..Departures::default() });
-    let moved = solve(&mut model, &material, Some(&nominal));
+    let shifted = Departures { fixed_plate: shift, moved_plate: shift, ..Departures::default() };
+    let moved = solve(&mut model.departed(&shifted), &material, Some(&nominal));
     assert!((moved.force_n / nominal.force_n - 1.0).abs() < 1e-8);
     let expected: Vec<[f64; 3]> =
         nominal.displacement.iter().map(|u| [0, 1, 2].map(|i| u[i] + shift.translation_mm[i])).collect();
@@ -124,11 +125,11 @@ fn firm_bonds_hold_and_broken_bonds_let_go() {
     // Slip of traction / bond stiffness: some 50 kPa at the coarse mesh's edges over 10⁶ kPa/mm, against 4 mm of drive.
     assert!((firm.force_n / nominal.force_n - 1.0).abs() < 1e-4, "{} {}", firm.force_n, nominal.force_n);
     assert!(firm.reaction_imbalance < 1e-6);
-    released.set_departures(&Departures {
+    let mut unbonded = released.departed(&Departures {
         bond_kpa_per_mm: Some(Field::new(|x| if x[0] > 8.7 { 0.0 } else { FIRM_BOND_KPA_PER_MM })),
         ..Departures::default()
     });
-    let part = solve(&mut released, &material, None);
+    let part = solve(&mut unbonded, &material, None);
     // About an eighth of the face carries no shear any more; the block's end still passes some on.
     assert!(part.force_n < 0.97 * nominal.force_n && part.force_n > 0.8 * nominal.force_n, "{}", part.force_n);
     let slip = released.mesh().moved_nodes.iter().map(|&v| 4.0 - part.displacement[v as usize][0]);
@@ -140,17 +141,16 @@ fn firm_bonds_hold_and_broken_bonds_let_go() {
 fn bonds_pass_the_taylor_test() {
     let (specimen, options, material) = coarse();
     let mesh = mesh_specimen(&specimen, &options).unwrap();
-    let mut model = ForwardModel::with_released(mesh, &specimen, &|_, is_moved| is_moved).unwrap();
+    let model = ForwardModel::with_released(mesh, &specimen, &|_, is_moved| is_moved).unwrap();
     let path = |t: f64| Departures {
         bond_kpa_per_mm: Some(Field::new(move |x| if x[0] > 5.0 { 30.0 * (1.0 + t) } else { FIRM_BOND_KPA_PER_MM })),
         ..Departures::default()
     };
-    model.set_departures(&path(0.0));
-    let base = solve(&mut model, &material, None);
-    let slope = model.departure_sensitivity(&material, &base, &path, 1e-3).unwrap();
+    let mut departed = model.departed(&path(0.0));
+    let base = solve(&mut departed, &material, None);
+    let slope = departed.tangent(&material, &base).unwrap().departure_sensitivity(&path, 1e-3).unwrap();
     let errors = [0.2, 0.1].map(|t| {
-        model.set_departures(&path(t));
-        let moved = solve(&mut model, &material, Some(&base));
+        let moved = solve(&mut model.departed(&path(t)), &material, Some(&base));
         (moved.force_n - base.force_n - t * slope.force_n).abs()
     });
     // Second order is 4; stiffness enters as t/(1 + t), whose third-order term is a fifth of the second at t = 0.2.
@@ -164,15 +164,15 @@ fn plates_are_brought_out_of_place_by_parts() {
         moved_plate: PlateMotion { rotation_rad: [0.0, 0.0, degrees.to_radians()], ..PlateMotion::default() },
         ..Departures::default()
     };
-    let (mut model, material) = model();
-    model.set_departures(&turned(1.0));
-    let at_once = solve(&mut model, &material, None);
-    let by_parts = model.solve_by_parts(&material, 4.0, &TIGHT, &|| false).unwrap();
+    let (model, material) = model();
+    let mut near = model.departed(&turned(1.0));
+    let at_once = solve(&mut near, &material, None);
+    let by_parts = near.solve_by_parts(&material, 4.0, &TIGHT, &|| false).unwrap();
     // The tolerance of the solver, 1e-9 of the force, moves points of this soft block by less than this, mm.
     assert!(largest_difference(&at_once.displacement, &by_parts.displacement) < 1e-6);
-    model.set_departures(&turned(4.0));
-    let far = model.solve_by_parts(&material, 4.0, &TIGHT, &|| false).unwrap();
+    let mut turned_far = model.departed(&turned(4.0));
+    let far = turned_far.solve_by_parts(&material, 4.0, &TIGHT, &|| false).unwrap();
     // It is an equilibrium of the whole departure: solved anew from there, it stays.
-    let again = solve(&mut model, &material, Some(&far));
-    assert!(largest_difference(&far.displacement, &again.displacement) < 1e-6);
+    let solved_anew = solve(&mut turned_far, &material, Some(&far));
+    assert!(largest_difference(&far.displacement, &solved_anew.displacement) < 1e-6);
 }

@@ -10,10 +10,11 @@
 //! closed-form element vectors (no solve is differenced): with t a 1/500 of the smallest element their error is
 //! (1/500)⁴ κ/μ ≈ 10⁻⁸ at κ/μ = 10³.
 
+use super::assembler::Configuration;
 use super::error::{SolveError, StepFailure};
-use super::model::ForwardModel;
-use super::newton::Equilibrium;
-use crate::material::{Ogden, Parameter};
+use super::tangent::Tangent;
+use crate::material::Parameter;
+use crate::mesh::Mesh;
 
 /// Derivative of an equilibrium with respect to one material parameter.
 #[derive(Clone, Debug)]
@@ -22,7 +23,7 @@ pub struct ParameterSensitivity {
     pub parameter: Parameter,
     /// ∂u/∂ξ at each node, mm per unit of ξ.
     pub displacement: Vec<[f64; 3]>,
-    /// ∂F/∂ξ, N per unit of ξ (as [`Equilibrium::force_n`]).
+    /// ∂F/∂ξ, N per unit of ξ (as [`Equilibrium::force_n`](super::Equilibrium::force_n)).
     pub force_n: f64,
 }
 
@@ -40,71 +41,40 @@ pub struct PathSensitivity {
 /// Relative accuracy of the linear solves (two iterations with the single-precision factor).
 const ACCURACY: f64 = 1e-8;
 
-impl ForwardModel {
-    /// Makes the stored tangent that of `equilibrium`, and a factor near it.
-    pub(super) fn ensure_tangent(&mut self, material: &Ogden, equilibrium: &Equilibrium) -> Result<(), SolveError> {
-        if self.tangent_at == equilibrium.serial && equilibrium.serial != 0 && self.system.has_factor() {
-            return Ok(());
-        }
-        let mut residual = vec![[0.0; 3]; self.mesh.nodes.len()];
-        self.assemble_tangent(
-            material,
-            equilibrium.drive_mm,
-            &equilibrium.displacement,
-            Some(&equilibrium.pressure),
-            &mut residual,
-        )
-        .map_err(|cause| at(equilibrium, cause))?;
-        self.system.factorise(&self.topology)?;
-        self.tangent_at = equilibrium.serial;
-        Ok(())
-    }
+/// A path t ↦ (X + t `velocity`, u + t `rate`), differenced over multiples of `step`.
+#[derive(Clone, Copy)]
+struct Path<'a> {
+    velocity: &'a [[f64; 3]],
+    rate: &'a [[f64; 3]],
+    step: f64,
+}
 
-    /// ∂u/∂ξ and ∂F/∂ξ for every parameter, in the order of [`Ogden::parameters`], at an equilibrium of `material`.
+impl Tangent<'_> {
+    /// ∂u/∂ξ and ∂F/∂ξ for every parameter, in the order of [`Ogden::parameters`](crate::material::Ogden::parameters).
     ///
     /// # Errors
-    /// [`SolveError::Linear`] if the tangent at the equilibrium is not positive definite.
-    pub fn material_sensitivities(
-        &mut self,
-        material: &Ogden,
-        equilibrium: &Equilibrium,
-    ) -> Result<Vec<ParameterSensitivity>, SolveError> {
-        self.ensure_tangent(material, equilibrium)?;
-        let num_nodes = self.mesh.nodes.len();
-        let parameters = material.parameters();
-        let positions = self.mesh.nodes.clone();
-        let mut derivative = vec![[0.0; 3]; num_nodes];
+    /// [`SolveError::Linear`] if the tangent is not positive definite.
+    pub fn material_sensitivities(&mut self) -> Result<Vec<ParameterSensitivity>, SolveError> {
+        let assembler = self.assembler.clone();
+        let parameters = self.material.parameters();
+        let mut derivative = vec![[0.0; 3]; assembler.mesh().nodes.len()];
         let mut right = Vec::with_capacity(parameters.len());
         for &parameter in &parameters {
-            self.assemble_directional(
-                material,
-                &positions,
-                &equilibrium.displacement,
-                None,
-                Some(parameter),
-                None,
-                &mut derivative,
-            )
-            .map_err(|cause| at(equilibrium, cause))?;
-            right.push(self.collect(&derivative, -1.0));
+            assembler
+                .assemble_directional(&self.configuration(), None, Some(parameter), None, &mut derivative)
+                .map_err(|cause| self.diverged(cause))?;
+            right.push(assembler.collect(&derivative, -1.0));
         }
-        let solutions = self.solve_all(&right)?;
-        let driven = self.driven_elements.clone();
+        let solutions = self.solve_all(&right, ACCURACY)?;
+        let driven = Some(&assembler.plates().driven_elements[..]);
         let mut all = Vec::with_capacity(parameters.len());
         for (&parameter, x) in parameters.iter().zip(&solutions) {
-            let displacement = self.spread(x);
-            self.assemble_directional(
-                material,
-                &positions,
-                &equilibrium.displacement,
-                Some(&displacement),
-                Some(parameter),
-                Some(&driven),
-                &mut derivative,
-            )
-            .map_err(|cause| at(equilibrium, cause))?;
-            let force_n = self.reaction(&derivative)[0] * self.multiplicity * 1e-3;
-            all.push(ParameterSensitivity { parameter, displacement, force_n });
+            let displacement = assembler.spread(x);
+            let direction = Some(&displacement[..]);
+            assembler
+                .assemble_directional(&self.configuration(), direction, Some(parameter), driven, &mut derivative)
+                .map_err(|cause| self.diverged(cause))?;
+            all.push(ParameterSensitivity { parameter, displacement, force_n: assembler.force_n(&derivative) });
         }
         Ok(all)
     }
@@ -116,133 +86,83 @@ impl ForwardModel {
     /// [`SolveError::Linear`] if the tangent is not positive definite.
     pub fn path_sensitivity(
         &mut self,
-        material: &Ogden,
-        equilibrium: &Equilibrium,
         sensitivities: &[ParameterSensitivity],
         velocity: Option<&[[f64; 3]]>,
         drive_rate: f64,
     ) -> Result<PathSensitivity, SolveError> {
-        self.ensure_tangent(material, equilibrium)?;
-        let num_nodes = self.mesh.nodes.len();
-        let still = vec![[0.0; 3]; num_nodes];
+        let assembler = self.assembler.clone();
+        let mesh = assembler.mesh();
+        let still = vec![[0.0; 3]; mesh.nodes.len()];
         let velocity = velocity.unwrap_or(&still);
-        let mut drive = vec![[0.0; 3]; num_nodes];
-        for &v in &self.mesh.moved_nodes {
+        let mut drive = vec![[0.0; 3]; mesh.nodes.len()];
+        for &v in &mesh.moved_nodes {
             drive[v as usize][0] = drive_rate;
         }
-        let speed = velocity.iter().chain(&drive).flatten().fold(0.0f64, |s, x| s.max(x.abs()));
-        let t = self.difference_length() / speed.max(1e-12);
-        let derivative = self.residual_along(material, equilibrium, velocity, &drive, t, false)?;
-        let x = self.solve_all(&[self.collect(&derivative, -1.0)])?;
-        let mut displacement = self.spread(&x[0]);
+        let driven = Some(&assembler.plates().driven_elements[..]);
+        let along = Path { velocity, rate: &drive, step: difference_step(mesh, velocity, &drive) };
+        let derivative = self.residual_along(along, None)?;
+        let x = self.solve_all(&[assembler.collect(&derivative, -1.0)], ACCURACY)?;
+        let mut displacement = assembler.spread(&x[0]);
         for (u, d) in displacement.iter_mut().zip(&drive) {
             for i in 0..3 {
                 u[i] += d[i];
             }
         }
-        let speed = velocity.iter().chain(&displacement).flatten().fold(0.0f64, |s, x| s.max(x.abs()));
-        let t = self.difference_length() / speed.max(1e-12);
-        let force = self.residual_along(material, equilibrium, velocity, &displacement, t, true)?;
-        let force_n = self.reaction(&force)[0] * self.multiplicity * 1e-3;
-        let mut gradients = Vec::with_capacity(sensitivities.len());
+        let along = Path { velocity, rate: &displacement, step: difference_step(mesh, velocity, &displacement) };
+        let force_n = assembler.force_n(&self.residual_along(along, driven)?);
+        let mut reactions = Vec::with_capacity(sensitivities.len());
         let mut right = Vec::with_capacity(sensitivities.len());
         for s in sensitivities {
-            let g = self.linearisation_along(material, equilibrium, s, velocity, &displacement, t)?;
-            right.push(self.collect(&g, -1.0));
-            gradients.push(self.reaction(&g)[0]);
+            let g = self.linearisation_along(along, s)?;
+            right.push(assembler.collect(&g, -1.0));
+            reactions.push(assembler.reaction(&g)[0]);
         }
-        let solutions = self.solve_all(&right)?;
-        let driven = self.driven_elements.clone();
-        let positions = self.mesh.nodes.clone();
-        let mut buffer = vec![[0.0; 3]; num_nodes];
+        let solutions = self.solve_all(&right, ACCURACY)?;
+        let mut buffer = vec![[0.0; 3]; mesh.nodes.len()];
         let mut parameters = Vec::with_capacity(sensitivities.len());
-        for ((s, x), g) in sensitivities.iter().zip(&solutions).zip(&gradients) {
-            let change = self.spread(x);
-            self.assemble_directional(
-                material,
-                &positions,
-                &equilibrium.displacement,
-                Some(&change),
-                None,
-                Some(&driven),
-                &mut buffer,
-            )
-            .map_err(|cause| at(equilibrium, cause))?;
+        for ((s, x), g) in sensitivities.iter().zip(&solutions).zip(&reactions) {
+            let change = assembler.spread(x);
+            assembler
+                .assemble_directional(&self.configuration(), Some(&change), None, driven, &mut buffer)
+                .map_err(|cause| self.diverged(cause))?;
             parameters.push(ParameterSensitivity {
                 parameter: s.parameter,
                 displacement: change,
-                force_n: (g + self.reaction(&buffer)[0]) * self.multiplicity * 1e-3,
+                force_n: (g + assembler.reaction(&buffer)[0]) * assembler.multiplicity() * 1e-3,
             });
         }
         Ok(PathSensitivity { displacement, force_n, parameters })
     }
 
-    /// A 1/500 of the shortest element edge, roughly: the cube root of the smallest element volume over 500, mm.
-    fn difference_length(&self) -> f64 {
-        let mut shortest = f64::INFINITY;
-        for e in 0..self.mesh.num_elements() {
-            let nodes = self.mesh.element(e);
-            for pair in nodes.windows(2) {
-                let (a, b) = (self.mesh.nodes[pair[0] as usize], self.mesh.nodes[pair[1] as usize]);
-                let d: f64 = (0..3).map(|i| (a[i] - b[i]).powi(2)).sum();
-                shortest = shortest.min(d);
-            }
-        }
-        2.0 * shortest.sqrt() / 500.0
+    /// d/dt r along a path; `elements` restricts the sum.
+    fn residual_along(&self, path: Path, elements: Option<&[u32]>) -> Result<Vec<[f64; 3]>, SolveError> {
+        self.difference(path, |at, out| self.assembler.assemble_residual(at, elements, out))
     }
 
-    /// d/dt r(u + t `rate`, X + t `velocity`).
-    fn residual_along(
-        &mut self,
-        material: &Ogden,
-        equilibrium: &Equilibrium,
-        velocity: &[[f64; 3]],
-        rate: &[[f64; 3]],
-        t: f64,
-        only_driven: bool,
-    ) -> Result<Vec<[f64; 3]>, SolveError> {
-        let driven = self.driven_elements.clone();
-        let list = only_driven.then_some(&driven[..]);
-        self.difference(equilibrium, velocity, rate, t, |model, x, u, out| {
-            model.assemble_residual_at(material, x, u, list, out)
-        })
+    /// d/dt [∂r/∂ξ + K s] along a path.
+    fn linearisation_along(&self, path: Path, sensitivity: &ParameterSensitivity) -> Result<Vec<[f64; 3]>, SolveError> {
+        let (direction, parameter) = (Some(&sensitivity.displacement[..]), Some(sensitivity.parameter));
+        self.difference(path, |at, out| self.assembler.assemble_directional(at, direction, parameter, None, out))
     }
 
-    /// d/dt [∂r/∂ξ + K s](u + t `rate`, X + t `velocity`).
-    fn linearisation_along(
-        &mut self,
-        material: &Ogden,
-        equilibrium: &Equilibrium,
-        sensitivity: &ParameterSensitivity,
-        velocity: &[[f64; 3]],
-        rate: &[[f64; 3]],
-        t: f64,
-    ) -> Result<Vec<[f64; 3]>, SolveError> {
-        let direction = Some(&sensitivity.displacement[..]);
-        self.difference(equilibrium, velocity, rate, t, |model, x, u, out| {
-            model.assemble_directional(material, x, u, direction, Some(sensitivity.parameter), None, out)
-        })
-    }
-
-    /// Fourth-order central difference of a nodal vector along the path.
+    /// Fourth-order central difference of a nodal vector along a path.
     fn difference(
-        &mut self,
-        equilibrium: &Equilibrium,
-        velocity: &[[f64; 3]],
-        rate: &[[f64; 3]],
-        t: f64,
-        mut vector: impl FnMut(&mut Self, &[[f64; 3]], &[[f64; 3]], &mut [[f64; 3]]) -> Result<(), StepFailure>,
+        &self,
+        path: Path,
+        vector: impl Fn(&Configuration, &mut [[f64; 3]]) -> Result<(), StepFailure>,
     ) -> Result<Vec<[f64; 3]>, SolveError> {
-        let num_nodes = self.mesh.nodes.len();
-        let mut sum = vec![[0.0; 3]; num_nodes];
-        let mut value = vec![[0.0; 3]; num_nodes];
+        let nodes = &self.assembler.mesh().nodes;
+        let t = path.step;
+        let mut sum = vec![[0.0; 3]; nodes.len()];
+        let mut value = vec![[0.0; 3]; nodes.len()];
         for (multiple, weight) in [(1.0, 8.0), (-1.0, -8.0), (2.0, -1.0), (-2.0, 1.0)] {
-            let move_by = |base: &[[f64; 3]], by: &[[f64; 3]]| -> Vec<[f64; 3]> {
-                base.iter().zip(by).map(|(a, b)| [0, 1, 2].map(|i| a[i] + multiple * t * b[i])).collect()
+            let moved = |base: &[[f64; 3]], rate: &[[f64; 3]]| -> Vec<[f64; 3]> {
+                base.iter().zip(rate).map(|(a, b)| [0, 1, 2].map(|i| a[i] + multiple * t * b[i])).collect()
             };
-            let positions = move_by(&self.mesh.nodes, velocity);
-            let displacement = move_by(&equilibrium.displacement, rate);
-            vector(self, &positions, &displacement, &mut value).map_err(|cause| at(equilibrium, cause))?;
+            let positions = moved(nodes, path.velocity);
+            let displacement = moved(&self.equilibrium.displacement, path.rate);
+            let at = Configuration { material: self.material, positions: &positions, displacement: &displacement };
+            vector(&at, &mut value).map_err(|cause| self.diverged(cause))?;
             for (s, v) in sum.iter_mut().zip(&value) {
                 for i in 0..3 {
                     s[i] += weight / (12.0 * t) * v[i];
@@ -251,16 +171,24 @@ impl ForwardModel {
         }
         Ok(sum)
     }
-
-    fn solve_all(&mut self, right: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, SolveError> {
-        let mut all = Vec::with_capacity(right.len());
-        for chunk in right.chunks(4) {
-            all.extend(self.system.solve(&self.topology, chunk, ACCURACY)?);
-        }
-        Ok(all)
-    }
 }
 
-fn at(equilibrium: &Equilibrium, cause: StepFailure) -> SolveError {
-    SolveError::Diverged { reached_mm: equilibrium.drive_mm, asked_mm: equilibrium.drive_mm, cause }
+/// t at which the fastest node or displacement moves by [`difference_length`].
+fn difference_step(mesh: &Mesh, velocity: &[[f64; 3]], rate: &[[f64; 3]]) -> f64 {
+    let speed = velocity.iter().chain(rate).flatten().fold(0.0f64, |s, x| s.max(x.abs()));
+    difference_length(mesh) / speed.max(1e-12)
+}
+
+/// A 1/250 of the smallest distance of two nodes that follow each other in an element, mm: a 1/500 of the shortest element
+/// edge, roughly.
+fn difference_length(mesh: &Mesh) -> f64 {
+    let mut shortest = f64::INFINITY;
+    for e in 0..mesh.num_elements() {
+        for pair in mesh.element(e).windows(2) {
+            let (a, b) = (mesh.nodes[pair[0] as usize], mesh.nodes[pair[1] as usize]);
+            let d: f64 = (0..3).map(|i| (a[i] - b[i]).powi(2)).sum();
+            shortest = shortest.min(d);
+        }
+    }
+    2.0 * shortest.sqrt() / 500.0
 }

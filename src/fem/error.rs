@@ -1,6 +1,49 @@
-//! Why a forward problem was not solved.
+//! Why a mesh could not be made ready, a linear system not be solved or an equilibrium not be found.
 
-use super::linear::LinearError;
+use crate::mesh::MeshError;
+
+/// The matrix has no Cholesky factor.
+#[derive(Clone, Copy, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LinearError {
+    /// The matrix is not positive definite.
+    #[error("the tangent stiffness is not positive definite (pivot {index})")]
+    NotPositiveDefinite {
+        /// Pivot, in elimination order.
+        index: usize,
+    },
+    /// Out of memory in the factorisation.
+    #[error("not enough memory to factorise {num_unknowns} unknowns; use a coarser mesh")]
+    OutOfMemory {
+        /// Size of the system.
+        num_unknowns: usize,
+    },
+}
+
+/// Why one load step failed.
+#[derive(Clone, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum StepFailure {
+    /// An element would invert.
+    #[error("element {element} would invert (smallest det F = {jacobian:.3e})")]
+    InvertedElement {
+        /// Element index.
+        element: usize,
+        /// Smallest det F there.
+        jacobian: f64,
+    },
+    /// Newton's method did not reach the tolerance.
+    #[error("Newton's method stopped after {iterations} iterations at a relative residual of {residual:.3e}")]
+    NotConverged {
+        /// Iterations made.
+        iterations: usize,
+        /// Residual relative to the reactions.
+        residual: f64,
+    },
+    /// The tangent lost positive definiteness (instability of the specimen or of the material).
+    #[error("{0}")]
+    Linear(LinearError),
+}
 
 /// Why a forward problem was not solved.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -54,27 +97,20 @@ pub enum SolveError {
     Linear(#[from] LinearError),
 }
 
-/// Why one load step failed.
-#[derive(Clone, Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum StepFailure {
-    /// An element would invert.
-    #[error("element {element} would invert (smallest det F = {jacobian:.3e})")]
-    InvertedElement {
-        /// Element index.
-        element: usize,
-        /// Smallest det F there.
-        jacobian: f64,
-    },
-    /// Newton's method did not reach the tolerance.
-    #[error("Newton's method stopped after {iterations} iterations at a relative residual of {residual:.3e}")]
-    NotConverged {
-        /// Iterations made.
-        iterations: usize,
-        /// Residual relative to the reactions.
-        residual: f64,
-    },
-    /// The tangent lost positive definiteness (instability of the specimen or of the material).
-    #[error("{0}")]
-    Linear(LinearError),
+impl SolveError {
+    /// An assembly that failed at a given drive (mm): nothing was to be reached but that drive itself.
+    pub(super) fn diverged_at(drive_mm: f64, cause: StepFailure) -> SolveError {
+        SolveError::Diverged { reached_mm: drive_mm, asked_mm: drive_mm, cause }
+    }
+}
+
+/// A specimen could not be meshed, or its mesh not be solved on.
+#[derive(Debug, thiserror::Error)]
+pub enum PrepareError {
+    /// No mesh.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// No model.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
 }

@@ -4,6 +4,7 @@
 //! Symbolic work is done once per mesh. Measured on these matrices (κ/μ ≈ 130–800): the single-precision factor takes
 //! half the time and memory, and one iteration of conjugate gradients gains four to five digits.
 
+use super::error::LinearError;
 use super::topology::Topology;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::SupernodalThreshold;
@@ -12,55 +13,44 @@ use faer::sparse::linalg::cholesky::{
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side, Spec};
+use std::sync::Arc;
 
-/// The matrix is not positive definite, or the iteration stalls.
-#[derive(Clone, Copy, Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum LinearError {
-    /// No Cholesky factor exists.
-    #[error("the tangent stiffness is not positive definite (pivot {index})")]
-    NotPositiveDefinite {
-        /// Pivot, in elimination order.
-        index: usize,
-    },
-    /// Out of memory in the factorisation.
-    #[error("not enough memory to factorise {num_unknowns} unknowns; use a coarser mesh")]
-    OutOfMemory {
-        /// Size of the system.
-        num_unknowns: usize,
-    },
+/// Pattern and symbolic factorisation of the tangents of one mesh: made once, shared by all systems of that mesh.
+struct Analysis {
+    topology: Arc<Topology>,
+    symbolic: SymbolicCholesky<usize>,
 }
 
 /// A factor in one precision.
 enum Factor {
-    None,
     Single(Vec<f32>),
     Double(Vec<f64>),
 }
 
-/// Pattern, values and factor of a symmetric positive definite matrix (lower triangle, elimination order).
-pub struct LinearSystem {
-    symbolic: SymbolicCholesky<usize>,
+/// Values and factor of a symmetric positive definite matrix (lower triangle, elimination order).
+pub(super) struct LinearSystem {
+    analysis: Arc<Analysis>,
     /// 3×3 blocks of the lower triangle (columns of a block one after the other), in the block pattern of [`Topology`].
-    pub blocks: Vec<[f64; 9]>,
-    factor: Factor,
+    blocks: Arc<Vec<[f64; 9]>>,
+    factor: Option<Arc<Factor>>,
     single_values: Vec<f32>,
-    memory: MemBuffer,
-    /// Conjugate-gradient iterations spent, and factorisations made.
-    pub num_iterations: usize,
-    /// Factorisations made.
-    pub num_factorisations: usize,
+    /// Scratch of the factorisation.
+    memory: Option<MemBuffer>,
+    num_factorisations: usize,
 }
 
 /// Iterations after which a single-precision factor is given up.
 const MAX_ITERATIONS: usize = 40;
 
+/// Right-hand sides that are solved for at once.
+pub(super) const MAX_COLUMNS: usize = 4;
+
 impl LinearSystem {
-    /// Symbolic analysis.
+    /// Symbolic analysis; no values yet.
     ///
     /// # Errors
     /// [`LinearError::OutOfMemory`].
-    pub fn new(topology: &Topology) -> Result<LinearSystem, LinearError> {
+    pub(super) fn new(topology: Arc<Topology>) -> Result<LinearSystem, LinearError> {
         let n = topology.num_unknowns();
         // With the identity ordering the analysis reads the *upper* triangle, the numeric call the lower one.
         let (upper_pointers, upper_rows) = transpose(n, &topology.column_pointers, &topology.row_indices);
@@ -71,75 +61,109 @@ impl LinearSystem {
         };
         let symbolic = factorize_symbolic_cholesky(upper, Side::Upper, SymmetricOrdering::Identity, parameters)
             .map_err(|_| LinearError::OutOfMemory { num_unknowns: n })?;
-        let scratch = symbolic
-            .factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default())
-            .or(symbolic.solve_in_place_scratch::<f64>(4, Par::Seq));
-        let memory = MemBuffer::try_new(scratch).map_err(|_| LinearError::OutOfMemory { num_unknowns: n })?;
-        Ok(LinearSystem {
-            symbolic,
-            blocks: vec![[0.0; 9]; topology.block_rows.len()],
-            factor: Factor::None,
+        Ok(LinearSystem::of(Arc::new(Analysis { topology, symbolic })))
+    }
+
+    fn of(analysis: Arc<Analysis>) -> LinearSystem {
+        LinearSystem {
+            analysis,
+            blocks: Arc::default(),
+            factor: None,
             single_values: Vec::new(),
-            memory,
-            num_iterations: 0,
+            memory: None,
             num_factorisations: 0,
-        })
+        }
+    }
+
+    /// A system of the same mesh without values and factor; only the symbolic work is shared.
+    pub(super) fn empty_like(&self) -> LinearSystem {
+        LinearSystem::of(self.analysis.clone())
+    }
+
+    /// The present values and factor as a system of its own. Nothing is copied: whichever of the two is assembled or
+    /// factorised first takes memory of its own for that.
+    pub(super) fn share(&self) -> LinearSystem {
+        LinearSystem { blocks: self.blocks.clone(), factor: self.factor.clone(), ..self.empty_like() }
+    }
+
+    /// Zeroes the values, for an assembly to add to. The factor stays.
+    pub(super) fn zeroed_blocks(&mut self) -> &mut [[f64; 9]] {
+        let len = self.analysis.topology.block_rows.len();
+        match Arc::get_mut(&mut self.blocks) {
+            Some(blocks) if blocks.len() == len => blocks.fill([0.0; 9]),
+            _ => self.blocks = Arc::new(vec![[0.0; 9]; len]),
+        }
+        // Nobody else holds them by now, so nothing is cloned.
+        Arc::make_mut(&mut self.blocks).as_mut_slice()
+    }
+
+    /// Unknowns, those pinned by mirrors included.
+    pub(super) fn num_unknowns(&self) -> usize {
+        self.analysis.topology.num_unknowns()
+    }
+
+    /// Calls of [`LinearSystem::factorise`] so far.
+    pub(super) fn num_factorisations(&self) -> usize {
+        self.num_factorisations
     }
 
     /// Factorises the present values, in single precision unless that fails.
     ///
     /// # Errors
-    /// [`LinearError::NotPositiveDefinite`].
-    pub fn factorise(&mut self, topology: &Topology) -> Result<(), LinearError> {
+    /// [`LinearError`].
+    pub(super) fn factorise(&mut self) -> Result<(), LinearError> {
         self.num_factorisations += 1;
-        let mut l = match std::mem::replace(&mut self.factor, Factor::None) {
-            Factor::Single(l) => l,
-            _ => vec![0.0; self.symbolic.len_val()],
+        // The memory of the last factor is used again unless someone else still holds it.
+        let mut l = match self.factor.take().and_then(Arc::into_inner) {
+            Some(Factor::Single(l)) => l,
+            _ => vec![0.0; self.analysis.symbolic.len_val()],
         };
+        let Analysis { topology, symbolic } = &*self.analysis;
         topology.to_scalar(&self.blocks, |x| x as f32, &mut self.single_values);
         let n = topology.num_unknowns();
         let pattern =
             SymbolicSparseColMatRef::new_checked(n, n, &topology.column_pointers, None, &topology.row_indices);
-        let result = self.symbolic.factorize_numeric_llt(
+        let result = symbolic.factorize_numeric_llt(
             &mut l,
             SparseColMatRef::new(pattern, &self.single_values[..]),
             Side::Lower,
             Default::default(),
             Par::Seq,
-            MemStack::new(&mut self.memory),
+            MemStack::new(factorisation_memory(&mut self.memory, symbolic, n)?),
             Spec::default(),
         );
         if result.is_ok() && l.iter().step_by(97).all(|x| x.is_finite()) {
-            self.factor = Factor::Single(l);
+            self.factor = Some(Arc::new(Factor::Single(l)));
             return Ok(());
         }
-        self.factorise_double(topology)
+        self.factorise_double()
     }
 
     /// Factorises the present values in double precision.
     ///
     /// # Errors
-    /// [`LinearError::NotPositiveDefinite`].
-    pub fn factorise_double(&mut self, topology: &Topology) -> Result<(), LinearError> {
+    /// [`LinearError`].
+    fn factorise_double(&mut self) -> Result<(), LinearError> {
+        self.factor = None;
+        let Analysis { topology, symbolic } = &*self.analysis;
         let n = topology.num_unknowns();
-        let mut l = vec![0.0f64; self.symbolic.len_val()];
+        let mut l = vec![0.0f64; symbolic.len_val()];
         let mut values = Vec::new();
         topology.to_scalar(&self.blocks, |x| x, &mut values);
         let pattern =
             SymbolicSparseColMatRef::new_checked(n, n, &topology.column_pointers, None, &topology.row_indices);
-        let result = self.symbolic.factorize_numeric_llt(
+        let result = symbolic.factorize_numeric_llt(
             &mut l,
             SparseColMatRef::new(pattern, &values[..]),
             Side::Lower,
             Default::default(),
             Par::Seq,
-            MemStack::new(&mut self.memory),
+            MemStack::new(factorisation_memory(&mut self.memory, symbolic, n)?),
             Spec::default(),
         );
-        self.factor = Factor::None;
         match result {
             Ok(_) => {
-                self.factor = Factor::Double(l);
+                self.factor = Some(Arc::new(Factor::Double(l)));
                 Ok(())
             }
             Err(faer::linalg::solvers::LltError::NonPositivePivot { index }) => {
@@ -149,32 +173,34 @@ impl LinearSystem {
     }
 
     /// Whether a factor (of these or earlier values) exists.
-    pub fn has_factor(&self) -> bool {
-        !matches!(self.factor, Factor::None)
+    pub(super) fn has_factor(&self) -> bool {
+        self.factor.is_some()
     }
 
     /// x ← (factor)⁻¹ x for several right-hand sides, columns of length n.
-    fn precondition(&mut self, n: usize, columns: usize, x: &mut [f64], single: &mut Vec<f32>) {
-        match &self.factor {
-            Factor::None => {}
-            Factor::Single(l) => {
+    fn precondition(&self, columns: usize, x: &mut [f64], scratch: &mut Scratch) {
+        let (n, symbolic) = (self.num_unknowns(), &self.analysis.symbolic);
+        match self.factor.as_deref() {
+            None => {}
+            Some(Factor::Single(l)) => {
+                let single = &mut scratch.single;
                 single.clear();
                 single.extend(x.iter().map(|&v| v as f32));
-                LltRef::<usize, f32>::new(&self.symbolic, l).solve_in_place_with_conj(
+                LltRef::<usize, f32>::new(symbolic, l).solve_in_place_with_conj(
                     Conj::No,
                     MatMut::from_column_major_slice_mut(single, n, columns),
                     Par::Seq,
-                    MemStack::new(&mut self.memory),
+                    MemStack::new(&mut scratch.memory),
                 );
                 for (a, &b) in x.iter_mut().zip(single.iter()) {
                     *a = f64::from(b);
                 }
             }
-            Factor::Double(l) => LltRef::<usize, f64>::new(&self.symbolic, l).solve_in_place_with_conj(
+            Some(Factor::Double(l)) => LltRef::<usize, f64>::new(symbolic, l).solve_in_place_with_conj(
                 Conj::No,
                 MatMut::from_column_major_slice_mut(x, n, columns),
                 Par::Seq,
-                MemStack::new(&mut self.memory),
+                MemStack::new(&mut scratch.memory),
             ),
         }
     }
@@ -184,28 +210,34 @@ impl LinearSystem {
     ///
     /// # Errors
     /// [`LinearError::NotPositiveDefinite`].
-    pub fn solve(
+    pub(super) fn solve(
         &mut self,
-        topology: &Topology,
         right_hand_sides: &[Vec<f64>],
         tolerance: f64,
     ) -> Result<Vec<Vec<f64>>, LinearError> {
-        if let Some(x) = self.iterate(topology, right_hand_sides, tolerance, MAX_ITERATIONS)? {
+        if let Some(x) = self.iterate(right_hand_sides, tolerance, MAX_ITERATIONS)? {
             return Ok(x);
         }
-        self.factorise_double(topology)?;
-        match self.iterate(topology, right_hand_sides, tolerance, MAX_ITERATIONS)? {
+        self.factorise_double()?;
+        match self.iterate(right_hand_sides, tolerance, MAX_ITERATIONS)? {
             Some(x) => Ok(x),
             // With an exact factor the iteration refines to rounding; what is left is the matrix's condition.
             None => {
                 let mut x: Vec<Vec<f64>> = right_hand_sides.to_vec();
-                let mut single = Vec::new();
+                let mut scratch = self.scratch()?;
                 for column in &mut x {
-                    self.precondition(topology.num_unknowns(), 1, column, &mut single);
+                    self.precondition(1, column, &mut scratch);
                 }
                 Ok(x)
             }
         }
+    }
+
+    fn scratch(&self) -> Result<Scratch, LinearError> {
+        let request = self.analysis.symbolic.solve_in_place_scratch::<f64>(MAX_COLUMNS, Par::Seq);
+        let memory =
+            MemBuffer::try_new(request).map_err(|_| LinearError::OutOfMemory { num_unknowns: self.num_unknowns() })?;
+        Ok(Scratch { memory, single: Vec::new() })
     }
 
     /// Conjugate gradients with the factor at hand, which may be that of a nearby matrix; `None` where `max_iterations`
@@ -213,20 +245,20 @@ impl LinearSystem {
     ///
     /// # Errors
     /// [`LinearError::NotPositiveDefinite`] where a direction of negative curvature is met.
-    pub fn iterate(
-        &mut self,
-        topology: &Topology,
+    pub(super) fn iterate(
+        &self,
         right_hand_sides: &[Vec<f64>],
         tolerance: f64,
         max_iterations: usize,
     ) -> Result<Option<Vec<Vec<f64>>>, LinearError> {
+        let topology = &self.analysis.topology;
         let n = topology.num_unknowns();
         let m = right_hand_sides.len();
         let mut x = vec![0.0; n * m];
         let mut r: Vec<f64> = right_hand_sides.iter().flatten().copied().collect();
-        let mut single = Vec::new();
+        let mut scratch = self.scratch()?;
         let mut z = r.clone();
-        self.precondition(n, m, &mut z, &mut single);
+        self.precondition(m, &mut z, &mut scratch);
         let mut p = z.clone();
         let mut rz: Vec<f64> = (0..m).map(|c| dot(&r[c * n..][..n], &z[c * n..][..n])).collect();
         let target: Vec<f64> =
@@ -239,7 +271,6 @@ impl LinearSystem {
                 return Ok(None);
             }
             iteration += 1;
-            self.num_iterations += 1;
             for c in 0..m {
                 if is_done[c] {
                     continue;
@@ -262,7 +293,7 @@ impl LinearSystem {
                 break;
             }
             z.copy_from_slice(&r);
-            self.precondition(n, m, &mut z, &mut single);
+            self.precondition(m, &mut z, &mut scratch);
             for c in 0..m {
                 if is_done[c] {
                     continue;
@@ -277,6 +308,26 @@ impl LinearSystem {
         }
         Ok(Some((0..m).map(|c| x[c * n..(c + 1) * n].to_vec()).collect()))
     }
+}
+
+/// What applying a factor needs.
+struct Scratch {
+    memory: MemBuffer,
+    single: Vec<f32>,
+}
+
+/// The scratch of factorisations, taken once.
+fn factorisation_memory<'m>(
+    memory: &'m mut Option<MemBuffer>,
+    symbolic: &SymbolicCholesky<usize>,
+    num_unknowns: usize,
+) -> Result<&'m mut MemBuffer, LinearError> {
+    let buffer = match memory.take() {
+        Some(buffer) => buffer,
+        None => MemBuffer::try_new(symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default()))
+            .map_err(|_| LinearError::OutOfMemory { num_unknowns })?,
+    };
+    Ok(memory.insert(buffer))
 }
 
 /// y = K x with the lower triangle.

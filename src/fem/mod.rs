@@ -3,31 +3,51 @@
 //! Elements with quadratic displacement and discontinuous linear pressure ([`kernel`](self) describes the formulation),
 //! mixed Newton iterations, sparse Cholesky factors, and derivatives with respect to material, shape and drive from the
 //! factorised tangent.
+//!
+//! Four things build on each other. The *assembler* turns a state into residual and tangent. A *mesh model* is an assembler
+//! with a linear system and solves by Newton's method. The [`ForwardModel`] is a mesh model that a coarse one may guide. A
+//! [`Tangent`] is the factorised matrix of one equilibrium; every derivative is solved with one.
 
 mod adjoint;
+mod assembler;
+mod condensation;
+mod departure_sensitivity;
 mod departures;
+mod departures_on_mesh;
+#[cfg(test)]
+mod departures_tests;
 mod derivatives;
 mod element_data;
+mod equilibrium;
 mod error;
 mod fibre_kernel;
 mod fields;
+mod forward_model;
+mod guide;
 mod kernel;
 mod linear;
-mod model;
-mod nested;
+mod linearisation;
+mod mesh_model;
 mod newton;
+mod options;
 mod ordering;
+mod plates;
 mod result;
 mod stages;
+mod stiffness;
+mod tangent;
+#[cfg(test)]
+mod tangent_tests;
 mod topology;
 mod verification;
 
-pub use departures::{DepartureSensitivity, Departures, FIRM_BOND_KPA_PER_MM, Fibre, Field, PlateMotion};
+pub use departure_sensitivity::DepartureSensitivity;
+pub use departures::{Departures, FIRM_BOND_KPA_PER_MM, Fibre, Field, PlateMotion};
 pub use derivatives::{ParameterSensitivity, PathSensitivity};
-pub use error::{SolveError, StepFailure};
+pub use equilibrium::Equilibrium;
+pub use error::{LinearError, PrepareError, SolveError, StepFailure};
 pub use fields::QuadraturePoint;
-pub use linear::LinearError;
-pub use model::{ForwardModel, Statistics};
-pub use nested::PrepareError;
-pub use newton::{Equilibrium, SolveOptions};
+pub use forward_model::ForwardModel;
+pub use options::{SolveOptions, Statistics};
 pub use result::{SolveResult, SolveStep};
+pub use tangent::Tangent;

@@ -1,7 +1,8 @@
 //! The result of a forward solution (`solve/1`).
 
-use super::model::{ForwardModel, Statistics};
-use super::newton::Equilibrium;
+use super::equilibrium::Equilibrium;
+use super::forward_model::ForwardModel;
+use super::options::Statistics;
 use serde::{Deserialize, Serialize};
 
 /// Forces at each drive, with what they rest on.

@@ -1,8 +1,9 @@
 //! Single stages of a solution, so that benchmarks can time them one by one.
 
-use super::error::{SolveError, StepFailure};
-use super::model::ForwardModel;
-use super::newton::Equilibrium;
+use super::equilibrium::Equilibrium;
+use super::error::SolveError;
+use super::forward_model::ForwardModel;
+use super::mesh_model::MeshModel;
 use crate::material::Ogden;
 
 impl ForwardModel {
@@ -11,20 +12,11 @@ impl ForwardModel {
     /// # Errors
     /// [`SolveError::Diverged`] where an element is inverted.
     pub fn assemble_stage(&mut self, material: &Ogden, equilibrium: &Equilibrium) -> Result<f64, SolveError> {
-        let mut residual = vec![[0.0; 3]; self.mesh.nodes.len()];
-        self.assemble_tangent(
-            material,
-            equilibrium.drive_mm,
-            &equilibrium.displacement,
-            Some(&equilibrium.pressure),
-            &mut residual,
-        )
-        .map_err(|cause: StepFailure| SolveError::Diverged {
-            reached_mm: equilibrium.drive_mm,
-            asked_mm: equilibrium.drive_mm,
-            cause,
-        })?;
-        Ok(self.collect(&residual, 1.0).iter().fold(0.0, |s, x| s.max(x.abs())))
+        let MeshModel { assembler, linearisation } = &mut self.fine;
+        assembler
+            .linearise(material, equilibrium, linearisation)
+            .map_err(|cause| SolveError::diverged_at(equilibrium.drive_mm, cause))?;
+        Ok(assembler.collect(&linearisation.residual, 1.0).iter().fold(0.0, |s, x| s.max(x.abs())))
     }
 
     /// Factorises the assembled tangent.
@@ -32,7 +24,7 @@ impl ForwardModel {
     /// # Errors
     /// [`SolveError::Linear`].
     pub fn factorise_stage(&mut self) -> Result<(), SolveError> {
-        Ok(self.system.factorise(&self.topology)?)
+        Ok(self.fine.linearisation.system.factorise()?)
     }
 
     /// One solve with the factor, to a relative residual of 10⁻³ (a Newton step's accuracy).
@@ -40,8 +32,9 @@ impl ForwardModel {
     /// # Errors
     /// [`SolveError::Linear`].
     pub fn back_solve_stage(&mut self) -> Result<f64, SolveError> {
-        let right = vec![1.0; self.topology.num_unknowns()];
-        let x = self.system.solve(&self.topology, &[right], 1e-3)?;
+        let system = &mut self.fine.linearisation.system;
+        let right = vec![1.0; system.num_unknowns()];
+        let x = system.solve(&[right], 1e-3)?;
         Ok(x[0].iter().fold(0.0, |s, v| s.max(v.abs())))
     }
 }

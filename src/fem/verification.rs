@@ -4,9 +4,13 @@
 //! in the interior. The elements, the assembly and the linear solver are those of [`ForwardModel::solve`]; only the
 //! boundary values and the right-hand side differ.
 
+use super::condensation::pressure_update;
+use super::equilibrium::Equilibrium;
 use super::error::{SolveError, StepFailure};
-use super::model::ForwardModel;
-use super::newton::{Equilibrium, SolveOptions};
+use super::forward_model::ForwardModel;
+use super::mesh_model::MeshModel;
+use super::newton::finished;
+use super::options::SolveOptions;
 use crate::material::Ogden;
 
 impl ForwardModel {
@@ -27,50 +31,44 @@ impl ForwardModel {
         load: Option<&[[f64; 3]]>,
         options: &SolveOptions,
     ) -> Result<Equilibrium, SolveError> {
-        let diverged = |cause| SolveError::Diverged { reached_mm: 0.0, asked_mm: 0.0, cause };
-        let mut displacement = guess.to_vec();
-        let mut pressure = vec![[0.0; 4]; self.mesh.num_elements()];
-        let mut residual = vec![[0.0; 3]; self.mesh.nodes.len()];
+        let diverged = |cause| SolveError::diverged_at(0.0, cause);
+        let MeshModel { assembler, linearisation } = &mut self.fine;
+        let mesh = assembler.mesh();
+        let mut trial = Equilibrium::at_rest(mesh.nodes.len(), mesh.num_elements());
+        trial.displacement.copy_from_slice(guess);
         let mut iteration = 0;
         loop {
-            self.assemble_tangent(material, 0.0, &displacement, Some(&pressure), &mut residual).map_err(diverged)?;
+            assembler.linearise(material, &trial, linearisation).map_err(diverged)?;
             if let Some(load) = load {
-                for (r, f) in residual.iter_mut().zip(load) {
+                for (r, f) in linearisation.residual.iter_mut().zip(load) {
                     for i in 0..3 {
                         r[i] -= f[i];
                     }
                 }
             }
-            let right = self.collect(&residual, -1.0);
+            let residual = &linearisation.residual;
+            let right = assembler.collect(residual, -1.0);
             let norm = |x: &mut dyn Iterator<Item = f64>| x.map(|v| v * v).sum::<f64>().sqrt();
-            let mut kept = self.mesh.moved_nodes.iter().chain(&self.mesh.fixed_nodes);
+            let mut kept = mesh.moved_nodes.iter().chain(&mesh.fixed_nodes);
             let scale = norm(&mut kept.by_ref().flat_map(|&v| residual[v as usize]));
             let relative = norm(&mut right.iter().copied()) / scale.max(1e-6);
             if relative < options.tolerance {
-                let state = Equilibrium {
-                    drive_mm: 0.0,
-                    displacement,
-                    pressure,
-                    force_n: 0.0,
-                    normal_force_n: 0.0,
-                    reaction_imbalance: 0.0,
-                    serial: 0,
-                };
-                return Ok(self.finish(state, &residual));
+                return Ok(finished(assembler, linearisation, trial));
             }
             if !relative.is_finite() || iteration >= options.max_iterations {
                 return Err(diverged(StepFailure::NotConverged { iterations: iteration, residual: relative }));
             }
             iteration += 1;
-            self.system.factorise(&self.topology)?;
-            let x = self.system.solve(&self.topology, &[right], 1e-10)?;
-            let delta = self.spread(&x[0]);
-            for (p, d) in pressure.iter_mut().zip(self.pressure_update(&delta)) {
+            linearisation.system.factorise()?;
+            let x = linearisation.system.solve(&[right], 1e-10)?;
+            let delta = assembler.spread(&x[0]);
+            let delta_pressure = pressure_update(mesh, &linearisation.condensation, &delta);
+            for (p, d) in trial.pressure.iter_mut().zip(delta_pressure) {
                 for m in 0..4 {
                     p[m] += d[m];
                 }
             }
-            for (u, d) in displacement.iter_mut().zip(&delta) {
+            for (u, d) in trial.displacement.iter_mut().zip(&delta) {
                 for i in 0..3 {
                     u[i] += d[i];
                 }

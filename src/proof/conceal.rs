@@ -164,9 +164,7 @@ fn model_of(made: &Specimen, hidden: &Hidden) -> Result<ForwardModel, ConcealErr
                 && is_moved == (hidden.which == 1)
                 && [0, 2].into_iter().all(|a| is_inside(x[a], hidden, a, half[a]))
     };
-    let mut model = ForwardModel::with_released(mesh, made, &is_free)?;
-    model.set_departures(&departures(made, hidden));
-    Ok(model)
+    Ok(ForwardModel::with_released(mesh, made, &is_free)?.departed(&departures(made, hidden)))
 }
 
 /// Whether a node is in the patch along an axis: its edges hold, but for those that are the face's own.

@@ -183,7 +183,7 @@ pub fn evaluate_model(
     }
     let (mut steps, mut maps, mut information_by_drive) = (Vec::new(), Vec::new(), Vec::new());
     for equilibrium in &equilibria {
-        let sensitivities = model.material_sensitivities(material, equilibrium)?;
+        let sensitivities = model.tangent(material, equilibrium)?.material_sensitivities()?;
         let stretch = largest_principal_stretch(&model.quadrature_fields(material, equilibrium));
         let state = DrivenState {
             drive_mm: equilibrium.drive_mm,

@@ -90,7 +90,7 @@ pub struct DrivenState<'a> {
     pub force_n: f64,
     /// Nodal displacements, mm.
     pub displacement: &'a [[f64; 3]],
-    /// From [`crate::fem::ForwardModel::material_sensitivities`].
+    /// From [`crate::fem::Tangent::material_sensitivities`].
     pub sensitivities: &'a [ParameterSensitivity],
     /// From [`super::largest_principal_stretch`].
     pub largest_principal_stretch: f64,

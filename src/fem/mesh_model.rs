@@ -1,0 +1,83 @@
+//! A model of one mesh: an assembler and the linear system that its tangents are assembled in.
+
+use super::assembler::Assembler;
+use super::departures::Departures;
+use super::equilibrium::Equilibrium;
+use super::error::SolveError;
+use super::linear::LinearSystem;
+use super::linearisation::Linearisation;
+use super::newton::Newton;
+use super::options::{SolveOptions, Statistics};
+use super::tangent::Tangent;
+use crate::material::Ogden;
+use crate::mesh::Mesh;
+use crate::specimen::Specimen;
+
+/// An assembler with the matrix and factor of its last tangent.
+pub(super) struct MeshModel {
+    pub(super) assembler: Assembler,
+    pub(super) linearisation: Linearisation,
+}
+
+impl MeshModel {
+    /// For `mesh` of `specimen`; `is_released` as in [`Assembler::new`].
+    ///
+    /// # Errors
+    /// [`SolveError::InvalidMesh`]; [`SolveError::Linear`] where memory does not suffice.
+    pub(super) fn new(
+        mesh: Mesh,
+        specimen: &Specimen,
+        is_released: &dyn Fn([f64; 3], bool) -> bool,
+    ) -> Result<MeshModel, SolveError> {
+        let assembler = Assembler::new(mesh, specimen, is_released)?;
+        let system = LinearSystem::new(assembler.topology().clone())?;
+        Ok(MeshModel { assembler, linearisation: Linearisation::new(system) })
+    }
+
+    /// The same mesh with other departures and nothing assembled; all that is made once per mesh is shared.
+    pub(super) fn departed(&self, departures: &Departures) -> MeshModel {
+        MeshModel {
+            assembler: self.assembler.departed(departures),
+            linearisation: Linearisation::new(self.linearisation.system.empty_like()),
+        }
+    }
+
+    /// A run of Newton's method.
+    pub(super) fn newton<'a>(
+        &'a mut self,
+        material: &'a Ogden,
+        options: &'a SolveOptions,
+        is_cancelled: &'a dyn Fn() -> bool,
+    ) -> Newton<'a> {
+        Newton {
+            assembler: &self.assembler,
+            linearisation: &mut self.linearisation,
+            material,
+            options,
+            is_cancelled,
+            statistics: Statistics::default(),
+        }
+    }
+
+    /// The tangent of an equilibrium of `material`: the one just solved with where it is that equilibrium's, else assembled
+    /// and factorised.
+    ///
+    /// # Errors
+    /// [`SolveError::Diverged`] where an element is inverted, [`SolveError::Linear`] where there is no factor.
+    pub(super) fn tangent<'a>(
+        &mut self,
+        material: &'a Ogden,
+        equilibrium: &'a Equilibrium,
+    ) -> Result<Tangent<'a>, SolveError> {
+        let there = &mut self.linearisation;
+        let stands_there = equilibrium.serial.is_some() && there.stands_at == equilibrium.serial;
+        if !(stands_there && there.system.has_factor()) {
+            self.assembler
+                .linearise(material, equilibrium, there)
+                .map_err(|cause| SolveError::diverged_at(equilibrium.drive_mm, cause))?;
+            there.system.factorise()?;
+            there.stands_at = equilibrium.serial;
+        }
+        Ok(Tangent { assembler: self.assembler.clone(), material, equilibrium, system: there.system.share() })
+    }
+}

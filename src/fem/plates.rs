@@ -1,0 +1,94 @@
+//! The bonded faces: which nodes move with a plate or grip, which are released, and how a drive moves them.
+
+use super::departures::Departures;
+use crate::mesh::Mesh;
+use crate::specimen::{Specimen, TestKind};
+
+/// The plates or grips of a test, on a mesh. The moved one is displaced by the drive along x; the fixed one not at all.
+pub(super) struct Plates {
+    /// Whether each node is on the moved face.
+    pub(super) is_moved: Vec<bool>,
+    /// Whether each node moves with a plate.
+    pub(super) is_held: Vec<bool>,
+    /// Whether each node is on a face but moves under a spring instead of with the plate.
+    pub(super) is_released: Vec<bool>,
+    /// Those nodes with the area of the face that they stand for, mm².
+    pub(super) released: Vec<(u32, f64)>,
+    /// Elements with a node on the moved face.
+    pub(super) driven_elements: Vec<u32>,
+    /// Affine displacement along x per unit of drive at each node: the first guess of a load step.
+    pub(super) lift: Vec<f64>,
+    /// Largest first load step, mm.
+    pub(super) first_step_mm: f64,
+    /// Centres of the fixed and of the moved face, mm.
+    face_centers: [[f64; 3]; 2],
+}
+
+impl Plates {
+    /// The plates of `specimen` on its `mesh`; `is_released`(position, whether on the moved face) says which nodes of the
+    /// faces are held by springs.
+    pub(super) fn new(mesh: &Mesh, specimen: &Specimen, is_released: &dyn Fn([f64; 3], bool) -> bool) -> Plates {
+        let areas = mesh.face_areas();
+        let mut released = Vec::new();
+        let mut flags = vec![false; mesh.nodes.len()];
+        for (nodes, is_moved) in [(&mesh.fixed_nodes, false), (&mesh.moved_nodes, true)] {
+            for &v in nodes.iter() {
+                if is_released(mesh.nodes[v as usize], is_moved) {
+                    flags[v as usize] = true;
+                    released.push((v, areas[v as usize]));
+                }
+            }
+        }
+        let mut is_moved = vec![false; mesh.nodes.len()];
+        for &v in &mesh.moved_nodes {
+            is_moved[v as usize] = true;
+        }
+        let mut is_held = is_moved.clone();
+        for &v in &mesh.fixed_nodes {
+            is_held[v as usize] = true;
+        }
+        for &(v, _) in &released {
+            is_held[v as usize] = false;
+        }
+        let driven_elements = (0..mesh.num_elements() as u32)
+            .filter(|&e| mesh.element(e as usize).iter().any(|&v| is_moved[v as usize]))
+            .collect();
+        let (axis, extent) = match specimen.test {
+            TestKind::DoubleLapShear => (1, specimen.block.thickness_mm),
+            TestKind::Uniaxial => (0, specimen.block.length_mm),
+        };
+        Plates {
+            is_moved,
+            is_held,
+            is_released: flags,
+            released,
+            driven_elements,
+            lift: mesh.nodes.iter().map(|x| x[axis] / extent + 0.5).collect(),
+            // One step to a shear strain of 0.8 takes five or six iterations; stretching is more nonlinear.
+            first_step_mm: if axis == 1 { 0.85 } else { 0.3 } * extent,
+            face_centers: [-0.5, 0.5].map(|side| {
+                let mut center = [0.0; 3];
+                center[axis] = side * extent;
+                center
+            }),
+        }
+    }
+
+    /// Nodes that move with a plate.
+    pub(super) fn held_nodes(&self) -> impl Iterator<Item = usize> {
+        (0..self.is_held.len()).filter(|&v| self.is_held[v])
+    }
+
+    /// Displacement (mm) that the plates impose on node `v` of `mesh` at a drive; the node must be on a plate.
+    pub(super) fn imposed(&self, mesh: &Mesh, departures: &Departures, v: usize, drive_mm: f64) -> [f64; 3] {
+        let (motion, center, along) = if self.is_moved[v] {
+            (&departures.moved_plate, self.face_centers[1], drive_mm)
+        } else {
+            (&departures.fixed_plate, self.face_centers[0], 0.0)
+        };
+        let x = mesh.nodes[v];
+        let mut u = motion.displacement([0, 1, 2].map(|i| x[i] - center[i]), drive_mm);
+        u[0] += along;
+        u
+    }
+}

@@ -1,0 +1,113 @@
+//! A tangent is a value: what its model or a model beside it solves meanwhile does not change it.
+
+use super::*;
+use crate::material::Ogden;
+use crate::mesh::{MeshOptions, mesh_specimen};
+use crate::specimen::Specimen;
+
+const TWO_HOLE: &str = include_str!("../../geometries/two-hole-shear.json");
+const ECOFLEX: &str = include_str!("../../geometries/materials/ecoflex-0020.json");
+
+fn model() -> (ForwardModel, Ogden) {
+    let specimen = Specimen::from_json(TWO_HOLE).unwrap();
+    let mesh = mesh_specimen(&specimen, &MeshOptions::scaled(&specimen, 3.0)).unwrap();
+    (ForwardModel::new(mesh, &specimen).unwrap(), Ogden::from_json(ECOFLEX).unwrap())
+}
+
+fn solve(model: &mut ForwardModel, material: &Ogden, drive_mm: f64) -> Equilibrium {
+    model.solve(material, drive_mm, None, &SolveOptions::default(), &|| false).unwrap()
+}
+
+/// Every number of an equilibrium.
+fn bits_of(state: &Equilibrium) -> Vec<u64> {
+    let forces = [state.force_n, state.normal_force_n, state.reaction_imbalance];
+    let all = state.displacement.iter().flatten().chain(state.pressure.iter().flatten()).chain(&forces);
+    all.map(|x| x.to_bits()).collect()
+}
+
+/// Every number of every derivative that a tangent gives.
+fn derivatives(tangent: &mut Tangent, drive_rate: f64) -> Vec<u64> {
+    let material = tangent.material_sensitivities().unwrap();
+    let path = tangent.path_sensitivity(&material, None, drive_rate).unwrap();
+    let swelling = |t: f64| Departures { log_growth: Some(Field::new(move |_| 0.1 * t)), ..Departures::default() };
+    let swollen = tangent.departure_sensitivity(&swelling, 1e-3).unwrap();
+    let by_displacement = path.displacement.clone();
+    let adjoint = tangent.adjoint_gradient(&by_displacement, 1.0).unwrap();
+    let parameters = material.iter().chain(&path.parameters);
+    let mut numbers: Vec<f64> =
+        parameters.flat_map(|s| s.displacement.iter().flatten().copied().chain([s.force_n])).collect();
+    numbers.extend(path.displacement.iter().flatten().chain(swollen.displacement.iter().flatten()));
+    numbers.extend([path.force_n, swollen.force_n].iter().chain(&adjoint));
+    numbers.iter().map(|x| x.to_bits()).collect()
+}
+
+/// The model assembles and factorises other tangents, of another drive and of another material, while one is held.
+#[test]
+fn a_held_tangent_outlives_what_its_model_solves_next() {
+    let (mut model, material) = model();
+    let state = solve(&mut model, &material, 4.0);
+    let factorisations = model.num_factorisations();
+    let expected = derivatives(&mut model.tangent(&material, &state).unwrap(), 1.0);
+    let mut held = model.tangent(&material, &state).unwrap();
+    assert_eq!(model.num_factorisations(), factorisations, "the tangent of a state just found was factorised anew");
+    let mut softer = material.clone();
+    softer.terms[0].mu_kpa *= 0.7;
+    let other = solve(&mut model, &softer, 6.0);
+    let of_other = derivatives(&mut model.tangent(&softer, &other).unwrap(), 1.0);
+    assert_eq!(derivatives(&mut held, 1.0), expected);
+    assert_ne!(of_other, expected);
+    // Nor does the tangent that is held change what the model finds.
+    drop(held);
+    let unobserved = solve(&mut model, &softer, 6.0);
+    assert_eq!(bits_of(&unobserved), bits_of(&other));
+}
+
+/// The tangent of a state that the model has left is assembled and factorised once, and then held by the model.
+#[test]
+fn a_tangent_asked_for_late_takes_one_factorisation() {
+    let (mut model, material) = model();
+    let first = solve(&mut model, &material, 3.0);
+    let second = solve(&mut model, &material, 5.0);
+    let before = model.num_factorisations();
+    model.tangent(&material, &second).unwrap();
+    assert_eq!(model.num_factorisations(), before);
+    for _ in 0..2 {
+        model.tangent(&material, &first).unwrap();
+        assert_eq!(model.num_factorisations(), before + 1);
+    }
+}
+
+/// Two models of one mesh, one departed, in turn: each gives what it gives alone, to the bit.
+#[test]
+fn departed_and_nominal_models_do_not_disturb_each_other() {
+    let departures = Departures {
+        stiffness_factor: Some(Field::new(|x| 1.0 + 0.05 * x[1])),
+        moved_plate: PlateMotion { translation_mm: [0.0, 0.1, 0.0], ..PlateMotion::default() },
+        ..Departures::default()
+    };
+    let alone = |departures: &Departures| -> Vec<Vec<u64>> {
+        let (nominal, material) = model();
+        let mut model = nominal.departed(departures);
+        let at = |drive: f64| {
+            let state = solve(&mut model, &material, drive);
+            let derivatives = derivatives(&mut model.tangent(&material, &state).unwrap(), 1.0);
+            [bits_of(&state), derivatives].concat()
+        };
+        [3.0, 5.0].map(at).to_vec()
+    };
+    let (mut nominal, material) = model();
+    let mut departed = nominal.departed(&departures);
+    let mut found = [Vec::new(), Vec::new()];
+    for drive in [3.0, 5.0] {
+        let states = [solve(&mut nominal, &material, drive), solve(&mut departed, &material, drive)];
+        let mut tangents =
+            [nominal.tangent(&material, &states[0]).unwrap(), departed.tangent(&material, &states[1]).unwrap()];
+        for k in 0..2 {
+            found[k].push([bits_of(&states[k]), derivatives(&mut tangents[k], 1.0)].concat());
+        }
+    }
+    assert!(nominal.departures().is_none() && !departed.departures().is_none());
+    assert_eq!(found[0], alone(&Departures::default()));
+    assert_eq!(found[1], alone(&departures));
+    assert_ne!(found[0], found[1]);
+}
