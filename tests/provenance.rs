@@ -1,7 +1,7 @@
 //! The input hash covers all that a job reads: a changed voxel, stretch or option changes it; where files lie does not.
 
 use lambdak::job::{InputFile, Job, JobError, Progress, Surroundings, kind_of_command};
-use lambdak::recording::{RawRecording, ReadLimits, ReadRaw, ReadRecording, Recording};
+use lambdak::recording::{RawRecording, ReadLimits, ReadRecording, Recording};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -14,7 +14,7 @@ impl Surroundings for Folders {
         Recording::read_with_digest(Path::new(name), &ReadLimits::default()).map_err(|e| unreadable(&e))
     }
 
-    fn raw_recording(&self, name: &str) -> Result<ReadRaw, JobError> {
+    fn raw_recording(&self, name: &str) -> Result<ReadRecording<RawRecording>, JobError> {
         let unreadable = |e: &dyn std::fmt::Display| JobError::Unreadable { name: name.into(), message: e.to_string() };
         RawRecording::read_with_digest(Path::new(name), &ReadLimits::default()).map_err(|e| unreadable(&e))
     }

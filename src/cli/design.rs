@@ -5,10 +5,9 @@ use super::job_command::{Asked, run_asked};
 use super::results::default_path;
 use super::slurm::SlurmArguments;
 use super::{Common, design_slurm, input};
-use crate::design::{Study, study_json};
+use crate::design::Study;
 use clap::Args;
-use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// Name of the command and of its kind of job.
@@ -39,12 +38,8 @@ pub(super) struct DesignArguments {
 pub(super) fn run(a: &DesignArguments) -> Result<(), CliError> {
     super::start_threads(&a.common)?;
     let limit = time_limit(a.time_limit)?;
-    let beside = a.study.parent().unwrap_or(Path::new("."));
     let source = a.study.display().to_string();
-    // The request spells out what the study's file names.
-    let whole = study_json(&input::read_text(&a.study)?, beside)
-        .map_err(|e| CliError::Input { path: a.study.clone(), message: e.to_string() })?;
-    let mut asked = Asked { kind: COMMAND, request: whole, sources: vec![(String::new(), source)] };
+    let mut asked = Asked { kind: COMMAND, request: input::read_study(&a.study)?, sources: vec![(String::new(), source)] };
     if let Some(seed) = a.seed {
         asked.set("seed", seed, "--seed");
     }
@@ -55,7 +50,7 @@ pub(super) fn run(a: &DesignArguments) -> Result<(), CliError> {
     if a.slurm.array.slurm {
         // The job checks the study; what is left is to read it.
         asked.job()?;
-        let study: Study = read(&asked.request)?;
+        let study = Study::from_request(&asked.request).map_err(|errors| asked.explained(&errors))?;
         let (folder, seed) = design_slurm::search_on_cluster(&a.slurm, &study, &folder, &a.common)?;
         asked.set("seed", seed, "--seed");
         let common = Common { json: a.common.json, out: Some(folder), threads: a.common.threads };
@@ -71,10 +66,6 @@ pub(super) fn run(a: &DesignArguments) -> Result<(), CliError> {
         let _ = std::fs::remove_file(folder.join(name));
     }
     Ok(())
-}
-
-fn read(request: &Value) -> Result<Study, CliError> {
-    crate::field::read(request).map_err(|e| CliError::Fields(vec![e.to_string()]))
 }
 
 /// The option as a duration.

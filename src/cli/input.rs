@@ -26,3 +26,27 @@ pub fn read_json(path: &Path) -> Result<Value, CliError> {
     let text = read_text(path)?;
     serde_json::from_str(&text).map_err(|e| CliError::Input { path: path.into(), message: format!("not JSON: {e}") })
 }
+
+/// A study with the specimen and the materials that it names spelled out, as requests hold them.
+///
+/// # Errors
+/// [`CliError::Input`].
+pub fn read_study(path: &Path) -> Result<Value, CliError> {
+    let beside = path.parent().unwrap_or(Path::new("."));
+    let mut study = read_json(path)?;
+    let spell_out = |value: &mut Value| -> Result<(), CliError> {
+        if let Value::String(name) = value {
+            *value = read_json(&beside.join(name.as_str()))?;
+        }
+        Ok(())
+    };
+    if let Some(base) = study.get_mut("base") {
+        spell_out(base)?;
+    }
+    for entry in study.get_mut("materials").and_then(Value::as_array_mut).into_iter().flatten() {
+        if let Some(material) = entry.get_mut("material") {
+            spell_out(material)?;
+        }
+    }
+    Ok(study)
+}

@@ -45,7 +45,7 @@ impl Asked {
     }
 
     /// The errors, each with the option or file that it is about.
-    fn explained(&self, errors: &[FieldError]) -> CliError {
+    pub(super) fn explained(&self, errors: &[FieldError]) -> CliError {
         let explain = |e: &FieldError| {
             let is_within = |p: &str| e.pointer.strip_prefix(p).is_some_and(|r| r.is_empty() || r.starts_with('/'));
             let found = self.sources.iter().filter(|(p, _)| is_within(p)).max_by_key(|(p, _)| p.len());

@@ -94,9 +94,10 @@ fn run_study(a: &SweepArguments, path: &Path) -> Result<(), CliError> {
 }
 
 fn read_study(path: &Path) -> Result<SweepStudy, CliError> {
-    let beside = path.parent().unwrap_or(Path::new("."));
-    SweepStudy::from_json(&input::read_text(path)?, beside)
-        .map_err(|e| CliError::Input { path: path.into(), message: e.to_string() })
+    let source = path.display().to_string();
+    let asked = Asked { kind: COMMAND, request: input::read_study(path)?, sources: vec![(String::new(), source)] };
+    asked.job()?;
+    SweepStudy::from_request(&asked.request).map_err(|errors| asked.explained(&errors))
 }
 
 /// Keeps the study, with all that it names, beside its results; refuses a folder that has another one.

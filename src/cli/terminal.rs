@@ -2,7 +2,7 @@
 
 use super::interrupt;
 use crate::job::{InputFile, JobError, Progress, Surroundings};
-use crate::recording::{ReadLimits, ReadRaw, ReadRecording, RawRecording, Recording};
+use crate::recording::{RawRecording, ReadLimits, ReadRecording, Recording};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -59,7 +59,7 @@ impl Surroundings for Terminal {
         Recording::read_with_digest(Path::new(name), &ReadLimits::default()).map_err(|e| unreadable(name, &e))
     }
 
-    fn raw_recording(&self, name: &str) -> Result<ReadRaw, JobError> {
+    fn raw_recording(&self, name: &str) -> Result<ReadRecording<RawRecording>, JobError> {
         RawRecording::read_with_digest(Path::new(name), &ReadLimits::default()).map_err(|e| unreadable(name, &e))
     }
 

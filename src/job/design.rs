@@ -14,7 +14,7 @@ use crate::mesh::{MeshOptions, mesh_specimen};
 use crate::provenance::input_hash;
 use crate::report::design_report;
 use crate::specimen::Specimen;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Most evaluations that a study may ask for.
@@ -25,8 +25,12 @@ impl Request for Study {
     const COLLECTION: &'static str = "designs";
     const ABOUT: &'static str = "The best specimen under the limits of a study, with the evidence.";
 
+    fn read(value: &Value) -> Result<Study, Vec<FieldError>> {
+        Study::from_request(value)
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
-        let mut errors = self.field_errors();
+        let mut errors = Vec::new();
         let budget = self.budget;
         let evaluations = budget
             .refine

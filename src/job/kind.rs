@@ -5,7 +5,7 @@ use super::schema::{RequestField, RequestSchema};
 use super::{Failure, InputFile, JobError, Outcome, Progress, Surroundings};
 use crate::field::FieldError;
 use crate::provenance::{VERSION, input_hash};
-use crate::recording::{ReadRaw, ReadRecording};
+use crate::recording::{RawRecording, ReadRecording};
 use crate::specimen::Specimen;
 use serde_json::{Value, json};
 use std::borrow::Cow;
@@ -51,7 +51,7 @@ pub struct Kind {
 
 /// Reads a request of type `R` whose fields fit its schema: its canonical form, with defaults written out, and itself ready to run.
 fn checked<R: Request>(value: &Value) -> Result<(Value, Box<dyn Run>), Vec<FieldError>> {
-    let request: R = crate::field::read(value).map_err(|e| vec![e])?;
+    let request = R::read(value)?;
     let whole = |e: serde_json::Error| vec![FieldError::new("", e, "a request that JSON can hold")];
     let canonical = serde_json::to_value(&request).map_err(whole)?;
     Ok((canonical, request.check()?))
@@ -294,7 +294,7 @@ impl Surroundings for Quiet<'_> {
         self.0.recording(name)
     }
 
-    fn raw_recording(&self, name: &str) -> Result<ReadRaw, JobError> {
+    fn raw_recording(&self, name: &str) -> Result<ReadRecording<RawRecording>, JobError> {
         self.0.raw_recording(name)
     }
 

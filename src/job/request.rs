@@ -22,6 +22,14 @@ pub trait Request: Serialize + DeserializeOwned + ToSchema + Send + Sync + 'stat
     /// What it does, in one sentence.
     const ABOUT: &'static str;
 
+    /// The request in `value`, whose fields fit the schema.
+    ///
+    /// # Errors
+    /// What does not fit, each with its JSON pointer.
+    fn read(value: &Value) -> Result<Self, Vec<FieldError>> {
+        crate::field::read(value).map_err(|e| vec![e])
+    }
+
     /// The request, ready to run.
     ///
     /// # Errors

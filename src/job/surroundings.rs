@@ -1,7 +1,7 @@
 //! What a running job is given by the door through which it came.
 
 use super::JobError;
-use crate::recording::{ReadRaw, ReadRecording};
+use crate::recording::{RawRecording, ReadRecording};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use utoipa::ToSchema;
@@ -56,7 +56,7 @@ pub trait Surroundings: Sync {
     ///
     /// # Errors
     /// [`JobError`] where there is none or it cannot be read.
-    fn raw_recording(&self, name: &str) -> Result<ReadRaw, JobError>;
+    fn raw_recording(&self, name: &str) -> Result<ReadRecording<RawRecording>, JobError>;
 
     /// The file of a laboratory's own format that a request names.
     ///

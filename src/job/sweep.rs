@@ -20,9 +20,12 @@ impl Request for SweepStudy {
     const COLLECTION: &'static str = "sweep-studies";
     const ABOUT: &'static str = "Many designs evaluated: a table of what each would tell.";
 
+    fn read(value: &Value) -> Result<SweepStudy, Vec<FieldError>> {
+        SweepStudy::from_request(value)
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
-        let errors = self.field_errors();
-        if errors.is_empty() { Ok(Box::new(CheckedSweep(self))) } else { Err(errors) }
+        Ok(Box::new(CheckedSweep(self)))
     }
 }
 

@@ -6,7 +6,7 @@
 use super::problem::Problem;
 use super::store::{NewUpload, Store};
 use crate::job::{InputFile, JobError, Progress, ScratchFolder, Surroundings, recording_identifier};
-use crate::recording::{RawRecording, ReadLimits, ReadRaw, ReadRecording, Recording, RecordingError};
+use crate::recording::{RawRecording, ReadLimits, ReadRecording, Recording, RecordingError};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -103,7 +103,7 @@ pub fn unpack(mut stream: impl Read, max_bytes: usize) -> Result<BTreeMap<String
 /// A recording as it was uploaded.
 enum Uploaded {
     Displacements(Box<ReadRecording>),
-    RawPhases(Box<ReadRaw>),
+    RawPhases(Box<ReadRecording<RawRecording>>),
 }
 
 /// Reads a recording from its files.
@@ -216,7 +216,7 @@ impl Surroundings for StoredSurroundings<'_> {
         }
     }
 
-    fn raw_recording(&self, name: &str) -> Result<ReadRaw, JobError> {
+    fn raw_recording(&self, name: &str) -> Result<ReadRecording<RawRecording>, JobError> {
         match self.uploaded(name)? {
             Uploaded::RawPhases(read) => Ok(*read),
             Uploaded::Displacements(_) => {
