@@ -1,5 +1,12 @@
 //! What is wrong with single fields of a file, a request or an option: one type for every reader and every door.
 
+mod path;
+mod read;
+pub mod schema;
+
+pub use path::FieldPath;
+pub use read::read;
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -20,12 +27,7 @@ pub struct FieldError {
 impl FieldError {
     /// The field at `pointer` holds `value`; it must be `allowed`.
     pub fn new(pointer: impl Into<String>, value: impl std::fmt::Display, allowed: impl Into<String>) -> FieldError {
-        FieldError {
-            pointer: pointer.into(),
-            value: value.to_string(),
-            allowed: allowed.into(),
-            remedy: String::new(),
-        }
+        FieldError { pointer: pointer.into(), value: value.to_string(), allowed: allowed.into(), remedy: String::new() }
     }
 
     /// With what to change.

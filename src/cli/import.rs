@@ -5,6 +5,7 @@ use super::scan::{filter, recording_error};
 use super::{Common, input, output};
 use crate::acquisition::unwrap::{Method, UnwrapOptions};
 use crate::acquisition::{Anchor, ReconstructOptions, StepReport, reconstruct};
+use crate::file::{ReadError, read_text_limited};
 use crate::provenance::VERSION;
 use crate::recording::{
     ImportError, ImportOptions, LoadCurve, RawRecording, ReadLimits, Recording, RecordingError, mat, read_points,
@@ -237,11 +238,10 @@ fn from_csv(a: &ImportArguments, limits: &ReadLimits) -> Result<Recording, CliEr
     let (specimen, options) = options(a)?;
     let mut steps = Vec::new();
     for path in &a.files {
-        let size = std::fs::metadata(path).map_err(|source| CliError::Read { path: path.clone(), source })?.len();
-        if size > limits.max_file_bytes {
-            return Err(bad(path, &format!("{size} bytes (limit: {})", limits.max_file_bytes)));
-        }
-        let text = std::fs::read_to_string(path).map_err(|source| CliError::Read { path: path.clone(), source })?;
+        let text = read_text_limited(path, limits.max_file_bytes).map_err(|error| match error {
+            ReadError::Io(source) => CliError::Read { path: path.clone(), source },
+            other => bad(path, &other),
+        })?;
         let max_points = usize::try_from(limits.max_values / 8).unwrap_or(usize::MAX);
         steps.push(read_points(&text, path, max_points).map_err(|e: ImportError| bad(path, &e))?);
     }

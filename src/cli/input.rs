@@ -1,6 +1,7 @@
 //! Reading what the commands are given.
 
 use super::error::CliError;
+use crate::file::{ReadError, read_text_limited};
 use crate::material::Ogden;
 use crate::mesh::MeshOptions;
 use crate::specimen::Specimen;
@@ -12,15 +13,15 @@ const MAX_FILE_BYTES: u64 = 16 << 20;
 /// Text of a small file.
 ///
 /// # Errors
-/// [`CliError::Read`], [`CliError::Input`] for a file that is too large.
+/// [`CliError::Read`], [`CliError::Input`] for what is no regular file or too large.
 pub fn read_text(path: &Path) -> Result<String, CliError> {
-    let fail = |source| CliError::Read { path: path.into(), source };
-    let size = std::fs::metadata(path).map_err(fail)?.len();
-    if size > MAX_FILE_BYTES {
-        let message = format!("{size} bytes (limit: {MAX_FILE_BYTES}); this is not a specimen, material or study");
-        return Err(CliError::Input { path: path.into(), message });
-    }
-    std::fs::read_to_string(path).map_err(fail)
+    read_text_limited(path, MAX_FILE_BYTES).map_err(|error| match error {
+        ReadError::Io(source) => CliError::Read { path: path.into(), source },
+        other => {
+            let message = format!("{other}; this is not a specimen, material or study");
+            CliError::Input { path: path.into(), message }
+        }
+    })
 }
 
 /// A specimen file.

@@ -230,7 +230,7 @@ impl ForwardModel {
 
     fn quadrature_positions(&self) -> Vec<[[Lanes; MAX_GROUPS]; 3]> {
         let rest = vec![[0.0; 3]; self.mesh.nodes.len()];
-        let material = Ogden { schema: String::new(), bulk_kpa: 1.0, terms: Vec::new() };
+        let material = Ogden { bulk_kpa: 1.0, terms: Vec::new() };
         let mut out = ElementOutput::default();
         (0..self.mesh.num_elements())
             .map(|e| {

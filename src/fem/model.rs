@@ -200,7 +200,7 @@ impl ForwardModel {
 
     fn check_geometry(&self) -> Result<(), SolveError> {
         let rest = vec![[0.0; 3]; self.mesh.nodes.len()];
-        let material = Ogden { schema: String::new(), bulk_kpa: 1.0, terms: Vec::new() };
+        let material = Ogden { bulk_kpa: 1.0, terms: Vec::new() };
         let mut out = ElementOutput::default();
         for e in 0..self.mesh.num_elements() {
             let input = self.input(e, &self.mesh.nodes, &rest, None, &material);

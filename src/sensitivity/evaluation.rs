@@ -3,8 +3,9 @@
 use super::continuum::largest_principal_stretch;
 use super::covariance::{IDENTIFIABILITY_LIMIT, PromisedSd};
 use super::drives::{DriveSelection, check_drives, solve_for_median};
-use super::information::{FisherInformation, InformationError, ScanSettings};
+use super::information::{FisherInformation, InformationError};
 use super::observation::{DriveMaps, DrivenState, EvaluationStep, Scanner};
+use super::scan_settings::ScanSettings;
 use crate::fem::{Equilibrium, ForwardModel, PrepareError, SolveError, SolveOptions};
 use crate::material::{Ogden, Parameter};
 use crate::mesh::{MeshError, MeshOptions};
