@@ -16,6 +16,7 @@ pub mod design;
 pub mod diagnosis;
 pub mod fem;
 pub mod field;
+pub mod file;
 pub mod homogeneous;
 pub mod job;
 pub mod kinematics;

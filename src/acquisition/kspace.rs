@@ -13,7 +13,8 @@ pub struct KSpace {
 }
 
 /// Weights over the kept part of k-space, as a function of q in [0, 1] from the centre to the end of the kept part.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, utoipa::ToSchema)]
+#[schema(as = KSpaceWindow)]
 #[serde(rename_all = "snake_case")]
 pub enum Window {
     /// One.

@@ -3,6 +3,7 @@
 use super::error::CompareError;
 use super::figure::{Direction, Figure};
 use crate::design::DesignResult;
+use crate::file::{ReadError, read_text_limited};
 use crate::sensitivity::Evaluation;
 use crate::sweep::{SweepCell, SweepResult};
 use serde::Deserialize;
@@ -32,13 +33,11 @@ pub struct Subject {
 /// # Errors
 /// [`CompareError::Read`], [`CompareError::NotAResult`].
 pub fn read(path: &Path) -> Result<Subject, CompareError> {
-    let fail = |e: std::io::Error| CompareError::Read { path: path.into(), message: e.to_string() };
     let not = |message: String| CompareError::NotAResult { path: path.into(), message };
-    let size = std::fs::metadata(path).map_err(fail)?.len();
-    if size > MAX_BYTES {
-        return Err(not(format!("{size} bytes (limit: {MAX_BYTES})")));
-    }
-    let text = std::fs::read_to_string(path).map_err(fail)?;
+    let text = read_text_limited(path, MAX_BYTES).map_err(|error| match error {
+        ReadError::Io(error) => CompareError::Read { path: path.into(), message: error.to_string() },
+        other => not(other.to_string()),
+    })?;
     let value: Value = serde_json::from_str(&text).map_err(|e| not(e.to_string()))?;
     subject_of(path, &value)
 }

@@ -69,8 +69,7 @@ pub(super) fn first_guess(
         return Ok(prior.clone());
     }
     // A neo-Hookean guess, its modulus scaled to the measured force; κ/μ of a rubber.
-    let mut material =
-        Ogden { schema: "ogden/1".into(), bulk_kpa: 2000.0, terms: vec![OgdenTerm { mu_kpa: 16.0, alpha: 2.0 }] };
+    let mut material = Ogden { bulk_kpa: 2000.0, terms: vec![OgdenTerm { mu_kpa: 16.0, alpha: 2.0 }] };
     let predicted = laboratory.predict(&material, &Scene::default(), is_cancelled)?;
     let forces = laboratory.measured().force;
     let ratio = |n: &usize| forces[*n] / predicted.trace.force[*n];

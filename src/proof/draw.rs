@@ -184,7 +184,7 @@ pub fn draw_cause(cause: HiddenCause, seed: u64) -> Hidden {
     let mut hidden = Hidden {
         cause,
         seed,
-        material: Ogden { schema: "ogden/1".into(), bulk_kpa, terms: vec![OgdenTerm { mu_kpa, alpha }] },
+        material: Ogden { bulk_kpa, terms: vec![OgdenTerm { mu_kpa, alpha }] },
         noise_sd_mm: d.within(0.015, 0.035),
         strength: 0.0,
         which: 0,

@@ -9,6 +9,7 @@ mod information;
 mod integrated;
 mod observation;
 mod pointwise;
+mod scan_settings;
 mod separation;
 
 pub use continuum::{
@@ -20,8 +21,9 @@ pub use error::EvaluationError;
 pub use evaluation::{
     Evaluation, EvaluationMaps, EvaluationNotes, EvaluationOptions, EvaluationStatistics, evaluate, evaluate_model,
 };
-pub use information::{FisherInformation, InformationError, MeasurementNoise, PartialVoxels, ScanSettings};
+pub use information::{FisherInformation, InformationError, MeasurementNoise};
 pub use integrated::{IntegratedSensitivity, integrate_over_voxels, parameter_sensitivity, sensitivity_map};
 pub use observation::{DriveMaps, DrivenState, EvaluationStep, Observation, Scanner, median};
 pub use pointwise::{PointwiseSensitivity, alpha_sensitivity, mu_sensitivity};
+pub use scan_settings::{PartialVoxels, ScanSettings};
 pub use separation::{MaterialState, Separation, separation_over_quadrature};

@@ -29,6 +29,15 @@ pub enum LigamentKind {
     HoleEdge(usize, SectionEdge),
 }
 
+impl LigamentKind {
+    /// The hole, or the first of the two holes, that the ligament begins at.
+    pub fn first_hole(self) -> usize {
+        match self {
+            LigamentKind::HoleHole(hole, _) | LigamentKind::HoleEdge(hole, _) => hole,
+        }
+    }
+}
+
 impl std::fmt::Display for LigamentKind {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {

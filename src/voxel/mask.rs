@@ -126,7 +126,6 @@ pub(crate) mod tests {
 
     pub(crate) fn solid() -> Specimen {
         Specimen {
-            schema: "specimen/1".into(),
             name: "solid".into(),
             test: TestKind::DoubleLapShear,
             block: Block { length_mm: 25.4, thickness_mm: 6.4, width_mm: 19.1 },

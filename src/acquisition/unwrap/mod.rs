@@ -22,7 +22,8 @@ use graph::Graph;
 use std::f64::consts::{PI, TAU};
 
 /// How to decide which differences to trust.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, utoipa::ToSchema)]
+#[schema(as = UnwrapMethod)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
     /// Quality-guided: voxels are joined in the order of each difference's distance from half a turn in units of its

@@ -72,7 +72,7 @@ pub enum MatError {
 /// [`MatError`].
 pub fn read_mat(path: &Path, max_values: u64) -> Result<Vec<(String, MatValue)>, MatError> {
     use std::io::{Read, Seek, SeekFrom};
-    let mut file = std::fs::File::open(path)?;
+    let mut file = crate::file::open_regular(path).map_err(crate::file::ReadError::into_io)?;
     let mut header = [0u8; 128];
     if file.read_exact(&mut header).is_err() {
         return Err(MatError::NotMat);
