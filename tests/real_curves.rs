@@ -14,7 +14,7 @@ use lambdak::homogeneous::{
 };
 use lambdak::rate::{Hypothesis, LoadCurve, LoadCurveOptions, LoadCurveVerdict, analyse_load_curve};
 use prerequisites::Missing;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 fn never() -> bool {
     false

@@ -138,7 +138,7 @@ pub fn follow(
         }
         // A controller that does not answer is waited for.
         if let Some(states) = all_states(&scheduler, &jobs, &open)? {
-            restart_lost(job, settings, &scheduler, &mut jobs, &mut open, &states, &read, on_event)?;
+            restart_lost(job, settings, &mut jobs, &mut open, &states, &read, on_event)?;
         }
         let slice = Duration::from_millis(100).min(settings.poll);
         let mut waited = Duration::ZERO;
@@ -153,7 +153,6 @@ pub fn follow(
 fn restart_lost(
     job: &ArrayJob,
     settings: &FollowSettings,
-    scheduler: &Scheduler,
     jobs: &mut Jobs,
     open: &mut BTreeMap<usize, Watched>,
     states: &BTreeMap<usize, TaskState>,
@@ -169,7 +168,7 @@ fn restart_lost(
                 continue;
             }
             Some(TaskState::Held) => {
-                scheduler.release(&number, task);
+                Scheduler.release(&number, task);
                 continue;
             }
             Some(TaskState::Cancelled) => "CANCELLED".to_string(),
@@ -200,11 +199,11 @@ fn restart_lost(
             return Err(SlurmError::TaskFails { job: number, task, attempts, state, log_path, log });
         }
         on_event(&Following::Requeued { job: &number, task, state: &state });
-        if !(states.contains_key(&task) && scheduler.requeue(&number, task)) {
+        if !(states.contains_key(&task) && Scheduler.requeue(&number, task)) {
             again.push(task);
         }
     }
-    submit(job, &again, scheduler, jobs, on_event)
+    submit(job, &again, &Scheduler, jobs, on_event)
 }
 
 fn submit(

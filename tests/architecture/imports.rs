@@ -24,6 +24,8 @@ struct Mention {
     module: Vec<String>,
     path: Vec<String>,
     line: usize,
+    /// Whether it stands in a `use` item.
+    is_use: bool,
 }
 
 /// The names and modules of the whole library.
@@ -34,8 +36,10 @@ struct Names {
     aliases: BTreeMap<(Vec<String>, String), Vec<String>>,
 }
 
-/// All imports between different files. A name that a `mod.rs` re-exports belongs to the file that defines it, and
-/// handing it on is no import of the `mod.rs`, unless that uses the name itself.
+/// All imports between different files: names that a `use` item brings in, and paths that begin with `crate`, `super`
+/// or `self`. A name that a `mod.rs` re-exports belongs to the file that defines it, and handing it on is no import of
+/// the `mod.rs`, unless that uses the name itself. Nor is a call into a file of its own folder by that file's name
+/// (`v5::read`): to choose among the files that it declares is what a `mod.rs` is for.
 pub fn imports(files: &[SourceFile]) -> Vec<Import> {
     let mut names = Names { files: BTreeMap::new(), aliases: BTreeMap::new() };
     let mut mentions = Vec::new();
@@ -50,7 +54,9 @@ pub fn imports(files: &[SourceFile]) -> Vec<Import> {
     }
     let mut found = BTreeSet::new();
     for (from, mention) in mentions {
+        let is_import = mention.is_use || names.is_import(&mention);
         if let Some((to, name)) = names.resolve(&mention.module, &mention.path, 0)
+            && is_import
             && to != from
         {
             found.insert(Import { from, to, name, line: mention.line });
@@ -60,6 +66,13 @@ pub fn imports(files: &[SourceFile]) -> Vec<Import> {
 }
 
 impl Names {
+    /// Whether a path outside `use` items says itself where its name comes from, or repeats a name of a `use` item.
+    fn is_import(&self, mention: &Mention) -> bool {
+        let first = &mention.path[0];
+        ["crate", "super", "self"].contains(&first.as_str())
+            || self.aliases.contains_key(&(mention.module.clone(), first.clone()))
+    }
+
     /// The file that defines what `path` names in `module`, and its name there; none for what lies outside the library.
     fn resolve(&self, module: &[String], path: &[String], depth: usize) -> Option<(usize, String)> {
         // Deeper than any chain of re-exports: a name that stands for itself ends here.
@@ -118,8 +131,8 @@ impl Reader {
         Reader { modules: vec![module.clone()], module, aliases: BTreeMap::new(), mentions: Vec::new() }
     }
 
-    fn mention(&mut self, path: Vec<String>, line: usize) {
-        self.mentions.push(Mention { module: self.module.clone(), path, line });
+    fn mention(&mut self, path: Vec<String>, line: usize, is_use: bool) {
+        self.mentions.push(Mention { module: self.module.clone(), path, line, is_use });
     }
 
     /// The leaves of a `use` tree: each path with the name it gets.
@@ -177,7 +190,7 @@ impl Reader {
 
     fn end_path(&mut self, path: &mut Vec<String>, line: usize) {
         if path.len() > 1 {
-            self.mention(std::mem::take(path), line);
+            self.mention(std::mem::take(path), line, false);
         }
         path.clear();
     }
@@ -210,7 +223,7 @@ impl<'a> Visit<'a> for Reader {
         Self::leaves(&item.tree, &[], &mut leaves);
         for (path, name, line) in leaves {
             if matches!(item.vis, syn::Visibility::Inherited) {
-                self.mention(path.clone(), line);
+                self.mention(path.clone(), line, true);
             }
             self.aliases.insert((self.module.clone(), name), path);
         }
@@ -218,7 +231,7 @@ impl<'a> Visit<'a> for Reader {
 
     fn visit_path(&mut self, path: &'a syn::Path) {
         let segments = path.segments.iter().map(|s| s.ident.to_string()).collect();
-        self.mention(segments, path.span().start().line);
+        self.mention(segments, path.span().start().line, false);
         visit::visit_path(self, path);
     }
 

@@ -103,7 +103,7 @@ fn required() -> Vec<Prerequisite> {
 }
 
 /// A test of the harness.
-pub fn trial<T: Tested>(name: &str, test: fn() -> T) -> Trial {
+pub fn trial<T: Tested + 'static>(name: &str, test: fn() -> T) -> Trial {
     Trial::ignorable_test(name, move || match test().into_result() {
         Ok(()) => Ok(Completion::Completed),
         Err(missing) if required().contains(&missing.prerequisite) => {

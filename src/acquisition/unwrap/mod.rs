@@ -11,6 +11,7 @@
 //! region stays open.
 
 mod graph;
+mod image;
 mod least_squares;
 mod quality;
 mod reliable;
@@ -18,8 +19,10 @@ mod reliable;
 #[cfg(test)]
 mod tests;
 
+pub use image::{WrappedImage, wrapped};
+
 use graph::Graph;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 /// How to decide which differences to trust.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, utoipa::ToSchema)]
@@ -58,17 +61,6 @@ impl Default for UnwrapOptions {
     }
 }
 
-/// A wrapped phase image with what is known of its noise; lists in the grid's order, x fastest.
-#[derive(Clone, Copy, Debug)]
-pub struct WrappedImage<'a> {
-    /// Voxels along x, y, z.
-    pub shape: [usize; 3],
-    /// Phase, rad; NaN where missing.
-    pub phase: &'a [f64],
-    /// Standard deviation of the phase, rad; not finite outside the mask.
-    pub sd: &'a [f64],
-}
-
 /// An unwrapped image.
 #[derive(Clone, Debug)]
 pub struct Unwrapped {
@@ -88,12 +80,6 @@ pub struct Unwrapped {
     pub num_unconnected: usize,
 }
 
-/// The phase within (−π, π].
-pub fn wrapped(phase: f64) -> f64 {
-    let turned = phase - TAU * (phase / TAU).round();
-    if turned <= -PI { turned + TAU } else { turned }
-}
-
 /// Unwraps an image. The lists have one entry per voxel; entries beyond the shape are ignored.
 pub fn unwrap(image: &WrappedImage, options: &UnwrapOptions) -> Unwrapped {
     let is_asked = |v: usize| image.phase[v].is_finite() && image.sd[v].is_finite();
@@ -101,10 +87,10 @@ pub fn unwrap(image: &WrappedImage, options: &UnwrapOptions) -> Unwrapped {
     let asked: Vec<usize> = (0..num_image).filter(|&v| is_asked(v)).collect();
     let used: Vec<u32> = asked.iter().filter(|&&v| image.sd[v] <= options.max_phase_sd).map(|&v| v as u32).collect();
     let graph = Graph::new(image, &used);
-    let whole = by(options.method, &graph);
+    let whole = unwrapped_by(options.method, &graph);
     let is_agreed = if options.needs_agreement {
         let other = if options.method == Method::LeastSquares { Method::Margin } else { Method::LeastSquares };
-        agreed(&whole, &by(other, &graph))
+        agreed(&whole, &unwrapped_by(other, &graph))
     } else {
         vec![true; used.len()]
     };
@@ -127,7 +113,7 @@ pub fn unwrap(image: &WrappedImage, options: &UnwrapOptions) -> Unwrapped {
     }
 }
 
-fn by(method: Method, graph: &Graph) -> Vec<f64> {
+fn unwrapped_by(method: Method, graph: &Graph) -> Vec<f64> {
     match method {
         Method::Margin => quality::by_margin(graph),
         Method::SecondDifference => quality::by_second_difference(graph),
