@@ -1,5 +1,5 @@
 use super::super::study_error::SweepStudyError;
-use super::super::task::tasks;
+use super::super::task::{TaskInputs, tasks};
 use super::*;
 use std::path::Path;
 
@@ -40,7 +40,7 @@ fn a_grid_has_every_combination_and_every_material() {
     let values: Vec<&[f64]> = tasks.iter().step_by(2).map(|t| t.values.as_slice()).collect();
     assert_eq!(values, [[4.0, 3.0], [4.0, 4.0], [4.0, 5.0], [6.0, 3.0], [6.0, 4.0], [6.0, 5.0]]);
     assert!(tasks.iter().enumerate().all(|(i, t)| t.index == i && t.point == i / 2 && t.material == i % 2));
-    let (specimen, material, _) = tasks[11].inputs(&study);
+    let TaskInputs { specimen, material, .. } = tasks[11].inputs(&study);
     assert_eq!([specimen.holes[0].center_mm[0], specimen.holes[1].center_mm[0]], [-6.0, 6.0]);
     assert_eq!((specimen.drive_mm, material.bulk_kpa), (vec![5.0], 4000.0));
 }
