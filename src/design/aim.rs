@@ -1,5 +1,5 @@
-//! What a study seeks: which figure is maximised, how the figures of several parameters and materials combine, and which
-//! figures may not get worse.
+//! What a study seeks: which figure is maximised, how the figures of several parameters and materials combine, and
+//! which figures may not get worse.
 
 use super::study_error::StudyError;
 use super::study_limits::{MAX_WEIGHT, ParameterWeight};
@@ -182,8 +182,8 @@ impl Objective {
         }
     }
 
-    /// Adds what is wrong with the objective for materials with these parameters: weights that nothing uses, that are out
-    /// of their range or that are all zero for a material.
+    /// Adds what is wrong with the objective for materials with these parameters: weights that nothing uses, that are
+    /// out of their range or that are all zero for a material.
     pub(super) fn check(&self, parameters_of_materials: &[Vec<String>], problems: &mut Vec<StudyError>) {
         let has_weights = !self.parameter_weights.is_empty();
         if has_weights && self.combine != Combine::Weighted {

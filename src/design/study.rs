@@ -1,5 +1,5 @@
-//! The study (`study/1`): a base specimen, what may vary, for which materials, how it is scanned, what can be made, what
-//! is sought and how hard.
+//! The study (`study/1`): a base specimen, what may vary, for which materials, how it is scanned, what can be made,
+//! what is sought and how hard.
 
 use super::aim::Objective;
 use super::study_limits::{Count, HoleCount, LengthMm};
@@ -94,8 +94,8 @@ pub struct Budget {
     /// Designs confirmed on a finer mesh with the scan's voxels.
     #[schema(value_type = Count)]
     pub confirm: usize,
-    /// Whether the search judges every design at the priors' stiffer and softer variants too. If not, it is judged at the
-    /// central values, three times as many designs are seen in the same time, and the variants enter at confirmation.
+    /// Whether the search judges every design at the priors' stiffer and softer variants too. If not, it is judged at
+    /// the central values, three times as many designs are seen in the same time, and the variants enter at confirmation.
     pub variants_in_search: bool,
 }
 

@@ -86,8 +86,8 @@ schema_of_file!(Study, StudyFile);
 schema_of_file!(MaterialPrior, MaterialEntry);
 
 impl StudyFile {
-    /// The study, with the base specimen and the materials as the given functions take them; the second one is also given
-    /// the material's place in the list.
+    /// The study, with the base specimen and the materials as the given functions take them; the second one is also
+    /// given the material's place in the list.
     fn study<E>(
         self,
         base: impl FnOnce(Inline<Specimen>) -> Result<Specimen, E>,

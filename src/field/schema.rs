@@ -1,7 +1,7 @@
 //! JSON schemas of numbers, texts and lists whose limits are constants.
 //!
-//! The attributes of `utoipa` take literals only. So that a limit stands once, a field whose limit is a constant refers to
-//! a named schema: `#[schema(value_type = Name)]`, with `Name` defined by [`schema_type`].
+//! The attributes of `utoipa` take literals only. So that a limit stands once, a field whose limit is a constant refers
+//! to a named schema: `#[schema(value_type = Name)]`, with `Name` defined by the macro `schema_type`.
 
 use std::ops::RangeInclusive;
 use utoipa::ToSchema;

@@ -132,6 +132,25 @@ mod tests {
     }
 
     #[test]
+    fn all_errors_come_at_once_with_pointers() {
+        let bad = ogden(f64::NAN, &[(1e7, 0.0), (1.0, f64::INFINITY), (1.0, -1.0)]);
+        let pointers: Vec<String> = bad.field_errors().into_iter().map(|e| e.pointer).collect();
+        assert_eq!(pointers, ["/bulk_kpa", "/terms/0/mu_kpa", "/terms/0/alpha", "/terms/1/alpha"]);
+        let unstable = ogden(1.0, &[(9.0, 1.0), (1.0, -1.0)]);
+        assert_eq!(unstable.field_errors()[0].pointer, "/terms/1");
+        assert_eq!(ogden(2173.0, &[(17.0, 1.91)]).field_errors(), []);
+    }
+
+    /// The tag stands first in JSON, and reading needs it.
+    #[test]
+    fn the_tag_is_of_the_file() {
+        let written = serde_json::to_string(&ogden(2000.0, &[(17.0, 1.5)])).unwrap();
+        assert_eq!(written, r#"{"schema":"ogden/1","bulk_kpa":2000.0,"terms":[{"mu_kpa":17.0,"alpha":1.5}]}"#);
+        assert!(serde_json::from_str::<Ogden>(&written.replace("ogden/1", "ogden/2")).is_err());
+        assert!(serde_json::from_str::<Ogden>(r#"{"bulk_kpa":2000.0,"terms":[]}"#).is_err());
+    }
+
+    #[test]
     fn shipped_materials_are_valid() {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/geometries/materials");
         let mut count = 0;

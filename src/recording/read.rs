@@ -76,8 +76,8 @@ impl Recording {
     /// Reads the recording in `path`: a folder with a `recording.json`, or such a JSON file under another name.
     ///
     /// # Errors
-    /// [`RecordingError`]: a file that is missing, damaged, too large or not of the format; [`RecordingError::Raw`] where
-    /// the steps hold wrapped phases (read those as [`super::RawRecording`]).
+    /// [`RecordingError`]: a file that is missing, damaged, too large or not of the format; [`RecordingError::Raw`]
+    /// where the steps hold wrapped phases (read those as [`super::RawRecording`]).
     pub fn read(path: &Path, limits: &ReadLimits) -> Result<Recording, RecordingError> {
         Recording::read_with_digest(path, limits).map(|read| read.recording)
     }

@@ -21,8 +21,8 @@ pub enum PartialVoxels {
     /// As every voxel of the mask: `noise_sd_mm` is that of the values given, as in recordings.
     #[default]
     Uniform,
-    /// By its signal: the phase noise of an image goes as 1/magnitude and the magnitude as the filled part, so the weight
-    /// w is the filled part squared.
+    /// By its signal: the phase noise of an image goes as 1/magnitude and the magnitude as the filled part, so the
+    /// weight w is the filled part squared.
     Signal,
 }
 

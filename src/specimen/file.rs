@@ -82,3 +82,7 @@ impl From<Specimen> for SpecimenFile {
 }
 
 schema_of_file!(Specimen, SpecimenFile);
+
+#[cfg(test)]
+#[path = "file_tests.rs"]
+mod tests;

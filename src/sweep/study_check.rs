@@ -139,7 +139,7 @@ impl SweepStudy {
         }
     }
 
-    /// The values that a variable is given and where they stand: its list, the ends of its range, its column of the rows.
+    /// The values that a variable is given and where they stand: its list, the ends of its range, its column of rows.
     fn values_of(&self, index: usize) -> Vec<(FieldPath, f64)> {
         let v = &self.variables[index];
         let path = || FieldPath::of("variables").index(index);

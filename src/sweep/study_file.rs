@@ -69,8 +69,8 @@ schema_of_file!(SweepStudy, StudyFile);
 schema_of_file!(NamedMaterial, MaterialEntry);
 
 impl StudyFile {
-    /// The study, with the base specimen and the materials as the given functions take them; the second one is also given
-    /// the material's place in the list.
+    /// The study, with the base specimen and the materials as the given functions take them; the second one is also
+    /// given the material's place in the list.
     fn study<E>(
         self,
         base: impl FnOnce(Inline<Specimen>) -> Result<Specimen, E>,
