@@ -20,12 +20,7 @@ pub struct FieldError {
 impl FieldError {
     /// The field at `pointer` holds `value`; it must be `allowed`.
     pub fn new(pointer: impl Into<String>, value: impl std::fmt::Display, allowed: impl Into<String>) -> FieldError {
-        FieldError {
-            pointer: pointer.into(),
-            value: value.to_string(),
-            allowed: allowed.into(),
-            remedy: String::new(),
-        }
+        FieldError { pointer: pointer.into(), value: value.to_string(), allowed: allowed.into(), remedy: String::new() }
     }
 
     /// With what to change.

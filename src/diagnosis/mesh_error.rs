@@ -1,29 +1,32 @@
-//! What meshes and soft edges do to estimates: fits are corrected by a finer mesh's prediction, and the shifts that other meshes
-//! and wider edges of a cause make are added to the standard deviations.
+//! What meshes and soft edges do to estimates: fits are corrected by a finer mesh's prediction, and the shifts that
+//! other meshes and wider edges of a cause make are added to the standard deviations.
 //!
-//! Noise alone gives intervals that are far too narrow: 20,000 voxels average it out, and what is left is the error of the mesh,
-//! ours and that of whoever made synthetic data. The prediction of another mesh differs from ours by a multiple of our error;
-//! fitted as if it were a misfit, to first order, it says how far our error moves each parameter.
+//! Noise alone gives intervals that are far too narrow: 20,000 voxels average it out, and what is left is the error of
+//! the mesh, ours and that of whoever made synthetic data. The prediction of another mesh differs from ours by a
+//! multiple of our error; fitted as if it were a misfit, to first order, it says how far our error moves each
+//! parameter.
 
+use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
-use super::fit::{FitSettings, Fitted, derivatives, fit, normal_matrix, scales};
+use super::fit::{derivatives, fit, normal_matrix, scales};
 use super::laboratory::Laboratory;
 use super::metric::Metric;
+use super::prior::FitSettings;
 use super::scene::Scene;
 use super::trace::Trace;
 use crate::calibration::Observed;
 use crate::mesh::MeshOptions;
 use nalgebra::DVector;
 
-/// Element size of the finer mesh as a factor on ours, and the finest it is made, as a factor on the standard one: beyond, the
-/// error is smaller than what a recording shows.
+/// Element size of the finer mesh as a factor on ours, and the finest it is made, as a factor on the standard one:
+/// beyond, the error is smaller than what a recording shows.
 const FINER: f64 = 0.6;
 const FINEST: f64 = 0.45;
 /// With a factor nearer to one than this a finer mesh says nothing.
 const HARDLY_FINER: f64 = 0.9;
-/// Other meshes: element size as a factor on ours, and whether they are of prisms. Where ours is of hexahedra these err in another
-/// pattern: a parameter that ours leaves alone by its symmetry is not thought free of error. One alone may shift a parameter by
-/// little where it happens to err as ours does; the mean square of all counts.
+/// Other meshes: element size as a factor on ours, and whether they are of prisms. Where ours is of hexahedra these err
+/// in another pattern: a parameter that ours leaves alone by its symmetry is not thought free of error. One alone may
+/// shift a parameter by little where it happens to err as ours does; the mean square of all counts.
 const COARSER: [(f64, bool); 3] = [(1.25, false), (1.6, false), (1.6, true)];
 /// The order of convergence that singular edges leave.
 const ORDER: f64 = 1.4;
@@ -46,6 +49,13 @@ pub struct MeshDefect {
     pub ratio: f64,
 }
 
+impl MeshDefect {
+    /// What the mesh of the diagnosis would have shown of a recording, were it not for its own error.
+    pub fn taken_off(&self, recorded: &Trace) -> Trace {
+        recorded.plus(-1.0, &self.trace)
+    }
+}
+
 impl<'a> Finer<'a> {
     /// `None` where ours is fine already, or the finer one cannot be meshed.
     pub fn new(observed: &'a Observed, mesh_factor: f64) -> Option<Finer<'a>> {
@@ -57,9 +67,9 @@ impl<'a> Finer<'a> {
         Laboratory::new(observed, &mesh).ok().map(|laboratory| Finer { laboratory, ratio })
     }
 
-    /// Corrects a fit by the finer mesh's prediction (deferred correction: what the finer mesh predicts beyond ours is taken off
-    /// the measured, and the fit repeated on ours from where it ended). `fitted.residual` is then against the finer mesh to first
-    /// order.
+    /// Corrects a fit by the finer mesh's prediction (deferred correction: what the finer mesh predicts beyond ours is
+    /// taken off the measured, and the fit repeated on ours from where it ended). `fitted.residual` is then against the
+    /// finer mesh to first order.
     ///
     /// # Errors
     /// [`DiagnosisError`]: the finer model has no equilibrium, or the work was cancelled.
@@ -69,11 +79,11 @@ impl<'a> Finer<'a> {
         metric: &Metric,
         measured: &Trace,
         settings: &FitSettings,
-        fitted: &mut Fitted,
+        fitted: &mut CauseFit,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<MeshDefect, DiagnosisError> {
         let defect = self.defect(fitted, is_cancelled)?;
-        let seen = measured.plus(-1.0, &defect.trace);
+        let seen = defect.taken_off(measured);
         *fitted = fit(laboratory, metric, &seen, &fitted.material, &fitted.causes, settings, is_cancelled)?;
         Ok(defect)
     }
@@ -82,14 +92,14 @@ impl<'a> Finer<'a> {
     ///
     /// # Errors
     /// As [`Self::correct`].
-    pub fn defect(&mut self, fitted: &Fitted, is_cancelled: &dyn Fn() -> bool) -> Result<MeshDefect, DiagnosisError> {
+    pub fn defect(&mut self, fitted: &CauseFit, is_cancelled: &dyn Fn() -> bool) -> Result<MeshDefect, DiagnosisError> {
         let theirs = self.laboratory.predict(&fitted.material, &fitted.scene(), is_cancelled)?;
         Ok(MeshDefect { trace: theirs.trace.plus(-1.0, &fitted.prediction.trace), ratio: self.ratio })
     }
 }
 
-/// Adds the meshes' share to the standard deviations of `fitted`, found by `laboratory` on a mesh of `mesh_factor` and corrected
-/// by `defect`.
+/// Adds the meshes' share to the standard deviations of `fitted`, found by `laboratory` on a mesh of `mesh_factor` and
+/// corrected by `defect`.
 ///
 /// # Errors
 /// [`DiagnosisError`]: the coarser model has no equilibrium, or the work was cancelled.
@@ -98,7 +108,7 @@ pub fn widen(
     mesh_factor: f64,
     metric: &Metric,
     settings: &FitSettings,
-    fitted: &mut Fitted,
+    fitted: &mut CauseFit,
     defect: Option<&MeshDefect>,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<(), DiagnosisError> {

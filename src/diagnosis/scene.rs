@@ -59,8 +59,8 @@ pub struct Jump {
 }
 
 impl Scene {
-    /// The departures at a step where `force_n` was measured; `bond_scale_kpa_per_mm` is the stiffness of the sample under
-    /// its bond, against which a bond is loose or firm; the bonded faces lie across `face_axis`.
+    /// The departures at a step where `force_n` was measured; `bond_scale_kpa_per_mm` is the stiffness of the sample
+    /// under its bond, against which a bond is loose or firm; the bonded faces lie across `face_axis`.
     pub fn departures(&self, force_n: f64, bond_scale_kpa_per_mm: f64, face_axis: usize) -> Departures {
         let product = self.stiffness.clone();
         let stiffness_factor = (!product.is_empty())

@@ -11,8 +11,6 @@ pub struct Score {
     pub explained: f64,
     /// Best coefficients of the directions.
     pub coefficients: Vec<f64>,
-    /// Root mean square of the displacement explained, mm.
-    pub rms_mm: f64,
 }
 
 /// A residual and nuisance directions (the material's), against which directions are tested.
@@ -61,11 +59,7 @@ impl<'a> ScoreTest<'a> {
     pub fn test(&self, directions: &[Trace]) -> Score {
         let prepared = self.prepare(directions);
         let (explained, coefficients) = prepared.solve();
-        let mut sum = directions.first().map(|d| d.scaled(0.0)).unwrap_or_default();
-        for (d, c) in directions.iter().zip(&coefficients) {
-            sum = sum.plus(*c, d);
-        }
-        Score { explained, rms_mm: sum.rms_mm(), coefficients }
+        Score { explained, coefficients }
     }
 }
 
