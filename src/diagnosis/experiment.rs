@@ -1,8 +1,8 @@
 //! The experiment that would tell two explanations apart.
 //!
-//! Both explain what was recorded. A further step at another drive would show them apart by the least squares distance
-//! between the one's prediction and the nearest that the other can still give, its parameters held by the recording at
-//! hand (T-optimality: Atkinson and Fedorov 1975).
+//! Both explanations fit what was recorded. How well a further step at another drive would tell them apart is a least
+//! squares distance: from the first explanation's prediction of that step to the nearest prediction that the second one
+//! can give while it still fits the recording at hand (T-optimality: Atkinson and Fedorov 1975).
 
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;

@@ -11,7 +11,8 @@ use super::trace::Trace;
 use crate::material::{Ogden, Parameter};
 use nalgebra::{DMatrix, DVector};
 
-/// Prior of a cause's parameter that says how big, in its scales: wide, there to keep the fit in bounds.
+/// Standard deviation of the prior of a cause's parameter around its start, in scales of the parameter. It is wide: it
+/// only keeps a fit in bounds where the data say nothing.
 const PRIOR_SCALES: f64 = 100.0;
 /// Differences for derivatives, in scales.
 pub const STEP: f64 = 0.02;

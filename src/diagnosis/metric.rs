@@ -1,4 +1,4 @@
-//! What a misfit weighs: noise, and what neither our mesh nor anybody's resolves.
+//! What a misfit weighs: the covariance of the data, which is noise and an allowance for what no mesh resolves.
 //!
 //! The covariance of a trace is C = N + B S Bᵀ. N is the scan's noise, independent per voxel and component (inflated by
 //! the filter's correlation). B S Bᵀ is the discretisation allowance: smooth displacement errors in proportion to the

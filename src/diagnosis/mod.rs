@@ -1,8 +1,14 @@
 //! Diagnosis: where a recording and its nominal model differ, and what physics was left out.
 //!
-//! * [`diagnose()`] fits the nominal model, tests every cause of the registry ([`causes`]) to first order, fits the
-//!   leading ones in full with the material free, adds them one by one, and predicts data that were kept back.
-//! * A misfit counts by its pattern and size: noise and what meshes leave are in its weights.
+//! * [`diagnose()`] runs the stages of a diagnosis, each in a file of its own: it fits the nominal model, reads the
+//!   load curve, corrects the mesh, questions the material, takes artefacts out of the image, adds causes round by
+//!   round, and predicts data kept back.
+//! * A *cause* changes a [`Scene`]; the [`Laboratory`] predicts what would be recorded of a scene, and how that changes
+//!   with it.
+//! * A misfit counts by its pattern and size: noise and what meshes may leave are in its weights ([`Metric`]).
+//! * [`together()`] looks at several diagnosed recordings.
+//!
+//! A new cause is a file in `causes` and a line in the registry there.
 
 mod balls;
 mod candidate;

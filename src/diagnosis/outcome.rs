@@ -16,7 +16,7 @@ use crate::rate::Verdict;
 pub struct Diagnosis {
     /// How it ended.
     pub verdict: Verdict,
-    /// Causes, first found first.
+    /// Causes, the one with the most evidence first.
     pub causes: Vec<FoundCause>,
     /// What the data cannot tell apart from them; where the verdict is unexplained, what was tried and does not explain
     /// it.

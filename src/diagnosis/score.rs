@@ -1,4 +1,8 @@
-//! Score tests: how much of a misfit a cause would explain, to first order, with the material free.
+//! Score tests: how much of a misfit a cause would explain, to first order, with the material free to follow.
+//!
+//! A *direction* is the change of the prediction with one parameter. Directions of the parameters that are free in any
+//! case (the material's and those of the causes found so far) are a *nuisance*: what they can explain is no evidence
+//! for anything else.
 
 use super::metric::{Metric, Weighed};
 use super::trace::Trace;

@@ -24,6 +24,7 @@ pub struct SoftBond {
 /// The stiffest bond that is told from a firm one, mm/kPa: 20 kPa of traction slips 4 µm.
 const FIRMEST: f64 = 2e-4;
 
+/// Soft bonds as the maps of both faces tell them.
 fn suspects(search: &mut Search) -> Result<Vec<Candidate>, DiagnosisError> {
     let whole_faces: Option<Vec<Trace>> =
         search.bond_maps()?.as_ref().map(|bonds| bonds.iter().map(|bond| bond.whole.clone()).collect());

@@ -127,8 +127,9 @@ impl Cause for Debond {
         self.edges_mm.iter().flatten().copied().collect()
     }
 
-    /// An edge past the face's own feels no slope: whether a strip of bond holds beside it must be tried, and the other
-    /// way round.
+    /// The misfit does not change while an edge lies past the face's own, so that no slope leads a fit back from there.
+    /// It must be tried whether a strip of bond holds beside that edge, and where a narrow strip was found, whether
+    /// there is one at all.
     fn leaps(&self, values: &[f64]) -> Vec<Vec<f64>> {
         let mut all = Vec::new();
         for (i, &edge) in values.iter().enumerate() {

@@ -28,7 +28,8 @@ mod wrap;
 
 use super::entry::Entry;
 
-/// All causes, in the order in which they are looked at. The order decides nothing but ties.
+/// All causes. Those in the material's law and those with a place are asked in this order; for all others it only
+/// decides ties.
 pub(super) const REGISTRY: &[Entry] = &[
     cell::OFFSET,
     cell::FRICTION,
