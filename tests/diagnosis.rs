@@ -2,7 +2,7 @@
 
 use lambdak::calibration::Observed;
 use lambdak::diagnosis::{
-    Diagnosis, DiagnosisOptions, DiagnosisResult, Laboratory, Scene, Verdict, diagnose, together,
+    CauseName, Diagnosis, DiagnosisOptions, DiagnosisResult, Laboratory, Scene, Verdict, diagnose, together,
 };
 use lambdak::fem::{Field, PlateMotion};
 use lambdak::material::Ogden;
@@ -76,8 +76,8 @@ fn found_in(recording: &Recording) -> Diagnosis {
 }
 
 /// With causes that the diagnosis is not told of.
-fn diagnosed_without(recording: &Recording, left_out: &[&str]) -> DiagnosisResult {
-    let left_out = left_out.iter().map(|n| n.to_string()).collect();
+fn diagnosed_without(recording: &Recording, left_out: &[&'static str]) -> DiagnosisResult {
+    let left_out = left_out.iter().map(|n| CauseName::new(n)).collect();
     // The coarse mesh errs by some 0.01 mm at 4 mm of drive.
     let options =
         DiagnosisOptions { mesh_factor: 2.0, allowance_mm: Some(0.01), left_out, ..DiagnosisOptions::default() };

@@ -95,7 +95,7 @@ fn an_ambiguous_cause_comes_with_the_experiment() {
     let options = DiagnosisOptions { mesh_factor: 2.2, ..DiagnosisOptions::default() };
     let found = diagnose(&made.recording, &options, &|_| {}, &common::never).unwrap();
     assert_eq!(found.verdict, Verdict::ExplainedAmbiguously);
-    let names: Vec<&str> = found.causes.iter().chain(&found.alternatives).map(|c| c.name).collect();
+    let names: Vec<&str> = found.causes.iter().chain(&found.alternatives).map(|c| c.name.as_str()).collect();
     assert!(names.contains(&"compliance") && names.contains(&"gain"), "{names:?}");
     let experiments = &found.alternatives[0].experiments;
     eprintln!("{experiments:?}");
