@@ -1,4 +1,5 @@
-//! Arguments are checked before work starts: nonsense is exit code 2 with the option's name and range, and takes no time.
+//! Arguments are checked before work starts: nonsense is exit code 2 with the option's name and range, and takes no
+//! time.
 
 use std::path::Path;
 use std::process::{Command, Output};

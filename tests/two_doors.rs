@@ -1,4 +1,5 @@
-//! The same request through the command and through the service gives the same result to the byte, for every kind of job.
+//! The same request through the command and through the service gives the same result to the byte, for every kind of
+//! job.
 
 mod service_common;
 

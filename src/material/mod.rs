@@ -14,7 +14,6 @@ pub use limits::{MAX_ALPHA, MAX_MODULUS_KPA, MIN_ALPHA, SCHEMA};
 pub use ogden_lanes::{MAX_TERMS, SpectralState, Tensor};
 pub use point::{energy_density, first_piola_kirchhoff_stress, material_tangent, stress_parameter_derivative};
 
-use file::{Alpha, MuKpa, OgdenFile};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -24,10 +23,10 @@ use utoipa::ToSchema;
 #[serde(deny_unknown_fields)]
 pub struct OgdenTerm {
     /// μ, kPa.
-    #[schema(value_type = MuKpa)]
+    #[schema(value_type = file::MuKpa)]
     pub mu_kpa: f64,
     /// α.
-    #[schema(value_type = Alpha)]
+    #[schema(value_type = file::Alpha)]
     pub alpha: f64,
 }
 
@@ -35,7 +34,7 @@ pub struct OgdenTerm {
 ///
 /// In JSON it is `ogden/1`, with the tag `schema` before its fields.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(from = "OgdenFile", into = "OgdenFile")]
+#[serde(from = "file::OgdenFile", into = "file::OgdenFile")]
 pub struct Ogden {
     /// κ, kPa.
     pub bulk_kpa: f64,

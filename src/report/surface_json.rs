@@ -6,8 +6,8 @@ use crate::material::Ogden;
 use super::ReportError;
 use super::surface::{nodal_values, surface_quads};
 
-/// Facets of the surface as JSON: `reference_mm` and `displacement_mm` (twelve numbers per facet), `stretch_amplitude` and
-/// `deformation_mode` (one per facet; null where undefined), five digits.
+/// Facets of the surface as JSON: `reference_mm` and `displacement_mm` (twelve numbers per facet), `stretch_amplitude`
+/// and `deformation_mode` (one per facet; null where undefined), five digits.
 ///
 /// # Errors
 /// [`ReportError`].

@@ -45,7 +45,6 @@ pub use read::{
 };
 pub use read_error::SpecimenError;
 
-use file::{DiameterMm, ExtentMm, SpecimenFile};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -66,13 +65,13 @@ pub enum TestKind {
 #[serde(deny_unknown_fields)]
 pub struct Block {
     /// Extent along x, mm.
-    #[schema(value_type = ExtentMm)]
+    #[schema(value_type = file::ExtentMm)]
     pub length_mm: f64,
     /// Extent along y, mm.
-    #[schema(value_type = ExtentMm)]
+    #[schema(value_type = file::ExtentMm)]
     pub thickness_mm: f64,
     /// Extent along z, mm.
-    #[schema(value_type = ExtentMm)]
+    #[schema(value_type = file::ExtentMm)]
     pub width_mm: f64,
 }
 
@@ -108,7 +107,7 @@ pub struct Hole {
     #[schema(min_items = 2, max_items = 2)]
     pub center_mm: [f64; 2],
     /// Diameter, mm.
-    #[schema(value_type = DiameterMm)]
+    #[schema(value_type = file::DiameterMm)]
     pub diameter_mm: f64,
 }
 
@@ -137,7 +136,7 @@ impl Outline {
 
 /// A specimen; in JSON `specimen/1`, with the tag `schema` before its fields.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(from = "SpecimenFile", into = "SpecimenFile")]
+#[serde(from = "file::SpecimenFile", into = "file::SpecimenFile")]
 pub struct Specimen {
     /// Free name.
     pub name: String,

@@ -39,5 +39,7 @@ pub fn of_folder() -> Vec<String> {
         .filter(|name| name != "lib" && name != "main")
         .collect();
     rooms.sort();
+    // A room's file may have a folder beside it.
+    rooms.dedup();
     rooms
 }
