@@ -1,9 +1,9 @@
-//! Times whole calibrations of the two-hole double-lap shear specimen at 5 mm: from a blind start to the converged estimate,
-//! model and voxel operator included. `cargo bench --bench calibration`.
+//! Times whole calibrations of the two-hole double-lap shear specimen at 5 mm: from a blind start to the converged
+//! estimate, model and voxel operator included. `cargo bench --bench calibration`.
 //!
-//! The data come from a finer mesh, with noise of 0.05 mm and 0.02 N. The meshes are chosen by the force's error against the
-//! limit 10.462 N (two samples, independent reference): about 1.2 %, that of 18 thousand unknowns of quadratic tetrahedra,
-//! and a mesh of 18 thousand unknowns. CPU seconds of this thread.
+//! The data come from a finer mesh, with noise of 0.05 mm and 0.02 N. The meshes are chosen by the force's error
+//! against the limit 10.462 N (two samples, independent reference): about 1.2 %, that of 18 thousand unknowns of
+//! quadratic tetrahedra, and a mesh of 18 thousand unknowns. CPU seconds of this thread.
 
 use lambdak::calibration::{CalibrationProblem, FitOptions, Objective, Observed, SyntheticScan};
 use lambdak::fem::SolveOptions;

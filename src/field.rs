@@ -1,5 +1,12 @@
 //! What is wrong with single fields of a file, a request or an option: one type for every reader and every door.
 
+mod path;
+mod read;
+pub mod schema;
+
+pub use path::FieldPath;
+pub use read::read;
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 

@@ -1,8 +1,9 @@
 //! lambdak designs the specimen from which one full-field (MR-u) scan tells the most about a soft material.
 //!
 //! The rooms stand on one another in this order; a room uses only those before it:
-//! [`specimen`] → [`mesh`] → [`material`] → [`fem`] → [`kinematics`] → [`homogeneous`] → [`rate`] → [`voxel`] →
-//! [`sensitivity`] → [`recording`] → [`acquisition`] → [`calibration`] → [`diagnosis`], [`design`] → [`sweep`] → [`report`] → [`service`] → [`cli`].
+//! [`field`], [`file`], [`provenance`] → [`specimen`] → [`mesh`], [`material`] → [`fem`] → [`kinematics`], [`homogeneous`],
+//! [`rate`], [`voxel`] → [`sensitivity`] → [`recording`], [`acquisition`] → [`calibration`] → [`diagnosis`], [`design`]
+//! → [`proof`] → [`sweep`] → [`slurm`], [`report`] → [`compare`] → [`job`] → [`service`] → [`cli`].
 //!
 //! One unit system inside: lengths mm, moduli and stresses kPa, times s. Stress × area is then
 //! kPa·mm² = 10⁻³ N; forces cross every public boundary in N.
@@ -15,7 +16,9 @@ pub mod design;
 pub mod diagnosis;
 pub mod fem;
 pub mod field;
+pub mod file;
 pub mod homogeneous;
+pub mod job;
 pub mod kinematics;
 pub mod material;
 pub mod mesh;

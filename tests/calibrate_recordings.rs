@@ -1,7 +1,10 @@
 //! Calibration of recordings: the control recording of an independent code, and real MR-u measurements where present.
 //!
-//! `LAMBDAK_RECORDINGS` is the folder with `open-control`, `LAMBDAK_REAL_DATA` that with `mru/solid-5mm-a` and `-b`. Without
-//! them the tests say so and pass.
+//! `LAMBDAK_RECORDINGS` is the folder with `open-control`, `LAMBDAK_REAL_DATA` that with `mru/solid-5mm-a` and `-b`.
+//! Without them the tests are ignored.
+
+#[path = "common/prerequisites.rs"]
+mod prerequisites;
 
 use lambdak::calibration::{
     CalibrateOptions, CalibrationProblem, Objective, Observed, TermCount, calibrate, rms_misfit_mm,
@@ -9,15 +12,7 @@ use lambdak::calibration::{
 use lambdak::mesh::MeshOptions;
 use lambdak::recording::{ReadLimits, Recording};
 use lambdak::specimen::Specimen;
-use std::path::PathBuf;
-
-fn folder(variable: &str, name: &str) -> Option<PathBuf> {
-    let found = std::env::var_os(variable).map(|f| PathBuf::from(f).join(name)).filter(|f| f.is_dir());
-    if found.is_none() {
-        println!("SKIPPED: {name} (set {variable} to its folder)");
-    }
-    found
-}
+use prerequisites::Missing;
 
 fn observed(path: &std::path::Path) -> Observed {
     Observed::new(&Recording::read(path, &ReadLimits::default()).unwrap(), 0.02).unwrap()
@@ -28,9 +23,8 @@ fn mesh(specimen: &Specimen, factor: f64) -> MeshOptions {
 }
 
 /// κ 2173 kPa, μ₁ 17.0 kPa, α₁ 1.91 made the control; it departs in nothing but its own discretisation.
-#[test]
-fn control_is_within_its_intervals() {
-    let Some(path) = folder("LAMBDAK_RECORDINGS", "open-control") else { return };
+fn control_is_within_its_intervals() -> Result<(), Missing> {
+    let path = prerequisites::recording("open-control")?;
     let data = [observed(&path)];
     let options = CalibrateOptions { mesh_factor: 1.1, num_starts: 2, ..CalibrateOptions::default() };
     let found = calibrate(&data, &mesh, &options, &|_| (), &|| false).unwrap();
@@ -53,17 +47,13 @@ fn control_is_within_its_intervals() {
     let [low, high] = interval.unwrap();
     println!("initial shear modulus {shear:.4}, 95 % {low:.4} to {high:.4}, truth {:.4}", 0.5 * 17.0 * 1.91);
     assert!(low < 0.5 * 17.0 * 1.91 && 0.5 * 17.0 * 1.91 < high);
+    Ok(())
 }
 
-/// Two real blocks without a force: each is calibrated, and the other's displacements are predicted with its material. The
-/// prediction must not be worse than the other's own fit by more than a tenth: the blocks are of one material.
-#[test]
-fn real_blocks_predict_one_another() {
-    let (Some(a), Some(b)) =
-        (folder("LAMBDAK_REAL_DATA", "mru/solid-5mm-a"), folder("LAMBDAK_REAL_DATA", "mru/solid-5mm-b"))
-    else {
-        return;
-    };
+/// Two real blocks without a force: each is calibrated, and the other's displacements are predicted with its material.
+/// The prediction must not be worse than the other's own fit by more than a tenth: the blocks are of one material.
+fn real_blocks_predict_one_another() -> Result<(), Missing> {
+    let (a, b) = (prerequisites::real_data("mru/solid-5mm-a")?, prerequisites::real_data("mru/solid-5mm-b")?);
     let data = [[observed(&a)], [observed(&b)]];
     let options = CalibrateOptions {
         terms: TermCount::Fixed(1),
@@ -98,4 +88,7 @@ fn real_blocks_predict_one_another() {
         println!("block {name} predicted from the other: misfit {rms:.3?} mm (own fit {:.3?})", own[n]);
         assert!(length(rms) < 1.1 * length(own[n]));
     }
+    Ok(())
 }
+
+prerequisites::test_binary!(control_is_within_its_intervals, real_blocks_predict_one_another);

@@ -1,6 +1,6 @@
-//! Coverage, spread and number of terms over many draws of noise, at the published scan on search-fidelity meshes; the table
-//! is in docs/calibration.md. `cargo test --test calibration_study -- --ignored --nocapture` (minutes); DRAWS sets the
-//! draws, CASE runs one case.
+//! Coverage, spread and number of terms over many draws of noise, at the published scan on search-fidelity meshes; the
+//! table is in docs/calibration.md. `cargo test --test calibration_study -- --ignored --nocapture` (minutes); DRAWS
+//! sets the draws, CASE runs one case.
 
 mod common;
 

@@ -1,5 +1,5 @@
-//! A stopped `lambdak design`: what was found is written and marked as unfinished, the exit code says so, and the same command
-//! goes on to the end.
+//! A stopped `lambdak design`: what was found is written and marked as unfinished, the exit code says so, and the same
+//! command goes on to the end.
 
 mod design_common;
 

@@ -2,7 +2,7 @@
 
 use lambdak::calibration::Observed;
 use lambdak::diagnosis::{
-    Diagnosis, DiagnosisOptions, DiagnosisResult, Laboratory, Scene, Verdict, diagnose, together,
+    CauseName, Diagnosis, DiagnosisOptions, DiagnosisResult, Laboratory, Scene, Verdict, diagnose, together,
 };
 use lambdak::fem::{Field, PlateMotion};
 use lambdak::material::Ogden;
@@ -76,8 +76,8 @@ fn found_in(recording: &Recording) -> Diagnosis {
 }
 
 /// With causes that the diagnosis is not told of.
-fn diagnosed_without(recording: &Recording, left_out: &[&str]) -> DiagnosisResult {
-    let left_out = left_out.iter().map(|n| n.to_string()).collect();
+fn diagnosed_without(recording: &Recording, left_out: &[&'static str]) -> DiagnosisResult {
+    let left_out = left_out.iter().map(|n| CauseName::new(n)).collect();
     // The coarse mesh errs by some 0.01 mm at 4 mm of drive.
     let options =
         DiagnosisOptions { mesh_factor: 2.0, allowance_mm: Some(0.01), left_out, ..DiagnosisOptions::default() };
@@ -204,7 +204,8 @@ fn a_wrong_encoding_is_named() {
     assert!((value(&result, "relative_gain_error_x") - 0.05).abs() < 0.005, "{:?}", result.causes[0]);
 }
 
-/// One material and one scanner: the wrong encoding of both recordings is one, and each recording's model predicts the other.
+/// One material and one scanner: the wrong encoding of both recordings is one, and each recording's model predicts the
+/// other.
 #[test]
 fn two_recordings_agree_on_material_and_encoding() {
     let mut scene = Scene::default();

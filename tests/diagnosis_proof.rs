@@ -1,5 +1,5 @@
-//! The proof of the diagnosis in small: what is concealed is drawn alike from one seed, and is found or not named falsely. The
-//! whole proof is `lambdak prove-diagnosis`.
+//! The proof of the diagnosis in small: what is concealed is drawn alike from one seed, and is found or not named
+//! falsely. The whole proof is `lambdak prove-diagnosis`.
 
 mod common;
 
@@ -76,7 +76,8 @@ fn a_recording_that_cannot_be_made_is_a_result() {
     assert_eq!(*scored, serde_json::from_str::<lambdak::proof::Scored>(&kept).unwrap());
 }
 
-/// Without gradients to suppose, an inclusion and a shift of the image take most of this one away and leave a third: no explanation.
+/// Without gradients to suppose, an inclusion and a shift of the image take most of this one away and leave a third: no
+/// explanation.
 #[test]
 fn a_third_left_is_no_explanation() {
     let found =
@@ -85,7 +86,8 @@ fn a_third_left_is_no_explanation() {
     assert_eq!(found.verdict, Some(Verdict::Unexplained), "{found:?}");
 }
 
-/// A gain error of 1 % looks like a load train that gives way: both are named, with a further step that would tell them apart.
+/// A gain error of 1 % looks like a load train that gives way: both are named, with a further step that would tell them
+/// apart.
 #[test]
 fn an_ambiguous_cause_comes_with_the_experiment() {
     use lambdak::diagnosis::{DiagnosisOptions, diagnose};
@@ -93,7 +95,7 @@ fn an_ambiguous_cause_comes_with_the_experiment() {
     let options = DiagnosisOptions { mesh_factor: 2.2, ..DiagnosisOptions::default() };
     let found = diagnose(&made.recording, &options, &|_| {}, &common::never).unwrap();
     assert_eq!(found.verdict, Verdict::ExplainedAmbiguously);
-    let names: Vec<&str> = found.causes.iter().chain(&found.alternatives).map(|c| c.name).collect();
+    let names: Vec<&str> = found.causes.iter().chain(&found.alternatives).map(|c| c.name.as_str()).collect();
     assert!(names.contains(&"compliance") && names.contains(&"gain"), "{names:?}");
     let experiments = &found.alternatives[0].experiments;
     eprintln!("{experiments:?}");

@@ -1,5 +1,5 @@
-//! The traditional route, closed: a dumb-bell's force over grip displacement made by finite elements on one mesh, fitted with
-//! the conversion from another.
+//! The traditional route, closed: a dumb-bell's force over grip displacement made by finite elements on one mesh,
+//! fitted with the conversion from another.
 
 mod common;
 

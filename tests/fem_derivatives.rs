@@ -21,8 +21,8 @@ fn state(model: &mut ForwardModel, material: &Ogden, drive: f64, start: Option<&
 }
 
 /// Remainders |q(t) − q(0) − t q′| at two steps, one half of the other: `(at t, at t/2)` and the change itself.
-/// The ratio is 4 up to third-order terms; where the remainder is below `floor` of the change times t there is no second
-/// derivative to see, and it is enough that it is small.
+/// The ratio is 4 up to third-order terms; where the remainder is below `floor` of the change times t there is no
+/// second derivative to see, and it is enough that it is small.
 fn judge(what: &str, remainders: [f64; 2], change: f64, failures: &mut Vec<String>) {
     let ratio = remainders[0] / remainders[1];
     let relative = remainders[0] / change.max(1e-300);

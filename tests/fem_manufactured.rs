@@ -1,9 +1,9 @@
 //! Order of convergence on a manufactured finite-strain solution.
 //!
 //! The deformation is a composition of three shears (each with determinant 1) after a slight dilation of size μ/κ, so
-//! that displacement gradients are about 0.4, F is nearly isochoric for every κ/μ, and the pressure κ ln J is smooth and
-//! of the size of μ. The load is ∫ P(F_exact) : ∇N dV by quadrature of much higher degree: the weak form of the exact
-//! solution, so that no divergence of P is needed.
+//! that displacement gradients are about 0.4, F is nearly isochoric for every κ/μ, and the pressure κ ln J is smooth
+//! and of the size of μ. The load is ∫ P(F_exact) : ∇N dV by quadrature of much higher degree: the weak form of the
+//! exact solution, so that no divergence of P is needed.
 
 mod common;
 
@@ -176,7 +176,8 @@ fn the_deformation_is_what_it_says() {
     assert!((volume - 1.0).abs() < 1e-13);
 }
 
-/// Full order: 3 in displacement, 2 in its gradient, the same for κ/μ = 130 and 10⁴, on straight and on curved elements.
+/// Full order: 3 in displacement, 2 in its gradient, the same for κ/μ = 130 and 10⁴, on straight and on curved
+/// elements.
 #[test]
 fn elements_have_their_full_order() {
     let stored = include_str!("data/manufactured.txt");

@@ -1,9 +1,9 @@
 //! 200 random makeable specimens with random stable materials, driven to their limits: each converges or fails typed,
 //! none hangs or panics.
 //!
-//! With LAMBDAK_EXPLAIN set, each failure is followed up to the last drive that converges and the smallest principal stretch
-//! there, anywhere in the specimen, is printed. A free surface of an incompressible neo-Hookean solid under plane strain wrinkles
-//! below 0.544 (Biot 1963): a specimen that never comes near it failed for another reason.
+//! With LAMBDAK_EXPLAIN set, each failure is followed up to the last drive that converges and the smallest principal
+//! stretch there, anywhere in the specimen, is printed. A free surface of an incompressible neo-Hookean solid under
+//! plane strain wrinkles below 0.544 (Biot 1963): a specimen that never comes near it failed for another reason.
 
 mod common;
 
@@ -152,7 +152,7 @@ fn random_specimens_converge_or_fail_typed() {
     println!("{counts:?}; slowest {slowest:.1} s, all {:.1} s", start.elapsed().as_secs_f64());
     assert!(!counts.keys().any(|k| k.starts_with("HANGS")), "{counts:?}");
     // Typed failures are allowed (thin ligaments at coarse elements, buckling); most specimens must work.
-    // Every outcome above is typed, which is what is asked. This floor only catches a solver that gives up wholesale; about
-    // seven in ten reach the extreme drives, the others lose stability at a hole wall (see the counts printed).
+    // Every outcome above is typed, which is what is asked. This floor only catches a solver that gives up wholesale;
+    // about seven in ten reach the extreme drives, the others lose stability at a hole wall (see the counts printed).
     assert!(counts.get("converged").copied().unwrap_or(0) >= NUM_SPECIMENS * 6 / 10, "{counts:?}");
 }

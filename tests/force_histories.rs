@@ -1,5 +1,5 @@
-//! Relaxation found in the load histories of recordings made by an independent finite element code, with the elastic force
-//! from our own finite elements.
+//! Relaxation found in the load histories of recordings made by an independent finite element code, with the elastic
+//! force from our own finite elements.
 
 mod common;
 
@@ -50,8 +50,8 @@ fn analyse(text: &str, material: &Ogden) -> ForceHistorySequence {
 
 /// g = 0.25, 0.15 and τ = 8, 60 s behind the force of a history: at least two relaxations are chosen (the load
 /// cell's slow drift may look like a third), and two come out as follows. The layer between the plates
-/// is not homogeneous (two holes) and the mesh is coarse: the strengths' sum comes out within a tenth, each time within a
-/// factor of two, the stiffness within 5 %.
+/// is not homogeneous (two holes) and the mesh is coarse: the strengths' sum comes out within a tenth, each time within
+/// a factor of two, the stiffness within 5 %.
 #[test]
 fn the_relaxations_of_a_recording_are_found() {
     let text = include_str!("data/recordings/open-relaxation-load.csv");

@@ -1,24 +1,20 @@
 //! Published curves of real materials: fits, predictions of tests kept back, and what an elastic material leaves out.
 //!
 //! The data are not part of the project. Set `LAMBDAK_REAL_DATA` to the folder that holds `classical`,
-//! `soft_robotics_db_tension`, `ecoflex_compression`, `vhb4910_load_unload` and `oca_shear`; without it every test says that it
-//! was skipped. Sources: Treloar 1944 (Trans. Faraday Soc. 40), Meunier et al. 2008 (Polymer Testing 27, 765), Marechal et al.
-//! 2020 (doi 10.1089/soro.2019.0115), Dawood et al. 2026, Liu et al. 2024 (Comput. Methods Appl. Mech. Eng. 430, 117248).
+//! `soft_robotics_db_tension`, `ecoflex_compression`, `vhb4910_load_unload` and `oca_shear`; without it every test is
+//! ignored. Sources: Treloar 1944 (Trans. Faraday Soc. 40), Meunier et al. 2008 (Polymer Testing 27, 765), Marechal et
+//! al. 2020 (doi 10.1089/soro.2019.0115), Dawood et al. 2026, Liu et al. 2024 (Comput. Methods Appl. Mech. Eng.
+//! 430, 117248).
+
+#[path = "common/prerequisites.rs"]
+mod prerequisites;
 
 use lambdak::homogeneous::{
     CsvOptions, Curve, CurveFitOptions, HomogeneousTest, StressUnit, fit_curves, fit_terms, matches_of, read_csv,
 };
 use lambdak::rate::{Hypothesis, LoadCurve, LoadCurveOptions, LoadCurveVerdict, analyse_load_curve};
+use prerequisites::Missing;
 use std::path::{Path, PathBuf};
-
-/// The data folder, or a loud note.
-fn folder(test: &str, name: &str) -> Option<PathBuf> {
-    let found = std::env::var_os("LAMBDAK_REAL_DATA").map(|root| Path::new(&root).join(name)).filter(|p| p.is_dir());
-    if found.is_none() {
-        eprintln!("SKIPPED {test}: LAMBDAK_REAL_DATA does not name a folder with {name}");
-    }
-    found
-}
 
 fn never() -> bool {
     false
@@ -37,9 +33,8 @@ fn classical(folder: &Path, source: &str) -> [Curve; 3] {
 }
 
 /// Treloar's rubber, three tests together, three terms: each R² at least 0.995.
-#[test]
-fn treloar_three_terms_meet_three_tests() {
-    let Some(folder) = folder("treloar_three_terms_meet_three_tests", "classical") else { return };
+fn treloar_three_terms_meet_three_tests() -> Result<(), Missing> {
+    let folder = prerequisites::real_data("classical")?;
     let curves = classical(&folder, "Treloar_1944");
     let sequence = fit_curves(&curves, &CurveFitOptions::default()).unwrap();
     for fit in &sequence.fits {
@@ -53,12 +48,12 @@ fn treloar_three_terms_meet_three_tests() {
     }
     println!("chosen {}; {:?}", sequence.chosen().num_terms, sequence.fits[2].initial_shear_modulus_kpa);
     assert!(sequence.fits[2].curves.iter().all(|m| m.r_squared >= 0.995), "{:?}", sequence.fits[2].curves);
+    Ok(())
 }
 
 /// Meunier's silicone: fitted in uniaxial tension and compression and in pure shear, equibiaxial predicted.
-#[test]
-fn meunier_equibiaxial_is_predicted() {
-    let Some(folder) = folder("meunier_equibiaxial_is_predicted", "classical") else { return };
+fn meunier_equibiaxial_is_predicted() -> Result<(), Missing> {
+    let folder = prerequisites::real_data("classical")?;
     let [uniaxial, equibiaxial, pure_shear] = classical(&folder, "Meunier_2008");
     let fitted = [uniaxial, pure_shear];
     let options = CurveFitOptions { also_stable_at: equibiaxial.states.clone(), ..CurveFitOptions::default() };
@@ -77,15 +72,15 @@ fn meunier_equibiaxial_is_predicted() {
     }
     let kept = matches_of(&sequence.chosen().terms(), None, &[equibiaxial]).unwrap();
     println!("chosen {} terms", sequence.chosen().num_terms);
-    // The bulge test turns up beyond a stretch of 1.8, which the other two tests do not show: the prediction misses it (an error
-    // of about a fifth). What is asked is the curve below that.
+    // The bulge test turns up beyond a stretch of 1.8, which the other two tests do not show: the prediction misses it
+    // (an error of about a fifth). What is asked is the curve below that.
     assert!(kept[0].r_squared > 0.8, "{kept:?}");
+    Ok(())
 }
 
 /// Nineteen silicones to failure: every curve is read and fitted, and three terms leave little.
-#[test]
-fn silicones_in_tension_are_all_fitted() {
-    let Some(folder) = folder("silicones_in_tension_are_all_fitted", "soft_robotics_db_tension") else { return };
+fn silicones_in_tension_are_all_fitted() -> Result<(), Missing> {
+    let folder = prerequisites::real_data("soft_robotics_db_tension")?;
     let mut files: Vec<PathBuf> = std::fs::read_dir(&folder).unwrap().map(|e| e.unwrap().path()).collect();
     files.retain(|p| p.extension().is_some_and(|e| e == "csv") && !p.ends_with("META.csv"));
     files.sort();
@@ -107,12 +102,12 @@ fn silicones_in_tension_are_all_fitted() {
         let richest = sequence.fits.last().unwrap();
         assert!(richest.curves[0].r_squared > 0.995, "{}: {:?}", c.name, richest.curves);
     }
+    Ok(())
 }
 
 /// Compressed Ecoflex cylinders: one specimen fitted, the other predicted.
-#[test]
-fn compressed_cylinders_predict_each_other() {
-    let Some(folder) = folder("compressed_cylinders_predict_each_other", "ecoflex_compression") else { return };
+fn compressed_cylinders_predict_each_other() -> Result<(), Missing> {
+    let folder = prerequisites::real_data("ecoflex_compression")?;
     for grade in ["EF10_0T", "EF30_0T", "EF50_0T"] {
         let read = |name: &str| {
             let mut c =
@@ -133,6 +128,7 @@ fn compressed_cylinders_predict_each_other() {
             assert!(m.r_squared > 0.98, "{m:?}");
         }
     }
+    Ok(())
 }
 
 fn load_curve(path: &Path, test: HomogeneousTest) -> LoadCurve {
@@ -187,9 +183,8 @@ fn print(v: &LoadCurveVerdict) {
 }
 
 /// VHB 4910 at three rates: two fitted, the third predicted; relaxation is named and the prediction improves.
-#[test]
-fn vhb_third_rate_is_predicted() {
-    let Some(folder) = folder("vhb_third_rate_is_predicted", "vhb4910_load_unload") else { return };
+fn vhb_third_rate_is_predicted() -> Result<(), Missing> {
+    let folder = prerequisites::real_data("vhb4910_load_unload")?;
     for amplitude in ["1d5", "2d0", "2d5"] {
         for held in ["0d01", "0d03", "0d05"] {
             let curves: Vec<LoadCurve> = ["0d01", "0d03", "0d05"]
@@ -209,12 +204,12 @@ fn vhb_third_rate_is_predicted() {
             assert!(k.after.rms_error_kpa < k.before.rms_error_kpa, "{}", v.summary);
         }
     }
+    Ok(())
 }
 
 /// An optically clear adhesive in shear at three rates, each kept back in turn.
-#[test]
-fn adhesive_third_rate_is_predicted() {
-    let Some(folder) = folder("adhesive_third_rate_is_predicted", "oca_shear") else { return };
+fn adhesive_third_rate_is_predicted() -> Result<(), Missing> {
+    let folder = prerequisites::real_data("oca_shear")?;
     let names = ["monotonic_shear_0d01", "monotonic_shear_0d1", "monotonic_shear_1"];
     for held in names {
         let curves: Vec<LoadCurve> = names
@@ -228,12 +223,12 @@ fn adhesive_third_rate_is_predicted() {
         print(&v);
         assert!(v.causes.iter().any(|c| c.name == Hypothesis::Relaxation.name()), "{}", v.summary);
     }
+    Ok(())
 }
 
 /// The same adhesive, stepped relaxation: two ramp rates fitted, the third predicted.
-#[test]
-fn adhesive_relaxation_is_predicted() {
-    let Some(folder) = folder("adhesive_relaxation_is_predicted", "oca_shear") else { return };
+fn adhesive_relaxation_is_predicted() -> Result<(), Missing> {
+    let folder = prerequisites::real_data("oca_shear")?;
     let names = ["shear_relaxation_1", "shear_relaxation_2", "shear_relaxation_5"];
     for held in names {
         let curves: Vec<LoadCurve> = names
@@ -249,4 +244,15 @@ fn adhesive_relaxation_is_predicted() {
         assert!(v.causes.iter().any(|c| c.name == Hypothesis::Relaxation.name()), "{}", v.summary);
         assert!(k.after.rms_error_kpa < k.before.rms_error_kpa, "{}", v.summary);
     }
+    Ok(())
 }
+
+prerequisites::test_binary!(
+    treloar_three_terms_meet_three_tests,
+    meunier_equibiaxial_is_predicted,
+    silicones_in_tension_are_all_fitted,
+    compressed_cylinders_predict_each_other,
+    vhb_third_rate_is_predicted,
+    adhesive_third_rate_is_predicted,
+    adhesive_relaxation_is_predicted,
+);

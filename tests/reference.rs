@@ -1,15 +1,15 @@
 //! Forces and displacements of an independent finite-element code (tests/data/reference, made with FElupe) reproduced.
 //!
-//! Forces: the bound is the reference's stated error plus that of our standard mesh, 2.5 times its difference from a mesh
-//! with elements 0.7 times the size (the factor for order 1.4; the bonded edges are singular). One of three drives per
-//! case may miss it if it lies within the reference's extrapolations at orders 0.8 to 2.5, the range that the reference
-//! allows itself: three meshes do not determine the order (0.26 was observed for the bar, 2.2 for the solid block whose
-//! edges are singular).
+//! Forces: the bound is the reference's stated error plus that of our standard mesh, 2.5 times its difference from a
+//! mesh with elements 0.7 times the size (the factor for order 1.4; the bonded edges are singular). One of three drives
+//! per case may miss it if it lies within the reference's extrapolations at orders 0.8 to 2.5, the range that the
+//! reference allows itself: three meshes do not determine the order (0.26 was observed for the bar, 2.2 for the solid
+//! block whose edges are singular).
 //!
 //! Displacements: compared as vectors, on the finer mesh, with three times the stated error plus what the reference
-//! misses where symmetry gives the exact value (u_x = drive/2 on x = 0, u_y = 0 at the centre). The stated error is half
-//! a Richardson step per component on sequences that are not monotone; the reference misses the exact value by up to ten
-//! of these, as the last test shows. Ours is exact there.
+//! misses where symmetry gives the exact value (u_x = drive/2 on x = 0, u_y = 0 at the centre). The stated error is
+//! half a Richardson step per component on sequences that are not monotone; the reference misses the exact value by up
+//! to ten of these, as the last test shows. Ours is exact there.
 
 mod common;
 

@@ -1,16 +1,15 @@
 //! The Python client and its example run against the service.
 
+#[path = "common/prerequisites.rs"]
+mod prerequisites;
 mod service_common;
 
+use prerequisites::Missing;
 use service_common::Service;
 use std::process::Command;
 
-#[test]
-fn python_example_runs() {
-    if !Command::new("python3").arg("--version").output().is_ok_and(|o| o.status.success()) {
-        eprintln!("skipped: python_example_runs needs python3");
-        return;
-    }
+fn python_example_runs() -> Result<(), Missing> {
+    prerequisites::python()?;
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(folder.path(), &[]);
     let out = Command::new("python3")
@@ -25,4 +24,7 @@ fn python_example_runs() {
         assert!(text.contains(part), "{part}: {text}");
     }
     eprintln!("{text}");
+    Ok(())
 }
+
+prerequisites::test_binary!(python_example_runs);

@@ -1,7 +1,11 @@
 //! Killed at random points, a sweep loses nothing and gets every result once, equal to an undisturbed run's.
 
+#[path = "common/prerequisites.rs"]
+mod prerequisites;
 mod service_common;
 
+use lambdak::service::store::{Finished, MAX_LOSSES, NewJob, NewTask, Store, TaskResult};
+use prerequisites::Missing;
 use serde_json::Value;
 use service_common::{Service, lambdak, small_sweep};
 use std::process::{Child, Stdio};
@@ -41,12 +45,11 @@ fn check(service: &Service, job: &str, expected: &Value, completions: &[(i64, i6
     assert!(completions.iter().all(|c| c.1 == 1), "{completions:?}");
 }
 
-fn completions(store: &lambdak::service::store::Store, job: &str) -> Vec<(i64, i64)> {
+fn completions(store: &Store, job: &str) -> Vec<(i64, i64)> {
     let id = job.rsplit('/').next().unwrap();
     store.tasks(id).unwrap().iter().map(|t| (t.index, t.completions)).collect()
 }
 
-#[test]
 fn sqlite_service_killed_at_random_points() {
     let expected = undisturbed();
     let folder = tempfile::tempdir().unwrap();
@@ -76,7 +79,7 @@ fn sqlite_service_killed_at_random_points() {
     assert_eq!(view["state"], "succeeded", "{view}");
     let result = service.get(&format!("{job}/result")).json();
     service.kill();
-    let store = lambdak::service::store::Store::open_folder(folder.path()).unwrap();
+    let store = Store::open_folder(folder.path()).unwrap();
     let taken = completions(&store, &job);
     drop(store);
     let service = Service::start(folder.path(), &["--slots", "0"]);
@@ -110,22 +113,18 @@ impl Drop for Worker {
     }
 }
 
-/// A database of its own on the test server; `None` where there is no server.
-fn database(name: &str) -> Option<String> {
-    let Ok(url) = std::env::var("LAMBDAK_TEST_DATABASE_URL") else {
-        eprintln!("skipped: {name} needs LAMBDAK_TEST_DATABASE_URL");
-        return None;
-    };
+/// A database of its own on the test server.
+fn database(name: &str) -> Result<String, Missing> {
+    let url = prerequisites::postgres()?;
     let mut client = postgres::Client::connect(&url, postgres::NoTls).unwrap();
     client.batch_execute(&format!("DROP DATABASE IF EXISTS {name} WITH (FORCE)")).unwrap();
     client.batch_execute(&format!("CREATE DATABASE {name}")).unwrap();
     let (server, _) = url.rsplit_once('/').unwrap();
-    Some(format!("{server}/{name}"))
+    Ok(format!("{server}/{name}"))
 }
 
-#[test]
-fn postgres_workers_and_service_killed_at_random_points() {
-    let Some(url) = database("lambdak_kill") else { return };
+fn postgres_workers_and_service_killed_at_random_points() -> Result<(), Missing> {
+    let url = database("lambdak_kill")?;
     let expected = undisturbed();
     let folder = tempfile::tempdir().unwrap();
     let arguments = ["--slots", "0", "--database", url.as_str()];
@@ -154,13 +153,13 @@ fn postgres_workers_and_service_killed_at_random_points() {
     eprintln!("killed {kills} times");
     assert!(kills >= 3, "the sweep was too fast to be killed: {kills}");
     service.wait(&job, LONG);
-    let store = lambdak::service::store::Store::connect(&url).unwrap();
+    let store = Store::connect(&url).unwrap();
     check(&service, &job, &expected, &completions(&store, &job));
+    Ok(())
 }
 
-#[test]
-fn two_workers_share_a_sweep() {
-    let Some(url) = database("lambdak_share") else { return };
+fn two_workers_share_a_sweep() -> Result<(), Missing> {
+    let url = database("lambdak_share")?;
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(folder.path(), &["--slots", "0", "--database", url.as_str()]);
     let _workers: Vec<Worker> = (0..2).map(|_| Worker::start(&url)).collect();
@@ -176,17 +175,13 @@ fn two_workers_share_a_sweep() {
     assert_eq!(shares.iter().sum::<i64>(), NUM_TASKS as i64);
     // Half each on idle cores, which then takes half the time; whatever else runs on this machine may slow one of them.
     assert!(shares.len() == 2 && shares.iter().all(|n| *n >= NUM_TASKS as i64 / 5), "{shares:?}");
+    Ok(())
 }
 
 /// Workers as a Slurm job array take a sweep of the service and end when nothing is left.
-#[test]
-fn a_cluster_takes_a_sweep() {
-    let Some(url) = database("lambdak_cluster") else { return };
-    let answers = std::process::Command::new("sinfo").arg("-h").output().is_ok_and(|o| o.status.success());
-    if !answers {
-        eprintln!("SKIPPED a_cluster_takes_a_sweep: no Slurm answers on this machine (start one with .ci/slurm)");
-        return;
-    }
+fn a_cluster_takes_a_sweep() -> Result<(), Missing> {
+    let url = database("lambdak_cluster")?;
+    prerequisites::slurm()?;
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(folder.path(), &["--slots", "0", "--database", url.as_str()]);
     let job = service.submit("sweeps", &small_sweep(NUM_TASKS));
@@ -212,60 +207,73 @@ fn a_cluster_takes_a_sweep() {
         assert!(begin.elapsed() < LONG, "the workers did not end");
         std::thread::sleep(Duration::from_millis(200));
     }
+    Ok(())
 }
 
-#[test]
 fn a_task_that_ends_its_workers_is_put_aside_and_late_results_are_refused() {
-    use lambdak::service::store::{Finished, MAX_LOSSES, NewJob, NewTask, Store, TaskResult};
     let folder = tempfile::tempdir().unwrap();
-    let mut stores = vec![Store::open_folder(&folder.path().join("data")).unwrap()];
-    if let Some(url) = database("lambdak_fence") {
-        stores.push(Store::connect(&url).unwrap());
-    }
-    for store in &stores {
-        let job = NewJob {
-            id: "j".into(),
-            kind: "evaluations".into(),
-            owner: "o".into(),
-            title: String::new(),
-            body: "{}".into(),
-            tasks: vec![NewTask { input: "{}".into(), cache_key: "k".into() }],
-            has_gather: false,
-        };
-        store.submit(&job, None, 10, None).unwrap();
-        // A lease that is over at once stands for a worker that was killed or sleeps.
-        let first = store.claim("a", -1, "{}").unwrap().unwrap();
-        let second = store.claim("b", 60_000, "{}").unwrap().unwrap();
-        assert_eq!((first.attempt, second.attempt), (1, 2));
-        let result = TaskResult { result: b"1".to_vec(), artefacts: Vec::new() };
-        assert_eq!(store.finish(&first, "a", &result).unwrap(), Finished::NotOurs);
-        assert_eq!(store.heartbeat(&first, "a", 60_000, "").unwrap(), Finished::NotOurs);
-        assert!(store.claim("c", 60_000, "{}").unwrap().is_none(), "the second attempt holds it");
-        store.cancel("j").unwrap();
-        assert_eq!(store.finish(&second, "b", &result).unwrap(), Finished::NotOurs);
-        assert!(store.resume("j").unwrap());
-        for _ in 0..MAX_LOSSES {
-            assert!(store.claim("d", -1, "{\"dead\":1}").unwrap().is_some());
-        }
-        assert!(store.claim("e", 60_000, "{\"dead\":1}").unwrap().is_none());
-        let job = store.job("j").unwrap().unwrap();
-        assert_eq!((job.state.as_str(), job.problem.as_str()), ("failed", "{\"dead\":1}"));
-        assert!(store.resume("j").unwrap());
-        let last = store.claim("f", 60_000, "{}").unwrap().unwrap();
-        assert_eq!(store.finish(&last, "f", &result).unwrap(), Finished::Taken);
-        assert_eq!(store.finish(&last, "f", &result).unwrap(), Finished::NotOurs);
-        assert_eq!(store.tasks("j").unwrap()[0].completions, 1);
-    }
+    check_fence(&Store::open_folder(&folder.path().join("data")).unwrap());
 }
 
-#[test]
-fn a_worker_of_another_version_is_told() {
-    let Some(url) = database("lambdak_version") else { return };
-    let store = lambdak::service::store::Store::connect(&url).unwrap();
+fn postgres_puts_a_task_aside_and_refuses_late_results() -> Result<(), Missing> {
+    check_fence(&Store::connect(&database("lambdak_fence")?).unwrap());
+    Ok(())
+}
+
+/// A task that ends its workers is put aside, and what comes from an attempt that is over is refused.
+fn check_fence(store: &Store) {
+    let job = NewJob {
+        id: "j".into(),
+        kind: "evaluations".into(),
+        owner: "o".into(),
+        title: String::new(),
+        body: "{}".into(),
+        tasks: vec![NewTask { input: "{}".into(), cache_key: "k".into() }],
+        has_gather: false,
+    };
+    store.submit(&job, None, 10, None).unwrap();
+    // A lease that is over at once stands for a worker that was killed or sleeps.
+    let first = store.claim("a", -1, "{}").unwrap().unwrap();
+    let second = store.claim("b", 60_000, "{}").unwrap().unwrap();
+    assert_eq!((first.attempt, second.attempt), (1, 2));
+    let result = TaskResult { result: b"1".to_vec(), artefacts: Vec::new() };
+    assert_eq!(store.finish(&first, "a", &result).unwrap(), Finished::NotOurs);
+    assert_eq!(store.heartbeat(&first, "a", 60_000, "").unwrap(), Finished::NotOurs);
+    assert!(store.claim("c", 60_000, "{}").unwrap().is_none(), "the second attempt holds it");
+    store.cancel("j").unwrap();
+    assert_eq!(store.finish(&second, "b", &result).unwrap(), Finished::NotOurs);
+    assert!(store.resume("j").unwrap());
+    for _ in 0..MAX_LOSSES {
+        assert!(store.claim("d", -1, "{\"dead\":1}").unwrap().is_some());
+    }
+    assert!(store.claim("e", 60_000, "{\"dead\":1}").unwrap().is_none());
+    let job = store.job("j").unwrap().unwrap();
+    assert_eq!((job.state.as_str(), job.problem.as_str()), ("failed", "{\"dead\":1}"));
+    assert!(store.resume("j").unwrap());
+    let last = store.claim("f", 60_000, "{}").unwrap().unwrap();
+    assert_eq!(store.finish(&last, "f", &result).unwrap(), Finished::Taken);
+    assert_eq!(store.finish(&last, "f", &result).unwrap(), Finished::NotOurs);
+    assert_eq!(store.tasks("j").unwrap()[0].completions, 1);
+}
+
+fn a_worker_of_another_version_is_told() -> Result<(), Missing> {
+    let url = database("lambdak_version")?;
+    let store = Store::connect(&url).unwrap();
     store.start_service("{}").unwrap();
     let mut client = postgres::Client::connect(&url, postgres::NoTls).unwrap();
     client.batch_execute("UPDATE meta SET value = '99.0.0' WHERE key = 'version'").unwrap();
     let out = lambdak().args(["worker", "--database", &url]).output().unwrap();
     assert_eq!(out.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&out.stderr).contains("99.0.0"));
+    Ok(())
 }
+
+prerequisites::test_binary!(
+    sqlite_service_killed_at_random_points,
+    postgres_workers_and_service_killed_at_random_points,
+    two_workers_share_a_sweep,
+    a_cluster_takes_a_sweep,
+    a_task_that_ends_its_workers_is_put_aside_and_late_results_are_refused,
+    postgres_puts_a_task_aside_and_refuses_late_results,
+    a_worker_of_another_version_is_told,
+);

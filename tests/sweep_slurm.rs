@@ -1,21 +1,14 @@
-//! The same sweep through a real Slurm, with one array task killed and requeued. Skipped by name where there is none
-//! (`.ci/slurm` starts one).
+//! The same sweep through a real Slurm, with one array task killed and requeued.
 
 mod design_common;
+#[path = "common/prerequisites.rs"]
+mod prerequisites;
 mod sweep_common;
 
+use prerequisites::Missing;
 use std::process::Command;
 use std::time::{Duration, Instant};
 use sweep_common::*;
-
-fn has_slurm(test: &str) -> bool {
-    let answers = Command::new("sinfo").arg("-h").output().is_ok_and(|o| o.status.success());
-    if !answers || Command::new("sbatch").arg("--version").output().is_err() {
-        eprintln!("SKIPPED {test}: no Slurm answers on this machine (start one with .ci/slurm)");
-        return false;
-    }
-    true
-}
 
 /// Processes that run a shard into a folder.
 fn processes_of(out: &std::path::Path, shard: &str) -> Vec<String> {
@@ -41,11 +34,8 @@ fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
     }
 }
 
-#[test]
-fn an_array_with_a_lost_task_gives_the_same_table() {
-    if !has_slurm("an_array_with_a_lost_task_gives_the_same_table") {
-        return;
-    }
+fn an_array_with_a_lost_task_gives_the_same_table() -> Result<(), Missing> {
+    prerequisites::slurm()?;
     let folder = tempfile::tempdir().expect("a folder");
     let study = write_study(folder.path(), 18, 5);
     let (whole, array) = (folder.path().join("whole"), folder.path().join("array of tasks"));
@@ -75,14 +65,12 @@ fn an_array_with_a_lost_task_gives_the_same_table() {
     let again = sweep(&study, &array, &options);
     assert_success(&again);
     assert!(!String::from_utf8_lossy(&again.stderr).contains("submitted"));
+    Ok(())
 }
 
 /// Searches from two seeds as an array give the better of the two searches alone.
-#[test]
-fn a_design_search_runs_as_an_array() {
-    if !has_slurm("a_design_search_runs_as_an_array") {
-        return;
-    }
+fn a_design_search_runs_as_an_array() -> Result<(), Missing> {
+    prerequisites::slurm()?;
     let folder = tempfile::tempdir().expect("a folder");
     let study = design_common::write_study(folder.path());
     let out = folder.path().join("array");
@@ -106,14 +94,12 @@ fn a_design_search_runs_as_an_array() {
     let winner = first + u64::from(alone[1] > alone[0]);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(said.contains(&format!("best: seed {winner} ")), "{said}");
+    Ok(())
 }
 
 /// With `--cancel` Ctrl-C takes the jobs back; the same command goes on later.
-#[test]
-fn ctrl_c_cancels_the_jobs() {
-    if !has_slurm("ctrl_c_cancels_the_jobs") {
-        return;
-    }
+fn ctrl_c_cancels_the_jobs() -> Result<(), Missing> {
+    prerequisites::slurm()?;
     let folder = tempfile::tempdir().expect("a folder");
     let study = write_study(folder.path(), 160, 8);
     let out = folder.path().join("out");
@@ -128,28 +114,24 @@ fn ctrl_c_cancels_the_jobs() {
     assert_eq!(child.wait().expect("it ends").code(), Some(130), "it was over before it could be stopped");
     wait_until("no task is at work any more", || (1..=2).all(|n| processes_of(&out, &format!("{n}/2")).is_empty()));
     assert_success(&sweep(&study, &out, &options));
+    Ok(())
 }
 
 /// What sbatch refuses is told in its words.
-#[test]
-fn a_refused_job_is_told() {
-    if !has_slurm("a_refused_job_is_told") {
-        return;
-    }
+fn a_refused_job_is_told() -> Result<(), Missing> {
+    prerequisites::slurm()?;
     let folder = tempfile::tempdir().expect("a folder");
     let study = write_study(folder.path(), 4, 6);
     let output = sweep(&study, &folder.path().join("out"), &["--slurm", "--partition", "no-such-partition"]);
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(3), "{message}");
     assert!(message.contains("sbatch failed") && message.contains("partition"), "{message}");
+    Ok(())
 }
 
 /// A task that never gets anywhere is given up with the end of its log, not started again for ever.
-#[test]
-fn a_task_that_always_fails_is_given_up() {
-    if !has_slurm("a_task_that_always_fails_is_given_up") {
-        return;
-    }
+fn a_task_that_always_fails_is_given_up() -> Result<(), Missing> {
+    prerequisites::slurm()?;
     use lambdak::slurm::{ArrayJob, FollowSettings, Resources, SlurmError, TaskProgress, follow};
     let folder = tempfile::tempdir().expect("a folder");
     let job = ArrayJob {
@@ -165,4 +147,13 @@ fn a_task_that_always_fails_is_given_up() {
         Err(SlurmError::TaskFails { attempts: 2, log, .. }) => assert!(log.contains("out of luck in task 1"), "{log}"),
         other => panic!("{other:?}"),
     }
+    Ok(())
 }
+
+prerequisites::test_binary!(
+    an_array_with_a_lost_task_gives_the_same_table,
+    a_design_search_runs_as_an_array,
+    ctrl_c_cancels_the_jobs,
+    a_refused_job_is_told,
+    a_task_that_always_fails_is_given_up,
+);

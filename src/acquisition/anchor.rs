@@ -11,7 +11,8 @@ const LAYERS: usize = 4;
 const CERTAIN: f64 = 0.25;
 
 /// What is known of the phase's zero.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, serde::Deserialize, utoipa::ToSchema)]
+#[schema(as = PhaseAnchor)]
 #[serde(rename_all = "snake_case")]
 pub enum Anchor {
     /// Phase zero is displacement zero; only whole turns are open, and the fixed plate decides them.

@@ -15,8 +15,8 @@ pub struct FilteredField {
     pub sd_mm: Vec<[f64; 3]>,
 }
 
-/// Applies `hamming2` to displacements and their standard deviations (mm, grid order, NaN where missing). Missing voxels do
-/// not count; a component without at least half of the mask's voxels around a corner is missing there.
+/// Applies `hamming2` to displacements and their standard deviations (mm, grid order, NaN where missing). Missing
+/// voxels do not count; a component without at least half of the mask's voxels around a corner is missing there.
 ///
 /// # Errors
 /// [`AcquisitionError::Voxel`], [`AcquisitionError::Length`].

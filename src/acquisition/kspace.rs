@@ -13,7 +13,8 @@ pub struct KSpace {
 }
 
 /// Weights over the kept part of k-space, as a function of q in [0, 1] from the centre to the end of the kept part.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, utoipa::ToSchema)]
+#[schema(as = KSpaceWindow)]
 #[serde(rename_all = "snake_case")]
 pub enum Window {
     /// One.
@@ -38,10 +39,11 @@ impl KSpace {
         Ok(())
     }
 
-    /// Applies the window to an image (x fastest). The image is taken as periodic, as the discrete Fourier transform does.
+    /// Applies the window to an image (x fastest). The image is taken as periodic, as the discrete Fourier transform
+    /// does.
     ///
-    /// A window that is a product over the axes is a circular convolution along each of them, done directly: n kernel values
-    /// per voxel and axis.
+    /// A window that is a product over the axes is a circular convolution along each of them, done directly: n kernel
+    /// values per voxel and axis.
     pub fn apply(&self, image: &mut [Complex], shape: [usize; 3]) {
         let strides = [1, shape[0], shape[0] * shape[1]];
         for axis in 0..3 {

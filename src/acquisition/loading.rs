@@ -69,8 +69,9 @@ impl LoadProgram {
     }
 }
 
-/// The readings of a program that holds at `drives_mm` with true forces `forces_n`, and the window of each hold. On the ramps
-/// the force follows a monotone curve through rest and the holds. Times and readings are rounded as a file stores them.
+/// The readings of a program that holds at `drives_mm` with true forces `forces_n`, and the window of each hold. On the
+/// ramps the force follows a monotone curve through rest and the holds. Times and readings are rounded as a file stores
+/// them.
 ///
 /// # Errors
 /// [`AcquisitionError::Value`], [`AcquisitionError::Length`].

@@ -1,12 +1,13 @@
 //! The scanner: from a field of displacement to complex images, and back.
 //!
 //! Forward: the finite elements' displacement u(X) is seen by each voxel as the mean of exp(i uₐ/sₐ) over its material
-//! (sₐ: mm per radian of direction a), so that a strong gradient inside a voxel lowers the magnitude; complex Gaussian noise
-//! is added, the images may lose the edge of k-space, and only wrapped phases and magnitudes are kept ([`scan()`]).
+//! (sₐ: mm per radian of direction a), so that a strong gradient inside a voxel lowers the magnitude; complex Gaussian
+//! noise is added, the images may lose the edge of k-space, and only wrapped phases and magnitudes are kept
+//! ([`scan()`]).
 //!
 //! Backward: phases are unwrapped in three dimensions ([`unwrap`]), the whole multiple of 2π is fixed at the plate
-//! that does not move, the noise of each voxel follows from its magnitude, and voxels whose multiple of 2π is not certain are
-//! left out and counted ([`reconstruct()`]).
+//! that does not move, the noise of each voxel follows from its magnitude, and voxels whose multiple of 2π is not
+//! certain are left out and counted ([`reconstruct()`]).
 
 mod anchor;
 mod error;
@@ -20,8 +21,6 @@ mod scan;
 mod signal;
 pub mod unwrap;
 
-#[cfg(test)]
-mod real_tests;
 #[cfg(test)]
 mod scan_tests;
 

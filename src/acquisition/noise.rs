@@ -24,8 +24,8 @@ pub enum NoiseSource {
 pub struct NoiseEstimate {
     /// Where `sd` comes from.
     pub source: NoiseSource,
-    /// Standard deviation of the real (and imaginary) part, in the magnitude's unit, per direction. The phase of a voxel of
-    /// magnitude M has the standard deviation sd/M.
+    /// Standard deviation of the real (and imaginary) part, in the magnitude's unit, per direction. The phase of a
+    /// voxel of magnitude M has the standard deviation sd/M.
     pub sd: [f64; 3],
     /// The same from the phases, whatever the source: a check.
     pub sd_from_phases: [f64; 3],
@@ -49,7 +49,8 @@ impl NoiseEstimate {
 
 fn from_empty_voxels(raw: &RawRecording, step: &RawStep) -> Option<f64> {
     let shape = raw.grid.shape;
-    // Distance in voxels to the mask, the largest over the axes, up to the one needed: the mask grows by one box at a time.
+    // Distance in voxels to the mask, the largest over the axes, up to the one needed: the mask grows by one box at a
+    // time.
     let mut is_near = raw.mask.clone();
     for _ in 1..=EMPTY_DISTANCE - 1 {
         for axis in 0..3 {

@@ -22,10 +22,11 @@ pub struct ReconstructOptions {
 /// A recording from raw phases, with what became of every voxel.
 #[derive(Clone, Debug)]
 pub struct Reconstruction {
-    /// The displacements; voxels that were left out hold NaN. `noise_sd_mm` is the root of the mean estimated variance over
-    /// all kept voxels and steps.
+    /// The displacements; voxels that were left out hold NaN. `noise_sd_mm` is the root of the mean estimated variance
+    /// over all kept voxels and steps.
     pub recording: Recording,
-    /// Estimated standard deviation of every displacement, mm, per step in the recording's grid order; NaN where missing.
+    /// Estimated standard deviation of every displacement, mm, per step in the recording's grid order; NaN where
+    /// missing.
     pub sd_mm: Vec<Vec<[f64; 3]>>,
     /// Per step.
     pub steps: Vec<StepReport>,

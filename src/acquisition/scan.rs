@@ -71,7 +71,8 @@ pub struct Scan {
     pub raw: RawRecording,
     /// The mask: voxels at least half filled.
     pub mask: VoxelMask,
-    /// Voxel averages of the displacement that was scanned, mm, per drive in the mask's order. Not known in an experiment.
+    /// Voxel averages of the displacement that was scanned, mm, per drive in the mask's order. Not known in an
+    /// experiment.
     pub truth: Vec<Vec<[f64; 3]>>,
     /// Forces without noise, N.
     pub forces_n: Vec<f64>,
@@ -129,8 +130,8 @@ pub fn scan(
     Ok(Scan { raw, mask, truth, forces_n, num_unknowns: model.num_unknowns() })
 }
 
-/// Adds noise to the three images of drive `step`, applies the k-space window, and keeps what the format keeps: the wrapped
-/// phase of each direction and the mean of the three magnitudes. The same seed and step give the same numbers.
+/// Adds noise to the three images of drive `step`, applies the k-space window, and keeps what the format keeps: the
+/// wrapped phase of each direction and the mean of the three magnitudes. The same seed and step give the same numbers.
 pub fn noisy_images(mut signal: [Vec<Complex>; 3], options: &ScanOptions, step: u64) -> ([Vec<f64>; 3], Vec<f64>) {
     for (axis, image) in signal.iter_mut().enumerate() {
         let mut rng = ChaCha8Rng::seed_from_u64(options.seed);

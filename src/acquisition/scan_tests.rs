@@ -176,8 +176,9 @@ fn windows_lower_the_noise() {
     assert!((mean / expected - 1.0).abs() < 0.02, "{mean} {expected}");
 }
 
-/// The whole way: finite elements, complex images, noise, wrapped phases, unwrapping, noise estimate. The error is what the
-/// estimated noise says, no multiple of 2π is wrong, the fixed plate is found, and the same seed gives the same bits.
+/// The whole way: finite elements, complex images, noise, wrapped phases, unwrapping, noise estimate. The error is what
+/// the estimated noise says, no multiple of 2π is wrong, the fixed plate is found, and the same seed gives the same
+/// bits.
 #[test]
 fn scans_are_reconstructed_to_their_noise() {
     let specimen = two_hole();
@@ -193,8 +194,8 @@ fn scans_are_reconstructed_to_their_noise() {
     let result = ScanResult::new(&made, &settings, Some(&found), String::new()).unwrap();
     let step = &result.steps[0];
     for (error, component) in step.error.unwrap().iter().zip(&step.reconstruction.as_ref().unwrap().components) {
-        // Some 19,000 voxels scatter by 0.5 %; partly filled and dephased voxels have phases that are not Gaussian, and the
-        // magnitude that the estimate rests on is the mean of three directions.
+        // Some 19,000 voxels scatter by 0.5 %; partly filled and dephased voxels have phases that are not Gaussian, and
+        // the magnitude that the estimate rests on is the mean of three directions.
         assert!((error.rms_over_sd - 1.0).abs() < 0.12, "{error:?}");
         assert!(error.num_wrong_turns <= 2, "{error:?}");
         assert!(component.num_kept as f64 > 0.97 * component.num_voxels as f64, "{component:?}");

@@ -9,8 +9,8 @@ use rayon::prelude::*;
 /// A complex number.
 pub type Complex = nalgebra::Complex<f64>;
 
-/// Four Gauss points per axis: exp(iφ) is integrated to 10⁻³ of the signal for one whole turn of φ across the voxel, to 10⁻⁶
-/// for a third of a turn.
+/// Four Gauss points per axis: exp(iφ) is integrated to 10⁻³ of the signal for one whole turn of φ across the voxel, to
+/// 10⁻⁶ for a third of a turn.
 const SAMPLING: Sampling = Sampling { gauss_points: [4; 3], cut_slices: 12 };
 
 /// Voxels per parallel task; also how often `is_cancelled` is asked.
@@ -19,15 +19,16 @@ const CHUNK: usize = 2048;
 /// Signs of x, y, z under each reflection (1: y, 2: z).
 const SIGNS: [[f64; 3]; 4] = [[1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, -1.0], [1.0, -1.0, -1.0]];
 
-/// The images of each state (nodal displacements, mm) and direction: per voxel of `grid`, (material volume / voxel volume) ×
-/// mean over the material of exp(i uₐ / mm_per_radianₐ). A full voxel in a uniform field has magnitude one. `[state][axis]`,
-/// each in the grid's order.
+/// The images of each state (nodal displacements, mm) and direction: per voxel of `grid`, (material volume / voxel
+/// volume) × mean over the material of exp(i uₐ / mm_per_radianₐ). A full voxel in a uniform field has magnitude one.
+/// `[state][axis]`, each in the grid's order.
 ///
-/// `mesh` is a mesh of `specimen`. Sample points between a curved wall and the mesh's approximation of it lie in no element;
-/// the voxel's other points carry their weight.
+/// `mesh` is a mesh of `specimen`. Sample points between a curved wall and the mesh's approximation of it lie in no
+/// element; the voxel's other points carry their weight.
 ///
 /// # Errors
-/// [`AcquisitionError::Value`], [`AcquisitionError::Length`], [`AcquisitionError::Voxel`], [`AcquisitionError::Cancelled`].
+/// [`AcquisitionError::Value`], [`AcquisitionError::Length`], [`AcquisitionError::Voxel`],
+/// [`AcquisitionError::Cancelled`].
 pub fn signal_images(
     specimen: &Specimen,
     mesh: &Mesh,

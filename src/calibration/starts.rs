@@ -46,7 +46,7 @@ fn shear_modulus_kpa(observed: &[Observed]) -> f64 {
 }
 
 fn ogden(bulk_kpa: f64, terms: Vec<OgdenTerm>) -> Ogden {
-    Ogden { schema: crate::material::SCHEMA.into(), bulk_kpa, terms }
+    Ogden { bulk_kpa, terms }
 }
 
 /// Blind one-term starts, the likeliest first.

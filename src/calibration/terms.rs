@@ -11,7 +11,8 @@ use crate::material::{Ogden, OgdenTerm};
 use serde::{Deserialize, Serialize};
 
 /// Which rule decides.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
+#[schema(as = TermRule)]
 #[serde(rename_all = "snake_case")]
 pub enum Rule {
     /// The Bayesian information criterion.

@@ -11,7 +11,6 @@ use crate::voxel::{Sampling, VoxelOperator};
 
 pub(super) fn block() -> Specimen {
     Specimen {
-        schema: "specimen/1".into(),
         name: "small block".into(),
         test: TestKind::DoubleLapShear,
         block: Block { length_mm: 12.0, thickness_mm: 4.0, width_mm: 9.0 },
@@ -23,11 +22,7 @@ pub(super) fn block() -> Specimen {
 }
 
 pub(super) fn ogden(bulk_kpa: f64, terms: &[[f64; 2]]) -> Ogden {
-    Ogden {
-        schema: "ogden/1".into(),
-        bulk_kpa,
-        terms: terms.iter().map(|&[mu_kpa, alpha]| OgdenTerm { mu_kpa, alpha }).collect(),
-    }
+    Ogden { bulk_kpa, terms: terms.iter().map(|&[mu_kpa, alpha]| OgdenTerm { mu_kpa, alpha }).collect() }
 }
 
 /// Compressible enough for κ to be seen.

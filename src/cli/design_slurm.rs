@@ -16,10 +16,9 @@ use std::path::{Path, PathBuf};
 pub(super) fn search_on_cluster(
     a: &SlurmArguments,
     study: &Study,
-    study_path: &Path,
+    folder: &Path,
     common: &Common,
 ) -> Result<(PathBuf, u64), CliError> {
-    let folder = output::folder(common.out.as_deref(), false, study_path).unwrap_or_else(|| PathBuf::from("results"));
     let kept = folder.join("study.json");
     let text = study_text(study)?;
     if kept.exists() {
@@ -28,9 +27,9 @@ pub(super) fn search_on_cluster(
             return Err(CliError::Input { path: kept, message });
         }
     } else {
-        output::write_file(&folder, "study.json", text.as_bytes())?;
+        output::write_file(folder, "study.json", text.as_bytes())?;
     }
-    let folder = std::fs::canonicalize(&folder).map_err(|source| CliError::Read { path: folder.clone(), source })?;
+    let folder = std::fs::canonicalize(folder).map_err(|source| CliError::Read { path: folder.into(), source })?;
     let threads = common.threads.unwrap_or(1);
     // bash adds the task's number to the first seed.
     let program = own_program()?;

@@ -38,6 +38,20 @@ pub enum CliError {
         /// What is wrong with it.
         message: String,
     },
+    /// Fields of the request do not hold what they may hold; one line each.
+    #[error("{}", .0.join("\nlambdak: "))]
+    Fields(Vec<String>),
+    /// The folder holds the results of another command.
+    #[error("{} holds the results of `lambdak {command}`; choose another --out folder", path.display())]
+    FolderTaken {
+        /// The folder.
+        path: PathBuf,
+        /// Whose results lie there.
+        command: String,
+    },
+    /// What an earlier run kept belongs to other work.
+    #[error("{0}")]
+    Checkpoint(String),
     /// The computation did not succeed.
     #[error("{0}")]
     Numerics(String),
@@ -63,6 +77,7 @@ impl CliError {
     pub fn exit_code(&self) -> u8 {
         match self {
             CliError::Read { .. } | CliError::Input { .. } | CliError::Option { .. } => 2,
+            CliError::Fields(_) | CliError::FolderTaken { .. } | CliError::Checkpoint(_) => 2,
             CliError::Numerics(_) | CliError::Cluster(_) => 3,
             CliError::Write { .. } | CliError::Store(crate::sweep::StoreError::Write { .. }) => 4,
             CliError::Store(_) | CliError::Compare(_) => 2,

@@ -1,101 +1,52 @@
 //! Reading what the commands are given.
 
 use super::error::CliError;
-use crate::material::Ogden;
-use crate::mesh::MeshOptions;
-use crate::specimen::Specimen;
+use crate::file::read_limited;
+use serde_json::Value;
 use std::path::Path;
 
-/// Largest file that is read: specimens, materials and studies are a few kilobytes.
-const MAX_FILE_BYTES: u64 = 16 << 20;
+/// Largest file that is read as a part of a request: specimens, materials and studies are a few kilobytes, results of sweeps more.
+const MAX_FILE_BYTES: u64 = 256 << 20;
 
-/// Text of a small file.
+/// Text of a file.
 ///
 /// # Errors
-/// [`CliError::Read`], [`CliError::Input`] for a file that is too large.
+/// [`CliError::Input`] for a file that is no regular one, too large, or not text.
 pub fn read_text(path: &Path) -> Result<String, CliError> {
-    let fail = |source| CliError::Read { path: path.into(), source };
-    let size = std::fs::metadata(path).map_err(fail)?.len();
-    if size > MAX_FILE_BYTES {
-        let message = format!("{size} bytes (limit: {MAX_FILE_BYTES}); this is not a specimen, material or study");
-        return Err(CliError::Input { path: path.into(), message });
-    }
-    std::fs::read_to_string(path).map_err(fail)
+    let bad = |message: String| CliError::Input { path: path.into(), message };
+    let bytes = read_limited(path, MAX_FILE_BYTES).map_err(|e| bad(e.to_string()))?;
+    String::from_utf8(bytes).map_err(|_| bad("it is not text in UTF-8".into()))
 }
 
-/// A specimen file.
+/// JSON of a file.
 ///
 /// # Errors
-/// [`CliError`].
-pub fn read_specimen(path: &Path) -> Result<Specimen, CliError> {
-    Specimen::from_json(&read_text(path)?).map_err(|e| CliError::Input { path: path.into(), message: e.to_string() })
+/// [`CliError::Input`].
+pub fn read_json(path: &Path) -> Result<Value, CliError> {
+    let text = read_text(path)?;
+    serde_json::from_str(&text).map_err(|e| CliError::Input { path: path.into(), message: format!("not JSON: {e}") })
 }
 
-/// A material file; without one, Ecoflex 00-20 as calibrated in the paper (κ 2173 kPa, μ₁ 17.0 kPa, α₁ 1.91).
+/// A study with the specimen and the materials that it names spelled out, as requests hold them.
 ///
 /// # Errors
-/// [`CliError`].
-pub fn read_material(path: Option<&Path>) -> Result<Ogden, CliError> {
-    let Some(path) = path else {
-        let text = include_str!("../../geometries/materials/ecoflex-0020.json");
-        return Ogden::from_json(text).map_err(|e| CliError::Numerics(e.to_string()));
+/// [`CliError::Input`].
+pub fn read_study(path: &Path) -> Result<Value, CliError> {
+    let beside = path.parent().unwrap_or(Path::new("."));
+    let mut study = read_json(path)?;
+    let spell_out = |value: &mut Value| -> Result<(), CliError> {
+        if let Value::String(name) = value {
+            *value = read_json(&beside.join(name.as_str()))?;
+        }
+        Ok(())
     };
-    Ogden::from_json(&read_text(path)?).map_err(|e| CliError::Input { path: path.into(), message: e.to_string() })
-}
-
-/// `search`, `standard`, `fine`, or a factor on the standard element size.
-///
-/// # Errors
-/// [`CliError::Option`].
-pub fn mesh_options(text: &str, specimen: &Specimen, use_mirror: bool) -> Result<MeshOptions, CliError> {
-    let options = match text {
-        "search" => MeshOptions::search(specimen),
-        "standard" => MeshOptions::standard(specimen),
-        "fine" => MeshOptions::fine(specimen),
-        other => match other.parse::<f64>() {
-            Ok(factor) if (0.2..=5.0).contains(&factor) => MeshOptions::scaled(specimen, factor),
-            _ => {
-                return Err(CliError::Option {
-                    option: "mesh",
-                    message: format!("'{other}' is not search, standard, fine or a size factor from 0.2 to 5"),
-                });
-            }
-        },
-    };
-    Ok(MeshOptions { use_mirror: options.use_mirror && use_mirror, ..options })
-}
-
-/// The same names as a factor on the standard element size.
-///
-/// # Errors
-/// [`CliError::Option`].
-pub fn mesh_factor(text: &str) -> Result<f64, CliError> {
-    match text {
-        "search" => Ok(1.8),
-        "standard" => Ok(1.0),
-        "fine" => Ok(0.6),
-        other => match other.parse::<f64>() {
-            Ok(factor) if (0.2..=5.0).contains(&factor) => Ok(factor),
-            _ => Err(CliError::Option {
-                option: "mesh",
-                message: format!("'{other}' is not search, standard, fine or a size factor from 0.2 to 5"),
-            }),
-        },
+    if let Some(base) = study.get_mut("base") {
+        spell_out(base)?;
     }
-}
-
-/// Three comma-separated numbers, or one for all three.
-///
-/// # Errors
-/// [`CliError::Option`].
-pub fn triple(option: &'static str, text: &str) -> Result<[f64; 3], CliError> {
-    let numbers: Option<Vec<f64>> = text.split(',').map(|s| s.trim().parse().ok()).collect();
-    match numbers.as_deref() {
-        Some([a]) => Ok([*a; 3]),
-        Some([a, b, c]) => Ok([*a, *b, *c]),
-        _ => Err(CliError::Option {
-            option,
-            message: format!("'{text}' is not one number or three, such as 1,0.1875,0.75"),
-        }),
+    for entry in study.get_mut("materials").and_then(Value::as_array_mut).into_iter().flatten() {
+        if let Some(material) = entry.get_mut("material") {
+            spell_out(material)?;
+        }
     }
+    Ok(study)
 }

@@ -1,4 +1,4 @@
-//! Writing results: files in a folder, JSON or text on stdout.
+//! Writing: files through a temporary one, JSON or text on stdout.
 
 use super::error::CliError;
 use serde::Serialize;
@@ -17,6 +17,16 @@ pub fn write_file(folder: &Path, name: &str, bytes: &[u8]) -> Result<PathBuf, Cl
     std::fs::write(&temporary, bytes).map_err(fail)?;
     std::fs::rename(&temporary, &path).map_err(fail)?;
     Ok(path)
+}
+
+/// Writes `text` to a file that the command line names.
+///
+/// # Errors
+/// [`CliError::Write`].
+pub fn write_named(path: &Path, text: &str) -> Result<(), CliError> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    write_file(folder, &name, text.as_bytes()).map(|_| ())
 }
 
 /// Pretty JSON with a final newline.
@@ -38,14 +48,5 @@ pub fn print(text: &str) -> Result<(), CliError> {
         Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         Err(source) => Err(CliError::Write { path: "stdout".into(), source }),
         Ok(()) => Ok(()),
-    }
-}
-
-/// Where a command's files go: `--out`, else `results/STEM` unless `--json` was asked for (then nowhere).
-pub fn folder(out: Option<&Path>, is_json: bool, input: &Path) -> Option<PathBuf> {
-    match out {
-        Some(path) => Some(path.into()),
-        None if is_json => None,
-        None => Some(Path::new("results").join(input.file_stem().unwrap_or_default())),
     }
 }

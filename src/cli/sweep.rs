@@ -1,21 +1,26 @@
 //! `lambdak sweep`.
 
 use super::error::CliError;
+use super::job_command::{Asked, leave};
+use super::results::{ResultsFolder, default_path};
 use super::slurm::{SlurmArguments, own_program, path_text, run_array};
 use super::task_bar::TaskBar;
 use super::{Common, input, interrupt, output};
-use crate::report::sweep_report;
 use crate::slurm::TaskProgress;
 use crate::sweep::{
-    RunOptions, Shard, StoreError, SweepError, SweepProgress, SweepResult, SweepStudy, SweepTable, collect, read_shard,
-    run as run_sweep, shard_path, to_parquet,
+    RunOptions, Shard, StoreError, SweepError, SweepProgress, SweepStudy, collect, read_shard, run as run_sweep,
+    shard_path,
 };
 use clap::{Args, Subcommand};
+use serde_json::Value;
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::Instant;
+
+/// Name of the command and of its kind of job.
+const COMMAND: &str = "sweep";
 
 #[derive(Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
@@ -73,7 +78,8 @@ fn run_study(a: &SweepArguments, path: &Path) -> Result<(), CliError> {
     };
     let study = read_study(path)?;
     // Results must outlive the run: unlike other commands, a sweep has a folder even with --json.
-    let folder = output::folder(a.common.out.as_deref(), false, path).unwrap_or_else(|| PathBuf::from("results"));
+    let folder = default_path(a.common.out.as_deref(), path, COMMAND);
+    ResultsFolder::open(folder.clone(), COMMAND)?;
     keep_study(&study, &folder)?;
     if a.slurm.array.slurm {
         run_on_cluster(a, &study, &folder)?;
@@ -88,9 +94,10 @@ fn run_study(a: &SweepArguments, path: &Path) -> Result<(), CliError> {
 }
 
 fn read_study(path: &Path) -> Result<SweepStudy, CliError> {
-    let beside = path.parent().unwrap_or(Path::new("."));
-    SweepStudy::from_json(&input::read_text(path)?, beside)
-        .map_err(|e| CliError::Input { path: path.into(), message: e.to_string() })
+    let source = path.display().to_string();
+    let asked = Asked { kind: COMMAND, request: input::read_study(path)?, sources: vec![(String::new(), source)] };
+    asked.job()?;
+    SweepStudy::from_request(&asked.request).map_err(|errors| asked.explained(&errors))
 }
 
 /// Keeps the study, with all that it names, beside its results; refuses a folder that has another one.
@@ -201,26 +208,14 @@ fn run_merge(a: &MergeArguments) -> Result<(), CliError> {
 /// Table, result and report of a complete sweep.
 fn finish(study: &SweepStudy, folders: &[&Path], out: &Path, is_json: bool) -> Result<(), CliError> {
     let results = collected(study, folders)?;
-    let table = SweepTable::new(study, &results)?;
-    let result = SweepResult::new(study, &table);
-    let parquet = to_parquet(&table).map_err(|e| CliError::Numerics(e.to_string()))?;
-    output::write_file(out, "table.csv", table.to_csv().as_bytes())?;
-    output::write_file(out, "table.parquet", &parquet)?;
-    let json = output::to_json(&result)?;
-    output::write_file(out, "sweep.json", json.as_bytes())?;
-    output::write_file(out, "report.html", sweep_report(&result, &table).as_bytes())?;
-    if is_json {
-        return output::print(&json);
-    }
-    output::print(&format!(
-        "{}: {} designs, {} tasks, {} failed\n\ntable:  {} ({} rows), table.parquet\nresult: {}\nreport: {}\n",
-        study.name,
-        study.num_points(),
-        result.num_tasks,
-        result.num_failed,
-        out.join("table.csv").display(),
-        table.num_rows,
-        out.join("sweep.json").display(),
-        out.join("report.html").display(),
-    ))
+    results.check_complete(study.num_tasks())?;
+    let asked = Asked { kind: COMMAND, request: json(study)?, sources: Vec::new() };
+    let outcomes = results.outcomes.values().map(|o| Ok(json(o)?)).collect::<Result<Vec<_>, CliError>>()?;
+    let gathered = asked.job()?.gather(outcomes.into_iter().map(Ok).collect());
+    let outcome = gathered.map_err(|e| asked.failure(e, None))?;
+    leave(&outcome, Some(&ResultsFolder::open(out.to_path_buf(), COMMAND)?), is_json)
+}
+
+fn json<T: serde::Serialize>(value: &T) -> Result<Value, CliError> {
+    serde_json::to_value(value).map_err(|e| CliError::Numerics(e.to_string()))
 }

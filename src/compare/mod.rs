@@ -1,7 +1,8 @@
 //! Compares two results of the same kind: evaluations, sweeps or design searches.
 //!
 //! First whether they can be compared at all (same schema, inputs, scan, mesh, normalisation), then figure by figure:
-//! integrated sensitivities should not fall, promised standard deviations should not grow, forces and stretches should stay.
+//! integrated sensitivities should not fall, promised standard deviations should not grow, forces and stretches should
+//! stay.
 
 mod error;
 mod figure;
@@ -14,5 +15,5 @@ pub use error::CompareError;
 pub use figure::{Direction, Figure, Judgement, Line};
 pub use files::{Pair, pairs};
 pub use output::{to_junit, to_markdown, to_text};
-pub use read::{Subject, read};
+pub use read::{Subject, read, subject_of};
 pub use verdict::{CompareOptions, Comparison, compare};

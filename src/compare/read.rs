@@ -3,8 +3,10 @@
 use super::error::CompareError;
 use super::figure::{Direction, Figure};
 use crate::design::DesignResult;
+use crate::file::{ReadError, read_text_limited};
 use crate::sensitivity::Evaluation;
 use crate::sweep::{SweepCell, SweepResult};
+use serde::Deserialize;
 use serde_json::Value;
 use std::path::Path;
 
@@ -31,21 +33,28 @@ pub struct Subject {
 /// # Errors
 /// [`CompareError::Read`], [`CompareError::NotAResult`].
 pub fn read(path: &Path) -> Result<Subject, CompareError> {
-    let fail = |e: std::io::Error| CompareError::Read { path: path.into(), message: e.to_string() };
     let not = |message: String| CompareError::NotAResult { path: path.into(), message };
-    let size = std::fs::metadata(path).map_err(fail)?.len();
-    if size > MAX_BYTES {
-        return Err(not(format!("{size} bytes (limit: {MAX_BYTES})")));
-    }
-    let text = std::fs::read_to_string(path).map_err(fail)?;
+    let text = read_text_limited(path, MAX_BYTES).map_err(|error| match error {
+        ReadError::Io(error) => CompareError::Read { path: path.into(), message: error.to_string() },
+        other => not(other.to_string()),
+    })?;
     let value: Value = serde_json::from_str(&text).map_err(|e| not(e.to_string()))?;
+    subject_of(path, &value)
+}
+
+/// The subject in `value`; `path` is for errors.
+///
+/// # Errors
+/// [`CompareError::NotAResult`].
+pub fn subject_of(path: &Path, value: &Value) -> Result<Subject, CompareError> {
+    let not = |message: String| CompareError::NotAResult { path: path.into(), message };
     let Some(schema) = value.get("schema").and_then(Value::as_str) else {
         return Err(not("it has no schema".into()));
     };
     let subject = match schema {
-        "evaluation/1" => serde_json::from_str(&text).map(|e: Evaluation| of_evaluation(&e)),
-        "design/1" => serde_json::from_str(&text).map(|d: DesignResult| of_design(&d)),
-        "sweep/1" => serde_json::from_str(&text).map(|s: SweepResult| of_sweep(&s)),
+        "evaluation/1" => Evaluation::deserialize(value).map(|e| of_evaluation(&e)),
+        "design/1" => DesignResult::deserialize(value).map(|d| of_design(&d)),
+        "sweep/1" => SweepResult::deserialize(value).map(|s| of_sweep(&s)),
         other => return Err(not(format!("its schema is '{other}'; known: evaluation/1, sweep/1, design/1"))),
     };
     subject.map_err(|e| not(format!("{schema} of another version: {e}")))

@@ -14,7 +14,8 @@ const SHOWN: usize = 120;
 pub struct CompareOptions {
     /// Relative change up to which a figure counts as the same.
     pub relative_tolerance: f64,
-    /// Any change beyond the tolerance counts as worse, improvements too: for baselines that are changed on purpose only.
+    /// Any change beyond the tolerance counts as worse, improvements too: for baselines that are changed on purpose
+    /// only.
     pub is_strict: bool,
     /// Compare evaluations of different specimens, meshes or drives: only scan, material and normalisation must agree.
     pub across_inputs: bool,

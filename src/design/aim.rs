@@ -1,12 +1,15 @@
-//! What a study seeks: which figure is maximised, how the figures of several parameters and materials combine, and which
-//! figures may not get worse.
+//! What a study seeks: which figure is maximised, how the figures of several parameters and materials combine, and
+//! which figures may not get worse.
 
-use super::study::StudyError;
+use super::study_error::StudyError;
+use super::study_limits::{MAX_WEIGHT, ParameterWeight};
+use crate::field::FieldPath;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
+use utoipa::ToSchema;
 
 /// What is maximised: a gain over the base specimen, 1 for the base itself.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ObjectiveKind {
     /// Integrated sensitivity 𝒮 of each μᵢ and αᵢ, relative to the base.
@@ -53,7 +56,7 @@ impl ObjectiveKind {
 }
 
 /// How several parameters, and several materials, combine.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Combine {
     /// The smallest gain counts.
@@ -77,7 +80,7 @@ impl Combine {
 }
 
 /// What 𝒮 is divided by before designs are compared.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Normalisation {
     /// Σ over voxels, as in the paper: a removed voxel is a lost measurement.
@@ -102,7 +105,7 @@ impl Normalisation {
 }
 
 /// Whose promised standard deviations may not get worse than with the base specimen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Guard {
     /// Nobody's.
@@ -153,7 +156,7 @@ impl<'de> Deserialize<'de> for Guard {
 }
 
 /// The objective.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Objective {
     /// What is maximised.
@@ -164,6 +167,7 @@ pub struct Objective {
     pub normalisation: Normalisation,
     /// Weights of parameters by name (`mu_1`, `alpha_1`, …) for `weighted`; a parameter that is not named weighs 1.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    #[schema(value_type = BTreeMap<String, ParameterWeight>)]
     pub parameter_weights: BTreeMap<String, f64>,
     /// Besides: whose μᵢ and αᵢ may not be promised a larger standard deviation than by the base.
     pub guard_promised_sd: Guard,
@@ -178,41 +182,30 @@ impl Objective {
         }
     }
 
-    /// Checks the objective for materials with these parameters.
-    ///
-    /// # Errors
-    /// [`StudyError`] where weights are named that nothing uses, are negative, or are all zero for a material.
-    pub(super) fn validate(&self, parameters_of_materials: &[Vec<String>]) -> Result<(), StudyError> {
-        let wrong = |message: String| Err(StudyError::Inconsistent { message });
+    /// Adds what is wrong with the objective for materials with these parameters: weights that nothing uses, that are
+    /// out of their range or that are all zero for a material.
+    pub(super) fn check(&self, parameters_of_materials: &[Vec<String>], problems: &mut Vec<StudyError>) {
         let has_weights = !self.parameter_weights.is_empty();
         if has_weights && self.combine != Combine::Weighted {
-            return wrong("objective.parameter_weights: only `combine: weighted` uses them".into());
+            problems.push(StudyError::WeightsUnused);
         }
         if self.combine == Combine::Weighted && !self.kind.counts_sensitivity() {
-            return wrong(
-                "objective.combine: weighted needs a kind with a gain per parameter (integrated_sensitivity or \
-                 sensitivity_and_promised_sd)"
-                    .into(),
-            );
+            problems.push(StudyError::NothingToWeigh);
         }
         for (name, weight) in &self.parameter_weights {
             if !parameters_of_materials.iter().flatten().any(|p| p == name) {
-                return wrong(format!(
-                    "objective.parameter_weights: no material has '{name}'; the names are mu_1, alpha_1, …"
-                ));
+                problems.push(StudyError::UnknownParameter { name: name.clone() });
             }
-            if !(*weight >= 0.0 && *weight <= 1e6) {
-                return Err(StudyError::OutOfRange {
-                    field: "objective.parameter_weights",
-                    value: *weight,
-                    allowed: "from 0 to 1000000",
-                });
+            if !(0.0..=MAX_WEIGHT).contains(weight) {
+                let field = FieldPath::of("objective").name("parameter_weights").name(name);
+                let allowed = format!("from 0 to {MAX_WEIGHT}");
+                problems.push(StudyError::OutOfRange { field, value: *weight, allowed });
             }
         }
-        if parameters_of_materials.iter().any(|list| list.iter().map(|p| self.weight_of(p)).sum::<f64>() <= 0.0) {
-            return wrong("objective.parameter_weights: all weights of a material are zero".into());
+        let has_no_weight = |list: &Vec<String>| list.iter().map(|p| self.weight_of(p)).sum::<f64>() <= 0.0;
+        if parameters_of_materials.iter().any(has_no_weight) {
+            problems.push(StudyError::NoWeight);
         }
-        Ok(())
     }
 
     /// The whole objective in a sentence, for reports.
@@ -268,7 +261,12 @@ mod tests {
     fn weights_are_checked() {
         let names = vec![vec!["mu_1".to_string(), "alpha_1".to_string()]];
         let fine = objective(r#"{"combine": "weighted", "parameter_weights": {"mu_1": 3, "alpha_1": 0}}"#);
-        assert!(fine.validate(&names).is_ok());
+        let problems = |objective: &Objective| {
+            let mut problems = Vec::new();
+            objective.check(&names, &mut problems);
+            problems
+        };
+        assert!(problems(&fine).is_empty());
         for bad in [
             r#"{"combine": "maximin", "parameter_weights": {"mu_1": 3}}"#,
             r#"{"combine": "weighted", "parameter_weights": {"mu_2": 3}}"#,
@@ -276,7 +274,7 @@ mod tests {
             r#"{"combine": "weighted", "parameter_weights": {"mu_1": 0, "alpha_1": 0}}"#,
             r#"{"combine": "weighted", "kind": "d_optimal"}"#,
         ] {
-            assert!(objective(bad).validate(&names).is_err(), "{bad}");
+            assert!(!problems(&objective(bad)).is_empty(), "{bad}");
         }
     }
 }

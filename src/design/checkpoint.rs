@@ -3,6 +3,7 @@
 //! The search is deterministic, so a resumed run asks for the same evaluations in the same order and takes them from here;
 //! floats are written with the digits that read back to the same bits. A half-written last line is dropped.
 
+use crate::file::read_limited;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::collections::HashMap;
 use std::fs::{File, OpenOptions};
@@ -44,6 +45,9 @@ pub enum CheckpointError {
     },
 }
 
+/// Largest checkpoint that is read, bytes; one of a long search has some hundred megabytes.
+const MAX_BYTES: u64 = 1 << 34;
+
 /// What the evaluations hold. Those of another meaning must not be read: their lists of derivatives are told apart by place alone.
 const FORMAT: &str = "evaluations/2";
 
@@ -80,7 +84,7 @@ impl Checkpoint {
         // A header cut off by a crash has no line end; a whole line that is no header was written by something else.
         let mut lines_of_something_else = false;
         if path.exists() {
-            let bytes = std::fs::read(path).map_err(fail)?;
+            let bytes = read_limited(path, MAX_BYTES).map_err(|error| fail(error.into_io()))?;
             let text = String::from_utf8_lossy(&bytes);
             lines_of_something_else = text.contains('\n');
             for (number, line) in text.split_inclusive('\n').enumerate() {

@@ -14,7 +14,7 @@ fn two_variables(kind: ObjectiveKind) -> Study {
     study.limits.symmetry = crate::specimen::Symmetry::MirrorXAndZ;
     study.limits.max_local_stretch = Some(3.5);
     study.vary.hole_count = CountRange { min: 2, max: 2 };
-    study.vary.axes = vec![crate::specimen::HoleAxis::Thickness];
+    study.vary.axes = Some(vec![crate::specimen::HoleAxis::Thickness]);
     study.vary.drive_mm = Range { min: 5.0, max: 5.0 };
     (study.vary.length_mm, study.vary.thickness_mm, study.vary.width_mm) = (None, None, None);
     study.objective = Objective { kind, guard_promised_sd: Guard::None, ..Objective::default() };

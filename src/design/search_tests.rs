@@ -151,7 +151,7 @@ fn random_study(draw: &mut Draw) -> Study {
     limits.max_holes = Some(draw.below(4));
     limits.symmetry =
         [Symmetry::None, Symmetry::MirrorX, Symmetry::MirrorZ, Symmetry::MirrorXAndZ, Symmetry::Point][draw.below(5)];
-    study.vary.axes = vec![[HoleAxis::Thickness, HoleAxis::Width][draw.below(2)]];
+    study.vary.axes = Some(vec![[HoleAxis::Thickness, HoleAxis::Width][draw.below(2)]]);
     study.vary.tests = vec![[TestKind::Uniaxial, TestKind::DoubleLapShear][draw.below(2)]];
     study.vary.hole_count = CountRange { min: 0, max: 4 };
     study.vary.drive_mm = Range { min: 1.0, max: draw.between(2.0, 20.0) };

@@ -91,11 +91,7 @@ impl Structure {
 
 /// All structures of a study, fewest holes first.
 pub fn subspaces(study: &Study) -> Vec<Subspace> {
-    let axes = if study.vary.axes.is_empty() {
-        vec![study.base.hole_axis().unwrap_or(HoleAxis::Thickness)]
-    } else {
-        study.vary.axes.clone()
-    };
+    let axes = study.axes();
     let max_holes = study.limits.max_holes.unwrap_or(usize::MAX).min(study.vary.hole_count.max);
     let mut all = Vec::new();
     for test in study.tests() {

@@ -1,135 +1,38 @@
-//! The diagnosis: fit the nominal model, look at what is left, suppose causes, fit them, and prove them on data kept back.
+//! The diagnosis: fit the nominal model, look at what is left, suppose causes, fit them, and prove them on data kept
+//! back.
 
-use super::causes::Cause;
+use super::conclusion::{explain_too_little, kept_back_rms_mm, verdict_on};
 use super::error::DiagnosisError;
-use super::fit::{BulkPrior, FitSettings, Fitted, ShearPrior, Supposed, scene_of, shear_modulus};
-use super::found::{FoundCause, compressible, found_cause, load_causes, terms};
+use super::findings::Findings;
+use super::found::FoundCause;
+use super::inference::{Inference, KNOWN_LOG_SD};
 use super::laboratory::Laboratory;
-use super::leftover::{Leftover, leftover};
-use super::load_history::{LoadHistoryFit, fit_load_history};
-use super::maps::{ScoreMap, jumps};
+use super::leftover::leftover;
+use super::load_curve::{largest_drive_mm, read_load_curve, take_off_effects};
+use super::load_history::LoadHistoryFit;
+use super::material_cause::{MaterialCase, Recheck};
 use super::mesh_error::{Finer, MeshDefect, widen};
 use super::metric::Metric;
-use super::scene::Scene;
+use super::nominal::{first_guess, fit_nominal};
+use super::options::DiagnosisOptions;
+use super::outcome::Diagnosis;
+use super::prior::{BulkPrior, FitSettings, ShearPrior, shear_modulus};
+use super::registry::Registry;
+use super::rounds::add_causes;
 use super::trace::Trace;
-use super::work::{EVIDENCE, FREE_BULK, KNOWN_BULK, Work, first_guess, is_large, leading, penalty};
 use crate::calibration::Observed;
 use crate::material::Ogden;
 use crate::mesh::MeshOptions;
 use crate::recording::Recording;
-use std::sync::Arc;
 
-/// Fits of one cause are the same where their predictions differ by less than this part of the cause's effect.
-const SAME_EFFECT: f64 = 0.2;
-/// Causes whose fits differ by less than this cannot be told apart.
-const AMBIGUITY: f64 = 15.0;
-/// A further cause must explain this part of what the ones before it did: a model of a large effect errs by some percent, which
-/// is no effect of its own.
-const SMALLEST_SHARE: f64 = 0.02;
-/// Structured misfit that is left counts as unexplained above this multiple of the allowance (rms).
-const UNEXPLAINED: f64 = 2.0;
-/// Causes of a misfit above that limit explain it where they leave less than this part of it (rms), or no more than the allowance:
-/// the right cause leaves a tenth or less, but for the odd debond; another one in its place about a third.
-const EXPLAINED_LEAVES: f64 = 0.25;
-/// Where causes leave more than this part of the squares unexplained, they are not named but listed as tried.
-const UNEXPLAINED_SHARE: f64 = 0.5;
-
-/// Settings of [`diagnose`].
-#[derive(Clone, Debug)]
-pub struct DiagnosisOptions {
-    /// Element size as a factor on the standard one.
-    pub mesh_factor: f64,
-    /// What displacement error meshes may leave, mm rms at the largest drive; `None` for a thousandth of that drive.
-    pub allowance_mm: Option<f64>,
-    /// The material as believed; its number of terms is then the nominal one.
-    pub prior: Option<Ogden>,
-    /// Most causes.
-    pub max_causes: usize,
-    /// Drift of the load cell where the recording does not state it, N.
-    pub force_sd_n: f64,
-    /// Names of causes that are not to be supposed.
-    pub left_out: Vec<String>,
-}
-
-impl Default for DiagnosisOptions {
-    fn default() -> Self {
-        DiagnosisOptions {
-            mesh_factor: 1.35,
-            allowance_mm: None,
-            prior: None,
-            max_causes: 3,
-            force_sd_n: 0.02,
-            left_out: Vec::new(),
-        }
-    }
-}
-
-/// How the diagnosis ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Verdict {
-    /// Nothing beyond noise and meshes.
-    NoMismatch,
-    /// The causes named explain what was found.
-    Explained,
-    /// So do others, which the data cannot tell apart from them.
-    ExplainedAmbiguously,
-    /// Something is left that no cause explains.
-    Unexplained,
-}
-
-/// A cause that was looked at.
-#[derive(Clone, Debug)]
-pub struct Ranked {
-    /// Name.
-    pub name: String,
-    /// In words.
-    pub description: String,
-    /// Fall of the deviance to first order.
-    pub score: f64,
-    /// Fall of the deviance in a full fit, less ln n per parameter; none where not fitted.
-    pub fitted: Option<f64>,
-    /// Which round.
-    pub round: usize,
-}
-
-/// The diagnosis of a recording.
-pub struct Diagnosis {
-    /// How it ended.
-    pub verdict: Verdict,
-    /// Causes, first found first.
-    pub causes: Vec<FoundCause>,
-    /// What the data cannot tell apart from them; where the verdict is unexplained, what was tried and does not explain it.
-    pub alternatives: Vec<FoundCause>,
-    /// The nominal model's fit.
-    pub nominal: Fitted,
-    /// With the causes.
-    pub corrected: Fitted,
-    /// What each leaves.
-    pub left: [Leftover; 2],
-    /// Rms misfit (mm) on voxel blocks kept back, without and with the causes.
-    pub kept_back_rms_mm: [f64; 2],
-    /// All causes looked at.
-    pub ranked: Vec<Ranked>,
-    /// The load curve.
-    pub load: Option<LoadHistoryFit>,
-    /// Maps of the nominal misfit.
-    pub maps: Vec<(String, ScoreMap)>,
-    /// The material as believed.
-    pub believed: Option<Ogden>,
-    /// Priors and stops of the last fits.
-    pub settings: FitSettings,
-    /// The recording as compared.
-    pub observed: Observed,
-    /// Displacement unknowns of the model.
-    pub num_unknowns: usize,
-    /// Equilibria solved.
-    pub num_solves: usize,
-    /// The allowance in use, mm.
-    pub allowance_mm: f64,
-    /// What a finer mesh predicts beyond the mesh of the diagnosis, the causes included.
-    pub mesh_defect: Option<MeshDefect>,
-}
+/// Standard deviation of ln κ of the material believed.
+const BELIEVED_LOG_SD: f64 = 0.5;
+/// Most iterations of a fit.
+const MAX_ITERATIONS: usize = 12;
+/// A fit ends when a step would lower the deviance by less than this.
+const TOLERANCE: f64 = 0.3;
+/// The allowance where none is stated, as a part of the largest drive.
+const ALLOWANCE_OF_DRIVE: f64 = 1e-3;
 
 /// Diagnoses `recording`; `progress` is told what is being done.
 ///
@@ -141,266 +44,307 @@ pub fn diagnose(
     progress: &dyn Fn(&str),
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Diagnosis, DiagnosisError> {
-    if !(0.3..=5.0).contains(&options.mesh_factor) {
-        let value = options.mesh_factor;
-        return Err(DiagnosisError::Setting { name: "the mesh factor", value, requirement: "from 0.3 to 5" });
-    }
+    let registry = Registry::standard().without(&options.left_out)?;
+    diagnose_among(&registry, recording, options, progress, is_cancelled)
+}
+
+/// As [`diagnose`], with the causes of `registry`.
+///
+/// # Errors
+/// As [`diagnose`].
+pub(super) fn diagnose_among(
+    registry: &Registry,
+    recording: &Recording,
+    options: &DiagnosisOptions,
+    progress: &dyn Fn(&str),
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Diagnosis, DiagnosisError> {
+    options.check()?;
     let observed = Observed::new(recording, options.force_sd_n)?;
-    let largest = observed.steps.iter().map(|s| s.drive_mm.abs()).fold(0.0, f64::max);
-    let allowance_mm = options.allowance_mm.unwrap_or(1e-3 * largest);
-    let metric = Metric::new(&observed, allowance_mm, &|_| true);
-    let mesh = MeshOptions::scaled(&observed.specimen, options.mesh_factor);
-    let mut laboratory = Laboratory::new(&observed, &mesh)?;
-    let num_unknowns = laboratory.num_unknowns()?;
-    let mut recorded = laboratory.measured();
-    let start = first_guess(&mut laboratory, options, is_cancelled)?;
-    // Without a force the modulus is that of the first guess; what is fitted are ratios and shapes.
-    let has_force = observed.steps.iter().any(|s| s.force.is_some());
-    let shear = (!has_force).then(|| ShearPrior { center_kpa: shear_modulus(&start), log_sd: KNOWN_BULK });
-    let settings = FitSettings {
-        max_iterations: 12,
-        bulk: BulkPrior { center_kpa: start.bulk_kpa, log_sd: 0.5 },
-        shear,
-        tolerance: 0.3,
-    };
-    progress(&format!("fitting the nominal model ({num_unknowns} unknowns)"));
-    let mut work = Work {
-        laboratory: &mut laboratory,
-        metric: &metric,
-        settings,
-        nominal_bulk: settings.bulk,
-        is_cancelled,
-        allowance_mm,
-        left_out: &options.left_out,
-    };
-    let mut nominal = work.nominal(&recorded, &start, options.prior.is_some())?;
+    let mut run = Run::begin(&observed, registry, options, progress, is_cancelled)?;
+    run.read_load_curve(recording)?;
+    run.correct_mesh()?;
+    run.question_material()?;
+    run.take_out_artefacts()?;
+    run.add_causes()?;
+    run.question_material_again()?;
+    run.name_artefacts();
+    let seen = run.correct_fits()?;
+    run.conclude(&seen)
+}
 
-    // The load curve first: what time and the load cell add is taken off before the model is compared.
-    progress("reading the load curve");
-    let mut load = None;
-    if let Some(curve) = recording.load.as_ref().filter(|_| observed.steps.iter().any(|s| s.force.is_some())) {
-        let (table, kernel) =
-            work.elastic_table(&nominal, curve.drive_mm.iter().fold(largest, |s, d| s.max(d.abs())))?;
-        let drift = observed.steps.iter().filter_map(|s| s.force).map(|f| f.sd_n).fold(0.0, f64::max);
-        let windows: Vec<Option<[f64; 2]>> = recording.steps.iter().map(|s| s.window_s).collect();
-        load = fit_load_history(curve, &table, &kernel, drift.max(1e-6), &windows, &|e| !work.is_left_out(e.cause()));
+/// A diagnosis at work: its stages are its methods, in the order of [`diagnose_among`].
+struct Run<'a> {
+    registry: &'a Registry,
+    options: &'a DiagnosisOptions,
+    observed: &'a Observed,
+    inference: Inference<'a>,
+    /// The finer mesh; `None` where ours is fine already, or the finer one cannot be meshed.
+    finer: Option<Finer<'a>>,
+    /// The material from which nominal fits start.
+    start: Ogden,
+    /// Displacement unknowns of the model.
+    num_unknowns: usize,
+    /// What was recorded, less what the load curve's effects add.
+    recorded: Trace,
+    /// The load curve.
+    load: Option<LoadHistoryFit>,
+    /// What the finer mesh predicts beyond ours.
+    mesh_defect: Option<MeshDefect>,
+    findings: Findings,
+}
+
+impl<'a> Run<'a> {
+    /// Prepares the models and fits the nominal one.
+    fn begin(
+        observed: &'a Observed,
+        registry: &'a Registry,
+        options: &'a DiagnosisOptions,
+        progress: &'a dyn Fn(&str),
+        is_cancelled: &'a dyn Fn() -> bool,
+    ) -> Result<Run<'a>, DiagnosisError> {
+        let mesh_factor = options.mesh_factor;
+        let allowance_mm = options.allowance_mm.unwrap_or(ALLOWANCE_OF_DRIVE * largest_drive_mm(observed));
+        let metric = Metric::new(observed, allowance_mm, &|_| true);
+        let mut laboratory = Laboratory::new(observed, &MeshOptions::scaled(&observed.specimen, mesh_factor))?;
+        let num_unknowns = laboratory.num_unknowns()?;
+        let recorded = laboratory.measured();
+        let start = first_guess(&mut laboratory, options.prior.as_ref(), is_cancelled)?;
+        // Without a force the modulus is that of the first guess; what is fitted are ratios and shapes.
+        let has_force = observed.steps.iter().any(|s| s.force.is_some());
+        let shear = (!has_force).then(|| ShearPrior { center_kpa: shear_modulus(&start), log_sd: KNOWN_LOG_SD });
+        let believed_bulk = BulkPrior { center_kpa: start.bulk_kpa, log_sd: BELIEVED_LOG_SD };
+        let settings = FitSettings { max_iterations: MAX_ITERATIONS, bulk: believed_bulk, shear, tolerance: TOLERANCE };
+        progress(&format!("fitting the nominal model ({num_unknowns} unknowns)"));
+        let mut inference = Inference {
+            laboratory,
+            metric,
+            settings,
+            nominal_bulk: believed_bulk,
+            believed_bulk,
+            allowance_mm,
+            mesh_factor,
+            is_cancelled,
+            progress,
+        };
+        let nominal = fit_nominal(&mut inference, &recorded, &start, options.prior.is_some())?;
+        Ok(Run {
+            registry,
+            options,
+            observed,
+            inference,
+            finer: None,
+            start,
+            num_unknowns,
+            recorded,
+            load: None,
+            mesh_defect: None,
+            findings: Findings::of_nominal(nominal),
+        })
     }
-    let has_curve = load.is_some();
-    let mut causes: Vec<FoundCause> = Vec::new();
-    if let Some(found) = load.as_ref().filter(|l| !l.effects.is_empty()) {
-        for (force, excess) in recorded.force.iter_mut().zip(&found.window_excess_n) {
-            *force -= excess;
+
+    fn tell(&self, what: &str) {
+        (self.inference.progress)(what);
+    }
+
+    fn is_cancelled(&self) -> bool {
+        (self.inference.is_cancelled)()
+    }
+
+    /// Fits the nominal model to `measured` and goes on from it.
+    fn fit_nominal(&mut self, measured: &Trace, start: &Ogden) -> Result<(), DiagnosisError> {
+        let nominal = fit_nominal(&mut self.inference, measured, start, self.options.prior.is_some())?;
+        self.findings.restart_from(nominal);
+        Ok(())
+    }
+
+    /// What our mesh would have shown of what was recorded, were it not for its own error.
+    fn measured(&self) -> Trace {
+        self.mesh_defect.as_ref().map_or_else(|| self.recorded.clone(), |d| d.taken_off(&self.recorded))
+    }
+
+    /// Reads the load curve. What time and the load cell add to the forces is taken off before the model is compared.
+    fn read_load_curve(&mut self, recording: &Recording) -> Result<(), DiagnosisError> {
+        self.tell("reading the load curve");
+        let effects = self.registry.load_effects();
+        self.load = read_load_curve(&mut self.inference, recording, &self.findings.nominal, &effects)?;
+        if take_off_effects(&mut self.recorded, self.load.as_ref()) {
+            let effects = self.load.as_ref().map_or(&[][..], |l| &l.effects);
+            self.findings.causes.extend(FoundCause::of_load_curve(effects));
+            self.tell("refitting with the load curve's effects taken off");
+            let (recorded, start) = (self.recorded.clone(), self.start.clone());
+            self.fit_nominal(&recorded, &start)?;
         }
-        causes.extend(load_causes(&found.effects));
-        progress("refitting with the load curve's effects taken off");
-        nominal = work.nominal(&recorded, &start, options.prior.is_some())?;
+        Ok(())
     }
-    // What our mesh gets wrong of the nominal model is taken off before a misfit is looked for.
-    let mut finer = Finer::new(&observed, options.mesh_factor);
-    let mut mesh_defect: Option<MeshDefect> = None;
-    if let Some(finer) = finer.as_mut() {
-        progress("predicting on a finer mesh");
-        match finer.defect(&nominal, is_cancelled) {
+
+    /// Takes off what our mesh gets wrong of the nominal model, before a misfit is looked for.
+    fn correct_mesh(&mut self) -> Result<(), DiagnosisError> {
+        self.finer = Finer::new(self.observed, self.options.mesh_factor);
+        let Some(finer) = self.finer.as_mut() else { return Ok(()) };
+        (self.inference.progress)("predicting on a finer mesh");
+        match finer.defect(&self.findings.nominal, self.inference.is_cancelled) {
             Ok(found) => {
-                mesh_defect = Some(found);
-                nominal = work.nominal(&less(&recorded, &mesh_defect), &nominal.material, options.prior.is_some())?;
+                self.mesh_defect = Some(found);
+                let (measured, start) = (self.measured(), self.findings.nominal.material.clone());
+                self.fit_nominal(&measured, &start)
             }
-            Err(error) if is_cancelled() => return Err(error),
-            Err(_) => progress("a finer model has no equilibrium: the mismatch is that against this mesh"),
+            Err(error) if self.is_cancelled() => Err(error),
+            Err(_) => {
+                self.tell("a finer model has no equilibrium: the mismatch is that against this mesh");
+                Ok(())
+            }
         }
-    }
-    let measured = less(&recorded, &mesh_defect);
-    let mut ranked = Vec::new();
-    let mut maps = Vec::new();
-    let mut alternatives = Vec::new();
-    let mut current = nominal.clone();
-    if !work.is_left_out("compressibility")
-        && let Some((stiff, free, evidence)) = work.compressibility(&measured, &nominal)?
-    {
-        causes.push(compressible(&free, &stiff, evidence));
-        work.nominal_bulk.log_sd = KNOWN_BULK;
-        (nominal, work.settings.bulk) = (stiff, BulkPrior { center_kpa: free.material.bulk_kpa, log_sd: FREE_BULK });
-        current = free;
-    }
-    if options.prior.is_some()
-        && !work.is_left_out("terms")
-        && let Some((richer, evidence)) = work.further_term(&measured, &current)?
-    {
-        causes.push(terms(&richer, &current, evidence));
-        current = richer;
     }
 
-    let wraps = if work.is_left_out("wrap") { Vec::new() } else { jumps(&observed, &current.residual) };
-    if !wraps.is_empty() {
-        progress(&format!("{} groups of voxels are a whole turn of phase off", wraps.len()));
-        let supposed: Vec<Supposed> = wraps
-            .into_iter()
-            .map(|w| {
-                let values = vec![w.size_mm];
-                Supposed { cause: Arc::new(w) as Arc<dyn Cause>, values }
-            })
-            .collect();
-        current = work.fit(&measured, &current.material, &supposed)?;
-    }
-    let mut round = 0;
-    while current.causes.iter().filter(|c| c.cause.name() != "wrap").count() + causes.len() < options.max_causes {
-        round += 1;
-        progress(&format!("round {round}: testing causes"));
-        let candidates = work.candidates(&current, has_curve, round, &mut maps)?;
-        for c in &candidates {
-            ranked.push(Ranked {
-                name: c.cause.name().into(),
-                description: c.cause.description(),
-                score: c.score,
-                fitted: None,
-                round,
-            });
-        }
-        let mut fits: Vec<(f64, Fitted)> = Vec::new();
-        for c in leading(&candidates) {
-            if is_cancelled() {
-                break;
-            }
-            progress(&format!("round {round}: fitting '{}'", c.cause.description()));
-            let mut supposed = current.causes.clone();
-            supposed.push(Supposed { cause: c.cause.clone(), values: c.values.clone() });
-            let Ok(found) = work.fit_with_leaps(&measured, &current.material, &supposed) else { continue };
-            let gain = current.deviance - found.deviance - penalty(&metric, c.values.len());
-            if let Some(r) = ranked.iter_mut().rev().find(|r| r.description == c.cause.description()) {
-                r.fitted = Some(gain);
-            }
-            fits.push((gain, found));
-        }
-        fits.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let Some((gain, best)) = fits.first() else { break };
-        let effect = best.prediction.trace.plus(-1.0, &current.prediction.trace);
-        let explained = nominal.deviance - current.deviance;
-        if *gain < EVIDENCE.max(SMALLEST_SHARE * explained) || !is_large(&observed, &effect, allowance_mm) {
-            break;
-        }
-        for (other_gain, other) in &fits[1..] {
-            // Two starts of one cause that end in one place are no two causes.
-            let apart = other.prediction.trace.plus(-1.0, &best.prediction.trace);
-            let is_same = other.causes.last().map(|c| c.cause.name()) == best.causes.last().map(|c| c.cause.name())
-                && apart.rms_mm() < SAME_EFFECT * effect.rms_mm();
-            if gain - other_gain < AMBIGUITY && !is_same {
-                let effect = other.prediction.trace.plus(-1.0, &current.prediction.trace);
-                let mut alternative =
-                    found_cause(other, other.causes.len() - 1, &observed, *other_gain, effect.rms_mm());
-                progress(&format!("looking for the experiment that would tell '{}' apart", alternative.description));
-                let pair = [best, other];
-                alternative.experiments = work.experiments(options.mesh_factor, pair)?;
-                alternatives.push(alternative);
+    /// Looks for causes in the material's own law.
+    fn question_material(&mut self) -> Result<(), DiagnosisError> {
+        let measured = self.measured();
+        for cause in self.registry.material_causes() {
+            let Findings { nominal, current, .. } = &self.findings;
+            let case =
+                MaterialCase { measured: &measured, nominal, current, is_believed: self.options.prior.is_some() };
+            if let Some(finding) = cause.look(&mut self.inference, &case)? {
+                self.findings.causes.push(finding.found);
+                self.findings.current = finding.current;
+                if let Some(nominal) = finding.nominal {
+                    self.findings.nominal = nominal;
+                }
             }
         }
-        causes.push(found_cause(best, best.causes.len() - 1, &observed, *gain, effect.rms_mm()));
-        current = best.clone();
+        Ok(())
     }
-    // What pulled κ before the other causes were known may be one of them.
-    if let Some(place) = causes.iter().position(|c| c.name == "compressibility").filter(|_| !current.causes.is_empty())
-    {
-        progress("testing whether the material is compressible beside the other causes");
-        let free_bulk = work.settings.bulk;
-        work.settings.bulk = settings.bulk;
-        let mut start = current.material.clone();
-        start.bulk_kpa = settings.bulk.center_kpa;
-        let believed = work.fit(&measured, &start, &current.causes)?;
-        let gain = believed.deviance - current.deviance - penalty(&metric, 1);
-        if gain < EVIDENCE.max(SMALLEST_SHARE * (nominal.deviance - believed.deviance)) {
-            causes.remove(place);
-            current = believed;
-        } else {
-            causes[place].evidence = gain;
-            work.settings.bulk = free_bulk;
+
+    /// Finds the artefacts of the image in what the fit so far leaves, and fits their sizes.
+    fn take_out_artefacts(&mut self) -> Result<(), DiagnosisError> {
+        let current = &self.findings.current;
+        let found = self.registry.artefacts(self.observed, &current.residual, self.inference.progress);
+        if !found.is_empty() {
+            let measured = self.measured();
+            self.findings.current = self.inference.fit(&measured, &self.findings.current.material, &found)?;
+        }
+        Ok(())
+    }
+
+    /// Tests, fits and names causes, round by round.
+    fn add_causes(&mut self) -> Result<(), DiagnosisError> {
+        let (measured, max_causes) = (self.measured(), self.options.max_causes);
+        let Run { inference, registry, findings, load, .. } = self;
+        add_causes(inference, registry, findings, &measured, max_causes, load.is_some())
+    }
+
+    /// Looks again at the causes in the material's law, now that other causes are in the fit.
+    fn question_material_again(&mut self) -> Result<(), DiagnosisError> {
+        if self.findings.current.causes.is_empty() {
+            return Ok(());
+        }
+        let measured = self.measured();
+        for cause in self.registry.material_causes() {
+            let Some(place) = self.findings.causes.iter().position(|c| c.name == cause.name()) else { continue };
+            let Findings { nominal, current, .. } = &self.findings;
+            let case =
+                MaterialCase { measured: &measured, nominal, current, is_believed: self.options.prior.is_some() };
+            match cause.look_again(&mut self.inference, &case)? {
+                Recheck::Needed(None) => {}
+                Recheck::Needed(Some(evidence)) => self.findings.causes[place].evidence = evidence,
+                Recheck::NotNeeded(without) => {
+                    self.findings.causes.remove(place);
+                    self.findings.current = *without;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Names the artefacts of the image, even where nothing else is named.
+    fn name_artefacts(&mut self) {
+        let evidence = self.findings.explained();
+        let Findings { current, causes, .. } = &mut self.findings;
+        for (index, _) in current.causes.iter().enumerate().filter(|(_, c)| c.cause.is_artefact()) {
+            causes.push(FoundCause::of_fit(current, index, self.observed).with_evidence(evidence, 0.0));
         }
     }
-    // Wraps are named even where nothing else is.
-    for (index, c) in current.causes.iter().enumerate().filter(|(_, c)| c.cause.name() == "wrap") {
-        let _ = c;
-        causes.push(found_cause(&current, index, &observed, nominal.deviance - current.deviance, 0.0));
+
+    /// Corrects both fits, without and with the causes, by the finer mesh, and widens their intervals by what meshes
+    /// do. Gives what each of the two is compared with.
+    fn correct_fits(&mut self) -> Result<[Trace; 2], DiagnosisError> {
+        self.tell("correcting by a finer mesh");
+        let measured = self.measured();
+        let mut seen = [measured.clone(), measured];
+        let with_causes = self.inference.settings;
+        let settings = [FitSettings { bulk: self.inference.nominal_bulk, ..with_causes }, with_causes];
+        for n in 0..2 {
+            if let Some(defect) = self.correct_fit(n, &settings[n])? {
+                seen[n] = defect.taken_off(&self.recorded);
+                self.mesh_defect = Some(defect);
+            }
+        }
+        Ok(seen)
     }
-    progress("correcting by a finer mesh");
-    let free_settings = work.settings;
-    let mut seen = [measured.clone(), measured.clone()];
-    let corrected_settings = [FitSettings { bulk: work.nominal_bulk, ..free_settings }, free_settings];
-    for (n, fitted) in [&mut nominal, &mut current].into_iter().enumerate() {
-        let settings = corrected_settings[n];
+
+    /// Corrects one fit, the nominal one (0) or that with the causes (1); gives what the finer mesh predicts beyond
+    /// ours.
+    fn correct_fit(&mut self, n: usize, settings: &FitSettings) -> Result<Option<MeshDefect>, DiagnosisError> {
+        let Run { inference, finer, findings, recorded, .. } = self;
+        let Inference { laboratory, metric, mesh_factor, is_cancelled, progress, .. } = inference;
+        let (mesh_factor, is_cancelled, progress) = (*mesh_factor, *is_cancelled, *progress);
+        let fitted = if n == 0 { &mut findings.nominal } else { &mut findings.current };
         let correction =
-            finer.as_mut().map(|f| f.correct(work.laboratory, &metric, &recorded, &settings, fitted, is_cancelled));
-        let defect = match correction {
-            Some(Err(error)) if is_cancelled() => return Err(error),
-            Some(Err(_)) => {
+            finer.as_mut().map(|f| f.correct(laboratory, metric, recorded, settings, fitted, is_cancelled));
+        let defect = match correction.transpose() {
+            Err(error) if is_cancelled() => return Err(error),
+            Err(_) => {
                 progress("a finer model has no equilibrium: estimates are those of this mesh");
                 None
             }
-            Some(Ok(defect)) => Some(defect),
-            None => None,
+            Ok(defect) => defect,
         };
-        if defect.is_some() {
-            seen[n] = less(&recorded, &defect);
-        }
-        let widened =
-            widen(work.laboratory, options.mesh_factor, &metric, &settings, fitted, defect.as_ref(), is_cancelled);
-        match widened {
+        match widen(laboratory, mesh_factor, metric, settings, fitted, defect.as_ref(), is_cancelled) {
             Err(error) if is_cancelled() => return Err(error),
             Err(_) => progress("a coarser model has no equilibrium: the intervals are those of the noise"),
             Ok(()) => {}
         }
-        mesh_defect = defect.or(mesh_defect);
+        Ok(defect)
     }
-    // Parameters as in the last fit, all causes together.
-    for c in &mut causes {
-        c.refresh(&current, &observed);
+
+    /// Looks at what is left, predicts data that were kept back, and says how the diagnosis ended.
+    fn conclude(mut self, seen: &[Trace; 2]) -> Result<Diagnosis, DiagnosisError> {
+        let Findings { nominal, current, mut causes, mut alternatives, ranked, maps } = self.findings;
+        // Parameters as in the last fit, all causes together.
+        for cause in &mut causes {
+            cause.refresh(&current, self.observed);
+        }
+        causes.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+        let left = [&nominal, &current].map(|f| leftover(self.observed, &f.residual, &self.inference.metric));
+        (self.inference.progress)("predicting voxel blocks that were kept back");
+        let kept_back_rms_mm = kept_back_rms_mm(&mut self.inference, seen, [&nominal, &current])?;
+        let structured_mm = [left[0].structured_rms_mm, left[1].structured_rms_mm];
+        let verdict = verdict_on(structured_mm, self.inference.allowance_mm, &causes, &alternatives);
+        if explain_too_little(verdict, structured_mm) {
+            alternatives.splice(0..0, causes.drain(..));
+        }
+        Ok(Diagnosis {
+            verdict,
+            causes,
+            alternatives,
+            nominal,
+            corrected: current,
+            left,
+            kept_back_rms_mm,
+            ranked,
+            load: self.load,
+            maps,
+            believed: self.options.prior.clone(),
+            settings: self.inference.settings,
+            observed: self.observed.clone(),
+            num_unknowns: self.num_unknowns,
+            num_solves: self.inference.laboratory.num_solves,
+            allowance_mm: self.inference.allowance_mm,
+            mesh_defect: self.mesh_defect,
+        })
     }
-    causes.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
-    let left = [leftover(&observed, &nominal.residual, &metric), leftover(&observed, &current.residual, &metric)];
-    progress("predicting voxel blocks that were kept back");
-    let kept_back_rms_mm = work.kept_back(&seen, &nominal, &current)?;
-    let [before, after] = [0, 1].map(|n: usize| left[n].structured_rms_mm);
-    let limit = UNEXPLAINED * allowance_mm;
-    let is_half_done = before > limit && after > allowance_mm.max(EXPLAINED_LEAVES * before);
-    let verdict = if after > limit || is_half_done {
-        Verdict::Unexplained
-    } else if causes.is_empty() {
-        Verdict::NoMismatch
-    } else if alternatives.is_empty() {
-        Verdict::Explained
-    } else {
-        Verdict::ExplainedAmbiguously
-    };
-    // Causes that take away the smaller part of what is there are no explanation of it.
-    if verdict == Verdict::Unexplained && after.powi(2) > UNEXPLAINED_SHARE * before.powi(2) {
-        alternatives.splice(0..0, causes.drain(..));
-    }
-    let last_settings = work.settings;
-    let num_solves = laboratory.num_solves;
-    Ok(Diagnosis {
-        verdict,
-        causes,
-        alternatives,
-        nominal,
-        corrected: current,
-        left,
-        kept_back_rms_mm,
-        ranked,
-        load,
-        maps,
-        believed: options.prior.clone(),
-        settings: last_settings,
-        num_unknowns,
-        num_solves,
-        allowance_mm,
-        mesh_defect,
-        observed,
-    })
 }
 
-/// What our mesh would have shown of `recorded`, were it not for its own error.
-fn less(recorded: &Trace, defect: &Option<MeshDefect>) -> Trace {
-    defect.as_ref().map_or_else(|| recorded.clone(), |d| recorded.plus(-1.0, &d.trace))
-}
-
-/// The scene of a diagnosis' causes, for pictures.
-pub fn scene_of_fit(fitted: &Fitted) -> Scene {
-    scene_of(&fitted.causes)
-}
+#[cfg(test)]
+#[path = "diagnose_tests.rs"]
+mod tests;

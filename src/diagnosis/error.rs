@@ -20,6 +20,14 @@ pub enum DiagnosisError {
     /// A supposed specimen cannot exist.
     #[error("a supposed specimen: {0}")]
     Specimen(SpecimenError),
+    /// A cause is to be left out that there is not.
+    #[error("'{name}' is no cause; there are {known}")]
+    UnknownCause {
+        /// Its name.
+        name: &'static str,
+        /// The names that there are.
+        known: String,
+    },
     /// A setting is out of range.
     #[error("{name} is {value}; it must be {requirement}")]
     Setting {

@@ -1,13 +1,16 @@
 //! The experiment that would tell two explanations apart.
 //!
-//! Both explain what was recorded. A further step at another drive would show them apart by the least squares distance between
-//! the one's prediction and the nearest that the other can still give, its parameters held by the recording at hand
-//! (T-optimality: Atkinson and Fedorov 1975).
+//! Both explanations fit what was recorded. How well a further step at another drive would tell them apart is a least
+//! squares distance: from the first explanation's prediction of that step to the nearest prediction that the second one
+//! can give while it still fits the recording at hand (T-optimality: Atkinson and Fedorov 1975).
 
+use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
-use super::fit::{FitSettings, Fitted, derivatives, normal_matrix};
+use super::fit::{derivatives, normal_matrix};
+use super::inference::Inference;
 use super::laboratory::Laboratory;
 use super::metric::Metric;
+use super::prior::FitSettings;
 use crate::calibration::{Observed, ObservedForce, ObservedStep};
 use crate::mesh::MeshOptions;
 use nalgebra::{DMatrix, DVector};
@@ -30,15 +33,11 @@ pub struct Experiment {
 ///
 /// # Errors
 /// [`DiagnosisError`]: the work was cancelled, or the specimen cannot be meshed.
-pub fn experiments(
-    laboratory: &mut Laboratory,
-    metric: &Metric,
-    mesh_factor: f64,
-    allowance_mm: f64,
-    settings: &FitSettings,
-    [best, other]: [&Fitted; 2],
-    is_cancelled: &dyn Fn() -> bool,
+pub(super) fn experiments(
+    inference: &mut Inference,
+    [best, other]: [&CauseFit; 2],
 ) -> Result<Vec<Experiment>, DiagnosisError> {
+    let Inference { laboratory, metric, settings, mesh_factor, allowance_mm, is_cancelled, .. } = inference;
     let observed = laboratory.observed();
     let known = information(laboratory, metric, other, settings)?;
     let last = observed.steps.iter().max_by(|a, b| a.drive_mm.abs().total_cmp(&b.drive_mm.abs()));
@@ -51,8 +50,8 @@ pub fn experiments(
         let step = ObservedStep { drive_mm, force, displacement: vec![[0.0; 3]; observed.mask.num_voxels()] };
         let mut planned: Observed = observed.clone();
         planned.steps = vec![step];
-        let metric = Metric::new(&planned, allowance_mm * part.abs(), &|_| true);
-        let mut there = Laboratory::new(&planned, &MeshOptions::scaled(&planned.specimen, mesh_factor))?;
+        let metric = Metric::new(&planned, *allowance_mm * part.abs(), &|_| true);
+        let mut there = Laboratory::new(&planned, &MeshOptions::scaled(&planned.specimen, *mesh_factor))?;
         let ours = there.predict(&best.material, &best.scene(), is_cancelled);
         let theirs = there.predict(&other.material, &other.scene(), is_cancelled);
         if is_cancelled() {
@@ -76,7 +75,7 @@ pub fn experiments(
 fn information(
     laboratory: &mut Laboratory,
     metric: &Metric,
-    fitted: &Fitted,
+    fitted: &CauseFit,
     settings: &FitSettings,
 ) -> Result<DMatrix<f64>, DiagnosisError> {
     let columns = derivatives(laboratory, &fitted.material, &fitted.causes, &fitted.prediction)?;

@@ -1,13 +1,14 @@
 //! Where fibres may point: every direction tested to first order at once.
 //!
-//! The stress of a fibre, 2k (a·C a − 1) F a ⊗ a, is linear in a ⊗ a ⊗ a ⊗ a, whose components span the homogeneous polynomials
-//! of degree four: fifteen numbers. The responses to fibres along sixteen directions that span them combine to the response to
-//! fibres along any direction, so that a fine grid of directions costs sixteen solutions of the tangent.
+//! The stress of a fibre, 2k (a·C a − 1) F a ⊗ a, is linear in a ⊗ a ⊗ a ⊗ a, whose components span the homogeneous
+//! polynomials of degree four: fifteen numbers. The responses to fibres along sixteen directions that span them combine
+//! to the response to fibres along any direction, so that a fine grid of directions costs sixteen solutions of the
+//! tangent.
 
-use super::causes::Fibres;
 use super::error::DiagnosisError;
-use super::fit::{STEP, shear_modulus};
+use super::fit::STEP;
 use super::laboratory::{Laboratory, Prediction};
+use super::prior::shear_modulus;
 use super::scene::Scene;
 use super::score::{Prepared, ScoreTest};
 use crate::fem::Fibre;
@@ -42,7 +43,19 @@ const SPANNING: [[f64; 3]; 16] = [
     [1.0, 0.0, 2.0],
 ];
 
-/// Fibres worth a fit: deviance explained to first order, the cause, and its modulus, kPa.
+/// A direction of fibres that is worth a fit.
+#[derive(Clone, Copy, Debug)]
+pub struct FibreDirection {
+    /// Fall of the deviance to first order.
+    pub explained: f64,
+    /// Unit vector.
+    pub direction: [f64; 3],
+    /// Modulus of the fibres from which a fit starts, kPa.
+    pub modulus_kpa: f64,
+}
+
+/// Directions of fibres that are worth a fit: the one that explains most, and a second one far from it where that
+/// explains much too.
 ///
 /// # Errors
 /// [`DiagnosisError::Solve`].
@@ -52,7 +65,7 @@ pub fn fibre_directions(
     scene: &Scene,
     prediction: &Prediction,
     test: &ScoreTest,
-) -> Result<Vec<(f64, Fibres, f64)>, DiagnosisError> {
+) -> Result<Vec<FibreDirection>, DiagnosisError> {
     let modulus = shear_modulus(material);
     let paths: Vec<Box<dyn Fn(f64) -> Scene + '_>> = SPANNING
         .iter()
@@ -85,8 +98,10 @@ pub fn fibre_directions(
     }
     Ok(chosen
         .into_iter()
-        .map(|(explained, direction, strength)| {
-            (explained, Fibres::along(direction, modulus), modulus * strength.min(LARGEST_START))
+        .map(|(explained, direction, strength)| FibreDirection {
+            explained,
+            direction,
+            modulus_kpa: modulus * strength.min(LARGEST_START),
         })
         .collect())
 }

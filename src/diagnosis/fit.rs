@@ -1,120 +1,18 @@
 //! Full, nonlinear fits of a material and causes to a recording.
 
-use super::causes::Cause;
+use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
 use super::laboratory::{Laboratory, Prediction};
 use super::metric::{Metric, Weighed};
+use super::prior::{FitSettings, shear_modulus};
 use super::scene::Scene;
+use super::supposed::{Supposed, paths_of, scene_of};
 use super::trace::Trace;
 use crate::material::{Ogden, Parameter};
 use nalgebra::{DMatrix, DVector};
-use std::sync::Arc;
 
-/// A cause with values of its parameters.
-#[derive(Clone)]
-pub struct Supposed {
-    /// The cause.
-    pub cause: Arc<dyn Cause>,
-    /// Its parameters.
-    pub values: Vec<f64>,
-}
-
-/// What is known of κ beforehand: ln κ is Gaussian.
-#[derive(Clone, Copy, Debug)]
-pub struct BulkPrior {
-    /// Centre, kPa.
-    pub center_kpa: f64,
-    /// Standard deviation of ln κ.
-    pub log_sd: f64,
-}
-
-/// What is known of the initial shear modulus beforehand: its logarithm is Gaussian. Without any force the displacement says
-/// nothing of it, only of its ratio to κ.
-#[derive(Clone, Copy, Debug)]
-pub struct ShearPrior {
-    /// Centre, kPa.
-    pub center_kpa: f64,
-    /// Standard deviation of its logarithm.
-    pub log_sd: f64,
-}
-
-impl ShearPrior {
-    /// Squared distance, its gradient's negative half and the curvature's half, in scaled parameters (κ first).
-    fn terms(&self, material: &Ogden) -> (f64, Vec<f64>, f64) {
-        let modulus = shear_modulus(material);
-        let away = (self.center_kpa / modulus).ln();
-        let weight = self.log_sd.powi(-2);
-        let mut slope = vec![0.0];
-        for t in &material.terms {
-            // Modulus and exponent of a term act alike on ½ μ α.
-            let share = 0.5 * t.mu_kpa * t.alpha / modulus;
-            slope.extend([share, share]);
-        }
-        (weight * away * away, slope, weight * away)
-    }
-}
-
-/// Settings of a fit.
-#[derive(Clone, Copy, Debug)]
-pub struct FitSettings {
-    /// Most iterations, rejected ones included.
-    pub max_iterations: usize,
-    /// κ.
-    pub bulk: BulkPrior,
-    /// The shear modulus, where no force was recorded.
-    pub shear: Option<ShearPrior>,
-    /// Converged when the linear model promises to lower the deviance by less than this.
-    pub tolerance: f64,
-}
-
-/// A fitted material with causes.
-#[derive(Clone)]
-pub struct Fitted {
-    /// The material.
-    pub material: Ogden,
-    /// The causes.
-    pub causes: Vec<Supposed>,
-    /// Weighted squares of the misfit (see [`Metric`]), priors included: −2 ln of the likelihood up to a constant.
-    pub deviance: f64,
-    /// Measured minus predicted.
-    pub residual: Trace,
-    /// What is predicted.
-    pub prediction: Prediction,
-    /// Standard deviations: material parameters, then the causes' in order, in their units.
-    pub sd: Vec<f64>,
-    /// Iterations made.
-    pub iterations: usize,
-}
-
-impl Fitted {
-    /// Number of fitted parameters.
-    pub fn num_parameters(&self) -> usize {
-        self.material.parameters().len() + self.causes.iter().map(|c| c.values.len()).sum::<usize>()
-    }
-
-    /// Standard deviations of cause `index`'s parameters.
-    pub fn sd_of(&self, index: usize) -> &[f64] {
-        let first =
-            self.material.parameters().len() + self.causes[..index].iter().map(|c| c.values.len()).sum::<usize>();
-        &self.sd[first..first + self.causes[index].values.len()]
-    }
-
-    /// The scene of the causes.
-    pub fn scene(&self) -> Scene {
-        scene_of(&self.causes)
-    }
-}
-
-/// The scene of some causes.
-pub fn scene_of(causes: &[Supposed]) -> Scene {
-    let mut scene = Scene::default();
-    for c in causes {
-        c.cause.apply(&c.values, &mut scene);
-    }
-    scene
-}
-
-/// Prior of a cause's parameter that says how big, in its scales: wide, there to keep the fit in bounds.
+/// Standard deviation of the prior of a cause's parameter around its start, in scales of the parameter. It is wide: it
+/// only keeps a fit in bounds where the data say nothing.
 const PRIOR_SCALES: f64 = 100.0;
 /// Differences for derivatives, in scales.
 pub const STEP: f64 = 0.02;
@@ -139,25 +37,6 @@ pub fn derivatives(
     Ok(columns)
 }
 
-/// A path of scenes, and whether it changes the sample.
-pub type Path<'a> = (Box<dyn Fn(f64) -> Scene + 'a>, bool);
-
-/// One path per parameter of the causes, in units of its scale.
-pub fn paths_of(causes: &[Supposed]) -> Vec<Path<'_>> {
-    let mut paths: Vec<Path> = Vec::new();
-    for (index, supposed) in causes.iter().enumerate() {
-        for (n, parameter) in supposed.cause.parameters().into_iter().enumerate() {
-            let path = move |t: f64| {
-                let mut moved = causes.to_vec();
-                moved[index].values[n] += t * parameter.scale;
-                scene_of(&moved)
-            };
-            paths.push((Box::new(path), supposed.cause.changes_sample()));
-        }
-    }
-    paths
-}
-
 /// Fits `material` and `causes` from where they are.
 ///
 /// # Errors
@@ -170,7 +49,7 @@ pub fn fit(
     causes: &[Supposed],
     settings: &FitSettings,
     is_cancelled: &dyn Fn() -> bool,
-) -> Result<Fitted, DiagnosisError> {
+) -> Result<CauseFit, DiagnosisError> {
     let own = material.parameters().len() + causes.iter().map(|c| c.values.len()).sum::<usize>();
     let member = Member {
         laboratory,
@@ -197,8 +76,8 @@ pub struct Member<'a, 'b> {
     pub causes: Vec<Supposed>,
     /// Priors; iterations and tolerance are those of the first member.
     pub settings: FitSettings,
-    /// Of each of its parameters (the material's, then the causes'): the parameter of the whole fit. Members that share one
-    /// have it at the same place; together the places are 0, 1, … without a gap.
+    /// Of each of its parameters (the material's, then the causes'): the parameter of the whole fit. Members that share
+    /// one have it at the same place; together the places are 0, 1, … without a gap.
     pub places: Vec<usize>,
 }
 
@@ -216,7 +95,8 @@ impl Point {
     }
 }
 
-/// Fits one material to all members, each with its own causes but for parameters that they share; one result per member.
+/// Fits one material to all members, each with its own causes but for parameters that they share; one result per
+/// member.
 ///
 /// # Errors
 /// As [`fit`].
@@ -224,7 +104,7 @@ pub fn fit_members(
     members: &mut [Member],
     material: &Ogden,
     is_cancelled: &dyn Fn() -> bool,
-) -> Result<Vec<Fitted>, DiagnosisError> {
+) -> Result<Vec<CauseFit>, DiagnosisError> {
     let Some(settings) = members.first().map(|m| m.settings) else { return Ok(Vec::new()) };
     let num = members.iter().flat_map(|m| &m.places).max().map_or(0, |last| last + 1);
     let causes: Vec<Vec<Supposed>> = members.iter().map(|m| m.causes.clone()).collect();
@@ -345,7 +225,7 @@ fn whole_system(members: &[Member], at: &Point, columns: &[Vec<Trace>], num: usi
     (matrix, gradient)
 }
 
-fn fitted_members(members: &[Member], at: Point, matrix: &DMatrix<f64>, iterations: usize) -> Vec<Fitted> {
+fn fitted_members(members: &[Member], at: Point, matrix: &DMatrix<f64>, iterations: usize) -> Vec<CauseFit> {
     let covariance = matrix.clone().try_inverse();
     let Point { material, causes, predictions, deviances } = at;
     members
@@ -362,7 +242,7 @@ fn fitted_members(members: &[Member], at: Point, matrix: &DMatrix<f64>, iteratio
                 })
                 .collect();
             let residual = m.measured.plus(-1.0, &prediction.trace);
-            Fitted { material: material.clone(), causes, deviance, residual, prediction, sd, iterations }
+            CauseFit { material: material.clone(), causes, deviance, residual, prediction, sd, iterations }
         })
         .collect()
 }
@@ -505,9 +385,4 @@ fn moved(members: &[Member], at: &Point, step: &DVector<f64>) -> (Ogden, Vec<Vec
 pub fn scales(material: &Ogden, causes: &[Supposed]) -> Vec<f64> {
     let of_material = material.parameters().into_iter().map(|p| material.value(p).abs());
     of_material.chain(causes.iter().flat_map(|c| c.cause.parameters()).map(|p| p.scale)).collect()
-}
-
-/// ½ Σ μᵢαᵢ, kPa.
-pub fn shear_modulus(material: &Ogden) -> f64 {
-    material.terms.iter().map(|t| 0.5 * t.mu_kpa * t.alpha).sum()
 }

@@ -1,22 +1,28 @@
 //! Causes as they are reported: names, words, parameters with intervals, places.
 
-use super::causes::{Category, Location};
+use super::cause::{Category, CauseName};
+use super::cause_fit::CauseFit;
 use super::experiment::Experiment;
-use super::fit::{Fitted, shear_modulus};
-use super::load_history::{FittedEffect, LoadEffect};
+use super::interval::{HALF_WIDTH, interval};
+use super::load_effect::FittedEffect;
+use super::location::Location;
 use crate::calibration::Observed;
+
+/// A parameter of a cause found: its name with the unit, its value and its 95 % interval (infinite where the data do
+/// not bound it).
+pub type FoundParameter = (String, f64, [f64; 2]);
 
 /// One cause found.
 #[derive(Clone)]
 pub struct FoundCause {
     /// Name.
-    pub name: &'static str,
+    pub name: CauseName,
     /// Kind.
     pub category: Category,
     /// In words.
     pub description: String,
     /// Parameters: name, value, 95 % interval.
-    pub parameters: Vec<(String, f64, [f64; 2])>,
+    pub parameters: Vec<FoundParameter>,
     /// Where, if somewhere.
     pub location: Option<Location>,
     /// Fall of the deviance.
@@ -25,146 +31,96 @@ pub struct FoundCause {
     pub effect_rms_mm: f64,
     /// Of an alternative: further steps that would tell it apart, most telling first.
     pub experiments: Vec<Experiment>,
+    /// Where its parameters come from.
+    pub(super) source: Source,
+}
+
+/// Where the parameters of a found cause come from.
+#[derive(Clone, Copy)]
+pub(super) enum Source {
+    /// From the load curve: no later fit changes them.
+    LoadCurve,
+    /// From the cause at this place of the fit.
+    Fit(usize),
+    /// From the fitted material.
+    Material(fn(&CauseFit) -> Vec<FoundParameter>),
 }
 
 impl FoundCause {
-    /// Takes parameters and place from the last fit, all causes together. What the load curve told stays.
-    pub(super) fn refresh(&mut self, fitted: &Fitted, observed: &Observed) {
-        if let Some(index) = fitted.causes.iter().position(|c| c.cause.description() == self.description) {
-            let fresh = found_cause(fitted, index, observed, 0.0, 0.0);
-            (self.parameters, self.location) = (fresh.parameters, fresh.location);
-        } else if self.name == "compressibility" {
-            self.parameters = vec![bulk_ratio(fitted)];
-        } else if self.name == "terms" {
-            for (name, value, interval) in &mut self.parameters {
-                let known = fitted.material.parameters().into_iter().zip(&fitted.sd).find(|(p, _)| p.name() == *name);
-                if let Some((p, sd)) = known {
-                    *value = fitted.material.value(p);
-                    *interval = [*value - 1.96 * sd, *value + 1.96 * sd];
+    /// The cause at place `index` of a fit.
+    pub(super) fn of_fit(fitted: &CauseFit, index: usize, observed: &Observed) -> FoundCause {
+        let supposed = &fitted.causes[index];
+        let parameters = supposed
+            .cause
+            .parameters()
+            .iter()
+            .zip(supposed.values.iter().zip(fitted.sd_of(index)))
+            .map(|(p, (value, sd))| {
+                // Wider than the parameter's range, as of a patch's edge beyond the face's own: the data say nothing of
+                // it.
+                let sd = if HALF_WIDTH * sd > p.range[1] - p.range[0] { f64::INFINITY } else { *sd };
+                (p.name.clone(), *value, interval(*value, sd))
+            })
+            .collect();
+        FoundCause {
+            name: supposed.cause.name(),
+            category: supposed.cause.category(),
+            description: supposed.cause.description(),
+            parameters,
+            location: supposed.cause.location(&supposed.values, &observed.specimen),
+            evidence: 0.0,
+            effect_rms_mm: 0.0,
+            experiments: Vec::new(),
+            source: Source::Fit(index),
+        }
+    }
+
+    /// The causes of a load curve's effects. Effects of one name are one cause with the parameters of all of them.
+    pub(super) fn of_load_curve(effects: &[FittedEffect]) -> Vec<FoundCause> {
+        let mut causes: Vec<FoundCause> = Vec::new();
+        for fitted in effects {
+            let parameters = fitted.names.iter().zip(fitted.values.iter().zip(&fitted.sd)).map(|(n, (value, sd))| {
+                let is_numbered = fitted.effect.max_count() > 1;
+                let name = if is_numbered { format!("{n}_{}", fitted.ordinal + 1) } else { (*n).to_string() };
+                (name, *value, interval(*value, *sd))
+            });
+            let name = fitted.effect.name();
+            match causes.iter_mut().find(|c| c.name == name) {
+                Some(c) => {
+                    c.parameters.extend(parameters);
+                    c.evidence += fitted.gained;
                 }
+                None => causes.push(FoundCause {
+                    name,
+                    category: fitted.effect.category(),
+                    description: fitted.effect.description().into(),
+                    parameters: parameters.collect(),
+                    location: None,
+                    evidence: fitted.gained,
+                    effect_rms_mm: 0.0,
+                    experiments: Vec::new(),
+                    source: Source::LoadCurve,
+                }),
             }
         }
+        causes
     }
-}
 
-/// κ over the shear modulus, with its interval.
-fn bulk_ratio(fitted: &Fitted) -> (String, f64, [f64; 2]) {
-    let ratio = fitted.material.bulk_kpa / shear_modulus(&fitted.material);
-    // κ is fitted by its logarithm.
-    let spread = (1.96 * fitted.sd[0] / fitted.material.bulk_kpa).exp();
-    ("bulk_over_shear_modulus".into(), ratio, [ratio / spread, ratio * spread])
-}
-
-pub(super) fn found_cause(
-    fitted: &Fitted,
-    index: usize,
-    observed: &Observed,
-    evidence: f64,
-    effect_rms_mm: f64,
-) -> FoundCause {
-    let supposed = &fitted.causes[index];
-    let parameters = supposed
-        .cause
-        .parameters()
-        .iter()
-        .zip(supposed.values.iter().zip(fitted.sd_of(index)))
-        .map(|(p, (value, sd))| {
-            // Wider than what the parameter can be, as of a patch's edge beyond the face's own: the data say nothing of it.
-            let sd = if 1.96 * sd > p.range[1] - p.range[0] { f64::INFINITY } else { *sd };
-            (p.name.clone(), *value, [value - 1.96 * sd, value + 1.96 * sd])
-        })
-        .collect();
-    FoundCause {
-        name: supposed.cause.name(),
-        category: supposed.cause.category(),
-        description: supposed.cause.description(),
-        parameters,
-        location: supposed.cause.location(&supposed.values, &observed.specimen),
-        evidence,
-        effect_rms_mm,
-        experiments: Vec::new(),
+    /// The same with its evidence and the displacement that it explains, mm rms.
+    pub(super) fn with_evidence(mut self, evidence: f64, effect_rms_mm: f64) -> FoundCause {
+        (self.evidence, self.effect_rms_mm) = (evidence, effect_rms_mm);
+        self
     }
-}
 
-/// The cause that κ was far below the believed one.
-pub(super) fn compressible(free: &Fitted, stiff: &Fitted, evidence: f64) -> FoundCause {
-    FoundCause {
-        name: "compressibility",
-        category: Category::Material,
-        description: "the material is compressible, far from a rubber".into(),
-        parameters: vec![bulk_ratio(free)],
-        location: None,
-        evidence,
-        effect_rms_mm: free.prediction.trace.plus(-1.0, &stiff.prediction.trace).rms_mm(),
-        experiments: Vec::new(),
-    }
-}
-
-/// The cause that the material has more Ogden terms than believed.
-pub(super) fn terms(richer: &Fitted, before: &Fitted, evidence: f64) -> FoundCause {
-    let parameters = richer
-        .material
-        .parameters()
-        .into_iter()
-        .zip(&richer.sd)
-        .filter(|(p, _)| !before.material.parameters().contains(p))
-        .map(|(p, sd)| {
-            let value = richer.material.value(p);
-            (p.name(), value, [value - 1.96 * sd, value + 1.96 * sd])
-        })
-        .collect();
-    FoundCause {
-        name: "terms",
-        category: Category::Material,
-        description: "the material needs a further Ogden term".into(),
-        parameters,
-        location: None,
-        evidence,
-        effect_rms_mm: richer.prediction.trace.plus(-1.0, &before.prediction.trace).rms_mm(),
-        experiments: Vec::new(),
-    }
-}
-
-/// Causes of a load curve's effects; relaxations are one.
-pub(super) fn load_causes(effects: &[FittedEffect]) -> Vec<FoundCause> {
-    let mut causes: Vec<FoundCause> = Vec::new();
-    for e in effects {
-        let (name, category, description, names): (_, _, &str, &[&str]) = match e.effect {
-            LoadEffect::Relaxation => {
-                ("relaxation", Category::Material, "the material relaxes under load", &["g", "tau_s"])
+    /// Takes parameters and place from the last fit, all causes together. What the load curve told stays.
+    pub(super) fn refresh(&mut self, fitted: &CauseFit, observed: &Observed) {
+        match self.source {
+            Source::LoadCurve => {}
+            Source::Fit(index) => {
+                let fresh = FoundCause::of_fit(fitted, index, observed);
+                (self.parameters, self.location) = (fresh.parameters, fresh.location);
             }
-            LoadEffect::Mullins => (
-                "mullins",
-                Category::Material,
-                "the material softens with its largest load",
-                &["rho", "m_over_largest_work"],
-            ),
-            LoadEffect::Offset => ("cell", Category::Load, "the load cell does not read zero at rest", &["offset_n"]),
-            LoadEffect::Friction => {
-                ("cell", Category::Load, "friction adds to the force in the direction of motion", &["friction_n"])
-            }
-        };
-        let count = effects.iter().take_while(|o| !std::ptr::eq(*o, e)).filter(|o| o.effect == e.effect).count();
-        let parameters = names.iter().zip(e.values.iter().zip(&e.sd)).map(|(n, (value, sd))| {
-            let name = if e.effect == LoadEffect::Relaxation { format!("{n}_{}", count + 1) } else { (*n).to_string() };
-            (name, *value, [value - 1.96 * sd, value + 1.96 * sd])
-        });
-        match causes.iter_mut().find(|c| c.name == name) {
-            Some(c) => {
-                c.parameters.extend(parameters);
-                c.evidence += e.gained;
-            }
-            None => causes.push(FoundCause {
-                name,
-                category,
-                description: description.into(),
-                parameters: parameters.collect(),
-                location: None,
-                evidence: e.gained,
-                effect_rms_mm: 0.0,
-                experiments: Vec::new(),
-            }),
+            Source::Material(parameters) => self.parameters = parameters(fitted),
         }
     }
-    causes
 }

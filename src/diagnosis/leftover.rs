@@ -1,6 +1,6 @@
 //! What a fit leaves of a recording.
 
-use super::causes::Location;
+use super::location::Location;
 use super::metric::Metric;
 use super::trace::Trace;
 use crate::calibration::Observed;

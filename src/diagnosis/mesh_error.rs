@@ -1,33 +1,43 @@
-//! What meshes and soft edges do to estimates: fits are corrected by a finer mesh's prediction, and the shifts that other meshes
-//! and wider edges of a cause make are added to the standard deviations.
+//! What meshes and soft edges do to estimates.
 //!
-//! Noise alone gives intervals that are far too narrow: 20,000 voxels average it out, and what is left is the error of the mesh,
-//! ours and that of whoever made synthetic data. The prediction of another mesh differs from ours by a multiple of our error;
-//! fitted as if it were a misfit, to first order, it says how far our error moves each parameter.
+//! Noise alone gives intervals that are far too narrow: 20,000 voxels average it out. What is left is the error of the
+//! mesh, of ours and, where data are synthetic, of the mesh that they come from. Two things are done about it:
+//!
+//! * A fit is corrected by the prediction of a finer mesh ([`Finer`]).
+//! * The standard deviations are widened by the shifts that other meshes make ([`widen`]). The prediction of another
+//!   mesh differs from ours by a multiple of our error. Fitted as if it were a misfit, to first order, this difference
+//!   says how far our error moves each parameter. Causes with a soft edge are widened likewise by the shift that an
+//!   edge twice as wide makes.
 
+use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
-use super::fit::{FitSettings, Fitted, derivatives, fit, normal_matrix, scales};
+use super::fit::{derivatives, fit, normal_matrix, scales};
 use super::laboratory::Laboratory;
 use super::metric::Metric;
+use super::prior::FitSettings;
 use super::scene::Scene;
 use super::trace::Trace;
 use crate::calibration::Observed;
 use crate::mesh::MeshOptions;
 use nalgebra::DVector;
 
-/// Element size of the finer mesh as a factor on ours, and the finest it is made, as a factor on the standard one: beyond, the
-/// error is smaller than what a recording shows.
+/// Element size of the finer mesh as a factor on ours.
 const FINER: f64 = 0.6;
+/// The smallest element size of the finer mesh, as a factor on the standard one. The error of a mesh that fine is
+/// smaller than what a recording shows.
 const FINEST: f64 = 0.45;
-/// With a factor nearer to one than this a finer mesh says nothing.
+/// A finer mesh whose element size is closer to ours than this factor says nothing about our error.
 const HARDLY_FINER: f64 = 0.9;
-/// Other meshes: element size as a factor on ours, and whether they are of prisms. Where ours is of hexahedra these err in another
-/// pattern: a parameter that ours leaves alone by its symmetry is not thought free of error. One alone may shift a parameter by
-/// little where it happens to err as ours does; the mean square of all counts.
+/// Other meshes: element size as a factor on ours, and whether they are of prisms. Prisms err in another pattern than
+/// hexahedra, so that a parameter which hexahedra leave alone for their symmetry is not taken to be free of error. A
+/// single mesh may shift a parameter by little because it happens to err as ours does; therefore the mean square over
+/// all meshes counts.
 const COARSER: [(f64, bool); 3] = [(1.25, false), (1.6, false), (1.6, true)];
 /// The order of convergence that singular edges leave.
 const ORDER: f64 = 1.4;
-/// Standard deviation over the shift to an edge twice as wide: an edge is anything from sharp to that, evenly.
+/// Standard deviation of a parameter as a part of its shift when the edge is made twice as wide. The true edge may have
+/// any width from sharp to twice ours, each as likely as another: the standard deviation of an even distribution is
+/// 1/√12 of its range, which is two such shifts wide.
 const SD_OVER_EDGE: f64 = 0.58;
 
 /// The finer mesh of a recording, on which what was found with ours is corrected.
@@ -46,6 +56,13 @@ pub struct MeshDefect {
     pub ratio: f64,
 }
 
+impl MeshDefect {
+    /// What the mesh of the diagnosis would have shown of a recording, were it not for its own error.
+    pub fn taken_off(&self, recorded: &Trace) -> Trace {
+        recorded.plus(-1.0, &self.trace)
+    }
+}
+
 impl<'a> Finer<'a> {
     /// `None` where ours is fine already, or the finer one cannot be meshed.
     pub fn new(observed: &'a Observed, mesh_factor: f64) -> Option<Finer<'a>> {
@@ -57,9 +74,9 @@ impl<'a> Finer<'a> {
         Laboratory::new(observed, &mesh).ok().map(|laboratory| Finer { laboratory, ratio })
     }
 
-    /// Corrects a fit by the finer mesh's prediction (deferred correction: what the finer mesh predicts beyond ours is taken off
-    /// the measured, and the fit repeated on ours from where it ended). `fitted.residual` is then against the finer mesh to first
-    /// order.
+    /// Corrects a fit by the finer mesh's prediction (deferred correction: what the finer mesh predicts beyond ours is
+    /// taken off the measured, and the fit repeated on ours from where it ended). `fitted.residual` is then against the
+    /// finer mesh to first order.
     ///
     /// # Errors
     /// [`DiagnosisError`]: the finer model has no equilibrium, or the work was cancelled.
@@ -69,11 +86,11 @@ impl<'a> Finer<'a> {
         metric: &Metric,
         measured: &Trace,
         settings: &FitSettings,
-        fitted: &mut Fitted,
+        fitted: &mut CauseFit,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<MeshDefect, DiagnosisError> {
         let defect = self.defect(fitted, is_cancelled)?;
-        let seen = measured.plus(-1.0, &defect.trace);
+        let seen = defect.taken_off(measured);
         *fitted = fit(laboratory, metric, &seen, &fitted.material, &fitted.causes, settings, is_cancelled)?;
         Ok(defect)
     }
@@ -82,14 +99,14 @@ impl<'a> Finer<'a> {
     ///
     /// # Errors
     /// As [`Self::correct`].
-    pub fn defect(&mut self, fitted: &Fitted, is_cancelled: &dyn Fn() -> bool) -> Result<MeshDefect, DiagnosisError> {
+    pub fn defect(&mut self, fitted: &CauseFit, is_cancelled: &dyn Fn() -> bool) -> Result<MeshDefect, DiagnosisError> {
         let theirs = self.laboratory.predict(&fitted.material, &fitted.scene(), is_cancelled)?;
         Ok(MeshDefect { trace: theirs.trace.plus(-1.0, &fitted.prediction.trace), ratio: self.ratio })
     }
 }
 
-/// Adds the meshes' share to the standard deviations of `fitted`, found by `laboratory` on a mesh of `mesh_factor` and corrected
-/// by `defect`.
+/// Adds the meshes' share to the standard deviations of `fitted`, found by `laboratory` on a mesh of `mesh_factor` and
+/// corrected by `defect`.
 ///
 /// # Errors
 /// [`DiagnosisError`]: the coarser model has no equilibrium, or the work was cancelled.
@@ -98,7 +115,7 @@ pub fn widen(
     mesh_factor: f64,
     metric: &Metric,
     settings: &FitSettings,
-    fitted: &mut Fitted,
+    fitted: &mut CauseFit,
     defect: Option<&MeshDefect>,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<(), DiagnosisError> {
@@ -111,21 +128,21 @@ pub fn widen(
         let change = metric.weigh(change);
         factor.solve(&DVector::from_iterator(weighed.len(), weighed.iter().map(|c| metric.inner(c, &change))))
     };
-    // By every other mesh, what the error of ours does.
+    // The shift by the error of our mesh, as each of the other meshes tells it.
     let mut shifts = Vec::new();
     for (coarser, force_prisms) in COARSER {
         let mesh = MeshOptions { force_prisms, ..MeshOptions::scaled(&observed.specimen, coarser * mesh_factor) };
         let theirs = Laboratory::new(observed, &mesh)?.predict(&fitted.material, &fitted.scene(), is_cancelled)?;
         shifts.push(shift_by(&fitted.prediction.trace.plus(-1.0, &theirs.trace)) / (coarser.powf(ORDER) - 1.0));
     }
-    // What a correction by the finer mesh leaves of it.
+    // The part of that error which the correction by the finer mesh leaves.
     let left = defect.map_or(1.0, |d| d.ratio.powf(ORDER));
     shifts.extend(defect.map(|d| shift_by(&d.trace) / (1.0 - left)));
     let mut square = DVector::<f64>::zeros(weighed.len());
     for shift in &shifts {
         square += shift.component_mul(shift) / shifts.len() as f64;
     }
-    // Data that come from a mesh have an error like that of ours, and it is not known whose they are.
+    // The data may come from a mesh, whose error is then like that of ours; it is not known whether they do.
     square *= 1.0 + left * left;
     let mut wider = Scene::default();
     let mut has_edge = false;

@@ -1,6 +1,8 @@
 use super::*;
-use crate::diagnosis::causes::registry;
-use crate::diagnosis::fit::{BulkPrior, Supposed};
+use crate::diagnosis::cause::CauseName;
+use crate::diagnosis::prior::BulkPrior;
+use crate::diagnosis::registry::Registry;
+use crate::diagnosis::supposed::Supposed;
 use crate::material::Ogden;
 use crate::recording::{Filter, RecordedStep, Recording};
 use crate::specimen::Specimen;
@@ -31,8 +33,8 @@ fn observed(mut specimen: Specimen, voxel_mm: [f64; 3]) -> Observed {
     Observed::new(&recording, 0.02).unwrap()
 }
 
-/// Shrinkage that a mesh twice as fine shows is found on a coarse one; the coarse fit is off by the mesh, the corrected one by
-/// less than half of that, and the wider interval holds the truth.
+/// Shrinkage that a mesh twice as fine shows is found on a coarse one; the coarse fit is off by the mesh, the corrected
+/// one by less than half of that, and the wider interval holds the truth.
 #[test]
 fn a_finer_mesh_corrects_estimates() {
     let never = || false;
@@ -54,7 +56,11 @@ fn a_finer_mesh_corrects_estimates() {
         shear: None,
         tolerance: 1e-3,
     };
-    let swelling = registry(&observed.specimen).into_iter().find(|c| c.name() == "swelling").unwrap();
+    let swelling = Registry::standard()
+        .tested(&observed.specimen)
+        .into_iter()
+        .find(|c| c.name() == CauseName::new("swelling"))
+        .unwrap();
     let supposed = [Supposed { cause: swelling, values: vec![0.0] }];
     let mut fitted = fit(&mut laboratory, &metric, &measured, &material, &supposed, &settings, &never).unwrap();
     let before = fitted.causes[0].values[0] - truth;
@@ -68,7 +74,8 @@ fn a_finer_mesh_corrects_estimates() {
     widen(&mut laboratory, mesh_factor, &metric, &settings, &mut fitted, Some(&defect), &never).unwrap();
     let wider = fitted.sd_of(0)[0];
     assert!(wider > noise && after.abs() < 1.96 * wider, "{noise} {wider} {after}");
-    // Not everything fits into it: shrinkage of 1.2 % is told from none by five standard deviations, on this coarse mesh.
+    // Not everything fits into it: shrinkage of 1.2 % is told from none by five standard deviations, on this coarse
+    // mesh.
     assert!(wider < 0.2 * truth.abs(), "{wider}");
 }
 

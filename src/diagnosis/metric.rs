@@ -1,10 +1,10 @@
-//! What a misfit weighs: noise, and what neither our mesh nor anybody's resolves.
+//! What a misfit weighs: the covariance of the data, which is noise and an allowance for what no mesh resolves.
 //!
-//! The covariance of a trace is C = N + B S Bᵀ. N is the scan's noise, independent per voxel and component (inflated by the
-//! filter's correlation). B S Bᵀ is the discretisation allowance: smooth displacement errors in proportion to the drive, as
-//! means over boxes of several sizes, larger at the ends where bonded edges are singular. A misfit thus counts by its pattern
-//! and size: patterns below the allowance are not evidence, however many voxels show them. C⁻¹ is applied by the
-//! Sherman–Morrison–Woodbury formula. (A discrepancy term in the sense of Kennedy and O'Hagan 2001.)
+//! The covariance of a trace is C = N + B S Bᵀ. N is the scan's noise, independent per voxel and component (inflated by
+//! the filter's correlation). B S Bᵀ is the discretisation allowance: smooth displacement errors in proportion to the
+//! drive, as means over boxes of several sizes, larger at the ends where bonded edges are singular. A misfit thus
+//! counts by its pattern and size: patterns below the allowance are not evidence, however many voxels show them. C⁻¹ is
+//! applied by the Sherman–Morrison–Woodbury formula. (A discrepancy term in the sense of Kennedy and O'Hagan 2001.)
 //!
 //! Forces: the load cell's drift, and an allowance that is common to all drives and a smaller one of each.
 
@@ -48,7 +48,8 @@ pub struct Weighed {
 }
 
 impl Metric {
-    /// For `observed`, with an allowance of `allowance_mm` (rms, at the largest drive) and the voxels for which `is_kept`.
+    /// For `observed`, with an allowance of `allowance_mm` (rms, at the largest drive) and the voxels for which
+    /// `is_kept`.
     pub fn new(observed: &Observed, allowance_mm: f64, is_kept: &dyn Fn(usize) -> bool) -> Metric {
         let mask = &observed.mask;
         let b = observed.specimen.block;

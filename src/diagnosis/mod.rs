@@ -1,43 +1,89 @@
 //! Diagnosis: where a recording and its nominal model differ, and what physics was left out.
 //!
-//! * [`diagnose()`] fits the nominal model, tests every cause of the registry ([`causes`]) to first order, fits the leading ones
-//!   in full with the material free, adds them one by one, and predicts data that were kept back.
-//! * A misfit counts by its pattern and size: noise and what meshes leave are in its weights.
+//! * [`diagnose()`] runs the stages of a diagnosis, each in a file of its own: it fits the nominal model, reads the
+//!   load curve, corrects the mesh, questions the material, takes artefacts out of the image, adds causes round by
+//!   round, and predicts data kept back.
+//! * A *cause* changes a [`Scene`]; the [`Laboratory`] predicts what would be recorded of a scene, and how that changes
+//!   with it.
+//! * A misfit counts by its pattern and size: noise and what meshes may leave are in its weights ([`Metric`]).
+//! * [`together()`] looks at several diagnosed recordings.
+//!
+//! A new cause is a file in `causes` and a line in the registry there.
 
-pub mod causes;
+mod balls;
+mod candidate;
+mod cause;
+mod cause_fit;
+mod causes;
+mod conclusion;
 mod diagnose;
+mod division;
+mod elastic_table;
+mod entry;
 mod error;
+mod evidence;
 mod experiment;
 mod fibre_map;
+mod findings;
 mod fit;
 mod found;
+mod further_term;
+mod inference;
+mod interval;
+mod jumps;
 mod laboratory;
 mod leftover;
+mod load_curve;
+mod load_effect;
 mod load_history;
+mod load_problem;
+mod location;
 mod maps;
+mod material_cause;
 mod memory_kernel;
 mod mesh_error;
 mod metric;
+mod nominal;
+mod options;
+mod outcome;
+mod prior;
+mod ranked;
+mod registry;
 mod result;
+mod rounds;
 mod scene;
 mod score;
+mod score_round;
+mod search;
+mod supposed;
+#[cfg(test)]
+mod test_recordings;
 mod together;
 mod trace;
-mod work;
 
-pub use diagnose::{Diagnosis, DiagnosisOptions, Ranked, Verdict, diagnose, scene_of_fit};
+pub use crate::rate::{BeforeAfter, Verdict};
+pub use cause::{Category, Cause, CauseIdentity, CauseName, CauseParameter, Course};
+pub use cause_fit::CauseFit;
+pub use diagnose::diagnose;
+pub use division::Division;
 pub use error::DiagnosisError;
 pub use experiment::Experiment;
-pub use fit::{BulkPrior, FitSettings, Fitted, Member, Supposed, fit, fit_members, shear_modulus};
-pub use found::FoundCause;
+pub use found::{FoundCause, FoundParameter};
 pub use laboratory::{Laboratory, Prediction};
 pub use leftover::Leftover;
-pub use load_history::{ElasticTable, FittedEffect, LoadEffect, LoadHistoryFit, fit_load_history};
-pub use maps::{Division, ScoreMap};
-pub use memory_kernel::{KernelState, MemoryKernel};
+pub use load_effect::{EffectParameter, FittedEffect, ForceChange, LoadEffect, LoadReadings};
+pub use load_history::LoadHistoryFit;
+pub use location::Location;
+pub use maps::ScoreMap;
+pub use mesh_error::MeshDefect;
 pub use metric::Metric;
-pub use result::{BeforeAfter, CauseResult, DiagnosisResult, ModulusAgainstBelief, ParameterResult, RankedResult};
+pub use options::DiagnosisOptions;
+pub use outcome::Diagnosis;
+pub use prior::{BulkPrior, FitSettings, ShearPrior};
+pub use ranked::Ranked;
+pub use registry::cause_names;
+pub use result::{CauseResult, DiagnosisResult, ModulusAgainstBelief, ParameterResult, RankedResult};
 pub use scene::{ImageChange, Jump, Scene};
-pub use score::{Score, ScoreTest};
+pub use supposed::Supposed;
 pub use together::{Agreement, CommonCause, CrossPrediction, TogetherResult, together};
 pub use trace::Trace;

@@ -1,11 +1,15 @@
 //! The result of a diagnosis (`diagnosis/1`).
 
-use super::causes::{Category, Location};
-use super::diagnose::{Diagnosis, Verdict};
+use super::cause::Category;
+use super::cause_fit::CauseFit;
 use super::experiment::Experiment;
-use super::fit::{Fitted, shear_modulus};
 use super::found::FoundCause;
+use super::interval::{interval, log_interval};
+use super::location::Location;
+use super::outcome::Diagnosis;
+use super::prior::shear_modulus;
 use crate::material::{Ogden, Parameter};
+use crate::rate::{BeforeAfter, Verdict};
 use serde::{Deserialize, Serialize};
 
 /// A number with its 95 % interval.
@@ -43,8 +47,8 @@ pub struct CauseResult {
     pub experiments: Vec<Experiment>,
 }
 
-/// A sample stiffer or softer than believed. A load cell that reads too much or too little would look the same: displacements know
-/// ratios of moduli, not their size.
+/// A sample stiffer or softer than believed. A load cell that reads too much or too little would look the same:
+/// displacements know ratios of moduli, not their size.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModulusAgainstBelief {
@@ -86,16 +90,6 @@ impl ModulusAgainstBelief {
     }
 }
 
-/// A number before and after.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct BeforeAfter {
-    /// Nominal model.
-    pub before: f64,
-    /// With the causes.
-    pub after: f64,
-}
-
 /// A cause that was tested.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -133,8 +127,8 @@ pub struct DiagnosisResult {
     pub modulus_against_belief: Option<ModulusAgainstBelief>,
     /// Causes, most telling first.
     pub causes: Vec<CauseResult>,
-    /// What the data cannot tell apart from the last cause; where the verdict is unexplained, what was tried and explains less
-    /// than half.
+    /// What the data cannot tell apart from the last cause; where the verdict is unexplained, what was tried and
+    /// explains less than half.
     pub alternatives: Vec<CauseResult>,
     /// χ² of the displacement per datum.
     pub chi2_per_datum: BeforeAfter,
@@ -189,7 +183,7 @@ impl DiagnosisResult {
                 .iter()
                 .map(|r| RankedResult {
                     round: r.round,
-                    name: r.name.clone(),
+                    name: r.identity.name.as_str().into(),
                     description: r.description.clone(),
                     score: r.score,
                     fitted: r.fitted,
@@ -208,7 +202,7 @@ impl DiagnosisResult {
 
 fn cause(c: &FoundCause) -> CauseResult {
     CauseResult {
-        name: c.name.into(),
+        name: c.name.as_str().into(),
         category: c.category,
         description: c.description.clone(),
         parameters: c.parameters.iter().map(|(name, value, interval)| parameter(name, *value, *interval)).collect(),
@@ -224,7 +218,7 @@ pub(super) fn parameter(name: &str, value: f64, interval: [f64; 2]) -> Parameter
     ParameterResult { name: name.into(), value, interval_95: is_bounded.then_some(interval) }
 }
 
-pub(super) fn material_parameters(fitted: &Fitted) -> Vec<ParameterResult> {
+pub(super) fn material_parameters(fitted: &CauseFit) -> Vec<ParameterResult> {
     fitted
         .material
         .parameters()
@@ -232,13 +226,9 @@ pub(super) fn material_parameters(fitted: &Fitted) -> Vec<ParameterResult> {
         .zip(&fitted.sd)
         .map(|(p, sd)| {
             let value = fitted.material.value(p);
-            let interval = if p == Parameter::Kappa {
-                // κ is fitted by its logarithm.
-                let spread = (1.96 * sd / value).exp();
-                [value / spread, value * spread]
-            } else {
-                [value - 1.96 * sd, value + 1.96 * sd]
-            };
+            // κ is fitted by its logarithm.
+            let is_logarithm = p == Parameter::Kappa;
+            let interval = if is_logarithm { log_interval(value, value, *sd) } else { interval(value, *sd) };
             parameter(&p.name(), value, interval)
         })
         .collect()

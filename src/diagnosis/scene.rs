@@ -1,4 +1,4 @@
-//! A scene: the experiment as it may really have been, the nominal one where nothing is changed.
+//! A scene: the experiment as it may really have been. The default scene is the nominal experiment.
 
 use crate::fem::{Departures, FIRM_BOND_KPA_PER_MM, Fibre, Field, PlateMotion};
 use crate::specimen::Specimen;
@@ -18,7 +18,8 @@ pub struct Scene {
     pub plates: [PlateMotion; 2],
     /// Real minus commanded drive per newton of the measured force, mm/N.
     pub compliance_mm_per_n: f64,
-    /// How loose the bond is on the fixed and the moved face: 0 firm, 1 gone; the loosest counts.
+    /// How loose the bond is on the fixed and the moved face, from 0 (firm) to 1 (gone). Where several fields overlap,
+    /// the loosest counts.
     pub looseness: [Vec<Field>; 2],
     /// Compliance of the whole bond, fixed and moved face, mm/kPa.
     pub bond_mm_per_kpa: [f64; 2],
@@ -59,8 +60,8 @@ pub struct Jump {
 }
 
 impl Scene {
-    /// The departures at a step where `force_n` was measured; `bond_scale_kpa_per_mm` is the stiffness of the sample under
-    /// its bond, against which a bond is loose or firm; the bonded faces lie across `face_axis`.
+    /// The departures at a step where `force_n` was measured; `bond_scale_kpa_per_mm` is the stiffness of the sample
+    /// under its bond, against which a bond is loose or firm; the bonded faces lie across `face_axis`.
     pub fn departures(&self, force_n: f64, bond_scale_kpa_per_mm: f64, face_axis: usize) -> Departures {
         let product = self.stiffness.clone();
         let stiffness_factor = (!product.is_empty())

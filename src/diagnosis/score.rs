@@ -1,4 +1,8 @@
-//! Score tests: how much of a misfit a cause would explain, to first order, with the material free.
+//! Score tests: how much of a misfit a cause would explain, to first order, with the material free to follow.
+//!
+//! A *direction* is the change of the prediction with one parameter. Directions of the parameters that are free in any
+//! case (the material's and those of the causes found so far) are a *nuisance*: what they can explain is no evidence
+//! for anything else.
 
 use super::metric::{Metric, Weighed};
 use super::trace::Trace;
@@ -11,8 +15,6 @@ pub struct Score {
     pub explained: f64,
     /// Best coefficients of the directions.
     pub coefficients: Vec<f64>,
-    /// Root mean square of the displacement explained, mm.
-    pub rms_mm: f64,
 }
 
 /// A residual and nuisance directions (the material's), against which directions are tested.
@@ -61,11 +63,7 @@ impl<'a> ScoreTest<'a> {
     pub fn test(&self, directions: &[Trace]) -> Score {
         let prepared = self.prepare(directions);
         let (explained, coefficients) = prepared.solve();
-        let mut sum = directions.first().map(|d| d.scaled(0.0)).unwrap_or_default();
-        for (d, c) in directions.iter().zip(&coefficients) {
-            sum = sum.plus(*c, d);
-        }
-        Score { explained, rms_mm: sum.rms_mm(), coefficients }
+        Score { explained, coefficients }
     }
 }
 

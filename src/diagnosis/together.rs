@@ -1,18 +1,24 @@
-//! Several recordings together: does one material serve them all, do causes named in each have the same size, and does what one
-//! recording taught predict the others?
+//! Several recordings together: does one material serve them all, do causes named in each have the same size, and does
+//! what one recording taught predict the others?
 
-use super::causes::Category;
-use super::diagnose::Diagnosis;
+use super::cause::Category;
+use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
-use super::fit::{BulkPrior, FitSettings, Fitted, Member, Supposed, fit_members, scene_of};
+use super::evidence::EVIDENCE;
+use super::fit::{Member, fit_members};
+use super::interval::interval;
 use super::laboratory::{Laboratory, Prediction};
+use super::load_curve::take_off_effects;
 use super::mesh_error::widen;
 use super::metric::Metric;
-use super::result::{BeforeAfter, ParameterResult, material_parameters, parameter};
+use super::outcome::Diagnosis;
+use super::prior::{BulkPrior, FitSettings, ShearPrior};
+use super::result::{ParameterResult, material_parameters, parameter};
+use super::supposed::{Supposed, scene_of};
 use super::trace::Trace;
-use super::work::EVIDENCE;
 use crate::material::Ogden;
 use crate::mesh::MeshOptions;
+use crate::rate::BeforeAfter;
 use serde::{Deserialize, Serialize};
 
 /// A supposition that saves parameters, against every recording for itself.
@@ -51,8 +57,8 @@ pub struct CrossPrediction {
     pub from: String,
     /// The recording that is predicted; `from` itself is what its own fit leaves.
     pub to: String,
-    /// Misfit, mm rms over all drives, noise included: by the nominal material; with the causes too. Null where that model has no
-    /// equilibrium.
+    /// Misfit, mm rms over all drives, noise included: by the nominal material; with the causes too. Null where that
+    /// model has no equilibrium.
     pub displacement_rms_mm: Option<BeforeAfter>,
     /// Largest misfit of a force relative to it; null where there is none.
     pub force_relative: Option<BeforeAfter>,
@@ -83,6 +89,21 @@ struct Case<'a> {
     measured: Trace,
 }
 
+impl<'a> Case<'a> {
+    fn new(name: &'a str, found: &'a Diagnosis, mesh_factor: f64) -> Result<Case<'a>, DiagnosisError> {
+        let mesh = MeshOptions::scaled(&found.observed.specimen, mesh_factor);
+        let laboratory = Laboratory::new(&found.observed, &mesh)?;
+        let mut measured = laboratory.measured();
+        // As in the diagnosis: what the load curve explained is taken off, and what the mesh gets wrong.
+        take_off_effects(&mut measured, found.load.as_ref());
+        if let Some(defect) = &found.mesh_defect {
+            measured = defect.taken_off(&measured);
+        }
+        let metric = Metric::new(&found.observed, found.allowance_mm, &|_| true);
+        Ok(Case { name, found, laboratory, metric, measured })
+    }
+}
+
 /// Looks at diagnosed recordings together: at least two.
 ///
 /// # Errors
@@ -93,90 +114,31 @@ pub fn together(
     progress: &dyn Fn(&str),
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<TogetherResult, DiagnosisError> {
-    if diagnoses.len() < 2 {
+    // The richest material serves all, or none does.
+    let start = diagnoses.iter().map(|(_, d)| &d.corrected.material).max_by_key(|m| m.terms.len());
+    let Some(start) = start.filter(|_| diagnoses.len() >= 2) else {
         return Err(DiagnosisError::Setting {
             name: "the number of recordings",
             value: diagnoses.len() as f64,
             requirement: "at least two, to be looked at together",
         });
-    }
-    let mut cases = Vec::new();
-    for &(name, found) in diagnoses {
-        let mesh = MeshOptions::scaled(&found.observed.specimen, mesh_factor);
-        let laboratory = Laboratory::new(&found.observed, &mesh)?;
-        let mut measured = laboratory.measured();
-        // As in the diagnosis: what the load curve explained is taken off.
-        if let Some(load) = found.load.as_ref().filter(|l| !l.effects.is_empty()) {
-            for (force, excess) in measured.force.iter_mut().zip(&load.window_excess_n) {
-                *force -= excess;
-            }
-        }
-        if let Some(defect) = &found.mesh_defect {
-            measured = measured.plus(-1.0, &defect.trace);
-        }
-        let metric = Metric::new(&found.observed, found.allowance_mm, &|_| true);
-        cases.push(Case { name, found, laboratory, metric, measured });
-    }
-    // The richest material serves all, or none does.
-    let start = diagnoses.iter().map(|(_, d)| &d.corrected.material).max_by_key(|m| m.terms.len());
-    let Some(start) = start.cloned() else { unreachable!("two diagnoses at least") };
+    };
+    let cases = diagnoses.iter().map(|(name, found)| Case::new(name, found, mesh_factor)).collect::<Result<_, _>>()?;
+    let mut common = CommonFit { cases, num_material: start.parameters().len(), is_cancelled };
 
     progress("fitting one material to all recordings");
-    let num_material = start.parameters().len();
-    let apart: f64 = cases.iter().map(|c| c.found.corrected.deviance).sum();
-    let num_apart: usize = cases.iter().map(|c| c.found.corrected.num_parameters()).sum();
-    let ln_n = (cases.iter().map(|c| c.metric.num_data()).sum::<usize>() as f64).ln();
-    let agreement = |rise: f64, saved: usize| {
-        let deviance_limit = EVIDENCE + ln_n * saved as f64;
-        Agreement { deviance_rise: rise, parameters_saved: saved, deviance_limit, agrees: rise < deviance_limit }
-    };
-    let own: Vec<Vec<Supposed>> = cases.iter().map(|c| c.found.corrected.causes.clone()).collect();
-    let mut shared = fit_cases(&mut cases, &start, &own, num_material, None, is_cancelled)?;
-    let deviance: f64 = shared.iter().map(|f| f.deviance).sum();
-    let num_shared = num_material + own.iter().flatten().map(|c| c.values.len()).sum::<usize>();
-    let one_material = agreement(deviance - apart, num_apart.saturating_sub(num_shared));
-
-    let mut common_causes = Vec::new();
-    for cause in own[0].iter().filter(|c| c.cause.name() != "wrap") {
-        let description = cause.cause.description();
-        let place = |causes: &[Supposed]| causes.iter().position(|c| c.cause.description() == description);
-        let Some(places) = own.iter().map(|causes| place(causes)).collect::<Option<Vec<usize>>>() else { continue };
-        progress(&format!("fitting one size of '{description}' to all recordings"));
-        let size = cause.values.len();
-        let mean: Vec<f64> = (0..size)
-            .map(|i| {
-                let sum: f64 = shared.iter().zip(&places).map(|(f, &at)| f.causes[at].values[i]).sum();
-                sum / cases.len() as f64
-            })
-            .collect();
-        let mut same = own.clone();
-        for (causes, &at) in same.iter_mut().zip(&places) {
-            causes[at].values.clone_from(&mean);
-        }
-        let material = shared[0].material.clone();
-        let found = fit_cases(&mut cases, &material, &same, num_material, Some(&places), is_cancelled)?;
-        let rise = found.iter().map(|f| f.deviance).sum::<f64>() - deviance;
-        let (at, first) = (places[0], &found[0]);
-        let parameters = first.causes[at].cause.parameters();
-        common_causes.push(CommonCause {
-            name: cause.cause.name().into(),
-            description,
-            parameters: parameters
-                .iter()
-                .zip(first.causes[at].values.iter().zip(first.sd_of(at)))
-                .map(|(p, (value, sd))| parameter(&p.name, *value, [value - 1.96 * sd, value + 1.96 * sd]))
-                .collect(),
-            agreement: agreement(rise, size * (cases.len() - 1)),
-        });
-    }
+    let own: Vec<Vec<Supposed>> = common.cases.iter().map(|c| c.found.corrected.causes.clone()).collect();
+    let mut shared = common.fit(start, &own, None)?;
+    let one_material = common.one_material(&shared, &own);
+    let common_causes = common.common_causes(&shared, &own, progress)?;
 
     progress("estimating what the mesh does to the common material");
-    widen_all(&mut cases, mesh_factor, &mut shared, is_cancelled)?;
+    widen_all(&mut common.cases, mesh_factor, &mut shared, is_cancelled)?;
     progress("predicting every recording by every other");
     let mut predictions = Vec::new();
-    for to in 0..cases.len() {
-        for from in 0..cases.len() {
-            predictions.push(cross_prediction(&mut cases, from, to, is_cancelled)?);
+    for to in 0..diagnoses.len() {
+        for from in 0..diagnoses.len() {
+            predictions.push(cross_prediction(&mut common.cases, from, to, is_cancelled)?);
         }
     }
     Ok(TogetherResult {
@@ -188,39 +150,122 @@ pub fn together(
     })
 }
 
-/// Fits one material to all cases with `causes`; those at the places of `common` (one per case) are one.
-fn fit_cases(
-    cases: &mut [Case],
-    start: &Ogden,
-    causes: &[Vec<Supposed>],
+/// Fits of all recordings with one material.
+struct CommonFit<'a> {
+    cases: Vec<Case<'a>>,
+    /// Number of the one material's parameters.
     num_material: usize,
-    common: Option<&[usize]>,
-    is_cancelled: &dyn Fn() -> bool,
-) -> Result<Vec<Fitted>, DiagnosisError> {
-    let num_cases = cases.len() as f64;
-    let num_common = common.map_or(0, |places| causes[0][places[0]].values.len());
-    let mut next = num_material + num_common;
-    let mut members: Vec<Member> = Vec::new();
-    for (n, (case, causes)) in cases.iter_mut().zip(causes).enumerate() {
-        let mut places: Vec<usize> = (0..num_material).collect();
-        for (index, c) in causes.iter().enumerate() {
-            if common.is_some_and(|places| places[n] == index) {
-                places.extend(num_material..num_material + num_common);
-            } else {
-                places.extend(next..next + c.values.len());
-                next += c.values.len();
-            }
-        }
-        members.push(Member {
-            laboratory: &mut case.laboratory,
-            metric: &case.metric,
-            measured: &case.measured,
-            causes: causes.clone(),
-            settings: shared_prior(case.found.settings, num_cases),
-            places,
-        });
+    is_cancelled: &'a dyn Fn() -> bool,
+}
+
+/// The sum of the deviances of all recordings.
+fn deviance_of(fits: &[CauseFit]) -> f64 {
+    fits.iter().map(|f| f.deviance).sum()
+}
+
+impl CommonFit<'_> {
+    /// Whether a supposition that saves parameters is kept where it raises the deviance by `rise`.
+    fn agreement(&self, rise: f64, saved: usize) -> Agreement {
+        let ln_n = (self.cases.iter().map(|c| c.metric.num_data()).sum::<usize>() as f64).ln();
+        let deviance_limit = EVIDENCE + ln_n * saved as f64;
+        Agreement { deviance_rise: rise, parameters_saved: saved, deviance_limit, agrees: rise < deviance_limit }
     }
-    fit_members(&mut members, start, is_cancelled)
+
+    /// Whether one material serves all; `shared` are the fits with one, `own` the causes of each recording.
+    fn one_material(&self, shared: &[CauseFit], own: &[Vec<Supposed>]) -> Agreement {
+        let apart: f64 = self.cases.iter().map(|c| c.found.corrected.deviance).sum();
+        let num_apart: usize = self.cases.iter().map(|c| c.found.corrected.num_parameters()).sum();
+        let num_shared = self.num_material + own.iter().flatten().map(|c| c.values.len()).sum::<usize>();
+        self.agreement(deviance_of(shared) - apart, num_apart.saturating_sub(num_shared))
+    }
+
+    /// Causes that are named in every recording, each fitted with one size for all. Artefacts belong to one recording
+    /// alone.
+    fn common_causes(
+        &mut self,
+        shared: &[CauseFit],
+        own: &[Vec<Supposed>],
+        progress: &dyn Fn(&str),
+    ) -> Result<Vec<CommonCause>, DiagnosisError> {
+        let mut found = Vec::new();
+        for cause in own[0].iter().filter(|c| !c.cause.is_artefact()) {
+            let identity = cause.cause.identity();
+            let place = |causes: &[Supposed]| causes.iter().position(|c| c.cause.identity() == identity);
+            let Some(places) = own.iter().map(|causes| place(causes)).collect::<Option<Vec<usize>>>() else { continue };
+            progress(&format!("fitting one size of '{}' to all recordings", cause.cause.description()));
+            found.push(self.common_cause(shared, own, &places)?);
+        }
+        Ok(found)
+    }
+
+    /// The cause at `places` (one per recording), fitted with one size for all.
+    fn common_cause(
+        &mut self,
+        shared: &[CauseFit],
+        own: &[Vec<Supposed>],
+        places: &[usize],
+    ) -> Result<CommonCause, DiagnosisError> {
+        let num_cases = self.cases.len();
+        let num_values = own[0][places[0]].values.len();
+        let mean: Vec<f64> = (0..num_values)
+            .map(|i| {
+                let sum: f64 = shared.iter().zip(places).map(|(f, &at)| f.causes[at].values[i]).sum();
+                sum / num_cases as f64
+            })
+            .collect();
+        let mut same = own.to_vec();
+        for (causes, &at) in same.iter_mut().zip(places) {
+            causes[at].values.clone_from(&mean);
+        }
+        let fits = self.fit(&shared[0].material, &same, Some(places))?;
+        let rise = deviance_of(&fits) - deviance_of(shared);
+        let (at, first) = (places[0], &fits[0]);
+        let cause = &first.causes[at].cause;
+        Ok(CommonCause {
+            name: cause.name().as_str().into(),
+            description: cause.description(),
+            parameters: cause
+                .parameters()
+                .iter()
+                .zip(first.causes[at].values.iter().zip(first.sd_of(at)))
+                .map(|(p, (value, sd))| parameter(&p.name, *value, interval(*value, *sd)))
+                .collect(),
+            agreement: self.agreement(rise, num_values * (num_cases - 1)),
+        })
+    }
+
+    /// Fits one material to all cases with `causes`; those at the places of `common` (one per case) are one.
+    fn fit(
+        &mut self,
+        start: &Ogden,
+        causes: &[Vec<Supposed>],
+        common: Option<&[usize]>,
+    ) -> Result<Vec<CauseFit>, DiagnosisError> {
+        let (num_cases, num_material) = (self.cases.len() as f64, self.num_material);
+        let num_common = common.map_or(0, |places| causes[0][places[0]].values.len());
+        let mut next = num_material + num_common;
+        let mut members: Vec<Member> = Vec::new();
+        for (n, (case, causes)) in self.cases.iter_mut().zip(causes).enumerate() {
+            let mut places: Vec<usize> = (0..num_material).collect();
+            for (index, c) in causes.iter().enumerate() {
+                if common.is_some_and(|places| places[n] == index) {
+                    places.extend(num_material..num_material + num_common);
+                } else {
+                    places.extend(next..next + c.values.len());
+                    next += c.values.len();
+                }
+            }
+            members.push(Member {
+                laboratory: &mut case.laboratory,
+                metric: &case.metric,
+                measured: &case.measured,
+                causes: causes.clone(),
+                settings: shared_prior(case.found.settings, num_cases),
+                places,
+            });
+        }
+        fit_members(&mut members, start, self.is_cancelled)
+    }
 }
 
 /// Priors of the material count once for all recordings, not once for each.
@@ -228,7 +273,7 @@ fn shared_prior(settings: FitSettings, num_cases: f64) -> FitSettings {
     let wide = num_cases.sqrt();
     FitSettings {
         bulk: BulkPrior { log_sd: settings.bulk.log_sd * wide, ..settings.bulk },
-        shear: settings.shear.map(|s| super::fit::ShearPrior { log_sd: s.log_sd * wide, ..s }),
+        shear: settings.shear.map(|s| ShearPrior { log_sd: s.log_sd * wide, ..s }),
         ..settings
     }
 }
@@ -238,7 +283,7 @@ fn shared_prior(settings: FitSettings, num_cases: f64) -> FitSettings {
 fn widen_all(
     cases: &mut [Case],
     mesh_factor: f64,
-    shared: &mut [Fitted],
+    shared: &mut [CauseFit],
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<(), DiagnosisError> {
     let num_material = shared[0].material.parameters().len();
@@ -280,7 +325,7 @@ fn cross_prediction(
         .corrected
         .causes
         .iter()
-        .filter(|c| from == to || c.cause.name() != "wrap")
+        .filter(|c| from == to || !c.cause.is_artefact())
         .filter(|c| {
             let located = c.cause.location(&c.values, &teacher.observed.specimen).is_some();
             is_same_sample || c.cause.category() == Category::Material && !located

@@ -96,7 +96,7 @@ fn parameter_derivative(material: &Ogden, parameter: Parameter, e: [f64; 3]) -> 
 /// use lambdak::homogeneous::{HomogeneousTest, respond};
 /// use lambdak::material::{Ogden, OgdenTerm};
 /// let material =
-///     Ogden { schema: "ogden/1".into(), bulk_kpa: 2173.0, terms: vec![OgdenTerm { mu_kpa: 17.0, alpha: 1.91 }] };
+///     Ogden { bulk_kpa: 2173.0, terms: vec![OgdenTerm { mu_kpa: 17.0, alpha: 1.91 }] };
 /// let response = respond(&material, &HomogeneousTest::Uniaxial.at(1.5)).unwrap();
 /// assert!(response.principal_stretches.iter().product::<f64>() > 1.0);
 /// ```
@@ -182,7 +182,7 @@ mod tests {
             OgdenTerm { mu_kpa: -3.0, alpha: -2.0 },
             OgdenTerm { mu_kpa: 0.01, alpha: 9.0 },
         ];
-        Ogden { schema: "ogden/1".into(), bulk_kpa, terms }
+        Ogden { bulk_kpa, terms }
     }
 
     fn states() -> Vec<Deformation> {

@@ -18,7 +18,8 @@ use super::deformation::HomogeneousTest;
 const MAX_ROWS: usize = 1_000_000;
 
 /// Unit of a stress column whose name does not say it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, utoipa::ToSchema)]
+#[serde(rename_all = "lowercase")]
 pub enum StressUnit {
     /// Pa.
     Pa,

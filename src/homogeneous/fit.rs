@@ -112,7 +112,7 @@ impl TermFit {
 /// The material with these terms and κ.
 pub fn material_of(terms: &[ShearTerm], bulk_kpa: f64) -> Ogden {
     let terms = terms.iter().map(|t| OgdenTerm { mu_kpa: t.mu_kpa(), alpha: t.alpha }).collect();
-    Ogden { schema: "ogden/1".into(), bulk_kpa, terms }
+    Ogden { bulk_kpa, terms }
 }
 
 /// Stresses of a model at a curve's states, kPa. `None` where a state has no response.

@@ -1,33 +1,41 @@
 //! Strain energies, their stress, tangent and parameter derivatives.
 
+mod error;
+mod file;
 mod lanes;
+mod limits;
 mod ogden_lanes;
 mod point;
 mod read;
 
+pub use error::MaterialError;
 pub use lanes::{LANES, Lanes};
+pub use limits::{MAX_ALPHA, MAX_MODULUS_KPA, MIN_ALPHA, SCHEMA};
 pub use ogden_lanes::{MAX_TERMS, SpectralState, Tensor};
 pub use point::{energy_density, first_piola_kirchhoff_stress, material_tangent, stress_parameter_derivative};
-pub use read::{MAX_ALPHA, MIN_ALPHA, MaterialError, SCHEMA};
 
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// One Ogden term.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = TermSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OgdenTerm {
     /// μ, kPa.
+    #[schema(value_type = file::MuKpa)]
     pub mu_kpa: f64,
     /// α.
+    #[schema(value_type = file::Alpha)]
     pub alpha: f64,
 }
 
-/// N-term compressible Ogden material (`ogden/1`), Ψ = Σ μᵢ/αᵢ (λ̄₁^αᵢ + λ̄₂^αᵢ + λ̄₃^αᵢ − 3) + κ/2 (ln J)².
+/// N-term compressible Ogden material, Ψ = Σ μᵢ/αᵢ (λ̄₁^αᵢ + λ̄₂^αᵢ + λ̄₃^αᵢ − 3) + κ/2 (ln J)².
+///
+/// In JSON it is `ogden/1`, with the tag `schema` before its fields.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(from = "file::OgdenFile", into = "file::OgdenFile")]
 pub struct Ogden {
-    /// Always `ogden/1`.
-    pub schema: String,
     /// κ, kPa.
     pub bulk_kpa: f64,
     /// Terms.

@@ -78,7 +78,6 @@ mod tests {
 
     fn materials() -> Vec<Ogden> {
         let make = |bulk_kpa, terms: &[(f64, f64)]| Ogden {
-            schema: "ogden/1".into(),
             bulk_kpa,
             terms: terms.iter().map(|&(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha }).collect(),
         };

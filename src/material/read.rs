@@ -1,98 +1,10 @@
 //! Reading, writing and validating a material (`ogden/1`).
 
-use super::{MAX_TERMS, Ogden};
+use super::limits::{MAX_ALPHA, MAX_MODULUS_KPA, MIN_ALPHA, SCHEMA};
+use super::{MAX_TERMS, MaterialError, Ogden};
+use crate::field::{FieldError, FieldPath};
 use crate::specimen::JsonProblem;
 use crate::specimen::json::schema_of;
-
-/// The schema that this version reads and writes.
-pub const SCHEMA: &str = "ogden/1";
-/// Smallest |α|. The energy divides by α.
-pub const MIN_ALPHA: f64 = 1e-3;
-/// Largest |α|. Beyond it λ^α overflows the range of useful stresses within the supported stretches.
-pub const MAX_ALPHA: f64 = 50.0;
-/// Largest modulus, kPa (1 GPa: far beyond soft matter).
-pub const MAX_MODULUS_KPA: f64 = 1e6;
-
-/// Why a material is refused. Every variant carries the value, the limit and what to change.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum MaterialError {
-    /// The text is not JSON, or a field is missing, unknown, doubled or of the wrong type.
-    #[error("material JSON, {0}")]
-    Json(JsonProblem),
-    /// The schema is another one.
-    #[error("schema is {found:?}; set it to {expected:?}")]
-    WrongSchema {
-        /// What the text says.
-        found: String,
-        /// What this version reads.
-        expected: &'static str,
-    },
-    /// No or too many terms.
-    #[error("there are {count} terms; give 1 to {limit}")]
-    NumTerms {
-        /// How many.
-        count: usize,
-        /// Most.
-        limit: usize,
-    },
-    /// A number is NaN or infinite.
-    #[error("{field} is {value}; give a finite number")]
-    NotFinite {
-        /// Path of the field.
-        field: String,
-        /// Its value.
-        value: f64,
-    },
-    /// κ is not positive, or too large.
-    #[error("bulk_kpa is {value}; it must be above 0 and at most {limit} kPa")]
-    BulkOutOfRange {
-        /// κ, kPa.
-        value: f64,
-        /// Largest, kPa.
-        limit: f64,
-    },
-    /// |μ| is too large.
-    #[error("terms[{term}].mu_kpa is {value}; its magnitude must be at most {limit} kPa")]
-    MuOutOfRange {
-        /// Index of the term.
-        term: usize,
-        /// μ, kPa.
-        value: f64,
-        /// Largest |μ|, kPa.
-        limit: f64,
-    },
-    /// |α| is too small or too large.
-    #[error("terms[{term}].alpha is {value}; its magnitude must be from {min} to {max}")]
-    AlphaOutOfRange {
-        /// Index of the term.
-        term: usize,
-        /// α.
-        value: f64,
-        /// Smallest |α|.
-        min: f64,
-        /// Largest |α|.
-        max: f64,
-    },
-    /// Hill's condition for up to two terms: each μα is positive.
-    #[error(
-        "terms[{term}]: mu_kpa {mu} times alpha {alpha} is not above 0; with one or two terms each product must be (Hill's stability): give both the same sign"
-    )]
-    HillViolated {
-        /// Index of the term.
-        term: usize,
-        /// μ, kPa.
-        mu: f64,
-        /// α.
-        alpha: f64,
-    },
-    /// The initial shear modulus ½ Σ μα is not positive.
-    #[error("half the sum of mu_kpa times alpha, the initial shear modulus, is {value} kPa; it must be above 0")]
-    ShearModulusNotPositive {
-        /// ½ Σ μα, kPa.
-        value: f64,
-    },
-}
 
 impl Ogden {
     /// Reads and validates `ogden/1`.
@@ -115,8 +27,7 @@ impl Ogden {
         Ok(material)
     }
 
-    /// The material as `ogden/1`, indented, with a line break at the end. Reading it back gives each number to within one unit in its
-    /// last place (serde_json's default parser rounds so).
+    /// The material as `ogden/1`, indented, with a line break at the end. Reading it back gives the same numbers.
     pub fn to_json(&self) -> String {
         // Serialising fails only for maps with keys that are not strings and for failing writers: neither is here.
         let mut text = serde_json::to_string_pretty(self).expect("a struct of strings and numbers serialises");
@@ -124,45 +35,60 @@ impl Ogden {
         text
     }
 
-    /// Checks what the types do not: schema, finite numbers, ranges, κ > 0, ½ Σ μα > 0, and for one or two terms
-    /// each μα > 0 (Hill). For three and more terms the tangent must also be positive definite over the states that
-    /// a specimen visits, which is not checked here.
+    /// Checks what the types do not: finite numbers, ranges, κ > 0, ½ Σ μα > 0, and for one or two terms each
+    /// μα > 0 (Hill). For three and more terms the tangent must also be positive definite over the states that a
+    /// specimen visits, which is not checked here.
     ///
     /// # Errors
-    /// [`MaterialError`] with the value, the limit and what to change.
+    /// [`MaterialError`] with the value, the limit and what to change: the first problem found.
     pub fn validate(&self) -> Result<(), MaterialError> {
-        if self.schema != SCHEMA {
-            return Err(MaterialError::WrongSchema { found: self.schema.clone(), expected: SCHEMA });
-        }
+        self.problems().into_iter().next().map_or(Ok(()), Err)
+    }
+
+    /// Every rule that the material violates, with pointers into it; the first is that of [`Ogden::validate`].
+    pub fn field_errors(&self) -> Vec<FieldError> {
+        self.problems().iter().map(MaterialError::field_error).collect()
+    }
+
+    fn problems(&self) -> Vec<MaterialError> {
+        let mut problems = Vec::new();
         if self.terms.is_empty() || self.terms.len() > MAX_TERMS {
-            return Err(MaterialError::NumTerms { count: self.terms.len(), limit: MAX_TERMS });
+            problems.push(MaterialError::NumTerms { count: self.terms.len(), limit: MAX_TERMS });
         }
-        let finite = |field: String, value: f64| {
-            if value.is_finite() { Ok(()) } else { Err(MaterialError::NotFinite { field, value }) }
-        };
-        finite("bulk_kpa".into(), self.bulk_kpa)?;
-        if self.bulk_kpa <= 0.0 || self.bulk_kpa > MAX_MODULUS_KPA {
-            return Err(MaterialError::BulkOutOfRange { value: self.bulk_kpa, limit: MAX_MODULUS_KPA });
+        if !self.bulk_kpa.is_finite() {
+            problems.push(MaterialError::NotFinite { field: FieldPath::of("bulk_kpa"), value: self.bulk_kpa });
+        } else if self.bulk_kpa <= 0.0 || self.bulk_kpa > MAX_MODULUS_KPA {
+            problems.push(MaterialError::BulkOutOfRange { value: self.bulk_kpa, limit: MAX_MODULUS_KPA });
         }
-        for (term, ogden_term) in self.terms.iter().enumerate() {
-            let (mu, alpha) = (ogden_term.mu_kpa, ogden_term.alpha);
-            finite(format!("terms[{term}].mu_kpa"), mu)?;
-            finite(format!("terms[{term}].alpha"), alpha)?;
-            if mu.abs() > MAX_MODULUS_KPA {
-                return Err(MaterialError::MuOutOfRange { term, value: mu, limit: MAX_MODULUS_KPA });
-            }
-            if !(MIN_ALPHA..=MAX_ALPHA).contains(&alpha.abs()) {
-                return Err(MaterialError::AlphaOutOfRange { term, value: alpha, min: MIN_ALPHA, max: MAX_ALPHA });
-            }
-            if self.terms.len() <= 2 && mu * alpha <= 0.0 {
-                return Err(MaterialError::HillViolated { term, mu, alpha });
+        // Beyond the limit one error stands for all terms.
+        for term in 0..self.terms.len().min(MAX_TERMS) {
+            self.check_term(term, &mut problems);
+        }
+        if problems.is_empty() {
+            let value = 0.5 * self.terms.iter().map(|term| term.mu_kpa * term.alpha).sum::<f64>();
+            if value <= 0.0 {
+                problems.push(MaterialError::ShearModulusNotPositive { value });
             }
         }
-        let value = 0.5 * self.terms.iter().map(|term| term.mu_kpa * term.alpha).sum::<f64>();
-        if value <= 0.0 {
-            return Err(MaterialError::ShearModulusNotPositive { value });
+        problems
+    }
+
+    fn check_term(&self, term: usize, problems: &mut Vec<MaterialError>) {
+        let (mu, alpha) = (self.terms[term].mu_kpa, self.terms[term].alpha);
+        for (name, value) in [("mu_kpa", mu), ("alpha", alpha)] {
+            if !value.is_finite() {
+                let field = FieldPath::of("terms").index(term).name(name);
+                problems.push(MaterialError::NotFinite { field, value });
+            }
         }
-        Ok(())
+        if mu.is_finite() && mu.abs() > MAX_MODULUS_KPA {
+            problems.push(MaterialError::MuOutOfRange { term, value: mu, limit: MAX_MODULUS_KPA });
+        }
+        if alpha.is_finite() && !(MIN_ALPHA..=MAX_ALPHA).contains(&alpha.abs()) {
+            problems.push(MaterialError::AlphaOutOfRange { term, value: alpha, min: MIN_ALPHA, max: MAX_ALPHA });
+        } else if self.terms.len() <= 2 && mu * alpha <= 0.0 {
+            problems.push(MaterialError::HillViolated { term, mu, alpha });
+        }
     }
 }
 
@@ -174,7 +100,7 @@ mod tests {
 
     fn ogden(bulk_kpa: f64, terms: &[(f64, f64)]) -> Ogden {
         let terms = terms.iter().map(|&(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha }).collect();
-        Ogden { schema: SCHEMA.into(), bulk_kpa, terms }
+        Ogden { bulk_kpa, terms }
     }
 
     #[test]
@@ -203,6 +129,25 @@ mod tests {
         assert_eq!(problem.field, "terms[0].alfa");
         let text = r#"{ "schema": "ogden/2", "bulk_mpa": 1.0 }"#;
         assert!(matches!(Ogden::from_json(text), Err(MaterialError::WrongSchema { .. })));
+    }
+
+    #[test]
+    fn all_errors_come_at_once_with_pointers() {
+        let bad = ogden(f64::NAN, &[(1e7, 0.0), (1.0, f64::INFINITY), (1.0, -1.0)]);
+        let pointers: Vec<String> = bad.field_errors().into_iter().map(|e| e.pointer).collect();
+        assert_eq!(pointers, ["/bulk_kpa", "/terms/0/mu_kpa", "/terms/0/alpha", "/terms/1/alpha"]);
+        let unstable = ogden(1.0, &[(9.0, 1.0), (1.0, -1.0)]);
+        assert_eq!(unstable.field_errors()[0].pointer, "/terms/1");
+        assert_eq!(ogden(2173.0, &[(17.0, 1.91)]).field_errors(), []);
+    }
+
+    /// The tag stands first in JSON, and reading needs it.
+    #[test]
+    fn the_tag_is_of_the_file() {
+        let written = serde_json::to_string(&ogden(2000.0, &[(17.0, 1.5)])).unwrap();
+        assert_eq!(written, r#"{"schema":"ogden/1","bulk_kpa":2000.0,"terms":[{"mu_kpa":17.0,"alpha":1.5}]}"#);
+        assert!(serde_json::from_str::<Ogden>(&written.replace("ogden/1", "ogden/2")).is_err());
+        assert!(serde_json::from_str::<Ogden>(r#"{"bulk_kpa":2000.0,"terms":[]}"#).is_err());
     }
 
     #[test]
@@ -235,9 +180,8 @@ mod tests {
             let back = Ogden::from_json(&material.to_json()).unwrap();
             prop_assert_eq!(back.terms.len(), material.terms.len());
             for parameter in material.parameters() {
-                let (a, b) = (back.value(parameter), material.value(parameter));
-                // One unit in the last place, twice over.
-                prop_assert!((a - b).abs() <= 2.0 * f64::EPSILON * b.abs());
+                // The shortest decimal that reads back to the same number is written.
+                prop_assert_eq!(back.value(parameter).to_bits(), material.value(parameter).to_bits());
             }
         }
     }

@@ -4,18 +4,19 @@ use super::check::orient_and_limit;
 use super::domain::Domain;
 use super::error::MeshError;
 use super::grading::{divide, with_middles};
+use super::node_sets::{nodes_on_plane, pull_axis};
 use super::options::MeshOptions;
 use super::quads::quad_section;
 use super::section::Section;
 use super::triangles::triangle_section;
 use super::{ElementKind, Mesh};
-use crate::specimen::{Specimen, TestKind};
+use crate::specimen::Specimen;
 
 /// Meshes `specimen` (the half or quarter with positive coordinates where it is mirrored).
 ///
-/// The section is a structured grid (no holes), or O-grids in the holes' power-diagram cells, or triangles where neither
-/// suits; it is extruded in levels. Curved walls carry exact nodes at element corners and middles. Equal input gives
-/// equal bits.
+/// The section is a structured grid (no holes), or O-grids in the holes' power-diagram cells, or triangles where
+/// neither suits; it is extruded in levels. Curved walls carry exact nodes at element corners and middles. Equal input
+/// gives equal bits.
 ///
 /// # Errors
 /// Any [`MeshError`]; in particular [`MeshError::LigamentTooThin`] for holes that touch, and [`MeshError::PoorElement`]
@@ -31,9 +32,9 @@ pub fn mesh_specimen(specimen: &Specimen, options: &MeshOptions) -> Result<Mesh,
     extrude(&domain, options, &section)
 }
 
-/// As [`mesh_specimen`], of triangles whose edges follow straight `lines` of the section (x and z of both ends, mm; for holes
-/// along z: x and y), through the whole extrusion: a patch of a bonded face ends at element edges. Lines may meet at their
-/// ends and end on the outline, and must keep clear of the holes.
+/// As [`mesh_specimen`], of triangles whose edges follow straight `lines` of the section (x and z of both ends, mm; for
+/// holes along z: x and y), through the whole extrusion: a patch of a bonded face ends at element edges. Lines may meet
+/// at their ends and end on the outline, and must keep clear of the holes.
 ///
 /// # Errors
 /// As [`mesh_specimen`]; [`MeshError::Triangulation`] where parts of lines cross each other or a hole.
@@ -109,19 +110,6 @@ fn extrude(domain: &Domain, options: &MeshOptions, section: &Section) -> Result<
         mesh.mirror_z_nodes = nodes_on_plane(&mesh, 2, 0.0, tolerance);
     }
     Ok(mesh)
-}
-
-/// The coordinate whose extreme faces are held: y (plates) or x (grips).
-pub(super) fn pull_axis(test: TestKind) -> usize {
-    match test {
-        TestKind::DoubleLapShear => 1,
-        TestKind::Uniaxial => 0,
-    }
-}
-
-/// Nodes whose coordinate `axis` is `position`.
-pub(super) fn nodes_on_plane(mesh: &Mesh, axis: usize, position: f64, tolerance: f64) -> Vec<u32> {
-    (0..mesh.nodes.len() as u32).filter(|&n| (mesh.nodes[n as usize][axis] - position).abs() < tolerance).collect()
 }
 
 #[cfg(test)]

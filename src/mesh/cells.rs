@@ -6,9 +6,9 @@ use std::f64::consts::TAU;
 use super::domain::{Disc, Domain};
 use super::error::MeshError;
 use super::grading::{divide, with_middles};
+use super::grid::{Builder, count, limit_cells, line};
 use super::options::MeshOptions;
 use super::power::{PowerDiagram, Rectangle};
-use super::quads::{Builder, count, limit_cells, line};
 use super::section::{Section, dot, sub};
 
 /// Points of each edge by its vertices, the smaller index first.
@@ -85,7 +85,8 @@ impl Layout<'_> {
         ratio
     }
 
-    /// Points of every edge, from its vertex with the smaller index to the other, with middles: the same for both cells.
+    /// Points of every edge, from its vertex with the smaller index to the other, with middles: the same for both
+    /// cells.
     fn divide_edges(&self) -> Result<EdgePoints, MeshError> {
         let vertices = &self.diagram.vertices;
         // Per edge: parts asked for, feet of the centres, product of their distances, number of cells.
@@ -198,9 +199,9 @@ impl Layout<'_> {
         }
     }
 
-    /// How far the control point of the line from the hole to a corner of its cell is moved off the straight line. A line
-    /// that meets the corner along its bisector makes equal angles with both edges, also where the hole is seen from the
-    /// corner close to one of them.
+    /// How far the control point of the line from the hole to a corner of its cell is moved off the straight line. A
+    /// line that meets the corner along its bisector makes equal angles with both edges, also where the hole is seen
+    /// from the corner close to one of them.
     fn corner_bend(&self, index: usize, corner: usize) -> [f64; 2] {
         let (disc, polygon) = (&self.domain.discs[index], &self.diagram.polygons[index]);
         let n = polygon.vertices.len();
@@ -275,8 +276,8 @@ impl Layout<'_> {
     }
 }
 
-/// Angles of the arc's points that face `points`: between equal angles and straight radial lines, but no step much longer
-/// than the equal ones; the middles are exactly midway so that each element's arc is divided evenly.
+/// Angles of the arc's points that face `points`: between equal angles and straight radial lines, but no step much
+/// longer than the equal ones; the middles are exactly midway so that each element's arc is divided evenly.
 fn arc_angles(disc: &Disc, points: &[[f64; 2]]) -> Vec<f64> {
     const LONGEST_STEP: f64 = 1.15;
     let angle = |p: [f64; 2]| (p[1] - disc.center[1]).atan2(p[0] - disc.center[0]);

@@ -4,9 +4,9 @@ use std::collections::HashMap;
 
 use serde::Serialize;
 
-use super::build::{nodes_on_plane, pull_axis};
 use super::domain::Domain;
 use super::error::MeshError;
+use super::node_sets::{nodes_on_plane, pull_axis};
 use super::options::MeshOptions;
 use super::section::{Section, scaled_jacobian};
 use super::{ElementKind, Mesh};
@@ -51,10 +51,10 @@ pub(super) fn orient_and_limit(section: &Section, options: &MeshOptions) -> Resu
 }
 
 impl Mesh {
-    /// Checks everything that the solver takes for granted: valid indices and coordinates; positive geometry Jacobians at
-    /// all quadrature points and nodes; each face shared by two elements that agree on its nodes, or on the
-    /// specimen's surface or a mirror plane; volume equal to the closed form within the error of quadratic arcs; node sets
-    /// complete.
+    /// Checks everything that the solver takes for granted: valid indices and coordinates; positive geometry Jacobians
+    /// at all quadrature points and nodes; each face shared by two elements that agree on its nodes, or on the
+    /// specimen's surface or a mirror plane; volume equal to the closed form within the error of quadratic arcs; node
+    /// sets complete.
     ///
     /// # Errors
     /// The first violation, as a [`MeshError`].

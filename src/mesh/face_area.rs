@@ -9,8 +9,8 @@ const QUADRILATERAL: [f64; 9] =
 const TRIANGLE: [f64; 7] = [0.05, 0.05, 0.05, 2.0 / 15.0, 2.0 / 15.0, 2.0 / 15.0, 0.45];
 
 impl Mesh {
-    /// Area (mm²) of the bonded faces that each node stands for, zero for other nodes: ∫ N_a dA with straight-sided faces.
-    /// At a hole's edge the chord counts for the arc.
+    /// Area (mm²) of the bonded faces that each node stands for, zero for other nodes: ∫ N_a dA with straight-sided
+    /// faces. At a hole's edge the chord counts for the arc.
     pub fn face_areas(&self) -> Vec<f64> {
         let mut areas = vec![0.0; self.nodes.len()];
         for nodes in [&self.fixed_nodes, &self.moved_nodes] {

@@ -1,8 +1,8 @@
 //! Graded division of a line.
 
 /// Divides [0, 1] into `n` parts. The size of a part at relative position u is `start`^(1 − u) near a graded start and
-/// likewise `end`^u near a graded end, so a ratio of 1 leaves that end alone; with both ends graded each one governs its
-/// half. Geometric growth: dividing twice as finely halves every part, and the half of a symmetric division is the
+/// likewise `end`^u near a graded end, so a ratio of 1 leaves that end alone; with both ends graded each one governs
+/// its half. Geometric growth: dividing twice as finely halves every part, and the half of a symmetric division is the
 /// division of the half graded at one end.
 ///
 /// Returns `n + 1` positions; the first is exactly 0 and the last exactly 1.

@@ -90,8 +90,8 @@ fn forced_prisms_conform() {
     }
 }
 
-/// A mirrored mesh has half or a quarter of the closed-form volume, and finer meshes approach it with the fourth order of
-/// quadratic arcs with exact middle nodes.
+/// A mirrored mesh has half or a quarter of the closed-form volume, and finer meshes approach it with the fourth order
+/// of quadratic arcs with exact middle nodes.
 #[test]
 fn volume_converges_to_the_closed_form() {
     for (specimen, parts) in [(two_holes(), 2.0), (bar(), 4.0), (width_holes(), 2.0)] {

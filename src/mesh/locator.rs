@@ -5,8 +5,8 @@ use super::{ElementKind, Mesh};
 
 /// Newton on the inverse map stops when the reference coordinates move less than this.
 const TOLERANCE: f64 = 1e-12;
-/// Points this far outside an element, in reference coordinates, still belong to it: neighbours overlap so that no point
-/// falls between them.
+/// Points this far outside an element, in reference coordinates, still belong to it: neighbours overlap so that no
+/// point falls between them.
 const MARGIN: f64 = 1e-8;
 /// Newton iterations; 3–5 are usual, more means the point is far outside the element.
 const MAX_ITERATIONS: usize = 12;
@@ -29,8 +29,8 @@ pub struct Column {
     pub section_coordinates: [f64; 2],
 }
 
-/// Finds points in an extruded mesh. The section's cells are sorted into uniform bins by their bounding boxes; the inverse
-/// map is Newton's method in the section and a quadratic equation along the extrusion.
+/// Finds points in an extruded mesh. The section's cells are sorted into uniform bins by their bounding boxes; the
+/// inverse map is Newton's method in the section and a quadratic equation along the extrusion.
 #[derive(Clone, Debug)]
 pub struct Locator {
     /// 1 (y) or 2 (z).
@@ -145,16 +145,16 @@ impl Locator {
         [0, 1].map(|c| (((p[c] - self.low[c]) / self.bin_size[c]) as usize).min(self.num_bins[c] - 1))
     }
 
-    /// The element that holds `point` (mm, reference frame), or `None` outside the mesh. Points on a shared face belong to
-    /// one of its elements, always the same. Points of the mirrored half must be reflected by the caller.
+    /// The element that holds `point` (mm, reference frame), or `None` outside the mesh. Points on a shared face belong
+    /// to one of its elements, always the same. Points of the mirrored half must be reflected by the caller.
     pub fn locate(&self, mesh: &Mesh, point: [f64; 3]) -> Option<Location> {
         let (layer, zeta) = self.layer(point[self.extrusion_axis])?;
         let column = self.locate_column(mesh, [point[0], point[self.b_axis]])?;
         Some(self.at(column, layer, zeta))
     }
 
-    /// Where a line along the extrusion meets the section: the part of [`Self::locate`] that takes nearly all its time, for
-    /// callers with many points on one line. `section_point` is (x, z) or (x, y), mm; see [`Self::extrusion_axis`].
+    /// Where a line along the extrusion meets the section: the part of [`Self::locate`] that takes nearly all its time,
+    /// for callers with many points on one line. `section_point` is (x, z) or (x, y), mm; see [`Self::extrusion_axis`].
     pub fn locate_column(&self, mesh: &Mesh, section_point: [f64; 2]) -> Option<Column> {
         let [i, j] = self.bin(section_point);
         let bin = i + self.num_bins[0] * j;

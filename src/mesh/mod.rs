@@ -1,7 +1,7 @@
 //! Meshes: a section (quadrilaterals or triangles, quadratic, following the hole walls as curves) extruded.
 //!
 //! ```text
-//! specimen ─ domain ─┬─ quads ── cells ── power     structured grids; O-grids in the holes' power-diagram cells
+//! specimen ─ domain ─┬─ quads ── cells ── grid       structured grids; O-grids in the holes' power-diagram cells
 //!                    └─ triangles                   constrained Delaunay refinement, where quadrilaterals fail
 //!                         └─ section ─ build        extrusion in graded levels, node sets
 //! mesh ─ check, locator, morph                      invariants and quality; inverse map; shape derivatives
@@ -18,13 +18,16 @@ mod element;
 mod error;
 mod face_area;
 mod grading;
+mod grid;
 mod locator;
 mod morph;
+mod node_sets;
 mod options;
 mod power;
 mod quads;
 mod refine;
 mod section;
+mod size;
 mod triangles;
 
 #[cfg(test)]
@@ -40,6 +43,7 @@ pub use locator::{Column, Location, Locator};
 pub use morph::{DesignVariable, morphed, shape_velocity};
 pub use options::MeshOptions;
 pub use refine::{Refinement, refined};
+pub use size::{MeshSize, SIZE_FACTORS};
 
 /// Which mirror planes through the origin the mesh uses. A mirrored mesh covers the half with the positive
 /// coordinate only; normal displacement is zero on the plane.

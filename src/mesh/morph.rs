@@ -27,15 +27,15 @@ pub enum DesignVariable {
 
 /// d(node position)/d(variable), dimensionless, per node of `mesh` (of `specimen`).
 ///
-/// A hole's wall moves rigidly or dilates, so it stays a circle; the motion fades as d/(d + d_h) towards the other walls
-/// and the outline, with d_h the distance to the hole and d a smooth minimum of the distances to the others. A block
-/// dimension scales the outline affinely about the origin and leaves the holes' centres and shapes alone; along the
-/// extrusion everything is scaled.
+/// A hole's wall moves rigidly or dilates, so it stays a circle; the motion fades as d/(d + d_h) towards the other
+/// walls and the outline, with d_h the distance to the hole and d a smooth minimum of the distances to the others. A
+/// block dimension scales the outline affinely about the origin and leaves the holes' centres and shapes alone; along
+/// the extrusion everything is scaled.
 ///
 /// In a mirrored mesh the velocity is that of the meshed half. A hole and its image are moved together by summing their
 /// two variables (with opposite signs for [`DesignVariable::HoleOther`]); the one outside the meshed half contributes
-/// zero. [`DesignVariable::HoleOther`] of a hole centred on the mirror plane gives zero: by symmetry it changes symmetric
-/// results (forces, integrals) in second order only.
+/// zero. [`DesignVariable::HoleOther`] of a hole centred on the mirror plane gives zero: by symmetry it changes
+/// symmetric results (forces, integrals) in second order only.
 ///
 /// A dumb-bell keeps its standard outline: length moves its ends, width gives zero. An index of a hole that does not
 /// exist gives zero.

@@ -7,8 +7,8 @@ use crate::specimen::Specimen;
 
 /// Settings of [`super::mesh_specimen`].
 ///
-/// The constructors [`search`](Self::search), [`standard`](Self::standard) and [`fine`](Self::fine) derive the sizes from
-/// the specimen's block, so that the number of unknowns is about the same for every specimen of the same shape.
+/// The constructors [`search`](Self::search), [`standard`](Self::standard) and [`fine`](Self::fine) derive the sizes
+/// from the specimen's block, so that the number of unknowns is about the same for every specimen of the same shape.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MeshOptions {
@@ -36,11 +36,15 @@ pub struct MeshOptions {
 
 /// Elements in the unmirrored block at standard size.
 const STANDARD_ELEMENTS: f64 = 720.0;
+/// Element size of [`MeshOptions::search`] relative to standard.
+pub(super) const SEARCH_FACTOR: f64 = 1.8;
+/// Element size of [`MeshOptions::fine`] relative to standard.
+pub(super) const FINE_FACTOR: f64 = 0.6;
 
 impl MeshOptions {
     /// Coarse meshes for a search: about 2–4 thousand free unknowns in half of a two-hole block.
     pub fn search(specimen: &Specimen) -> Self {
-        MeshOptions { hole_segments: 8, ..Self::scaled(specimen, 1.8) }
+        MeshOptions { hole_segments: 8, ..Self::scaled(specimen, SEARCH_FACTOR) }
     }
 
     /// The default: about 10–15 thousand free unknowns in half of a two-hole block.
@@ -50,7 +54,7 @@ impl MeshOptions {
 
     /// Meshes to confirm results: about 40–70 thousand free unknowns in half of a two-hole block.
     pub fn fine(specimen: &Specimen) -> Self {
-        Self::scaled(specimen, 0.6)
+        Self::scaled(specimen, FINE_FACTOR)
     }
 
     /// Element size `factor` times that of [`Self::standard`]; unknowns go with its inverse third power.

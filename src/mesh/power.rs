@@ -1,4 +1,5 @@
-//! The power diagram of the holes in a rectangle: one polygon around each hole, sharing whole edges with its neighbours.
+//! The power diagram of the holes in a rectangle: one polygon around each hole, sharing whole edges with its
+//! neighbours.
 
 use super::domain::Disc;
 use super::section::{cross, dot, sub};

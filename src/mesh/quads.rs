@@ -3,16 +3,16 @@
 use super::cells::{Style, holed_section};
 use super::domain::Domain;
 use super::error::MeshError;
-use super::grading::{divide, with_middles};
+use super::grid::{Builder, count, limit_cells, line};
 use super::options::MeshOptions;
 use super::power::Rectangle;
-use super::section::{PointMerger, Section};
+use super::section::Section;
 
 /// The best section of quadrilaterals for `domain`, or `None` where quadrilaterals are no use.
 ///
-/// With holes, several inner rectangles around them (what is outside becomes structured strips) and several ways to make
-/// cells in them are ranked on a coarse section by shape and number of cells; the first that is good enough at the size
-/// asked for is taken. So the layout of cells hardly depends on the size.
+/// With holes, several inner rectangles around them (what is outside becomes structured strips) and several ways to
+/// make cells in them are ranked on a coarse section by shape and number of cells; the first that is good enough at the
+/// size asked for is taken. So the layout of cells hardly depends on the size.
 ///
 /// # Errors
 /// [`MeshError::TooManyElements`].
@@ -62,30 +62,9 @@ pub(super) fn quad_section(domain: &Domain, options: &MeshOptions) -> Result<Opt
 const RANKING_CELLS: f64 = 60.0;
 /// So many layouts are tried at the size asked for.
 const MAX_ATTEMPTS: usize = 8;
-/// Ways to make cells: edges shorter than this many element sizes are collapsed, and the lines to the cells' corners bend
-/// by this fraction.
+/// Ways to make cells: edges shorter than this many element sizes are collapsed, and the lines to the cells' corners
+/// bend by this fraction.
 const STYLES: [(f64, f64); 4] = [(0.45, 0.0), (0.15, 0.0), (0.45, 0.7), (0.15, 0.7)];
-
-/// Number of parts for a length, refused if absurd.
-pub(super) fn count(length: f64, options: &MeshOptions) -> Result<usize, MeshError> {
-    let n = (length / options.section_size_mm).round();
-    if n > options.max_elements as f64 {
-        return Err(MeshError::TooManyElements { elements: n as usize, limit: options.max_elements });
-    }
-    Ok((n as usize).max(1))
-}
-
-pub(super) fn limit_cells(cells: usize, options: &MeshOptions) -> Result<(), MeshError> {
-    if cells.saturating_mul(options.levels.div_ceil(2)) > options.max_elements {
-        return Err(MeshError::TooManyElements { elements: cells, limit: options.max_elements });
-    }
-    Ok(())
-}
-
-/// `low` to `high` in `n` graded parts, with middles.
-pub(super) fn line(low: f64, high: f64, n: usize, start: f64, end: f64) -> Vec<f64> {
-    with_middles(&divide(n, start, end)).iter().map(|u| low + (high - low) * u).collect()
-}
 
 /// Block or dumb-bell without holes.
 fn structured_section(domain: &Domain, options: &MeshOptions) -> Result<Section, MeshError> {
@@ -151,40 +130,4 @@ fn inner_rectangles(domain: &Domain, size: f64) -> Vec<Rectangle> {
         }
     }
     rectangles
-}
-
-/// Collects grids into a section.
-pub(super) struct Builder {
-    merger: PointMerger,
-    cells: Vec<u32>,
-}
-
-impl Builder {
-    pub fn new(domain: &Domain) -> Self {
-        Builder { merger: PointMerger::new(domain), cells: Vec::new() }
-    }
-
-    /// A grid of `ni` × `nj` points (odd numbers; every other one is a middle). The first direction turned
-    /// counter-clockwise gives the second.
-    pub fn grid(&mut self, ni: usize, nj: usize, point: impl Fn(usize, usize) -> [f64; 2]) {
-        let mut indices = Vec::with_capacity(ni * nj);
-        for j in 0..nj {
-            for i in 0..ni {
-                indices.push(self.merger.insert(point(i, j)));
-            }
-        }
-        for j in (0..nj - 1).step_by(2) {
-            for i in (0..ni - 1).step_by(2) {
-                for b in 0..3 {
-                    for a in 0..3 {
-                        self.cells.push(indices[i + a + ni * (j + b)]);
-                    }
-                }
-            }
-        }
-    }
-
-    pub fn finish(self) -> Section {
-        Section { nodes_per_cell: 9, points: self.merger.points, cells: self.cells }
-    }
 }

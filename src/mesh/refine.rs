@@ -132,8 +132,8 @@ mod tests {
     use crate::mesh::{MeshOptions, mesh_specimen};
     use crate::specimen::Specimen;
 
-    /// The refined mesh has the coarse volume to rounding, positive Jacobians and eight times the elements. (Its nodes on
-    /// hole walls lie on the coarse quadratic arcs, a few micrometres off the circle.)
+    /// The refined mesh has the coarse volume to rounding, positive Jacobians and eight times the elements. (Its nodes
+    /// on hole walls lie on the coarse quadratic arcs, a few micrometres off the circle.)
     #[test]
     fn refined_mesh_is_a_mesh_of_the_same_body() {
         let text = include_str!("../../geometries/two-hole-shear.json");

@@ -58,9 +58,9 @@ pub(super) fn dot(u: [f64; 2], v: [f64; 2]) -> f64 {
     u[0] * v[0] + u[1] * v[1]
 }
 
-/// Scaled Jacobian of a curved cell: the smallest sine of the angle between the two parametric directions over the nodes
-/// of a quadrilateral, or at the corners of a triangle det J over the largest product of two sides, times 2/√3 so that
-/// the equilateral triangle has 1. Negative if the cell is folded.
+/// Scaled Jacobian of a curved cell: the smallest sine of the angle between the two parametric directions over the
+/// nodes of a quadrilateral, or at the corners of a triangle det J over the largest product of two sides, times 2/√3 so
+/// that the equilateral triangle has 1. Negative if the cell is folded.
 pub(super) fn scaled_jacobian(points: &[[f64; 2]]) -> f64 {
     let mut worst = f64::INFINITY;
     if points.len() == 9 {

@@ -6,7 +6,6 @@ use crate::specimen::{Block, Hole, HoleAxis, Outline, Specimen, TestKind};
 pub(super) fn specimen(test: TestKind, extents: [f64; 3], axis: HoleAxis, holes: &[[f64; 3]]) -> Specimen {
     let [length_mm, thickness_mm, width_mm] = extents;
     Specimen {
-        schema: "specimen/1".into(),
         name: format!("{test:?} {extents:?} {axis:?} {holes:?}"),
         test,
         block: Block { length_mm, thickness_mm, width_mm },

@@ -70,8 +70,8 @@ impl Curve {
 type BoundaryEdges = HashMap<(usize, usize), (Curve, f64)>;
 
 /// Triangulates the section, with finer and finer boundary parts until no triangle is worse than
-/// `options.min_scaled_jacobian`; a long arc takes half its angle away from the corners of its triangle. If none is good
-/// enough, the best is returned.
+/// `options.min_scaled_jacobian`; a long arc takes half its angle away from the corners of its triangle. If none is
+/// good enough, the best is returned.
 ///
 /// # Errors
 /// [`MeshError::TooManyElements`], [`MeshError::Triangulation`], [`MeshError::RefinementIncomplete`].

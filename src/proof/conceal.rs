@@ -290,7 +290,8 @@ fn image(u: &mut [f64; 3], x: [f64; 3], hidden: &Hidden, specimen: &Specimen, is
     }
 }
 
-/// The load curve of a first cycle beyond the largest drive and then the steps with holds; windows and mean forces of the steps.
+/// The load curve of a first cycle beyond the largest drive and then the steps with holds; windows and mean forces of
+/// the steps.
 fn history(drives: &[f64], forces: &[f64], hidden: &Hidden, noise: &mut Draw) -> (LoadCurve, Vec<[f64; 2]>, Vec<f64>) {
     let num_steps = drives.len() - 1;
     let beyond = drives[num_steps];

@@ -1,5 +1,6 @@
 //! What is hidden in a recording, drawn from a seed.
 
+use crate::diagnosis::CauseName;
 use crate::material::{Ogden, OgdenTerm};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -81,6 +82,11 @@ impl HiddenCause {
     /// Whether it is to be seen in the displacement.
     pub fn acts_on_displacement(self) -> bool {
         !matches!(self, HiddenCause::None | HiddenCause::Relaxation | HiddenCause::Mullins | HiddenCause::Cell)
+    }
+
+    /// The cause that the diagnosis should name; `None` where nothing is hidden.
+    pub fn diagnosed(self) -> Option<CauseName> {
+        (self != HiddenCause::None).then(|| CauseName::new(self.name()))
     }
 
     /// The name that the diagnosis gives it.
@@ -170,11 +176,12 @@ impl Draw {
     }
 }
 
-/// Draws place, size, material and noise of `cause` in the two-hole shear specimen. Sizes range from what can hardly be seen to
-/// what is plain. `strength` is: g of a relaxation; ρ of softening; κ/μ; fibre modulus / shear modulus; relative change from the
-/// centre to a face; ln of an inclusion's stiffness factor; ln of the swelling's volume ratio; 1 for a debond; degrees of tilt at
-/// full drive; mm off axis at full drive; mm/N; N; mm of a hole's diameter or place; relative gain error; mm of background; mm of
-/// a jump; mm of shift; mm of slack; mm or degrees of the plate (along y, z; about x, y, z); mm/kPa of the bonds (fixed, moved, both).
+/// Draws place, size, material and noise of `cause` in the two-hole shear specimen. Sizes range from what can hardly be
+/// seen to what is plain. `strength` is: g of a relaxation; ρ of softening; κ/μ; fibre modulus / shear modulus;
+/// relative change from the centre to a face; ln of an inclusion's stiffness factor; ln of the swelling's volume ratio;
+/// 1 for a debond; degrees of tilt at full drive; mm off axis at full drive; mm/N; N; mm of a hole's diameter or place;
+/// relative gain error; mm of background; mm of a jump; mm of shift; mm of slack; mm or degrees of the plate (along y,
+/// z; about x, y, z); mm/kPa of the bonds (fixed, moved, both).
 pub fn draw_cause(cause: HiddenCause, seed: u64) -> Hidden {
     let mut d = Draw::new(seed, 1);
     let mu_kpa = d.within(12.0, 22.0);
@@ -184,7 +191,7 @@ pub fn draw_cause(cause: HiddenCause, seed: u64) -> Hidden {
     let mut hidden = Hidden {
         cause,
         seed,
-        material: Ogden { schema: "ogden/1".into(), bulk_kpa, terms: vec![OgdenTerm { mu_kpa, alpha }] },
+        material: Ogden { bulk_kpa, terms: vec![OgdenTerm { mu_kpa, alpha }] },
         noise_sd_mm: d.within(0.015, 0.035),
         strength: 0.0,
         which: 0,
@@ -279,4 +286,20 @@ pub fn draw_cause(cause: HiddenCause, seed: u64) -> Hidden {
         }
     }
     hidden
+}
+
+#[cfg(test)]
+mod tests {
+    use super::HiddenCause;
+    use crate::diagnosis::cause_names;
+
+    /// Every cause that can be hidden is one that the diagnosis can name.
+    #[test]
+    fn hidden_causes_are_causes_of_the_registry() {
+        let known = cause_names();
+        for cause in HiddenCause::ALL {
+            assert!(cause.diagnosed().is_some_and(|name| known.contains(&name)), "{cause:?}");
+        }
+        assert_eq!(HiddenCause::None.diagnosed(), None);
+    }
 }

@@ -1,15 +1,21 @@
-//! Proof of the diagnosis: recordings with a hidden, randomly drawn cause, made by code of its own on meshes of its own, and
-//! how the diagnosis fares on them.
+//! Proof of the diagnosis: recordings with a hidden, randomly drawn cause, made by code of its own on meshes of its
+//! own, and how the diagnosis fares on them.
 //!
 //! * [`draw_cause`]: a cause, its place, size, material and noise, from a seed.
-//! * [`fn@conceal`]: the recording, from triangular prisms where the diagnosis has hexahedra, with sharp edges where it has
-//!   smooth ones, a remeshed specimen where it moves nodes, and force histories of another model.
+//! * [`fn@conceal`]: the recording, from triangular prisms where the diagnosis has hexahedra, with sharp edges where it
+//!   has smooth ones, a remeshed specimen where it moves nodes, and force histories of another model.
 //! * [`prove`]: diagnoses each and scores cause, place and intervals; [`Proof`] sums up.
 
 mod conceal;
 mod draw;
+mod options;
+mod result;
 mod score;
+mod summary;
+mod truths;
 
 pub use conceal::{ConcealError, Concealed, conceal};
 pub use draw::{Hidden, HiddenCause, draw_cause};
-pub use score::{CauseSummary, Proof, ProofOptions, Scored, prove, score_one};
+pub use options::ProofOptions;
+pub use result::{CauseSummary, FirstNamed, Proof, Scored};
+pub use score::{prove, score_one};

@@ -3,17 +3,17 @@
 use crate::homogeneous::{CurveMatch, Interval};
 use serde::{Deserialize, Serialize};
 
-/// The answer.
+/// How the search for what a model leaves out ended, be it of load curves or of a whole recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// The elastic material meets the curves up to noise.
+    /// The model meets the data up to noise and to what the numerics leave.
     NoMismatch,
     /// The named causes explain the mismatch.
     Explained,
-    /// Other causes would explain it as well.
+    /// Other causes would explain it as well: the data cannot tell them apart.
     ExplainedAmbiguously,
-    /// Something is left that no hypothesis explains.
+    /// Something is left that no cause explains.
     Unexplained,
 }
 
@@ -132,11 +132,11 @@ pub struct CurveMaterial {
     pub initial_shear_modulus_kpa: Interval,
 }
 
-/// A number without and with the physics.
+/// A number without and with the named causes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BeforeAfter {
-    /// Elastic material alone.
+    /// The model without causes.
     pub before: f64,
     /// With the named causes.
     pub after: f64,

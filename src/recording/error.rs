@@ -18,14 +18,18 @@ pub enum RecordingError {
         source: std::io::Error,
     },
     /// A file is larger than allowed.
-    #[error("{}: {bytes} bytes (limit: {limit})", path.display())]
+    #[error("{}: more than {limit} bytes", path.display())]
     TooLarge {
         /// The file.
         path: PathBuf,
-        /// Its size.
-        bytes: u64,
-        /// The limit.
+        /// Most bytes.
         limit: u64,
+    },
+    /// A path does not lead to a file but to a folder, a pipe or a device.
+    #[error("{}: {}", path.display(), crate::file::ReadError::NotRegular)]
+    NotRegular {
+        /// The path.
+        path: PathBuf,
     },
     /// `recording.json` does not fit the schema.
     #[error("recording.json: {0}")]

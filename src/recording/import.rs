@@ -6,8 +6,8 @@ use crate::specimen::Specimen;
 use crate::voxel::{VoxelError, VoxelGrid};
 use std::path::PathBuf;
 
-/// The measured box may be this much smaller or larger than the drawn block, as a factor, before its unit or its axes are
-/// doubted.
+/// The measured box may be this much smaller or larger than the drawn block, as a factor, before its unit or its axes
+/// are doubted.
 const LARGEST_MISFIT: f64 = 1.6;
 
 /// Why a file was not imported.

@@ -1,9 +1,9 @@
 //! Displacement fields as MR-u laboratories keep them in MATLAB files.
 //!
-//! `U_t` is a cell per step of a cell of three arrays (or an array with the component as fourth and the step as fifth index);
-//! `mask` is one in material, zero or NaN elsewhere; `X` holds three arrays of positions, `osc` the voxel's edges along the
-//! array's three indices; `prescribedU` the drives. Which index runs along which axis is the laboratory's choice
-//! ([`ImportOptions::axes`]); component i of the displacement is the one along the array's index i.
+//! `U_t` is a cell per step of a cell of three arrays (or an array with the component as fourth and the step as fifth
+//! index); `mask` is one in material, zero or NaN elsewhere; `X` holds three arrays of positions, `osc` the voxel's
+//! edges along the array's three indices; `prescribedU` the drives. Which index runs along which axis is the
+//! laboratory's choice ([`ImportOptions::axes`]); component i of the displacement is the one along the array's index i.
 
 use super::import::{ImportError, ImportOptions, finish};
 use super::mat::MatValue;

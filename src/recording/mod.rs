@@ -1,8 +1,10 @@
-//! Recordings: a folder with `recording.json`, images and a load curve (see the formats page).
+//! Recordings: a folder with `recording.json`, images and a load curve (`mru-recording/1`).
 
 mod error;
+mod folder;
 mod import;
 mod lab;
+mod limits;
 mod load_curve;
 pub mod mat;
 mod nifti;
@@ -14,11 +16,12 @@ mod write;
 pub use error::RecordingError;
 pub use import::{ImportError, ImportOptions, IndexAxis};
 pub use lab::recording_from_mat;
+pub use limits::ReadLimits;
 pub use load_curve::LoadCurve;
 pub use nifti::{Image, NiftiError, Samples};
 pub use points::{DisplacementPoint, read_points, recording_from_points};
 pub use raw::{RawRecording, RawStep};
-pub use read::ReadLimits;
+pub use read::ReadRecording;
 pub use write::{write_scalars, write_vectors};
 
 use crate::specimen::Specimen;
@@ -63,7 +66,8 @@ pub struct RecordedStep {
 }
 
 /// A filter that displacements went through.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, utoipa::ToSchema)]
+#[schema(as = DisplacementFilter)]
 #[serde(rename_all = "snake_case")]
 pub enum Filter {
     /// None.

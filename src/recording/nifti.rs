@@ -1,6 +1,7 @@
 //! NIfTI-1 images, one file, plain or gzip (`.nii`, `.nii.gz`).
 //!
-//! Reading is bounded: what a compressed file expands to is limited by what its header promises, and that by the caller.
+//! Reading is bounded: what a compressed file expands to is limited by what its header promises, and that by the
+//! caller.
 
 use flate2::Compression;
 use flate2::read::GzDecoder;

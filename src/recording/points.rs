@@ -1,4 +1,5 @@
-//! Point clouds as CSV: `x,y,z,ux,uy,uz` with optional `w` (weight) and `sd`, in the specimen's frame; one file per step.
+//! Point clouds as CSV: `x,y,z,ux,uy,uz` with optional `w` (weight) and `sd`, in the specimen's frame; one file per
+//! step.
 
 use super::import::{ImportError, ImportOptions, finish};
 use super::{RecordedStep, Recording};
@@ -89,8 +90,8 @@ pub fn read_points(text: &str, path: &Path, max_points: usize) -> Result<Vec<Dis
     Ok(points)
 }
 
-/// A recording from one point cloud per step. Points on a regular grid become its voxels; others are averaged, by weight, in
-/// voxels of `voxel_mm` on the grid that covers the specimen.
+/// A recording from one point cloud per step. Points on a regular grid become its voxels; others are averaged, by
+/// weight, in voxels of `voxel_mm` on the grid that covers the specimen.
 ///
 /// # Errors
 /// [`ImportError`].

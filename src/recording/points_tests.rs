@@ -57,7 +57,8 @@ fn scattered_points_are_averaged() {
     assert!(matches!(read(None).unwrap_err(), ImportError::NoGrid { .. }));
     let r = read(Some([6.35, 3.2, 9.55])).unwrap();
     assert_eq!(r.num_voxels(), 16);
-    // Half of the points carry 1 with weight two, half 4 with weight one: 2; some 250 points per voxel, spread 1.4: 0.09.
+    // Half of the points carry 1 with weight two, half 4 with weight one: 2; some 250 points per voxel,
+    // spread 1.4: 0.09.
     assert!(r.steps[0].displacement.iter().all(|u| (u[0] - 2.0).abs() < 0.4));
 }
 

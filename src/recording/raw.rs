@@ -1,7 +1,7 @@
 //! Raw recordings: wrapped phases and magnitudes, from which displacements are unwrapped.
 
-use super::read::{Head, ReadLimits, check_step, positive, read_scalar};
-use super::{Filter, LoadCurve, RecordingError};
+use super::read::{Head, ReadRecording, check_step, positive, read_scalar};
+use super::{Filter, LoadCurve, ReadLimits, RecordingError};
 use crate::specimen::Specimen;
 use crate::voxel::VoxelGrid;
 use std::path::Path;
@@ -53,9 +53,18 @@ impl RawRecording {
     /// Reads the raw recording in `path`: a folder with a `recording.json`, or such a JSON file under another name.
     ///
     /// # Errors
-    /// [`RecordingError`], as for [`super::Recording::read`]; [`RecordingError::NotRaw`] where a step holds displacements.
+    /// [`RecordingError`], as for [`super::Recording::read`]; [`RecordingError::NotRaw`] where a step holds
+    /// displacements.
     pub fn read(path: &Path, limits: &ReadLimits) -> Result<RawRecording, RecordingError> {
-        let head = Head::read(path, limits)?;
+        RawRecording::read_with_digest(path, limits).map(|read| read.recording)
+    }
+
+    /// As [`RawRecording::read`], with a digest of the files that were read.
+    ///
+    /// # Errors
+    /// See [`RawRecording::read`].
+    pub fn read_with_digest(path: &Path, limits: &ReadLimits) -> Result<ReadRecording<RawRecording>, RecordingError> {
+        let mut head = Head::read(path, limits)?;
         let mut steps = Vec::with_capacity(head.json.steps.len());
         if head.json.acquisition.filter != Filter::None {
             return Err(RecordingError::Json(
@@ -72,7 +81,7 @@ impl RawRecording {
             }
             let mut phase = [Vec::new(), Vec::new(), Vec::new()];
             for (axis, name) in raw.phase.iter().enumerate() {
-                let values = read_scalar(&head.folder, name, &head.grid, limits)?;
+                let values = read_scalar(&mut head.files, name, &head.grid)?;
                 if let Some(&value) = values.iter().find(|p| p.abs() > std::f64::consts::PI + PHASE_MARGIN) {
                     return Err(RecordingError::Value {
                         name: name.clone(), value, requirement: "a phase in (−π, π]"
@@ -80,7 +89,7 @@ impl RawRecording {
                 }
                 phase[axis] = values;
             }
-            let magnitude = read_scalar(&head.folder, &raw.magnitude, &head.grid, limits)?;
+            let magnitude = read_scalar(&mut head.files, &raw.magnitude, &head.grid)?;
             if let Some(&value) = magnitude.iter().find(|m| **m < 0.0) {
                 return Err(RecordingError::Value { name: raw.magnitude.clone(), value, requirement: "not negative" });
             }
@@ -100,7 +109,7 @@ impl RawRecording {
                 mm_per_radian: raw.mm_per_radian,
             });
         }
-        Ok(RawRecording {
+        let recording = RawRecording {
             id: head.json.id,
             specimen: head.specimen,
             grid: head.grid,
@@ -109,7 +118,8 @@ impl RawRecording {
             noise_sd_mm: head.json.acquisition.noise_sd_mm,
             load: head.load,
             notes: head.json.notes,
-        })
+        };
+        Ok(ReadRecording { recording, digest: head.files.digest() })
     }
 
     /// Number of voxels in the mask.

@@ -1,35 +1,17 @@
 //! Reading a recording's folder.
 
+use super::folder::FolderReader;
 use super::nifti::{INTENT_DISPLACEMENT, Image, NiftiError};
-use super::{Filter, LoadCurve, RecordedStep, Recording, RecordingError};
+use super::{Filter, LoadCurve, ReadLimits, RecordedStep, Recording, RecordingError};
 use crate::specimen::Specimen;
 use crate::voxel::VoxelGrid;
 use serde::{Deserialize, Serialize};
-use std::fs::File;
-use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The schema that this version reads and writes.
 pub const SCHEMA: &str = "mru-recording/1";
 /// Grids of two images agree to this part of a voxel: their affines are stored in single precision.
 const GRID_TOLERANCE: f64 = 1e-3;
-
-/// What reading may take.
-#[derive(Clone, Copy, Debug)]
-pub struct ReadLimits {
-    /// Largest file, bytes.
-    pub max_file_bytes: u64,
-    /// Most numbers of an image.
-    pub max_values: u64,
-    /// Most steps.
-    pub max_steps: usize,
-}
-
-impl Default for ReadLimits {
-    fn default() -> Self {
-        ReadLimits { max_file_bytes: 1 << 30, max_values: 200_000_000, max_steps: 1000 }
-    }
-}
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -80,14 +62,32 @@ pub(super) struct AcquisitionJson {
     pub(super) filter: Filter,
 }
 
+/// A recording with a digest of the files that it was read from.
+#[derive(Clone, Debug)]
+pub struct ReadRecording<T = Recording> {
+    /// The recording.
+    pub recording: T,
+    /// SHA-256, hexadecimal, over name and content of every file that was read: `recording.json`, mask, load curve and
+    /// images. Other files of the folder do not enter.
+    pub digest: String,
+}
+
 impl Recording {
     /// Reads the recording in `path`: a folder with a `recording.json`, or such a JSON file under another name.
     ///
     /// # Errors
-    /// [`RecordingError`]: a file that is missing, damaged, too large or not of the format; [`RecordingError::Raw`] where
-    /// the steps hold wrapped phases (read those as [`super::RawRecording`]).
+    /// [`RecordingError`]: a file that is missing, damaged, too large or not of the format; [`RecordingError::Raw`]
+    /// where the steps hold wrapped phases (read those as [`super::RawRecording`]).
     pub fn read(path: &Path, limits: &ReadLimits) -> Result<Recording, RecordingError> {
-        let head = Head::read(path, limits)?;
+        Recording::read_with_digest(path, limits).map(|read| read.recording)
+    }
+
+    /// As [`Recording::read`], with a digest of the files that were read.
+    ///
+    /// # Errors
+    /// See [`Recording::read`].
+    pub fn read_with_digest(path: &Path, limits: &ReadLimits) -> Result<ReadRecording, RecordingError> {
+        let mut head = Head::read(path, limits)?;
         let num_voxels = head.mask.iter().filter(|m| **m).count();
         let mut steps = Vec::with_capacity(head.json.steps.len());
         for (n, step) in head.json.steps.iter().enumerate() {
@@ -95,7 +95,7 @@ impl Recording {
             let Some(name) = &step.displacement else {
                 return Err(RecordingError::Raw { step: n + 1 });
             };
-            let displacement = read_displacement(&head.folder, name, &head.grid, limits)?;
+            let displacement = read_displacement(&mut head.files, name, &head.grid)?;
             let is_measured = |(m, u): (&bool, &[f64; 3])| *m && u.iter().all(|x| x.is_finite());
             if !head.mask.iter().zip(&displacement).any(is_measured) {
                 return Err(RecordingError::NoDisplacement { step: n + 1, num_voxels });
@@ -108,7 +108,7 @@ impl Recording {
                 displacement,
             });
         }
-        Ok(Recording {
+        let recording = Recording {
             id: head.json.id,
             specimen: head.specimen,
             grid: head.grid,
@@ -118,13 +118,14 @@ impl Recording {
             filter: head.json.acquisition.filter,
             load: head.load,
             notes: head.json.notes,
-        })
+        };
+        Ok(ReadRecording { recording, digest: head.files.digest() })
     }
 }
 
 /// What recordings of both kinds share.
-pub(super) struct Head {
-    pub(super) folder: PathBuf,
+pub(super) struct Head<'a> {
+    pub(super) files: FolderReader<'a>,
     pub(super) json: RecordingJson,
     pub(super) specimen: Specimen,
     pub(super) grid: VoxelGrid,
@@ -132,14 +133,16 @@ pub(super) struct Head {
     pub(super) load: Option<LoadCurve>,
 }
 
-impl Head {
-    pub(super) fn read(path: &Path, limits: &ReadLimits) -> Result<Head, RecordingError> {
-        let (folder, file) = if path.is_file() {
-            (path.parent().unwrap_or(Path::new("")).to_path_buf(), path.to_path_buf())
+impl<'a> Head<'a> {
+    pub(super) fn read(path: &Path, limits: &'a ReadLimits) -> Result<Head<'a>, RecordingError> {
+        let (folder, name) = if path.is_file() {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            (path.parent().unwrap_or(Path::new("")), name)
         } else {
-            (path.to_path_buf(), path.join("recording.json"))
+            (path, "recording.json".to_string())
         };
-        let text = read_text(&file, limits)?;
+        let mut files = FolderReader::new(folder, limits);
+        let text = files.text(&name)?;
         let json: RecordingJson = serde_json::from_str(&text).map_err(|e| RecordingError::Json(e.to_string()))?;
         if json.schema != SCHEMA {
             return Err(RecordingError::Json(format!("schema is '{}'; this version reads {SCHEMA}", json.schema)));
@@ -153,9 +156,11 @@ impl Head {
             });
         }
         let specimen = Specimen::from_json(&json.specimen.to_string())?;
-        let (mask_path, mask_image) = image(&folder, &json.mask, limits)?;
-        let grid =
-            grid_of(&mask_image, [1, 1]).map_err(|source| RecordingError::Image { path: mask_path, source })??;
+        let mask_image = files.image(&json.mask)?;
+        let grid = match grid_of(&mask_image, [1, 1]) {
+            Ok(grid) => grid?,
+            Err(source) => return Err(RecordingError::Image { path: files.path(&json.mask)?, source }),
+        };
         let mask: Vec<bool> = mask_image.values.iter().map(|v| *v > 0.5).collect();
         if !mask.contains(&true) {
             return Err(RecordingError::EmptyMask);
@@ -167,12 +172,9 @@ impl Head {
         }
         let load = match &json.load {
             None => None,
-            Some(name) => {
-                let path = folder.join(plain(name)?);
-                Some(LoadCurve::from_csv(&read_text(&path, limits)?, &path)?)
-            }
+            Some(name) => Some(LoadCurve::from_csv(&files.text(name)?, &files.path(name)?)?),
         };
-        Ok(Head { folder, json, specimen, grid, mask, load })
+        Ok(Head { files, json, specimen, grid, mask, load })
     }
 }
 
@@ -201,38 +203,6 @@ pub(super) fn positive(name: &str, value: f64) -> Result<(), RecordingError> {
     }
 }
 
-/// A name that stays in the folder.
-pub(super) fn plain(name: &str) -> Result<&str, RecordingError> {
-    let is_plain = !name.is_empty() && !name.contains(['/', '\\', ':', '\0']) && name != "." && name != "..";
-    if is_plain { Ok(name) } else { Err(RecordingError::FileName { name: name.into() }) }
-}
-
-fn open(path: &Path, limits: &ReadLimits) -> Result<File, RecordingError> {
-    let fail = |source| RecordingError::File { path: path.into(), source };
-    let file = File::open(path).map_err(fail)?;
-    let bytes = file.metadata().map_err(fail)?.len();
-    if bytes > limits.max_file_bytes {
-        return Err(RecordingError::TooLarge { path: path.into(), bytes, limit: limits.max_file_bytes });
-    }
-    Ok(file)
-}
-
-fn read_text(path: &Path, limits: &ReadLimits) -> Result<String, RecordingError> {
-    let mut text = String::new();
-    let mut file = open(path, limits)?.take(limits.max_file_bytes);
-    file.read_to_string(&mut text).map_err(|source| RecordingError::File { path: path.into(), source })?;
-    Ok(text)
-}
-
-fn image(folder: &Path, name: &str, limits: &ReadLimits) -> Result<(PathBuf, Image), RecordingError> {
-    let path = folder.join(plain(name)?);
-    let file = std::io::BufReader::new(open(&path, limits)?);
-    match Image::read(file, limits.max_values) {
-        Ok(image) => Ok((path, image)),
-        Err(source) => Err(RecordingError::Image { path, source }),
-    }
-}
-
 /// The grid of an image with `[time points, components]`.
 fn grid_of(image: &Image, [time, components]: [usize; 2]) -> Result<Result<VoxelGrid, RecordingError>, NiftiError> {
     let [nx, ny, nz, t, c] = image.shape;
@@ -254,13 +224,12 @@ fn grid_of(image: &Image, [time, components]: [usize; 2]) -> Result<Result<Voxel
 
 /// A scalar image on the mask's grid.
 pub(super) fn read_scalar(
-    folder: &Path,
+    files: &mut FolderReader,
     name: &str,
     expected: &VoxelGrid,
-    limits: &ReadLimits,
 ) -> Result<Vec<f64>, RecordingError> {
-    let (path, image) = image(folder, name, limits)?;
-    check_grid(&path, &image, [1, 1], expected)?;
+    let image = files.image(name)?;
+    check_grid(&files.path(name)?, &image, [1, 1], expected)?;
     Ok(image.values)
 }
 
@@ -282,12 +251,11 @@ fn check_grid(path: &Path, image: &Image, kind: [usize; 2], expected: &VoxelGrid
 }
 
 fn read_displacement(
-    folder: &Path,
+    files: &mut FolderReader,
     name: &str,
     expected: &VoxelGrid,
-    limits: &ReadLimits,
 ) -> Result<Vec<[f64; 3]>, RecordingError> {
-    let (path, image) = image(folder, name, limits)?;
+    let (image, path) = (files.image(name)?, files.path(name)?);
     if image.intent != INTENT_DISPLACEMENT {
         return Err(RecordingError::Image { path, source: NiftiError::Intent { found: image.intent } });
     }

@@ -198,13 +198,19 @@ fn raw_recordings_round_trip() {
     };
     let folder = tempfile::tempdir().unwrap();
     raw.write(folder.path()).unwrap();
+    let digest = || RawRecording::read_with_digest(folder.path(), &ReadLimits::default()).unwrap().digest;
     let again = RawRecording::read(&folder.path().join("recording.json"), &ReadLimits::default()).unwrap();
+    let before = digest();
     assert_eq!((&again.grid, &again.mask, &again.notes), (&raw.grid, &raw.mask, &raw.notes));
     // Sixteenths are exact in single precision.
     assert_eq!(again.steps[0].phase, raw.steps[0].phase);
     assert_eq!(again.steps[0].magnitude, raw.steps[0].magnitude);
     assert_eq!(again.steps[0].mm_per_radian, [0.1, 0.2, 0.3]);
     assert!(matches!(read(folder.path()), Err(RecordingError::Raw { step: 1 })));
+    let mut brighter = raw.clone();
+    brighter.steps[0].magnitude[2] += 1.0;
+    brighter.write(folder.path()).unwrap();
+    assert_ne!(digest(), before);
     let mut turned = raw.clone();
     turned.steps[0].phase[1][3] = 4.0;
     turned.write(folder.path()).unwrap();
@@ -251,4 +257,75 @@ fn wrong_units_shapes_and_endless_streams_are_refused() {
         read(folder.path()),
         Err(RecordingError::Image { source: NiftiError::Shape { expected_components: 3, .. }, .. })
     ));
+}
+
+/// The digest covers every file that is read and no other.
+#[test]
+fn a_digest_tells_what_was_read() {
+    let digest = |folder: &Path| Recording::read_with_digest(folder, &ReadLimits::default()).expect("it reads").digest;
+    let (folder, mut recording) = written();
+    let first = digest(folder.path());
+    assert_eq!(first.len(), 64);
+    std::fs::write(folder.path().join("notes.txt"), "unrelated").expect("written");
+    assert_eq!(digest(folder.path()), first, "another file of the folder");
+    let rewritten = |recording: &Recording| {
+        recording.write(folder.path()).expect("written");
+        digest(folder.path())
+    };
+    assert_eq!(rewritten(&recording), first, "the same content");
+    recording.steps[0].displacement[0][2] += 0.5;
+    let moved = rewritten(&recording);
+    assert_ne!(moved, first, "a changed voxel");
+    recording.load.as_mut().expect("a curve").force_n[1] += 0.5;
+    let loaded = rewritten(&recording);
+    assert_ne!(loaded, moved, "a changed line of the load curve");
+    recording.mask[0] = false;
+    let masked = rewritten(&recording);
+    assert_ne!(masked, loaded, "a changed mask");
+    recording.id = "other".into();
+    assert_ne!(rewritten(&recording), masked, "a changed recording.json");
+}
+
+/// Bytes behind an image's data belong to the file, and to its digest.
+#[test]
+fn a_digest_covers_whole_files() {
+    use std::io::Write;
+    let (folder, _) = written();
+    let digest = || Recording::read_with_digest(folder.path(), &ReadLimits::default()).expect("it reads").digest;
+    let before = digest();
+    let image = folder.path().join("u_1.nii.gz");
+    let mut file = std::fs::OpenOptions::new().append(true).open(image).expect("it is there");
+    file.write_all(b"more").expect("written");
+    assert_ne!(digest(), before);
+}
+
+#[test]
+fn files_that_are_too_large_are_refused_while_reading() {
+    let (folder, _) = written();
+    let size = std::fs::metadata(folder.path().join("recording.json")).expect("it is there").len();
+    let limits = ReadLimits { max_file_bytes: size - 1, ..ReadLimits::default() };
+    let refused = Recording::read(folder.path(), &limits).expect_err("refused");
+    assert!(matches!(refused, RecordingError::TooLarge { limit, .. } if limit == size - 1), "{refused}");
+}
+
+/// A pipe has no other end here: to open it would wait for ever.
+#[cfg(unix)]
+#[test]
+fn what_is_no_regular_file_is_refused() {
+    let (folder, _) = written();
+    let replace = |name: &str, make: &dyn Fn(&Path)| {
+        let path = folder.path().join(name);
+        std::fs::remove_file(&path).expect("it is there");
+        make(&path);
+        read(folder.path()).expect_err("refused")
+    };
+    let pipe = |path: &Path| {
+        assert!(std::process::Command::new("mkfifo").arg(path).status().expect("mkfifo runs").success());
+    };
+    let device = |path: &Path| std::os::unix::fs::symlink("/dev/zero", path).expect("linked");
+    let folder_at = |path: &Path| std::fs::create_dir(path).expect("made");
+    assert!(matches!(replace("u_1.nii.gz", &pipe), RecordingError::NotRegular { .. }));
+    assert!(matches!(replace("load.csv", &device), RecordingError::NotRegular { .. }));
+    assert!(matches!(replace("mask.nii.gz", &folder_at), RecordingError::NotRegular { .. }));
+    assert!(matches!(replace("recording.json", &pipe), RecordingError::NotRegular { .. }));
 }

@@ -8,8 +8,8 @@ use crate::design::DesignResult;
 /// Half width of a 95 % interval of a normal distribution, in standard deviations.
 const HALF_WIDTH_95: f64 = 1.96;
 
-/// Share of the draws whose interval, estimate ± 1.96 promised standard deviations, holds the truth once the mesh's shift is
-/// taken out; `None` where nothing is promised or found.
+/// Share of the draws whose interval, estimate ± 1.96 promised standard deviations, holds the truth once the mesh's
+/// shift is taken out; `None` where nothing is promised or found.
 fn coverage(p: &ParameterSpread) -> Option<f64> {
     let sd = p.promised_sd?;
     let shift = p.discretisation_bias.unwrap_or(0.0);
@@ -98,8 +98,8 @@ pub(super) fn verification(page: &mut Report, result: &DesignResult) {
 mod tests {
     use super::*;
 
-    /// Estimates 1, 2, 3 around a truth of 2 with a promise of 0.4: only the middle one is within 1.96 × 0.4; a mesh shift
-    /// of 1 makes it the last one.
+    /// Estimates 1, 2, 3 around a truth of 2 with a promise of 0.4: only the middle one is within 1.96 × 0.4; a mesh
+    /// shift of 1 makes it the last one.
     #[test]
     fn coverage_takes_the_mesh_out() {
         let mut p = ParameterSpread {

@@ -61,8 +61,8 @@ impl Frame {
     }
 }
 
-/// A vertical colour bar in `area` for values from `range[0]` to `range[1]`; `label` above it. Where `is_clipped`, values
-/// beyond that end have its colour, and the end carries a ≤ or ≥.
+/// A vertical colour bar in `area` for values from `range[0]` to `range[1]`; `label` above it. Where `is_clipped`,
+/// values beyond that end have its colour, and the end carries a ≤ or ≥.
 pub(super) fn draw_color_bar(
     svg: &mut Svg,
     [x, y, w, h]: [f64; 4],

@@ -22,8 +22,8 @@ pub struct VoxelField {
     pub range: Option<[f64; 2]>,
 }
 
-/// Maps of several fields on one grid. Each field has four maps: the slice through the middle voxel and the mean over the
-/// third direction, in x–z (above) and x–y (below).
+/// Maps of several fields on one grid. Each field has four maps: the slice through the middle voxel and the mean over
+/// the third direction, in x–z (above) and x–y (below).
 #[derive(Clone, Debug, Default)]
 pub struct VoxelMaps {
     /// Voxels along x, y, z.

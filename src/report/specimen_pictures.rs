@@ -134,8 +134,8 @@ pub fn map_pictures(maps: &EvaluationMaps) -> Vec<(String, String)> {
     pictures
 }
 
-/// Bars of the integrated sensitivities of every drive, relative to the first drive, and of the promised relative standard
-/// deviations.
+/// Bars of the integrated sensitivities of every drive, relative to the first drive, and of the promised relative
+/// standard deviations.
 pub fn bar_pictures(evaluation: &Evaluation) -> Vec<(String, String)> {
     let mut pictures = Vec::new();
     let series: Vec<String> = evaluation.steps.iter().map(|s| format!("{} mm", s.drive_mm)).collect();

@@ -38,7 +38,8 @@ const ROW: f64 = 34.0;
 const HALF_RANGE: [f64; 2] = [3.5, 8.0];
 
 impl SpreadPlot {
-    /// The picture. The bands show one and two promised standard deviations; the bar is mean ± standard deviation found.
+    /// The picture. The bands show one and two promised standard deviations; the bar is mean ± standard deviation
+    /// found.
     pub fn to_svg(&self) -> String {
         if !self.rows.iter().any(|r| r.found.iter().any(|v| v.is_finite())) {
             return Svg::placeholder(&self.title, "no calibration was made");

@@ -191,8 +191,8 @@ impl Svg {
         ));
     }
 
-    /// Coloured cells: `color_of(i, j)` for column i from the left and row j from the top, None for nothing. Cells of one
-    /// colour become one path, so that large maps stay small files.
+    /// Coloured cells: `color_of(i, j)` for column i from the left and row j from the top, None for nothing. Cells of
+    /// one colour become one path, so that large maps stay small files.
     ///
     /// Print smooths the edges of abutting cells, which leaves white hairlines. A copy below, whose cells reach half a
     /// cell under their right and lower neighbours, closes them.

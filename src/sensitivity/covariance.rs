@@ -54,6 +54,13 @@ pub struct Covariance {
     is_determined: Vec<bool>,
 }
 
+impl FisherInformation {
+    /// The covariance that the data promise (Cramér–Rao).
+    pub fn covariance(&self) -> Covariance {
+        Covariance::of(self)
+    }
+}
+
 impl Covariance {
     pub(super) fn of(information: &FisherInformation) -> Self {
         let n = information.parameters().len();
@@ -297,7 +304,7 @@ mod tests {
     #[test]
     fn twin_terms_do_not_panic() {
         let term = OgdenTerm { mu_kpa: 8.0, alpha: 2.0 };
-        let material = Ogden { schema: "ogden/1".into(), bulk_kpa: 2000.0, terms: vec![term, term] };
+        let material = Ogden { bulk_kpa: 2000.0, terms: vec![term, term] };
         let mut information = FisherInformation::none(&material);
         information.add_force(&[0.0, 0.3, 0.7, 0.3, 0.7], 0.02);
         let covariance = information.covariance();

@@ -1,6 +1,6 @@
 //! At which drives a specimen is evaluated, and the search for the drive that reaches a median stretch.
 
-use super::evaluation::EvaluationError;
+use super::error::EvaluationError;
 use super::observation::Scanner;
 use crate::fem::{Equilibrium, ForwardModel, SolveOptions};
 use crate::material::Ogden;

@@ -3,66 +3,17 @@
 use super::continuum::largest_principal_stretch;
 use super::covariance::{IDENTIFIABILITY_LIMIT, PromisedSd};
 use super::drives::{DriveSelection, check_drives, solve_for_median};
-use super::information::{FisherInformation, InformationError, ScanSettings};
+use super::error::EvaluationError;
+use super::information::FisherInformation;
 use super::observation::{DriveMaps, DrivenState, EvaluationStep, Scanner};
-use crate::fem::{Equilibrium, ForwardModel, PrepareError, SolveError, SolveOptions};
+use super::scan_settings::ScanSettings;
+use crate::fem::{Equilibrium, ForwardModel, PrepareError, SolveOptions};
 use crate::material::{Ogden, Parameter};
-use crate::mesh::{MeshError, MeshOptions};
+use crate::mesh::MeshOptions;
 use crate::provenance::input_hash;
 use crate::specimen::Specimen;
-use crate::voxel::{Sampling, VoxelError, VoxelMask};
+use crate::voxel::{Sampling, VoxelMask};
 use serde::{Deserialize, Serialize};
-
-/// Why a specimen was not evaluated.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum EvaluationError {
-    /// The specimen was not meshed.
-    #[error(transparent)]
-    Mesh(#[from] MeshError),
-    /// An equilibrium was not found.
-    #[error(transparent)]
-    Solve(#[from] SolveError),
-    /// The scan's grid does not suit the specimen.
-    #[error(transparent)]
-    Voxel(#[from] VoxelError),
-    /// The noise or a sensitivity is unusable.
-    #[error(transparent)]
-    Information(#[from] InformationError),
-    /// No drive was given.
-    #[error("no drive to evaluate; give at least one, in mm")]
-    NoDrive,
-    /// Drives must be positive and increase.
-    #[error("drive {drive_mm} mm after {previous_mm} mm; drives must be finite, positive and increasing")]
-    InvalidDrive {
-        /// The drive, mm.
-        drive_mm: f64,
-        /// The one before, mm (0 for the first).
-        previous_mm: f64,
-    },
-    /// The median stretch asked for is not above 1 or not a number.
-    #[error("median stretch {value} asked for; it must lie between 1 and {limit}")]
-    InvalidMedianStretch {
-        /// Value asked for.
-        value: f64,
-        /// Largest value.
-        limit: f64,
-    },
-    /// The search for the drive did not end.
-    #[error(
-        "median stretch {target} not reached in {num_solves} solves: {found} at a drive of {drive_mm} mm; ask for a smaller one"
-    )]
-    MedianStretchNotReached {
-        /// Asked for.
-        target: f64,
-        /// Found last.
-        found: f64,
-        /// At this drive, mm.
-        drive_mm: f64,
-        /// Equilibria solved.
-        num_solves: usize,
-    },
-}
 
 /// Settings of an evaluation.
 #[derive(Clone, Copy, Debug)]

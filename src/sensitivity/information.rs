@@ -7,9 +7,7 @@
 //!
 //! Not included: the correlation of the noise of filtered scans, and errors of the model.
 
-use super::covariance::Covariance;
 use crate::material::{Ogden, Parameter};
-use crate::voxel::VoxelMask;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -85,56 +83,11 @@ impl MeasurementNoise {
     }
 }
 
+/// A standard deviation must be above this: its square must not underflow either.
+pub(super) const LEAST_SD: f64 = 1e-100;
+
 fn check_sd(name: &'static str, value: f64) -> Result<(), InformationError> {
-    // The square must not underflow either.
-    if value.is_finite() && value > 1e-100 { Ok(()) } else { Err(InformationError::InvalidSd { name, value }) }
-}
-
-/// How much a partly filled voxel counts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum PartialVoxels {
-    /// As every voxel of the mask: `noise_sd_mm` is that of the values given, as in recordings.
-    #[default]
-    Uniform,
-    /// By its signal: the phase noise of an image goes as 1/magnitude and the magnitude as the filled part, so the weight
-    /// w is the filled part squared.
-    Signal,
-}
-
-impl PartialVoxels {
-    /// Weights w of the voxels of a mask.
-    pub fn weights(self, mask: &VoxelMask) -> Vec<f64> {
-        mask.material_fraction
-            .iter()
-            .map(|f| match self {
-                PartialVoxels::Uniform => 1.0,
-                PartialVoxels::Signal => f * f,
-            })
-            .collect()
-    }
-}
-
-/// The scan: grid and noise.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ScanSettings {
-    /// Edges of a voxel, mm.
-    pub voxel_mm: [f64; 3],
-    /// Standard deviation of a voxel's displacement along x, y, z, mm.
-    pub noise_sd_mm: [f64; 3],
-    /// Standard deviation of the load cell's force (all samples together), N.
-    pub force_sd_n: f64,
-    /// Weight of partly filled voxels.
-    #[serde(default)]
-    pub partial_voxels: PartialVoxels,
-}
-
-impl ScanSettings {
-    /// The noise alone.
-    pub fn noise(&self) -> MeasurementNoise {
-        MeasurementNoise { displacement_sd_mm: self.noise_sd_mm, force_sd_n: self.force_sd_n }
-    }
+    if value.is_finite() && value > LEAST_SD { Ok(()) } else { Err(InformationError::InvalidSd { name, value }) }
 }
 
 /// Fisher information matrix about material parameters, in their own units (I_ij in 1/(ξ_i ξ_j)).
@@ -296,11 +249,6 @@ impl FisherInformation {
         check_sd("prior standard deviation of the logarithm", log_sd)?;
         let i = self.index_of(parameter)?;
         self.add_prior(parameter, log_sd * self.values[i].abs())
-    }
-
-    /// The covariance that the data promise (Cramér–Rao).
-    pub fn covariance(&self) -> Covariance {
-        Covariance::of(self)
     }
 }
 

@@ -86,7 +86,6 @@ mod tests {
 
     fn material() -> Ogden {
         Ogden {
-            schema: "ogden/1".into(),
             bulk_kpa: 2200.0,
             terms: vec![OgdenTerm { mu_kpa: 16.0, alpha: 1.9 }, OgdenTerm { mu_kpa: 0.35, alpha: 8.0 }],
         }

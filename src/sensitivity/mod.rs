@@ -3,11 +3,13 @@
 mod continuum;
 mod covariance;
 mod drives;
+mod error;
 mod evaluation;
 mod information;
 mod integrated;
 mod observation;
 mod pointwise;
+mod scan_settings;
 mod separation;
 
 pub use continuum::{
@@ -15,12 +17,13 @@ pub use continuum::{
 };
 pub use covariance::{Covariance, Criterion, IDENTIFIABILITY_LIMIT, PromisedSd};
 pub use drives::DriveSelection;
+pub use error::EvaluationError;
 pub use evaluation::{
-    Evaluation, EvaluationError, EvaluationMaps, EvaluationNotes, EvaluationOptions, EvaluationStatistics, evaluate,
-    evaluate_model,
+    Evaluation, EvaluationMaps, EvaluationNotes, EvaluationOptions, EvaluationStatistics, evaluate, evaluate_model,
 };
-pub use information::{FisherInformation, InformationError, MeasurementNoise, PartialVoxels, ScanSettings};
+pub use information::{FisherInformation, InformationError, MeasurementNoise};
 pub use integrated::{IntegratedSensitivity, integrate_over_voxels, parameter_sensitivity, sensitivity_map};
 pub use observation::{DriveMaps, DrivenState, EvaluationStep, Observation, Scanner, median};
 pub use pointwise::{PointwiseSensitivity, alpha_sensitivity, mu_sensitivity};
+pub use scan_settings::{PartialVoxels, ScanSettings};
 pub use separation::{MaterialState, Separation, separation_over_quadrature};

@@ -1,9 +1,10 @@
 //! What the scan sees at one drive: voxel states, sensitivities and information of one equilibrium.
 
 use super::covariance::PromisedSd;
-use super::evaluation::EvaluationError;
-use super::information::{FisherInformation, MeasurementNoise, ScanSettings};
+use super::error::EvaluationError;
+use super::information::{FisherInformation, MeasurementNoise};
 use super::integrated::{IntegratedSensitivity, integrate_over_voxels, sensitivity_map, shear_parameters};
+use super::scan_settings::ScanSettings;
 use crate::fem::ParameterSensitivity;
 use crate::kinematics::{Decomposition, decompose};
 use crate::material::{Ogden, Parameter};

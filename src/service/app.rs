@@ -2,7 +2,6 @@
 
 use super::access::{Access, Caller, random_hex};
 use super::hub::Hub;
-use super::kinds::SizeLimits;
 use super::metrics::Metrics;
 use super::problem::Problem;
 use super::runner::Signal;
@@ -37,8 +36,8 @@ pub struct Limits {
     pub request_time: Duration,
     /// Time for a client to send its request's head.
     pub head_time: Duration,
-    /// Size of jobs.
-    pub size: SizeLimits,
+    /// Most elements of a mesh.
+    pub max_elements: usize,
 }
 
 impl Default for Limits {
@@ -52,7 +51,7 @@ impl Default for Limits {
             max_queued_tasks: 50_000,
             request_time: Duration::from_secs(30),
             head_time: Duration::from_secs(10),
-            size: SizeLimits { max_elements: 20_000, max_tasks: 10_000 },
+            max_elements: 20_000,
         }
     }
 }

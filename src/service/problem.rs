@@ -1,5 +1,7 @@
 //! Errors as RFC 9457 `application/problem+json`, with a stable `type` per cause and JSON pointers to offending fields.
 
+use crate::field::{FieldError, in_lines};
+use crate::job::{Failure, JobError};
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
@@ -8,10 +10,18 @@ use utoipa::ToSchema;
 /// Where in the request something is wrong.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct FieldProblem {
-    /// JSON pointer (RFC 6901) to the field; empty for the whole body.
-    pub pointer: String,
-    /// What is wrong and what to change.
+    /// The field.
+    #[serde(flatten)]
+    pub error: FieldError,
+    /// What is wrong and what to change, in a sentence.
     pub detail: String,
+}
+
+impl From<FieldError> for FieldProblem {
+    fn from(error: FieldError) -> Self {
+        let detail = error.to_string();
+        FieldProblem { detail, error }
+    }
 }
 
 /// A problem (RFC 9457).
@@ -79,20 +89,10 @@ impl Problem {
         }
     }
 
-    /// `invalid-input` at a field.
-    pub fn at(pointer: impl Into<String>, detail: impl Into<String>) -> Self {
-        let detail = detail.into();
-        let mut problem = Problem::new("invalid-input", detail.clone());
-        problem.errors.push(FieldProblem { pointer: pointer.into(), detail });
-        problem
-    }
-
-    /// `too-big-a-problem` at a field.
-    pub fn too_big(pointer: impl Into<String>, detail: impl Into<String>) -> Self {
-        let detail = detail.into();
-        let mut problem = Problem::new("too-big-a-problem", detail.clone());
-        problem.errors.push(FieldProblem { pointer: pointer.into(), detail });
-        problem
+    /// `invalid-input` with all offending fields.
+    pub fn invalid(errors: Vec<FieldError>) -> Self {
+        let detail = in_lines(&errors);
+        Problem { errors: errors.into_iter().map(Into::into).collect(), ..Problem::new("invalid-input", detail) }
     }
 
     /// With a time after which to try again.
@@ -138,49 +138,29 @@ impl IntoResponse for Problem {
     }
 }
 
-/// The JSON pointer of a path as validators write it: `holes[1].diameter_mm` → `/holes/1/diameter_mm`.
-pub fn pointer_of(path: &str) -> String {
-    if path.is_empty() || path == "." || path == "(root)" {
-        return String::new();
+impl From<JobError> for Problem {
+    fn from(error: JobError) -> Self {
+        match error {
+            JobError::Invalid(errors) => Problem::invalid(errors),
+            JobError::TooBig(error) => {
+                Problem { errors: vec![error.clone().into()], ..Problem::new("too-big-a-problem", error.to_string()) }
+            }
+            JobError::Unreadable { .. } => Problem::new("not-found", error.to_string()),
+            JobError::NoSolution(message) => Problem::new("no-solution", message),
+            other => Problem::new("internal", other.to_string()),
+        }
     }
-    path.split(['.', '['])
-        .map(|part| part.trim_end_matches(']'))
-        .filter(|part| !part.is_empty())
-        .map(|part| format!("/{}", part.replace('~', "~0").replace('/', "~1")))
-        .collect()
 }
 
-/// Reads a value, with a pointer to the field that does not fit.
-///
-/// # Errors
-/// A [`Problem`] `invalid-json` or `invalid-input`.
-pub fn parse<T: serde::de::DeserializeOwned>(value: &serde_json::Value) -> Result<T, Problem> {
-    serde_path_to_error::deserialize(value).map_err(|error| {
-        let path = pointer_of(&error.path().to_string());
-        Problem::at(path, error.inner().to_string())
-    })
-}
-
-/// A pointer from a message that starts with a field's path, as those of the validators do.
-pub fn pointer_in_message(prefix: &str, message: &str) -> String {
-    let first = message.split([' ', ':', ',']).next().unwrap_or_default();
-    let is_path =
-        first.contains('_') || first.contains('[') || first.contains('.') || first == "schema" || first == "name";
-    if is_path { format!("{prefix}{}", pointer_of(first)) } else { prefix.into() }
+impl From<&Problem> for Failure {
+    fn from(problem: &Problem) -> Self {
+        Failure { detail: problem.detail.clone(), errors: problem.errors.iter().map(|e| e.error.clone()).collect() }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn pointers() {
-        assert_eq!(pointer_of("holes[1].diameter_mm"), "/holes/1/diameter_mm");
-        assert_eq!(pointer_of("(root)"), "");
-        assert_eq!(pointer_of("a/b.c~d"), "/a~1b/c~0d");
-        assert_eq!(pointer_in_message("/specimen", "block.length_mm is -1 mm; choose"), "/specimen/block/length_mm");
-        assert_eq!(pointer_in_message("/specimen", "there are 65 holes; use at most 64"), "/specimen");
-    }
 
     #[test]
     fn names_are_unique_and_known() {

@@ -4,12 +4,14 @@
 //! compressed images inside are bounded in what they may unpack to.
 
 use super::problem::Problem;
-use super::store::{NewUpload, Store, StoreError, sha256_hex};
-use crate::recording::{ReadLimits, Recording};
-use sha2::{Digest, Sha256};
+use super::store::{NewUpload, Store};
+use crate::job::{InputFile, JobError, Progress, ScratchFolder, Surroundings, recording_identifier};
+use crate::recording::{RawRecording, ReadLimits, ReadRecording, Recording, RecordingError};
+use serde_json::json;
 use std::collections::BTreeMap;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 /// Most files of a recording.
 const MAX_FILES: usize = 2000;
@@ -98,56 +100,31 @@ pub fn unpack(mut stream: impl Read, max_bytes: usize) -> Result<BTreeMap<String
     Ok(files)
 }
 
-/// Writes files with names of [`unpack`] into a fresh folder.
-fn lay_out(folder: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<(), Problem> {
-    for (name, bytes) in files {
-        std::fs::write(folder.join(name), bytes).map_err(|e| Problem::new("internal", format!("scratch: {e}")))?;
-    }
-    Ok(())
-}
-
-/// A folder that is removed when dropped.
-pub(super) struct Scratch(std::path::PathBuf);
-
-impl Scratch {
-    pub(super) fn new() -> Result<Scratch, Problem> {
-        let failed = |e: String| Problem::new("internal", format!("scratch: {e}"));
-        let name = super::access::random_hex::<8>().map_err(|e| failed(e.to_string()))?;
-        let path = std::env::temp_dir().join(format!("lambdak-recording-{name}"));
-        std::fs::create_dir(&path).map_err(|e| failed(e.to_string()))?;
-        Ok(Scratch(path))
-    }
-
-    pub(super) fn path(&self) -> &Path {
-        &self.0
-    }
-}
-
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
-
-/// Identifier of an upload: of its names and contents.
-pub fn identifier(files: &BTreeMap<String, Vec<u8>>) -> String {
-    let mut hash = Sha256::new();
-    for (name, bytes) in files {
-        hash.update(format!("{name}\n{}\n{}\n", bytes.len(), sha256_hex(bytes)).as_bytes());
-    }
-    hash.finalize().iter().map(|b| format!("{b:02x}")).collect()
+/// A recording as it was uploaded.
+enum Uploaded {
+    Displacements(Box<ReadRecording>),
+    RawPhases(Box<ReadRecording<RawRecording>>),
 }
 
 /// Reads a recording from its files.
 ///
 /// # Errors
 /// `unsafe-upload` with what the reader says.
-pub fn read(files: &BTreeMap<String, Vec<u8>>) -> Result<Recording, Problem> {
-    let scratch = Scratch::new()?;
-    lay_out(&scratch.0, files)?;
-    Recording::read(&scratch.0, &LIMITS).map_err(|e| {
+fn read(files: &BTreeMap<String, Vec<u8>>) -> Result<Uploaded, Problem> {
+    let failed = |e: std::io::Error| Problem::new("internal", format!("scratch: {e}"));
+    let scratch = ScratchFolder::new().map_err(failed)?;
+    for (name, bytes) in files {
+        std::fs::write(scratch.path().join(name), bytes).map_err(failed)?;
+    }
+    let found = match Recording::read_with_digest(scratch.path(), &LIMITS) {
+        Ok(read) => Ok(Uploaded::Displacements(Box::new(read))),
+        Err(RecordingError::Raw { .. }) => RawRecording::read_with_digest(scratch.path(), &LIMITS)
+            .map(|read| Uploaded::RawPhases(Box::new(read))),
+        Err(error) => Err(error),
+    };
+    found.map_err(|e| {
         // The reader names files by their path here, which is nobody's business.
-        let message = e.to_string().replace(&format!("{}/", scratch.0.display()), "");
+        let message = e.to_string().replace(&format!("{}/", scratch.path().display()), "");
         unsafe_upload(message)
     })
 }
@@ -157,26 +134,36 @@ pub fn read(files: &BTreeMap<String, Vec<u8>>) -> Result<Recording, Problem> {
 /// # Errors
 /// `unsafe-upload`.
 pub fn upload_of(files: BTreeMap<String, Vec<u8>>, owner: String) -> Result<NewUpload, Problem> {
-    let recording = read(&files)?;
-    let steps: Vec<_> =
-        recording.steps.iter().map(|s| serde_json::json!({ "drive_mm": s.drive_mm, "force_n": s.force_n })).collect();
-    let manifest = serde_json::json!({
-        "specimen": recording.specimen,
-        "shape": recording.grid.shape,
-        "voxel_mm": recording.grid.voxel_mm,
-        "num_voxels": recording.num_voxels(),
-        "steps": steps,
-    });
+    let force = |drive_mm: f64, force_n: Option<f64>| json!({ "drive_mm": drive_mm, "force_n": force_n });
+    let (title, manifest) = match read(&files)? {
+        Uploaded::Displacements(read) => {
+            let r = read.recording;
+            let steps: Vec<_> = r.steps.iter().map(|s| force(s.drive_mm, s.force_n)).collect();
+            let manifest = json!({
+                "specimen": r.specimen, "shape": r.grid.shape, "voxel_mm": r.grid.voxel_mm,
+                "num_voxels": r.num_voxels(), "steps": steps,
+            });
+            (r.id, manifest)
+        }
+        Uploaded::RawPhases(read) => {
+            let r = read.recording;
+            let steps: Vec<_> = r.steps.iter().map(|s| force(s.drive_mm, s.force_n)).collect();
+            let manifest = json!({
+                "specimen": r.specimen, "shape": r.grid.shape, "voxel_mm": r.grid.voxel_mm, "is_raw": true, "steps": steps,
+            });
+            (r.id, manifest)
+        }
+    };
     Ok(NewUpload {
-        id: identifier(&files),
+        id: recording_identifier(&files),
         owner,
-        title: recording.id.chars().filter(|c| !c.is_control()).take(200).collect(),
+        title: title.chars().filter(|c| !c.is_control()).take(200).collect(),
         manifest: manifest.to_string(),
         files: files.into_iter().collect(),
     })
 }
 
-/// Keeps the recording of a scan made by job `job`. Its identifier is a hash of its content.
+/// Keeps the recording that job `job` made. Its identifier is a hash of its content.
 ///
 /// # Errors
 /// `quota` where recordings fill the service's space.
@@ -192,17 +179,74 @@ pub fn keep(store: &Store, job: &str, files: BTreeMap<String, Vec<u8>>) -> Resul
     Ok(upload.id)
 }
 
-/// Reads a kept recording; `None` where there is none of that name.
-///
-/// # Errors
-/// [`StoreError`], inside a [`Problem`].
-pub fn load(store: &Store, id: &str) -> Result<Option<Recording>, Problem> {
-    let files: Result<Vec<(String, Vec<u8>)>, StoreError> = store.upload_files(id);
-    let files: BTreeMap<_, _> = files.map_err(Problem::from)?.into_iter().collect();
-    if files.is_empty() {
-        return Ok(None);
+/// What a task is given: recordings from the storage, and the runner's progress, checkpoint and cancellation.
+pub(super) struct StoredSurroundings<'a> {
+    /// Where recordings are kept.
+    pub store: &'a Store,
+    /// Whether to stop.
+    pub is_cancelled: &'a (dyn Fn() -> bool + Sync),
+    /// Progress as JSON, for whoever keeps the lease alive.
+    pub progress: &'a Mutex<String>,
+    /// A file whose content is kept across attempts.
+    pub checkpoint: &'a Path,
+    /// Most elements of a mesh.
+    pub max_elements: usize,
+}
+
+impl StoredSurroundings<'_> {
+    fn uploaded(&self, name: &str) -> Result<Uploaded, JobError> {
+        let unreadable = |message: String| JobError::Unreadable { name: name.into(), message };
+        let files = self.store.upload_files(name).map_err(|e| JobError::Internal(e.to_string()))?;
+        let files: BTreeMap<String, Vec<u8>> = files.into_iter().collect();
+        if files.is_empty() {
+            return Err(unreadable("the recording is gone; upload it again".into()));
+        }
+        read(&files).map_err(|problem| unreadable(problem.detail))
     }
-    read(&files).map(Some)
+}
+
+impl Surroundings for StoredSurroundings<'_> {
+    fn recording(&self, name: &str) -> Result<ReadRecording, JobError> {
+        match self.uploaded(name)? {
+            Uploaded::Displacements(read) => Ok(*read),
+            Uploaded::RawPhases(_) => {
+                let message = "it holds raw phases; import it first".into();
+                Err(JobError::Unreadable { name: name.into(), message })
+            }
+        }
+    }
+
+    fn raw_recording(&self, name: &str) -> Result<ReadRecording<RawRecording>, JobError> {
+        match self.uploaded(name)? {
+            Uploaded::RawPhases(read) => Ok(*read),
+            Uploaded::Displacements(_) => {
+                let message = "this recording already holds displacements".into();
+                Err(JobError::Unreadable { name: name.into(), message })
+            }
+        }
+    }
+
+    fn file(&self, name: &str) -> Result<InputFile, JobError> {
+        let message = "the service reads uploaded recordings alone; import other files with the command".into();
+        Err(JobError::Unreadable { name: name.into(), message })
+    }
+
+    fn progress(&self, progress: &Progress) {
+        let text = serde_json::to_string(progress).unwrap_or_default();
+        *self.progress.lock().unwrap_or_else(PoisonError::into_inner) = text;
+    }
+
+    fn is_cancelled(&self) -> bool {
+        (self.is_cancelled)()
+    }
+
+    fn checkpoint(&self, _: &str) -> Option<PathBuf> {
+        Some(self.checkpoint.to_path_buf())
+    }
+
+    fn max_elements(&self) -> usize {
+        self.max_elements
+    }
 }
 
 #[cfg(test)]

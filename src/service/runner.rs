@@ -1,9 +1,11 @@
 //! Runs tasks: claims one, runs its library call on an own thread, keeps its lease alive, hands its result over.
 
-use super::kinds::{JobKind, RunContext, RunError, TaskProgress, kind_named};
 use super::log;
 use super::problem::Problem;
+use super::recordings::StoredSurroundings;
 use super::store::{Claimed, Finished, Store, StoreError, TaskResult};
+use super::task::TaskInput;
+use crate::job::{Failure, JobError, Outcome, kind_of_collection};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
@@ -131,20 +133,14 @@ fn run_task(store: &Store, settings: &WorkerSettings, signal: &Signal, worker: &
     let progress = Mutex::new(String::new());
     let outcome = std::thread::scope(|scope| {
         let keeper = scope.spawn(|| keep(store, settings, worker, task, &path, &is_lost, &is_done, &progress));
-        let context = RunContext {
+        let surroundings = StoredSurroundings {
+            store,
             is_cancelled: &|| is_lost.load(Ordering::Relaxed) || signal.is_stopping(),
-            progress: &|p: TaskProgress| {
-                let text = serde_json::to_string(&p).unwrap_or_default();
-                *progress.lock().unwrap_or_else(PoisonError::into_inner) = text;
-            },
-            recording: &|id: &str| {
-                super::recordings::load(store, id)?
-                    .ok_or_else(|| Problem::new("not-found", "the recording is gone; upload it again"))
-            },
-            keep: &|files| super::recordings::keep(store, &task.job_id, files),
+            progress: &progress,
             checkpoint: &path,
+            max_elements: usize::MAX,
         };
-        let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| run_kind(store, task, &context)));
+        let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| run_job(store, task, surroundings)));
         is_done.store(true, Ordering::SeqCst);
         keeper.thread().unpark();
         outcome
@@ -152,20 +148,22 @@ fn run_task(store: &Store, settings: &WorkerSettings, signal: &Signal, worker: &
     let elapsed = started.elapsed();
     signal.busy_ms.fetch_add(elapsed.as_millis() as u64, Ordering::Relaxed);
     let outcome = outcome.unwrap_or_else(|_| {
-        Err(Problem::new("internal", "the computation ended with a programming error; please report it").into())
+        Err(JobError::Internal("the computation ended with a programming error; please report it".into()))
     });
+    let outcome = outcome.and_then(|outcome| stored(store, task, outcome));
     let (what, stored) = match outcome {
         Ok(result) => {
             signal.finished.fetch_add(1, Ordering::Relaxed);
-            ("finished", again(|| store.finish(task, worker, &result)))
+            ("finished", until_stored(|| store.finish(task, worker, &result)))
         }
-        Err(RunError::Failed(problem)) => {
-            signal.failed.fetch_add(1, Ordering::Relaxed);
-            ("failed", again(|| store.fail(task, worker, &problem.to_json())))
-        }
-        Err(RunError::Stopped) => {
+        Err(JobError::Stopped { .. }) => {
             save_checkpoint(store, worker, task, &path);
-            ("stopped", again(|| store.release(task, worker).map(|()| Finished::Taken)))
+            ("stopped", until_stored(|| store.release(task, worker).map(|()| Finished::Taken)))
+        }
+        Err(error) => {
+            signal.failed.fetch_add(1, Ordering::Relaxed);
+            let problem = Problem::from(error).to_json();
+            ("failed", until_stored(|| store.fail(task, worker, &problem)))
         }
     };
     let _ = std::fs::remove_file(&path);
@@ -180,28 +178,52 @@ fn run_task(store: &Store, settings: &WorkerSettings, signal: &Signal, worker: &
     signal.wake();
 }
 
-fn run_kind(store: &Store, task: &Claimed, context: &RunContext) -> Result<TaskResult, RunError> {
-    let unreadable = || Problem::new("internal", "the stored task cannot be read");
-    let kind: &dyn JobKind =
-        kind_named(&task.kind).ok_or_else(|| Problem::new("internal", format!("no kind of job {}", task.kind)))?;
+/// Runs a task, or gathers the results of its job's tasks.
+fn run_job(store: &Store, task: &Claimed, surroundings: StoredSurroundings) -> Result<Outcome, JobError> {
+    let unreadable = |e: serde_json::Error| JobError::Internal(format!("the stored task cannot be read: {e}"));
     if !task.is_gather {
-        let input: serde_json::Value = serde_json::from_str(&task.input).map_err(|_| unreadable())?;
-        return kind.run(&input, context);
+        let input: TaskInput = serde_json::from_str(&task.input).map_err(unreadable)?;
+        let job = input.job()?;
+        let surroundings = StoredSurroundings { max_elements: input.max_elements, ..surroundings };
+        return match job.run(&surroundings) {
+            // A damaged checkpoint: the work starts afresh.
+            Err(JobError::Checkpoint(_)) => {
+                let _ = std::fs::remove_file(surroundings.checkpoint);
+                job.run(&surroundings)
+            }
+            ran => ran,
+        };
     }
-    let body: serde_json::Value = serde_json::from_str(&task.body).map_err(|_| unreadable())?;
-    let mut results = Vec::new();
-    for (result, problem) in store.task_results(&task.job_id).map_err(Problem::from)? {
-        results.push(if problem.is_empty() {
-            Ok(serde_json::from_slice(&result).map_err(|_| unreadable())?)
-        } else {
-            Err(serde_json::from_str(&problem).map_err(|_| unreadable())?)
-        });
+    let body: serde_json::Value = serde_json::from_str(&task.body).map_err(unreadable)?;
+    let kind = kind_of_collection(&task.kind)
+        .ok_or_else(|| JobError::Internal(format!("no kind of job {}", task.kind)))?;
+    let stored = store.task_results(&task.job_id).map_err(|e| JobError::Internal(e.to_string()))?;
+    let result = |(result, problem): (Vec<u8>, String)| -> Result<Result<_, Failure>, serde_json::Error> {
+        if problem.is_empty() {
+            return Ok(Ok(serde_json::from_slice(&result)?));
+        }
+        let problem: Problem = serde_json::from_str(&problem)?;
+        Ok(Err(Failure::from(&problem)))
+    };
+    let results = stored.into_iter().map(result).collect::<Result<Vec<_>, _>>().map_err(unreadable)?;
+    kind.job(&body).map_err(JobError::Invalid)?.gather(results)
+}
+
+/// An outcome as it is stored; a recording that the job made is kept for further jobs.
+fn stored(store: &Store, task: &Claimed, outcome: Outcome) -> Result<TaskResult, JobError> {
+    let recording = outcome.recording();
+    if !recording.is_empty() {
+        super::recordings::keep(store, &task.job_id, recording).map_err(|p| JobError::NoSolution(p.detail))?;
     }
-    kind.gather(&body, results)
+    let artefact = |f: crate::job::File| (f.name, f.media_type.name().to_string(), f.bytes);
+    Ok(TaskResult {
+        result: outcome.result.into_bytes(),
+        artefacts: outcome.files.into_iter().map(artefact).collect(),
+    })
 }
 
 /// A result is worth waiting for a storage that does not answer; the lease decides whether it is still wanted.
-fn again(store: impl Fn() -> Result<Finished, StoreError>) -> Result<Finished, StoreError> {
+fn until_stored(store: impl Fn() -> Result<Finished, StoreError>) -> Result<Finished, StoreError> {
     for _ in 0..20 {
         match store() {
             Err(error) => {

@@ -1,8 +1,8 @@
 //! What the service shows of jobs.
 
-use super::kinds::TaskProgress;
 use super::problem::Problem;
 use super::store::JobRow;
+use crate::job::Progress;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -51,7 +51,7 @@ pub struct JobView {
     /// How far the running task is.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
-    pub progress: Option<TaskProgress>,
+    pub progress: Option<Progress>,
     /// Why it failed.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]

@@ -55,8 +55,8 @@ impl Scheduler {
         })
     }
 
-    /// State of each task of a job that the controller or the accounting still knows; `None` where the controller does not
-    /// answer.
+    /// State of each task of a job that the controller or the accounting still knows; `None` where the controller does
+    /// not answer.
     ///
     /// # Errors
     /// [`SlurmError::NoCommand`].
@@ -123,7 +123,8 @@ fn parse(text: &str) -> BTreeMap<usize, TaskState> {
 
 /// Standard output of a command that succeeds.
 fn run(command: &'static str, arguments: &[&OsStr]) -> Result<String, SlurmError> {
-    // The script's own options must not be overruled from the environment; Ctrl-C is this program's business, not theirs.
+    // The script's own options must not be overruled from the environment; Ctrl-C is this program's business, not
+    // theirs.
     let output = Command::new(command)
         .args(arguments)
         .env_remove("SBATCH_ARRAY_INX")

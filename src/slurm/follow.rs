@@ -61,7 +61,8 @@ pub enum Following<'a> {
     Progress(TaskProgress),
 }
 
-/// Looks, half a second apart, at cancelled jobs that have not ended yet. (Slurm's grace before it kills is 30 s by default.)
+/// Looks, half a second apart, at cancelled jobs that have not ended yet. (Slurm's grace before it kills is 30 s by
+/// default.)
 const MAX_LOOKS_AT_CANCELLED: usize = 120;
 
 /// The jobs submitted for an array, kept beside the script so that the command can be run again and go on.
@@ -78,8 +79,8 @@ struct Watched {
     done_at_start: usize,
 }
 
-/// Submits the tasks that are not finished, unless an earlier run's jobs are at them, and waits until `progress_of` says that
-/// every task has all its results. `pause` sleeps.
+/// Submits the tasks that are not finished, unless an earlier run's jobs are at them, and waits until `progress_of`
+/// says that every task has all its results. `pause` sleeps.
 ///
 /// # Errors
 /// [`SlurmError`].
@@ -137,7 +138,7 @@ pub fn follow(
         }
         // A controller that does not answer is waited for.
         if let Some(states) = all_states(&scheduler, &jobs, &open)? {
-            restart_lost(job, settings, &scheduler, &mut jobs, &mut open, &states, &read, on_event)?;
+            restart_lost(job, settings, &mut jobs, &mut open, &states, &read, on_event)?;
         }
         let slice = Duration::from_millis(100).min(settings.poll);
         let mut waited = Duration::ZERO;
@@ -152,7 +153,6 @@ pub fn follow(
 fn restart_lost(
     job: &ArrayJob,
     settings: &FollowSettings,
-    scheduler: &Scheduler,
     jobs: &mut Jobs,
     open: &mut BTreeMap<usize, Watched>,
     states: &BTreeMap<usize, TaskState>,
@@ -168,7 +168,7 @@ fn restart_lost(
                 continue;
             }
             Some(TaskState::Held) => {
-                scheduler.release(&number, task);
+                Scheduler.release(&number, task);
                 continue;
             }
             Some(TaskState::Cancelled) => "CANCELLED".to_string(),
@@ -199,11 +199,11 @@ fn restart_lost(
             return Err(SlurmError::TaskFails { job: number, task, attempts, state, log_path, log });
         }
         on_event(&Following::Requeued { job: &number, task, state: &state });
-        if !(states.contains_key(&task) && scheduler.requeue(&number, task)) {
+        if !(states.contains_key(&task) && Scheduler.requeue(&number, task)) {
             again.push(task);
         }
     }
-    submit(job, &again, scheduler, jobs, on_event)
+    submit(job, &again, &Scheduler, jobs, on_event)
 }
 
 fn submit(

@@ -1,91 +1,13 @@
-//! The dimensioned drawing as lines, arcs and texts on a sheet; `drawing_svg` and `drawing_dxf` write it.
+//! The layout of a specimen's dimensioned drawing; `drawing_svg` and `drawing_dxf` write it.
 //!
 //! Front view (x, z) above, side view (x, y) below, x to the right in both. Holes appear as circles in the view
 //! along their axis and as hidden lines in the other. Positions are ordinates from the block's centre lines; the
 //! table repeats them and adds distances from the end at −x and from the negative side.
 
 use super::drawing_labels::{place_labels, spread};
+use super::drawing_sheet::{Anchor, CHARACTER_WIDTH, Drawing, Entity, Layer, Shape, TEXT_HEIGHT, format_mm};
 use super::{HoleAxis, Outline, Specimen, TestKind, dumbbell};
 
-/// What an entity belongs to; the layer names of the DXF.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Layer {
-    Outline,
-    Holes,
-    Centre,
-    Dimensions,
-    /// Frame, table and title: on the sheet only, not in the DXF.
-    Sheet,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Anchor {
-    Start,
-    Middle,
-    End,
-}
-
-/// A shape, paper mm, origin at the sheet's lower left corner, second coordinate up.
-#[derive(Clone, Debug)]
-pub(super) enum Shape {
-    Line([f64; 2], [f64; 2]),
-    Circle([f64; 2], f64),
-    /// Centre, radius, start and end in degrees, counter-clockwise.
-    Arc([f64; 2], f64, f64, f64),
-    Text(Text),
-}
-
-/// A line of text on its baseline. Vertical text reads upwards.
-#[derive(Clone, Debug)]
-pub(super) struct Text {
-    pub at: [f64; 2],
-    pub height: f64,
-    pub anchor: Anchor,
-    pub is_vertical: bool,
-    pub content: String,
-}
-
-/// Mean width of a character over the height given for the text, sans-serif, on the generous side.
-pub(super) const CHARACTER_WIDTH: f64 = 0.64;
-
-impl Text {
-    /// Bounding box (min, max), paper mm.
-    pub(super) fn bounds(&self) -> [[f64; 2]; 2] {
-        let width = CHARACTER_WIDTH * self.height * self.content.chars().count() as f64;
-        let start = match self.anchor {
-            Anchor::Start => 0.0,
-            Anchor::Middle => -0.5 * width,
-            Anchor::End => -width,
-        };
-        let [x, y] = self.at;
-        if self.is_vertical {
-            [[x - self.height, y + start], [x, y + start + width]]
-        } else {
-            [[x + start, y], [x + start + width, y + self.height]]
-        }
-    }
-}
-
-#[derive(Clone, Debug)]
-pub(super) struct Entity {
-    pub layer: Layer,
-    pub is_hidden: bool,
-    pub shape: Shape,
-}
-
-/// A drawing on a sheet.
-#[derive(Clone, Debug)]
-pub(super) struct Drawing {
-    pub entities: Vec<Entity>,
-    /// Sheet, paper mm.
-    pub size: [f64; 2],
-    /// Paper mm per specimen mm.
-    pub scale: f64,
-    /// Centre of the front view, paper mm.
-    pub front_center: [f64; 2],
-}
-
-pub(super) const TEXT_HEIGHT: f64 = 2.5;
 const MARGIN: f64 = 10.0;
 const COLUMN_WIDTHS: [f64; 6] = [9.0, 15.0, 15.0, 15.0, 15.0, 15.0];
 const TABLE_WIDTH: f64 = 84.0;
@@ -101,13 +23,6 @@ const BELOW_OTHER: f64 = 6.0;
 const MAX_ORDINATES: usize = 24;
 /// Usual scales, largest first.
 const SCALES: [f64; 14] = [50.0, 20.0, 10.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01];
-
-/// A length with up to three decimals, without trailing zeros.
-pub(super) fn format_mm(value: f64) -> String {
-    let text = format!("{value:.3}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".into() } else { text.into() }
-}
 
 impl Drawing {
     /// Lays out the drawing of a specimen.
@@ -147,25 +62,6 @@ impl Drawing {
         drawing.table(specimen, rows, [size[0] - MARGIN - panel, size[1] - MARGIN]);
         drawing.title(specimen);
         drawing
-    }
-
-    pub(super) fn push(&mut self, layer: Layer, shape: Shape) {
-        self.entities.push(Entity { layer, is_hidden: false, shape });
-    }
-
-    fn line(&mut self, layer: Layer, from: [f64; 2], to: [f64; 2]) {
-        self.push(layer, Shape::Line(from, to));
-    }
-
-    fn text(&mut self, layer: Layer, at: [f64; 2], height: f64, anchor: Anchor, is_vertical: bool, content: String) {
-        self.push(layer, Shape::Text(Text { at, height, anchor, is_vertical, content }));
-    }
-
-    fn rectangle(&mut self, layer: Layer, [x0, y0]: [f64; 2], [x1, y1]: [f64; 2]) {
-        let corners = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
-        for (i, corner) in corners.into_iter().enumerate() {
-            self.line(layer, corner, corners[(i + 1) % 4]);
-        }
     }
 
     fn outline(&mut self, specimen: &Specimen, front: [f64; 2], side: [f64; 2]) {
@@ -312,29 +208,6 @@ impl Drawing {
         self.text(Layer::Dimensions, at, TEXT_HEIGHT, Anchor::Start, false, side_title);
     }
 
-    /// A horizontal dimension between two points, its line at height `y`.
-    fn dimension_x(&mut self, ends: [[f64; 2]; 2], y: f64, content: String) {
-        for [x, from] in ends {
-            self.line(Layer::Dimensions, [x, from + 1.0], [x, y + 1.5]);
-            self.line(Layer::Dimensions, [x - 1.0, y - 1.0], [x + 1.0, y + 1.0]);
-        }
-        self.line(Layer::Dimensions, [ends[0][0], y], [ends[1][0], y]);
-        let middle = 0.5 * (ends[0][0] + ends[1][0]);
-        self.text(Layer::Dimensions, [middle, y + 1.0], TEXT_HEIGHT, Anchor::Middle, false, content);
-    }
-
-    /// The vertical overall dimension at the left of a view with half extents `half`.
-    fn dimension_y(&mut self, center: [f64; 2], half: [f64; 2], content: String) {
-        let edge = center[0] - half[0];
-        let x = edge - 9.0;
-        for y in [center[1] - half[1], center[1] + half[1]] {
-            self.line(Layer::Dimensions, [edge - 1.0, y], [x - 1.5, y]);
-            self.line(Layer::Dimensions, [x - 1.0, y - 1.0], [x + 1.0, y + 1.0]);
-        }
-        self.line(Layer::Dimensions, [x, center[1] - half[1]], [x, center[1] + half[1]]);
-        self.text(Layer::Dimensions, [x - 1.5, center[1]], TEXT_HEIGHT, Anchor::Middle, true, content);
-    }
-
     /// The table of holes; `rows` per table, tables side by side from `top_left`.
     fn table(&mut self, specimen: &Specimen, rows: usize, top_left: [f64; 2]) {
         if specimen.holes.is_empty() {
@@ -430,6 +303,7 @@ fn wrap(text: &str, per_line: usize, max_lines: usize) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::specimen::drawing_sheet::Text;
     use crate::specimen::sampling::{dumbbell_with_hole, valid_specimen};
     use proptest::prelude::*;
 
@@ -453,14 +327,6 @@ mod tests {
             }
         }
         Ok(())
-    }
-
-    #[test]
-    fn numbers_are_short() {
-        assert_eq!(format_mm(4.2333), "4.233");
-        assert_eq!(format_mm(-0.0001), "0");
-        assert_eq!(format_mm(100.0), "100");
-        assert_eq!(format_mm(-25.4), "-25.4");
     }
 
     #[test]

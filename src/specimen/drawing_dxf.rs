@@ -1,7 +1,7 @@
 //! The dimensioned drawing as DXF (R12, ASCII) for cutting and for CAD.
 
 use super::Specimen;
-use super::drawing::{Anchor, Drawing, Layer, Shape};
+use super::drawing_sheet::{Anchor, Drawing, Layer, Shape};
 use std::fmt::Write;
 
 /// The specimen's two views and their dimensions as plain entities (LINE, CIRCLE, ARC, TEXT) in mm, full size,

@@ -1,6 +1,6 @@
 //! Places labels at holes so that none covers a hole, a centre line or another label.
 
-use super::drawing::{Anchor, CHARACTER_WIDTH, TEXT_HEIGHT, Text};
+use super::drawing_sheet::{Anchor, CHARACTER_WIDTH, TEXT_HEIGHT, Text};
 
 /// A label and, where it stands beside its hole, the line to it.
 pub(super) struct Label {

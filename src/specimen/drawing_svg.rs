@@ -1,7 +1,7 @@
 //! The dimensioned drawing as SVG, for reading and printing.
 
 use super::Specimen;
-use super::drawing::{Anchor, Drawing, Layer, Shape};
+use super::drawing_sheet::{Anchor, Drawing, Layer, Shape};
 use std::fmt::Write;
 
 /// A dimensioned drawing of the specimen: front view (x, z), side view (x, y), every hole with its place and

@@ -2,7 +2,29 @@
 
 use super::json::JsonProblem;
 use super::{LigamentKind, LimitsError, MAX_HOLES, MIRROR_TOLERANCE_MM, Specimen};
+use crate::field::schema::{integer_within, number_above, schema_type};
+use crate::field::{FieldError, FieldPath};
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+use utoipa::openapi::schema::ArrayBuilder;
+
+/// A largest stretch must be above this: the undeformed body has it.
+const UNDEFORMED_STRETCH: f64 = 1.0;
+
+schema_type! {
+    /// A length, mm, above 0.
+    PositiveMm = number_above(0.0);
+    /// A force, N, above 0.
+    PositiveForceN = number_above(0.0);
+    /// A number above 0.
+    PositiveNumber = number_above(0.0);
+    /// A stretch above that of the undeformed body.
+    LargestStretch = number_above(UNDEFORMED_STRETCH);
+    /// Diameters of punches, mm.
+    Punches = ArrayBuilder::new().items(number_above(0.0)).min_items(Some(1));
+    /// A number of holes.
+    NumHoles = integer_within(0..=MAX_HOLES);
+}
 
 /// How far a diameter may be off a punch, mm.
 const PUNCH_TOLERANCE_MM: f64 = 1e-6;
@@ -10,17 +32,19 @@ const PUNCH_TOLERANCE_MM: f64 = 1e-6;
 const ROUNDING: f64 = 1e-9;
 
 /// Diameters that can be made, mm.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DiameterRange {
     /// Smallest, mm.
+    #[schema(value_type = PositiveMm)]
     pub min: f64,
     /// Largest, mm.
+    #[schema(value_type = PositiveMm)]
     pub max: f64,
 }
 
 /// Mirror planes through the origin that the geometry must have.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Symmetry {
     /// Free.
@@ -69,33 +93,42 @@ impl Symmetry {
 /// assert_eq!(limits.max_holes, None);
 /// # Ok::<(), lambdak::specimen::LimitsError>(())
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ManufacturingLimits {
     /// Thinnest ligament between two holes, mm.
+    #[schema(value_type = PositiveMm)]
     pub min_ligament_hole_hole_mm: f64,
     /// Thinnest ligament between a hole and a side of the section, mm.
+    #[schema(value_type = PositiveMm)]
     pub min_ligament_hole_edge_mm: f64,
     /// Continuous range of diameters, mm. Exactly one of this and `punches_mm` is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<DiameterRange>, nullable = false)]
     pub diameter_mm: Option<DiameterRange>,
     /// Diameters of the punches or pins at hand, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<Punches>, nullable = false)]
     pub punches_mm: Option<Vec<f64>>,
     /// Fewest voxels across any ligament, counted as [`ManufacturingLimits::voxels_across`] does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<PositiveNumber>, nullable = false)]
     pub min_voxels_across_ligament: Option<f64>,
     /// Largest force of the actuator or load cell, all samples together, N.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<PositiveForceN>, nullable = false)]
     pub max_force_n: Option<f64>,
     /// Largest travel of the actuator, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<PositiveMm>, nullable = false)]
     pub max_drive_mm: Option<f64>,
     /// Largest principal stretch anywhere, against tearing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<LargestStretch>, nullable = false)]
     pub max_local_stretch: Option<f64>,
     /// Most holes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<NumHoles>, nullable = false)]
     pub max_holes: Option<usize>,
     /// Mirror planes that the geometry must have.
     #[serde(default)]
@@ -160,49 +193,57 @@ impl ManufacturingLimits {
     /// Checks the limits themselves. Call it when the limits are part of a larger file.
     ///
     /// # Errors
-    /// [`LimitsError`].
+    /// [`LimitsError`]: the first problem found.
     pub fn validate(&self) -> Result<(), LimitsError> {
-        let above = |field: &str, value: f64, above: f64| {
-            let is_fine = value.is_finite() && value > above;
-            if is_fine { Ok(()) } else { Err(LimitsError::OutOfRange { field: field.into(), value, above }) }
+        self.problems().into_iter().next().map_or(Ok(()), Err)
+    }
+
+    /// Every limit that is no limit, with pointers; the first is that of [`ManufacturingLimits::validate`].
+    pub fn field_errors(&self) -> Vec<FieldError> {
+        self.problems().iter().map(LimitsError::field_error).collect()
+    }
+
+    fn problems(&self) -> Vec<LimitsError> {
+        let mut problems = Vec::new();
+        let mut check = |field: FieldPath, value: f64, above: f64| {
+            if !(value.is_finite() && value > above) {
+                problems.push(LimitsError::OutOfRange { field, value, above });
+            }
         };
-        above("min_ligament_hole_hole_mm", self.min_ligament_hole_hole_mm, 0.0)?;
-        above("min_ligament_hole_edge_mm", self.min_ligament_hole_edge_mm, 0.0)?;
-        match (&self.diameter_mm, &self.punches_mm) {
-            (Some(range), None) => {
-                above("diameter_mm.min", range.min, 0.0)?;
-                above("diameter_mm.max", range.max, 0.0)?;
-                if range.min > range.max {
-                    return Err(LimitsError::EmptyRange { min_mm: range.min, max_mm: range.max });
-                }
-            }
-            (None, Some(punches)) => {
-                if punches.is_empty() {
-                    return Err(LimitsError::NoPunches);
-                }
-                for (i, punch) in punches.iter().enumerate() {
-                    above(&format!("punches_mm[{i}]"), *punch, 0.0)?;
-                }
-            }
-            (range, punches) => {
-                let (has_range, has_punches) = (range.is_some(), punches.is_some());
-                return Err(LimitsError::DiametersAmbiguous { has_range, has_punches });
-            }
+        check(FieldPath::of("min_ligament_hole_hole_mm"), self.min_ligament_hole_hole_mm, 0.0);
+        check(FieldPath::of("min_ligament_hole_edge_mm"), self.min_ligament_hole_edge_mm, 0.0);
+        if let Some(range) = &self.diameter_mm {
+            check(FieldPath::of("diameter_mm").name("min"), range.min, 0.0);
+            check(FieldPath::of("diameter_mm").name("max"), range.max, 0.0);
         }
-        for (field, value, least) in [
+        for (i, punch) in self.punches_mm.iter().flatten().enumerate() {
+            check(FieldPath::of("punches_mm").index(i), *punch, 0.0);
+        }
+        for (name, value, least) in [
             ("min_voxels_across_ligament", self.min_voxels_across_ligament, 0.0),
             ("max_force_n", self.max_force_n, 0.0),
             ("max_drive_mm", self.max_drive_mm, 0.0),
-            ("max_local_stretch", self.max_local_stretch, 1.0),
+            ("max_local_stretch", self.max_local_stretch, UNDEFORMED_STRETCH),
         ] {
             if let Some(value) = value {
-                above(field, value, least)?;
+                check(FieldPath::of(name), value, least);
             }
         }
-        match self.max_holes {
-            Some(value) if value > MAX_HOLES => Err(LimitsError::TooManyHoles { value, limit: MAX_HOLES }),
-            _ => Ok(()),
+        match (&self.diameter_mm, &self.punches_mm) {
+            (Some(range), None) if range.min > range.max => {
+                problems.push(LimitsError::EmptyRange { min_mm: range.min, max_mm: range.max });
+            }
+            (None, Some(punches)) if punches.is_empty() => problems.push(LimitsError::NoPunches),
+            (Some(_), None) | (None, Some(_)) => {}
+            (range, punches) => {
+                let (has_range, has_punches) = (range.is_some(), punches.is_some());
+                problems.push(LimitsError::DiametersAmbiguous { has_range, has_punches });
+            }
         }
+        if let Some(value) = self.max_holes.filter(|value| *value > MAX_HOLES) {
+            problems.push(LimitsError::TooManyHoles { value, limit: MAX_HOLES });
+        }
+        problems
     }
 
     /// The thinnest allowed ligament of a kind, mm.

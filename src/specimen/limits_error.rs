@@ -1,6 +1,7 @@
 //! What can be wrong with manufacturability limits.
 
 use super::JsonProblem;
+use crate::field::{FieldError, FieldPath};
 
 /// Why a set of limits is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -12,8 +13,8 @@ pub enum LimitsError {
     /// A limit is not a finite positive number.
     #[error("{field} is {value}; give a finite number above {above}")]
     OutOfRange {
-        /// Name of the field.
-        field: String,
+        /// Path of the field.
+        field: FieldPath,
         /// Its value.
         value: f64,
         /// It must be above this.
@@ -46,4 +47,29 @@ pub enum LimitsError {
         /// Most.
         limit: usize,
     },
+}
+
+impl LimitsError {
+    /// The same as an error of a field, with a pointer into the limits.
+    pub fn field_error(&self) -> FieldError {
+        use LimitsError as E;
+        match self {
+            E::Json(problem) => FieldError::new("", "", "JSON of limits").remedy(problem.to_string()),
+            E::OutOfRange { field, value, above } => {
+                FieldError::new(field.pointer(), value, format!("a finite number above {above}"))
+            }
+            E::DiametersAmbiguous { has_range: true, .. } => {
+                FieldError::new("/punches_mm", "given besides diameter_mm", "left out, or given instead of diameter_mm")
+            }
+            E::DiametersAmbiguous { has_range: false, .. } => {
+                FieldError::new("/diameter_mm", "", "given, or punches_mm instead of it")
+            }
+            E::EmptyRange { min_mm, max_mm } => {
+                FieldError::new("/diameter_mm/max", max_mm, format!("at least the minimum, {min_mm} mm"))
+            }
+            E::NoPunches => FieldError::new("/punches_mm", "[]", "a list of at least one diameter, mm")
+                .remedy("or give diameter_mm instead"),
+            E::TooManyHoles { value, limit } => FieldError::new("/max_holes", value, format!("at most {limit}")),
+        }
+    }
 }

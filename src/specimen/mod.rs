@@ -2,7 +2,6 @@
 //!
 //! Frame (reference): origin at the centre of the undeformed block; x along its length (the pull direction),
 //! y along its thickness, z along its width. Lengths in mm.
-
 //!
 //! What is supported: a plain block or one standard dumb-bell, with circular holes that all share one axis.
 //! The mesh is a section extruded along that axis, so holes of two directions in one specimen are refused.
@@ -13,11 +12,14 @@ mod clearance;
 mod drawing;
 mod drawing_dxf;
 mod drawing_labels;
+mod drawing_sheet;
 mod drawing_stl;
 mod drawing_svg;
 pub mod dumbbell;
+mod file;
 mod geometry;
 pub(crate) mod json;
+mod ligament;
 mod limits;
 mod limits_error;
 mod read;
@@ -27,11 +29,14 @@ mod sampling;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use file::Name;
+
 pub use drawing_dxf::to_dxf;
 pub use drawing_stl::{DrawingError, to_stl};
 pub use drawing_svg::to_svg;
-pub use geometry::{Ligament, LigamentKind, MIRROR_TOLERANCE_MM, SectionEdge};
+pub use geometry::MIRROR_TOLERANCE_MM;
 pub use json::JsonProblem;
+pub use ligament::{Ligament, LigamentKind, SectionEdge};
 pub use limits::{DiameterRange, LimitMargin, ManufacturingLimits, Symmetry};
 pub use limits_error::LimitsError;
 pub use read::{
@@ -41,9 +46,11 @@ pub use read::{
 pub use read_error::SpecimenError;
 
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// How the specimen is held and moved.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
+#[schema(as = TestSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TestKind {
     /// Faces y = ±thickness/2 bonded to rigid plates; the one at +y moves by +drive along x.
@@ -53,19 +60,24 @@ pub enum TestKind {
 }
 
 /// The bounding block, mm.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = BlockSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Block {
     /// Extent along x, mm.
+    #[schema(value_type = file::ExtentMm)]
     pub length_mm: f64,
     /// Extent along y, mm.
+    #[schema(value_type = file::ExtentMm)]
     pub thickness_mm: f64,
     /// Extent along z, mm.
+    #[schema(value_type = file::ExtentMm)]
     pub width_mm: f64,
 }
 
 /// The direction of a hole's axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
+#[schema(as = AxisSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum HoleAxis {
     /// Along y, centred at (x, z).
@@ -74,20 +86,34 @@ pub enum HoleAxis {
     Width,
 }
 
+impl HoleAxis {
+    /// The axis as JSON writes it.
+    pub fn name(self) -> &'static str {
+        match self {
+            HoleAxis::Thickness => "thickness",
+            HoleAxis::Width => "width",
+        }
+    }
+}
+
 /// A circular hole through the whole block.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = HoleSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Hole {
     /// Direction of the axis.
     pub axis: HoleAxis,
     /// Centre, mm: (x, z) for `thickness`, (x, y) for `width`.
+    #[schema(min_items = 2, max_items = 2)]
     pub center_mm: [f64; 2],
     /// Diameter, mm.
+    #[schema(value_type = file::DiameterMm)]
     pub diameter_mm: f64,
 }
 
 /// The outline in the (x, z) section, extruded along the thickness.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
+#[schema(as = OutlineSchema)]
 pub enum Outline {
     /// The plain block.
     #[default]
@@ -98,12 +124,20 @@ pub enum Outline {
     Iso37Type4,
 }
 
-/// A specimen (`specimen/1`).
+impl Outline {
+    /// The outline as JSON writes it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Outline::Block => "block",
+            Outline::Iso37Type4 => "iso37_type4",
+        }
+    }
+}
+
+/// A specimen; in JSON `specimen/1`, with the tag `schema` before its fields.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(from = "file::SpecimenFile", into = "file::SpecimenFile")]
 pub struct Specimen {
-    /// Always `specimen/1`.
-    pub schema: String,
     /// Free name.
     pub name: String,
     /// How it is held and moved.
@@ -111,22 +145,11 @@ pub struct Specimen {
     /// Bounding block.
     pub block: Block,
     /// Outline in the (x, z) section.
-    #[serde(default, skip_serializing_if = "is_block")]
     pub outline: Outline,
     /// Holes; all with the same axis.
-    #[serde(default)]
     pub holes: Vec<Hole>,
     /// Drives at which the specimen is scanned, mm, increasing.
     pub drive_mm: Vec<f64>,
     /// How many identical samples share the load cell.
-    #[serde(default = "one")]
     pub samples_in_parallel: u32,
-}
-
-fn is_block(outline: &Outline) -> bool {
-    *outline == Outline::Block
-}
-
-fn one() -> u32 {
-    1
 }

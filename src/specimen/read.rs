@@ -1,7 +1,8 @@
 //! Reading, writing and validating a specimen (`specimen/1`).
 
 use super::json::{JsonProblem, schema_of};
-use super::{Hole, HoleAxis, LigamentKind, Outline, Specimen, SpecimenError, TestKind, dumbbell};
+use super::{Block, Hole, HoleAxis, Ligament, LigamentKind, Outline, Specimen, SpecimenError, TestKind, dumbbell};
+use crate::field::{FieldError, FieldPath};
 
 /// The schema that this version reads and writes.
 pub const SCHEMA: &str = "specimen/1";
@@ -58,8 +59,7 @@ impl Specimen {
         Ok(specimen)
     }
 
-    /// The specimen as `specimen/1`, indented, with a line break at the end. Reading it back gives each number to within one unit in its
-    /// last place (serde_json's default parser rounds so).
+    /// The specimen as `specimen/1`, indented, with a line break at the end. Reading it back gives the same numbers.
     pub fn to_json(&self) -> String {
         // Serialising fails only for maps with keys that are not strings and for failing writers: neither is here.
         let mut text = serde_json::to_string_pretty(self).expect("a struct of strings and numbers serialises");
@@ -67,153 +67,168 @@ impl Specimen {
         text
     }
 
-    /// Checks everything that the types do not. The first problem found is returned, in this order: schema,
-    /// name, block, outline, holes, ligaments, drives, samples.
+    /// Checks everything that the types do not. The first problem found is returned, in this order: name, block,
+    /// outline, holes, ligaments, drives, samples.
     ///
     /// # Errors
     /// [`SpecimenError`] with the value, the limit and what to change.
     pub fn validate(&self) -> Result<(), SpecimenError> {
-        if self.schema != SCHEMA {
-            return Err(SpecimenError::WrongSchema { found: self.schema.clone(), expected: SCHEMA });
-        }
+        self.problems().into_iter().next().map_or(Ok(()), Err)
+    }
+
+    /// Every rule that the specimen violates, with pointers into it; the order is that of [`Specimen::validate`].
+    pub fn field_errors(&self) -> Vec<FieldError> {
+        self.problems().iter().map(SpecimenError::field_error).collect()
+    }
+
+    fn problems(&self) -> Vec<SpecimenError> {
+        let mut problems = Vec::new();
         let length = self.name.chars().count();
         let has_control = self.name.chars().any(char::is_control);
         if length > MAX_NAME_LENGTH || has_control {
-            return Err(SpecimenError::BadName { length, has_control, limit: MAX_NAME_LENGTH });
+            problems.push(SpecimenError::BadName { length, has_control, limit: MAX_NAME_LENGTH });
         }
-        for (field, value_mm) in [
-            ("block.length_mm", self.block.length_mm),
-            ("block.thickness_mm", self.block.thickness_mm),
-            ("block.width_mm", self.block.width_mm),
-        ] {
-            check_size(field, value_mm, MIN_SIZE_MM, MAX_SIZE_MM)?;
+        for (name, value_mm) in self.extents() {
+            let field = || FieldPath::of("block").name(name);
+            problems.extend(check_size(field, value_mm, MIN_SIZE_MM, MAX_SIZE_MM));
         }
-        self.validate_outline()?;
-        self.validate_holes()?;
-        self.validate_drives()?;
+        self.check_outline(&mut problems);
+        self.check_holes(&mut problems);
+        // Ligaments mean something only where the holes and the block do.
+        if problems.is_empty() {
+            problems.extend(self.thin_ligaments());
+        }
+        self.check_drives(&mut problems);
         if self.samples_in_parallel == 0 || self.samples_in_parallel > MAX_SAMPLES_IN_PARALLEL {
             let (value, limit) = (self.samples_in_parallel, MAX_SAMPLES_IN_PARALLEL);
-            return Err(SpecimenError::SamplesOutOfRange { value, limit });
+            problems.push(SpecimenError::SamplesOutOfRange { value, limit });
         }
-        Ok(())
+        problems
     }
 
-    fn validate_outline(&self) -> Result<(), SpecimenError> {
+    /// Extents of the block by name, mm.
+    fn extents(&self) -> [(&'static str, f64); 3] {
+        let Block { length_mm, thickness_mm, width_mm } = self.block;
+        [("length_mm", length_mm), ("thickness_mm", thickness_mm), ("width_mm", width_mm)]
+    }
+
+    fn check_outline(&self, problems: &mut Vec<SpecimenError>) {
         if self.outline == Outline::Block {
-            return Ok(());
+            return;
         }
         if self.test == TestKind::DoubleLapShear {
-            return Err(SpecimenError::DumbbellInShear);
+            problems.push(SpecimenError::DumbbellInShear);
         }
-        for (field, value_mm, standard_mm) in [
-            ("block.length_mm", self.block.length_mm, dumbbell::LENGTH_MM),
-            ("block.thickness_mm", self.block.thickness_mm, dumbbell::THICKNESS_MM),
-            ("block.width_mm", self.block.width_mm, dumbbell::END_WIDTH_MM),
-        ] {
+        let standards_mm = [dumbbell::LENGTH_MM, dumbbell::THICKNESS_MM, dumbbell::END_WIDTH_MM];
+        for ((name, value_mm), standard_mm) in self.extents().into_iter().zip(standards_mm) {
             if (value_mm - standard_mm).abs() > STANDARD_TOLERANCE_MM {
-                return Err(SpecimenError::NotTheStandardsBlock { field, value_mm, standard_mm });
+                let field = FieldPath::of("block").name(name);
+                problems.push(SpecimenError::NotTheStandardsBlock { field, value_mm, standard_mm });
             }
         }
-        match self.holes.iter().position(|hole| hole.axis == HoleAxis::Width) {
-            Some(hole) => Err(SpecimenError::DumbbellHoleAlongWidth { hole }),
-            None => Ok(()),
+        if let Some(hole) = self.holes.iter().position(|hole| hole.axis == HoleAxis::Width) {
+            problems.push(SpecimenError::DumbbellHoleAlongWidth { hole });
         }
     }
 
-    fn validate_holes(&self) -> Result<(), SpecimenError> {
+    fn check_holes(&self, problems: &mut Vec<SpecimenError>) {
         if self.holes.len() > MAX_HOLES {
-            return Err(SpecimenError::TooManyHoles { count: self.holes.len(), limit: MAX_HOLES });
+            // One error for all of them: each hole beyond could be wrong in its own way.
+            problems.push(SpecimenError::TooManyHoles { count: self.holes.len(), limit: MAX_HOLES });
+            return;
         }
         for (i, hole) in self.holes.iter().enumerate() {
-            check_size(&format!("holes[{i}].diameter_mm"), hole.diameter_mm, MIN_DIAMETER_MM, MAX_DIAMETER_MM)?;
+            let of_hole = || FieldPath::of("holes").index(i);
+            let diameter = || of_hole().name("diameter_mm");
+            problems.extend(check_size(diameter, hole.diameter_mm, MIN_DIAMETER_MM, MAX_DIAMETER_MM));
             for (k, value) in hole.center_mm.into_iter().enumerate() {
                 if !value.is_finite() {
-                    return Err(SpecimenError::NotFinite { field: format!("holes[{i}].center_mm[{k}]"), value });
+                    let field = of_hole().name("center_mm").index(k);
+                    problems.push(SpecimenError::NotFinite { field, value });
                 }
             }
             let expected = self.holes[0].axis;
             if hole.axis != expected {
-                return Err(SpecimenError::MixedHoleAxes { hole: i, axis: hole.axis, expected });
+                problems.push(SpecimenError::MixedHoleAxes { hole: i, axis: hole.axis, expected });
             }
         }
-        let diameter_of = |i: usize| self.holes.get(i).map_or(0.0, |hole: &Hole| hole.diameter_mm);
-        for ligament in self.ligaments() {
-            let (between, length_mm) = (ligament.kind, ligament.length_mm);
-            match between {
-                LigamentKind::HoleEdge(i, _) => {
-                    let limit_mm = min_meshable_ligament_mm(diameter_of(i));
-                    if length_mm <= 0.0 {
-                        return Err(SpecimenError::HoleOutside { between, excess_mm: -length_mm, limit_mm });
-                    }
-                    check_ligament(between, length_mm, limit_mm)?;
-                }
-                LigamentKind::HoleHole(i, j) => {
-                    let limit_mm = min_meshable_ligament_mm(diameter_of(i).max(diameter_of(j)));
-                    if length_mm <= 0.0 {
-                        return Err(SpecimenError::HolesOverlap { between, overlap_mm: -length_mm, limit_mm });
-                    }
-                    check_ligament(between, length_mm, limit_mm)?;
-                }
-            }
-        }
-        Ok(())
     }
 
-    fn validate_drives(&self) -> Result<(), SpecimenError> {
+    /// Ligaments that cannot be meshed, overlaps and holes that reach outside.
+    fn thin_ligaments(&self) -> Vec<SpecimenError> {
+        let diameter_of = |i: usize| self.holes.get(i).map_or(0.0, |hole: &Hole| hole.diameter_mm);
+        let check = |ligament: Ligament| {
+            let (between, length_mm) = (ligament.kind, ligament.length_mm);
+            let limit_mm = min_meshable_ligament_mm(match between {
+                LigamentKind::HoleEdge(i, _) => diameter_of(i),
+                LigamentKind::HoleHole(i, j) => diameter_of(i).max(diameter_of(j)),
+            });
+            if length_mm <= 0.0 {
+                return Some(match between {
+                    LigamentKind::HoleEdge(..) => {
+                        SpecimenError::HoleOutside { between, excess_mm: -length_mm, limit_mm }
+                    }
+                    LigamentKind::HoleHole(..) => {
+                        SpecimenError::HolesOverlap { between, overlap_mm: -length_mm, limit_mm }
+                    }
+                });
+            }
+            (length_mm < limit_mm).then_some(SpecimenError::LigamentTooThin { between, length_mm, limit_mm })
+        };
+        self.ligaments().into_iter().filter_map(check).collect()
+    }
+
+    fn check_drives(&self, problems: &mut Vec<SpecimenError>) {
         if self.drive_mm.is_empty() {
-            return Err(SpecimenError::NoDrives { limit: MAX_DRIVES });
+            problems.push(SpecimenError::NoDrives { limit: MAX_DRIVES });
         }
         if self.drive_mm.len() > MAX_DRIVES {
-            return Err(SpecimenError::TooManyDrives { count: self.drive_mm.len(), limit: MAX_DRIVES });
+            problems.push(SpecimenError::TooManyDrives { count: self.drive_mm.len(), limit: MAX_DRIVES });
+            return;
         }
         let limit_mm = self.max_supported_drive_mm();
         let mut previous_mm = 0.0;
         for (index, &value_mm) in self.drive_mm.iter().enumerate() {
-            if !value_mm.is_finite() {
-                return Err(SpecimenError::NotFinite { field: format!("drive_mm[{index}]"), value: value_mm });
-            }
-            if value_mm <= 0.0 {
-                return Err(SpecimenError::DriveNotPositive { index, value_mm });
-            }
-            if value_mm <= previous_mm {
-                return Err(SpecimenError::DrivesNotIncreasing { index, value_mm, previous_mm });
-            }
-            if value_mm > limit_mm * (1.0 + LIMIT_SLACK) {
-                let (measure, limit, dimension) = match self.test {
-                    TestKind::DoubleLapShear => ("shear strain", MAX_SHEAR_STRAIN, "thicker"),
-                    TestKind::Uniaxial => ("stretch", MAX_NOMINAL_STRETCH, "longer"),
-                };
-                let deformation = self.nominal_deformation(value_mm);
-                return Err(SpecimenError::DriveTooLarge {
-                    index,
-                    value_mm,
-                    measure,
-                    deformation,
-                    limit,
-                    limit_mm,
-                    dimension,
-                });
-            }
+            problems.extend(self.check_drive(index, value_mm, previous_mm, limit_mm));
             previous_mm = value_mm;
         }
-        Ok(())
+    }
+
+    fn check_drive(&self, index: usize, value_mm: f64, previous_mm: f64, limit_mm: f64) -> Option<SpecimenError> {
+        if !value_mm.is_finite() {
+            let field = FieldPath::of("drive_mm").index(index);
+            return Some(SpecimenError::NotFinite { field, value: value_mm });
+        }
+        if value_mm <= 0.0 {
+            return Some(SpecimenError::DriveNotPositive { index, value_mm });
+        }
+        if value_mm <= previous_mm {
+            return Some(SpecimenError::DrivesNotIncreasing { index, value_mm, previous_mm });
+        }
+        if value_mm > limit_mm * (1.0 + LIMIT_SLACK) {
+            let (measure, limit, dimension) = match self.test {
+                TestKind::DoubleLapShear => ("shear strain", MAX_SHEAR_STRAIN, "thicker"),
+                TestKind::Uniaxial => ("stretch", MAX_NOMINAL_STRETCH, "longer"),
+            };
+            let deformation = self.nominal_deformation(value_mm);
+            return Some(SpecimenError::DriveTooLarge {
+                index,
+                value_mm,
+                measure,
+                deformation,
+                limit,
+                limit_mm,
+                dimension,
+            });
+        }
+        None
     }
 }
 
-fn check_size(field: &str, value_mm: f64, min_mm: f64, max_mm: f64) -> Result<(), SpecimenError> {
-    let field = field.to_string();
+fn check_size(field: impl Fn() -> FieldPath, value_mm: f64, min_mm: f64, max_mm: f64) -> Option<SpecimenError> {
     if !value_mm.is_finite() {
-        return Err(SpecimenError::NotFinite { field, value: value_mm });
+        return Some(SpecimenError::NotFinite { field: field(), value: value_mm });
     }
-    if value_mm < min_mm || value_mm > max_mm {
-        return Err(SpecimenError::SizeOutOfRange { field, value_mm, min_mm, max_mm });
-    }
-    Ok(())
-}
-
-fn check_ligament(between: LigamentKind, length_mm: f64, limit_mm: f64) -> Result<(), SpecimenError> {
-    if length_mm < limit_mm {
-        return Err(SpecimenError::LigamentTooThin { between, length_mm, limit_mm });
-    }
-    Ok(())
+    let is_outside = value_mm < min_mm || value_mm > max_mm;
+    is_outside.then(|| SpecimenError::SizeOutOfRange { field: field(), value_mm, min_mm, max_mm })
 }

@@ -1,6 +1,7 @@
 //! What can be wrong with a specimen.
 
-use super::{HoleAxis, JsonProblem, LigamentKind};
+use super::{HoleAxis, JsonProblem, LigamentKind, Outline};
+use crate::field::{FieldError, FieldPath};
 
 /// Why a specimen is refused. Every variant carries the value, the limit and what to change.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -31,7 +32,7 @@ pub enum SpecimenError {
     #[error("{field} is {value}; give a finite number")]
     NotFinite {
         /// Path of the field.
-        field: String,
+        field: FieldPath,
         /// Its value.
         value: f64,
     },
@@ -39,7 +40,7 @@ pub enum SpecimenError {
     #[error("{field} is {value_mm} mm; choose a value from {min_mm} to {max_mm} mm")]
     SizeOutOfRange {
         /// Path of the field.
-        field: String,
+        field: FieldPath,
         /// Its value, mm.
         value_mm: f64,
         /// Smallest, mm.
@@ -171,7 +172,7 @@ pub enum SpecimenError {
     )]
     NotTheStandardsBlock {
         /// Path of the field.
-        field: &'static str,
+        field: FieldPath,
         /// Its value, mm.
         value_mm: f64,
         /// The standard's, mm.
@@ -188,4 +189,81 @@ pub enum SpecimenError {
         /// Which hole.
         hole: usize,
     },
+}
+
+impl SpecimenError {
+    /// The same as an error of a field, with a pointer into the specimen.
+    pub fn field_error(&self) -> FieldError {
+        use SpecimenError as E;
+        let of_hole = |hole: usize| FieldPath::of("holes").index(hole);
+        let of_drive = |index: usize| FieldPath::of("drive_mm").index(index).pointer();
+        match self {
+            E::Json(problem) => FieldError::new("", "", "JSON of a specimen").remedy(problem.to_string()),
+            E::WrongSchema { found, expected } => {
+                FieldError::new("/schema", format!("{found:?}"), format!("{expected:?}"))
+            }
+            E::BadName { length, has_control, limit } => {
+                let value = format!("a text of {length} characters, control characters: {has_control}");
+                FieldError::new("/name", value, format!("0 to {limit} printable characters"))
+            }
+            E::NotFinite { field, value } => FieldError::new(field.pointer(), value, "a finite number"),
+            E::SizeOutOfRange { field, value_mm, min_mm, max_mm } => {
+                FieldError::new(field.pointer(), value_mm, format!("from {min_mm} to {max_mm} mm"))
+            }
+            E::TooManyHoles { count, limit } => {
+                FieldError::new("/holes", format!("a list of {count}"), format!("at most {limit} holes"))
+            }
+            E::MixedHoleAxes { hole, axis, expected } => {
+                let pointer = of_hole(*hole).name("axis").pointer();
+                FieldError::new(pointer, axis.name(), format!("{}, as for the holes before it", expected.name()))
+                    .remedy("the mesh is extruded along the holes, so all holes of one specimen share their axis")
+            }
+            E::HoleOutside { between, excess_mm, limit_mm } => {
+                let value = format!("a hole that reaches {excess_mm:.4} mm too far");
+                let allowed = format!("at least {limit_mm:.4} mm inside ({between})");
+                FieldError::new(of_hole(between.first_hole()).pointer(), value, allowed)
+                    .remedy("move the hole inwards or make it smaller")
+            }
+            E::HolesOverlap { between, overlap_mm, limit_mm } => {
+                let value = format!("a hole that overlaps another by {overlap_mm:.4} mm");
+                let allowed = format!("at least {limit_mm:.4} mm away ({between})");
+                FieldError::new(of_hole(between.first_hole()).pointer(), value, allowed)
+                    .remedy("move the holes apart or make them smaller")
+            }
+            E::LigamentTooThin { between, length_mm, limit_mm } => {
+                let value = format!("a hole with a ligament of {length_mm:.4} mm");
+                let allowed = format!("at least {limit_mm:.4} mm away ({between})");
+                FieldError::new(of_hole(between.first_hole()).pointer(), value, allowed)
+                    .remedy("move the hole or make it smaller")
+            }
+            E::NoDrives { limit } => FieldError::new("/drive_mm", "[]", format!("a list of 1 to {limit} drives, mm")),
+            E::TooManyDrives { count, limit } => {
+                FieldError::new("/drive_mm", format!("a list of {count}"), format!("a list of at most {limit} drives"))
+            }
+            E::DriveNotPositive { index, value_mm } => FieldError::new(of_drive(*index), value_mm, "above 0 mm"),
+            E::DrivesNotIncreasing { index, value_mm, previous_mm } => {
+                FieldError::new(of_drive(*index), value_mm, format!("above the {previous_mm} mm before it"))
+                    .remedy("list the drives in increasing order, each once")
+            }
+            E::DriveTooLarge { index, value_mm, measure, limit, limit_mm, dimension, .. } => {
+                let allowed = format!("at most {limit_mm:.4} mm, a nominal {measure} of {limit}");
+                FieldError::new(of_drive(*index), value_mm, allowed)
+                    .remedy(format!("drive less, or make the specimen {dimension}"))
+            }
+            E::SamplesOutOfRange { value, limit } => {
+                FieldError::new("/samples_in_parallel", value, format!("from 1 to {limit}"))
+            }
+            E::NotTheStandardsBlock { field, value_mm, standard_mm } => {
+                FieldError::new(field.pointer(), value_mm, format!("{standard_mm} mm, as the standard has it"))
+                    .remedy("set it, or leave out the outline")
+            }
+            E::DumbbellInShear => FieldError::new("/outline", Outline::Iso37Type4.name(), "block in a shear test")
+                .remedy("set test to uniaxial, or leave out the outline"),
+            E::DumbbellHoleAlongWidth { hole } => {
+                let pointer = of_hole(*hole).name("axis").pointer();
+                FieldError::new(pointer, HoleAxis::Width.name(), "thickness in a dumb-bell")
+                    .remedy("the mesh of a dumb-bell is extruded along its thickness")
+            }
+        }
+    }
 }

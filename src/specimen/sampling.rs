@@ -1,6 +1,6 @@
 //! Random specimens for tests.
 
-use super::{Block, Hole, HoleAxis, Outline, SCHEMA, Specimen, TestKind, dumbbell};
+use super::{Block, Hole, HoleAxis, Outline, Specimen, TestKind, dumbbell};
 use proptest::prelude::*;
 
 /// Any arrangement of up to seven holes in a block, valid or not.
@@ -17,7 +17,6 @@ pub(crate) fn any_layout() -> impl Strategy<Value = Specimen> {
                 diameter_mm: 0.1 + d * lateral,
             };
             Specimen {
-                schema: SCHEMA.into(),
                 name: "random layout".into(),
                 test: if is_shear { TestKind::DoubleLapShear } else { TestKind::Uniaxial },
                 block: Block { length_mm, thickness_mm, width_mm },
@@ -49,7 +48,6 @@ pub(crate) fn valid_specimen() -> impl Strategy<Value = Specimen> {
 /// A dumb-bell with one hole that may lie anywhere.
 pub(crate) fn dumbbell_with_hole() -> impl Strategy<Value = Specimen> {
     (-17.0..17.0, -2.5..2.5, 0.1..1.5).prop_map(|(x, z, diameter_mm): (f64, f64, f64)| Specimen {
-        schema: SCHEMA.into(),
         name: "dumb-bell".into(),
         test: TestKind::Uniaxial,
         block: Block {

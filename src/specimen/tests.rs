@@ -65,7 +65,6 @@ fn refuses_bad_holes() {
 #[test]
 fn refuses_bad_numbers_and_names() {
     use SpecimenError as E;
-    assert!(matches!(refused(|s| s.schema = "specimen/2".into()), E::WrongSchema { .. }));
     assert!(matches!(refused(|s| s.name = "a\nb".into()), E::BadName { .. }));
     assert!(matches!(refused(|s| s.name = "a".repeat(201)), E::BadName { length: 201, .. }));
     assert!(matches!(refused(|s| s.block.width_mm = 0.0), E::SizeOutOfRange { .. }));
@@ -96,7 +95,9 @@ fn refuses_bad_dumbbells() {
         change(&mut specimen);
         specimen.validate().unwrap_err()
     };
-    assert!(matches!(refused(&|s| s.block.width_mm = 7.0), E::NotTheStandardsBlock { field: "block.width_mm", .. }));
+    let wide = refused(&|s| s.block.width_mm = 7.0);
+    assert!(matches!(wide, E::NotTheStandardsBlock { .. }));
+    assert_eq!(wide.field_error().pointer, "/block/width_mm");
     assert!(matches!(refused(&|s| s.test = TestKind::DoubleLapShear), E::DumbbellInShear));
     let hole = |axis, x, z, d| Hole { axis, center_mm: [x, z], diameter_mm: d };
     assert!(matches!(
@@ -270,7 +271,7 @@ proptest! {
             prop_assert!((a - b).abs() <= 2.0 * f64::EPSILON * b.abs());
         }
         // Everything that is not a measured number is the same.
-        let strip = |s: Specimen| (s.schema, s.name, s.test, s.outline, s.samples_in_parallel, s.holes.first().map(|h| h.axis));
+        let strip = |s: Specimen| (s.name, s.test, s.outline, s.samples_in_parallel, s.holes.first().map(|h| h.axis));
         prop_assert_eq!(strip(back), strip(specimen));
     }
 }
@@ -315,4 +316,54 @@ proptest! {
         let tolerance = perimeter * (length + lateral) / N as f64 * specimen.extrusion_mm();
         prop_assert!((volume - specimen.volume_mm3()).abs() <= tolerance + 1e-9 * volume);
     }
+}
+
+/// Every violated rule is told at once, each with its pointer; ligaments only where the holes themselves are fine.
+#[test]
+fn all_errors_come_at_once_with_pointers() {
+    let mut specimen = two_holes();
+    specimen.name = "a\nb".into();
+    specimen.block.width_mm = f64::NAN;
+    specimen.holes[1].diameter_mm = -3.0;
+    specimen.holes[1].axis = HoleAxis::Width;
+    specimen.drive_mm = vec![2.0, 1.0, -1.0];
+    specimen.samples_in_parallel = 0;
+    let pointers: Vec<String> = specimen.field_errors().into_iter().map(|e| e.pointer).collect();
+    assert_eq!(
+        pointers,
+        [
+            "/name",
+            "/block/width_mm",
+            "/holes/1/diameter_mm",
+            "/holes/1/axis",
+            "/drive_mm/1",
+            "/drive_mm/2",
+            "/samples_in_parallel"
+        ]
+    );
+    assert_eq!(specimen.validate().expect_err("refused").field_error().pointer, pointers[0]);
+    let mut close = two_holes();
+    close.holes[1] = close.holes[0];
+    let errors = close.field_errors();
+    assert_eq!(errors.len(), 1, "{errors:?}");
+    assert_eq!(errors[0].pointer, "/holes/0");
+    assert_eq!(two_holes().field_errors(), []);
+}
+
+#[test]
+fn limits_that_are_none_have_pointers() {
+    let limits = ManufacturingLimits::from_json(
+        r#"{ "min_ligament_hole_hole_mm": 2.0, "min_ligament_hole_edge_mm": 2.0, "punches_mm": [3.0, 4.0] }"#,
+    )
+    .expect("they are valid");
+    assert_eq!(limits.field_errors(), []);
+    let bad = ManufacturingLimits {
+        min_ligament_hole_hole_mm: f64::NAN,
+        punches_mm: Some(vec![3.0, 0.0]),
+        max_local_stretch: Some(1.0),
+        max_holes: Some(65),
+        ..limits
+    };
+    let pointers: Vec<String> = bad.field_errors().into_iter().map(|e| e.pointer).collect();
+    assert_eq!(pointers, ["/min_ligament_hole_hole_mm", "/punches_mm/1", "/max_local_stretch", "/max_holes"]);
 }

@@ -30,8 +30,8 @@ fn latin_hypercube(study: &SweepStudy, count: usize) -> Vec<Vec<f64>> {
     latin_hypercube_points(&ranges, count, study.seed)
 }
 
-/// `count` points of a Latin hypercube over `ranges` (least and greatest value of each variable): along every variable one
-/// point lies in each of `count` equal parts. The same arguments give the same points.
+/// `count` points of a Latin hypercube over `ranges` (least and greatest value of each variable): along every variable
+/// one point lies in each of `count` equal parts. The same arguments give the same points.
 pub fn latin_hypercube_points(ranges: &[[f64; 2]], count: usize, seed: u64) -> Vec<Vec<f64>> {
     let mut points = vec![vec![0.0; ranges.len()]; count];
     for (v, &[min, max]) in ranges.iter().enumerate() {

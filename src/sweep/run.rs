@@ -46,8 +46,8 @@ pub struct SweepRun {
     pub resumed: usize,
 }
 
-/// Evaluates the tasks of a shard that have no result in `folder` yet, single-threaded each, on all threads of the pool.
-/// The next task is taken by the next free thread, so that all threads work until the tasks run out.
+/// Evaluates the tasks of a shard that have no result in `folder` yet, single-threaded each, on all threads of the
+/// pool. The next task is taken by the next free thread, so that all threads work until the tasks run out.
 ///
 /// # Errors
 /// [`SweepError::Store`] at the first result that cannot be written, [`SweepError::Stopped`].
@@ -79,7 +79,8 @@ pub fn run(study: &SweepStudy, folder: &Path, options: &RunOptions) -> Result<Sw
             let Some(task) = todo.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
             let Some(outcome) = (options.observe)(task, &|| guarded(study, task, &stop)) else { break };
             let is_failure = matches!(outcome, Outcome::Failed { .. });
-            // A poisoned lock means that another thread died while writing: what the file then holds is checked when read.
+            // A poisoned lock means that another thread died while writing: what the file then holds is checked when
+            // read.
             let mut kept = kept.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
             if kept.1.is_some() {
                 break;

@@ -1,18 +1,19 @@
 //! The results on disk: one append-only file of JSON lines per shard.
 //!
-//! A line is `{"sha256":"<16 digits>","record":…}`; the digits are the start of the SHA-256 of the record's text. The first
-//! record is the header with the study's hash, each other one a task with its outcome. A line is written at once and synced
-//! before the next. A torn last line (a kill, a crash, a full disk) is dropped; its task is computed again.
+//! A line is `{"sha256":"<16 digits>","record":…}`; the digits are the start of the SHA-256 of the record's text. The
+//! first record is the header with the study's hash, each other one a task with its outcome. A line is written at once
+//! and synced before the next. A torn last line (a kill, a crash, a full disk) is dropped; its task is computed again.
 
 use super::error::StoreError;
 use super::shard::Shard;
 use super::task::Outcome;
+use crate::file::read_limited;
 use crate::provenance::VERSION;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{Read, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -20,6 +21,8 @@ const HEAD: &str = "{\"sha256\":\"";
 const MIDDLE: &str = "\",\"record\":";
 /// Digits of the checksum: 64 bits, far more than torn lines need.
 const DIGITS: usize = 16;
+/// Largest shard that is read, bytes: ten million results take a few gigabytes.
+const MAX_SHARD_BYTES: u64 = 1 << 36;
 /// A requeued task may meet its predecessor's lock while that one dies.
 const LOCK_ATTEMPTS: usize = 20;
 const LOCK_PAUSE: Duration = Duration::from_millis(250);
@@ -93,13 +96,11 @@ fn record_of(line: &[u8]) -> Result<&str, &'static str> {
 /// Reads a shard's file.
 ///
 /// # Errors
-/// [`StoreError::Read`], [`StoreError::NotAShard`], [`StoreError::OtherStudy`], [`StoreError::Damaged`] for a line that is not the last
-/// one.
+/// [`StoreError::Read`], [`StoreError::NotAShard`], [`StoreError::OtherStudy`], [`StoreError::Damaged`] for a line that
+/// is not the last one.
 pub fn read_shard(path: &Path, study_hash: &str) -> Result<ShardContents, StoreError> {
-    let mut bytes = Vec::new();
-    File::open(path)
-        .and_then(|mut f| f.read_to_end(&mut bytes))
-        .map_err(|source| StoreError::Read { path: path.into(), source })?;
+    let bytes = read_limited(path, MAX_SHARD_BYTES)
+        .map_err(|error| StoreError::Read { path: path.into(), source: error.into_io() })?;
     let mut contents = ShardContents { shard: None, outcomes: BTreeMap::new(), good_bytes: 0 };
     let mut num_tasks = 0;
     let total = bytes.len() as u64;

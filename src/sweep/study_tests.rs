@@ -1,5 +1,7 @@
-use super::super::task::tasks;
+use super::super::study_error::SweepStudyError;
+use super::super::task::{TaskInputs, tasks};
 use super::*;
+use std::path::Path;
 
 /// A solid block and a bar; `patch` changes the study's JSON.
 fn study(patch: impl Fn(&mut serde_json::Value)) -> Result<SweepStudy, SweepStudyError> {
@@ -38,7 +40,7 @@ fn a_grid_has_every_combination_and_every_material() {
     let values: Vec<&[f64]> = tasks.iter().step_by(2).map(|t| t.values.as_slice()).collect();
     assert_eq!(values, [[4.0, 3.0], [4.0, 4.0], [4.0, 5.0], [6.0, 3.0], [6.0, 4.0], [6.0, 5.0]]);
     assert!(tasks.iter().enumerate().all(|(i, t)| t.index == i && t.point == i / 2 && t.material == i % 2));
-    let (specimen, material, _) = tasks[11].inputs(&study);
+    let TaskInputs { specimen, material, .. } = tasks[11].inputs(&study);
     assert_eq!([specimen.holes[0].center_mm[0], specimen.holes[1].center_mm[0]], [-6.0, 6.0]);
     assert_eq!((specimen.drive_mm, material.bulk_kpa), (vec![5.0], 4000.0));
 }
@@ -105,6 +107,47 @@ fn bad_studies_are_refused_with_what_to_change() {
         v["variables"][1].as_object_mut().map(|o| o.remove("range"));
     };
     assert!(matches!(study(short_row), Err(SweepStudyError::RowLength { row: 1, found: 1, expected: 2 })));
+}
+
+/// Each rule has its pointer, and all errors come at once.
+#[test]
+fn errors_have_pointers() {
+    let mut study = study(|_| {}).expect("a good study");
+    study.materials[1].name = "soft".into();
+    study.scan.voxel_mm[0] = 0.0;
+    study.variables[1].sets[0] = "holes[1].x_mm".into();
+    study.variables[0].values = Some(vec![4.0, f64::NAN]);
+    let pointers = |study: &SweepStudy| study.field_errors().into_iter().map(|e| e.pointer).collect::<Vec<_>>();
+    let expected = ["/materials/1/name", "/scan/voxel_mm/0", "/variables/0/values/1", "/variables/1/sets/0"];
+    assert_eq!(pointers(&study), expected);
+    assert!(study.validate().is_err());
+}
+
+#[test]
+fn one_number_is_set_by_one_variable() {
+    let refused = |sets: serde_json::Value| {
+        let error = study(|v| v["variables"][1]["sets"] = sets.clone()).expect_err("refused");
+        matches!(error, SweepStudyError::SameTarget { .. })
+    };
+    assert!(refused(serde_json::json!(["holes[1].x_mm"])));
+    assert!(refused(serde_json::json!(["-holes[1].x_mm"])));
+    assert!(refused(serde_json::json!(["drive_mm", "drive_mm"])));
+}
+
+/// A scan without extent or noise is no result of a design but a mistake in the study.
+#[test]
+fn values_for_the_scan_are_positive() {
+    let of = |values: &[f64]| {
+        study(|v| {
+            v["variables"][1] =
+                serde_json::json!({ "name": "voxel_mm", "sets": ["scan.voxel_mm[0]"], "values": values });
+        })
+    };
+    assert!(of(&[0.5, 1.0]).is_ok());
+    for bad in [0.0, -1.0] {
+        let error = of(&[1.0, bad]).expect_err("refused");
+        assert!(error.to_string().starts_with("variables[1].values[1] is"), "{error}");
+    }
 }
 
 /// A design that cannot be made is a result with its reason, not an end of the sweep.

@@ -1,6 +1,6 @@
 //! What a variable sets: one number of the specimen, the material or the scan, by name.
 
-use super::error::SweepStudyError;
+use super::study_error::SweepStudyError;
 use crate::material::Ogden;
 use crate::sensitivity::ScanSettings;
 use crate::specimen::Specimen;
@@ -32,10 +32,11 @@ enum Place {
 }
 
 impl Target {
-    /// Reads `drive_mm`, `block.length_mm`, `block.thickness_mm`, `block.width_mm`, `holes[i].x_mm`, `holes[i].other_mm`
-    /// (z of a hole along the thickness, y of one along the width), `holes[i].diameter_mm`, `material.bulk_kpa`,
-    /// `material.mu_1_kpa`, `material.alpha_1`, `scan.voxel_mm[c]`, `scan.noise_sd_mm[c]` or `scan.force_sd_n`; indices of
-    /// holes and components from 0, of Ogden terms from 1. A leading `-` sets the negated value.
+    /// Reads `drive_mm`, `block.length_mm`, `block.thickness_mm`, `block.width_mm`, `holes[i].x_mm`,
+    /// `holes[i].other_mm` (z of a hole along the thickness, y of one along the width), `holes[i].diameter_mm`,
+    /// `material.bulk_kpa`, `material.mu_1_kpa`, `material.alpha_1`, `scan.voxel_mm[c]`, `scan.noise_sd_mm[c]` or
+    /// `scan.force_sd_n`; indices of holes and components from 0, of Ogden terms from 1. A leading `-` sets the negated
+    /// value.
     ///
     /// # Errors
     /// [`SweepStudyError::UnknownTarget`].
@@ -92,9 +93,24 @@ impl Target {
         }
     }
 
+    /// Whether the value goes to the same number as that of `other`, with the same sign or not.
+    pub fn is_same_place(&self, other: &Target) -> bool {
+        self.place == other.place
+    }
+
+    /// Whether the value goes to the scan, whose numbers are all above 0.
+    pub(super) fn is_of_scan(&self) -> bool {
+        matches!(self.place, Place::Voxel(_) | Place::Noise(_) | Place::ForceSd)
+    }
+
+    /// What is set where the variable has `value`.
+    pub(super) fn signed(&self, value: f64) -> f64 {
+        if self.is_negated { -value } else { value }
+    }
+
     /// Sets `value`; false where there is no such hole or term.
     pub fn set(&self, value: f64, specimen: &mut Specimen, material: &mut Ogden, scan: &mut ScanSettings) -> bool {
-        let value = if self.is_negated { -value } else { value };
+        let value = self.signed(value);
         let slot = match self.place {
             Place::Drive => {
                 specimen.drive_mm = vec![value];

@@ -4,6 +4,7 @@ use super::points::points;
 use super::study::SweepStudy;
 use crate::fem::SolveError;
 use crate::material::Ogden;
+use crate::mesh::MeshSize;
 use crate::sensitivity::{
     DriveSelection, EvaluationError, EvaluationOptions, EvaluationStep, PromisedSd, ScanSettings, evaluate,
 };
@@ -21,6 +22,19 @@ pub struct Task {
     pub material: usize,
     /// Values of the variables.
     pub values: Vec<f64>,
+}
+
+/// What a task evaluates.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TaskInputs {
+    /// The design; one that cannot be made is a result.
+    pub specimen: Specimen,
+    /// The material.
+    pub material: Ogden,
+    /// The scan.
+    pub scan: ScanSettings,
+    /// The mesh.
+    pub mesh: MeshSize,
 }
 
 /// What became of a task.
@@ -56,7 +70,7 @@ pub struct Figures {
 }
 
 /// All tasks of a study, by index.
-pub(super) fn tasks(study: &SweepStudy) -> Vec<Task> {
+pub fn tasks(study: &SweepStudy) -> Vec<Task> {
     let num_materials = study.materials.len();
     let each = |(point, values): (usize, Vec<f64>)| {
         (0..num_materials).map(move |material| Task {
@@ -70,8 +84,8 @@ pub(super) fn tasks(study: &SweepStudy) -> Vec<Task> {
 }
 
 impl Task {
-    /// The specimen, material and scan of this task.
-    pub fn inputs(&self, study: &SweepStudy) -> (Specimen, Ogden, ScanSettings) {
+    /// What this task evaluates.
+    pub fn inputs(&self, study: &SweepStudy) -> TaskInputs {
         let mut specimen = study.base.clone();
         let mut material = study.materials[self.material].material.clone();
         let mut scan = study.scan;
@@ -81,12 +95,19 @@ impl Task {
                 target.set(value, &mut specimen, &mut material, &mut scan);
             }
         }
-        (specimen, material, scan)
+        TaskInputs { specimen, material, scan, mesh: study.mesh }
     }
 
     /// Evaluates; `None` where it was stopped from outside.
     pub fn evaluate(&self, study: &SweepStudy, is_cancelled: &dyn Fn() -> bool) -> Option<Outcome> {
-        let (specimen, material, scan) = self.inputs(study);
+        self.inputs(study).evaluate(is_cancelled)
+    }
+}
+
+impl TaskInputs {
+    /// Evaluates; `None` where it was stopped from outside.
+    pub fn evaluate(&self, is_cancelled: &dyn Fn() -> bool) -> Option<Outcome> {
+        let TaskInputs { specimen, material, scan, mesh } = self;
         if let Err(e) = specimen.validate() {
             return Some(failed("specimen", &e));
         }
@@ -94,9 +115,9 @@ impl Task {
             return Some(failed("material", &e));
         }
         let options =
-            EvaluationOptions { mesh: study.mesh.options(&specimen), ..EvaluationOptions::standard(&specimen) };
+            EvaluationOptions { mesh: mesh.options(specimen), ..EvaluationOptions::standard(specimen) };
         let drives = DriveSelection::DriveMm(specimen.drive_mm.clone());
-        let evaluation = match evaluate(&specimen, &material, &scan, &drives, &options, is_cancelled) {
+        let evaluation = match evaluate(specimen, material, scan, &drives, &options, is_cancelled) {
             Ok((evaluation, _)) => evaluation,
             Err(EvaluationError::Solve(SolveError::Cancelled { .. })) => return None,
             Err(error) => return Some(failed(kind_of(&error), &error)),

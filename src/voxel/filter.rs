@@ -3,11 +3,11 @@
 use super::{VoxelError, VoxelGrid, VoxelMask};
 use crate::specimen::Specimen;
 
-/// Averages the 2×2×2 acquired voxels around each corner of the acquired grid: equal weights, material voxels only. (Two
-/// Hamming weights are equal.) The filtered value lies at the corner.
+/// Averages the 2×2×2 acquired voxels around each corner of the acquired grid: equal weights, material voxels only.
+/// (Two Hamming weights are equal.) The filtered value lies at the corner.
 ///
-/// Neighbouring filtered values share acquired voxels, so their noise is correlated: `noise_sd_mm` of a filtered recording is
-/// that of one value, a factor √8 below the acquired noise in the interior.
+/// Neighbouring filtered values share acquired voxels, so their noise is correlated: `noise_sd_mm` of a filtered
+/// recording is that of one value, a factor √8 below the acquired noise in the interior.
 #[derive(Clone, Debug)]
 pub struct HammingFilter {
     filtered: VoxelMask,
@@ -18,8 +18,8 @@ pub struct HammingFilter {
 }
 
 impl HammingFilter {
-    /// All corners inside the acquired grid with at least half (four) of their eight voxels in the acquired mask. The filtered
-    /// grid has one voxel less along each axis and lies half a voxel further.
+    /// All corners inside the acquired grid with at least half (four) of their eight voxels in the acquired mask. The
+    /// filtered grid has one voxel less along each axis and lies half a voxel further.
     ///
     /// # Errors
     /// [`VoxelError::EmptyMask`].
@@ -32,9 +32,9 @@ impl HammingFilter {
         Self::build(acquired, grid, |_, num_present| num_present >= 4)
     }
 
-    /// The filter for a filtered recording: `filtered_grid` and the voxels marked by `flags` are the recording's. Also returns
-    /// the acquired mask, one voxel larger along each axis and taken from the nominal specimen. Marked voxels without any
-    /// acquired voxel are left out.
+    /// The filter for a filtered recording: `filtered_grid` and the voxels marked by `flags` are the recording's. Also
+    /// returns the acquired mask, one voxel larger along each axis and taken from the nominal specimen. Marked voxels
+    /// without any acquired voxel are left out.
     ///
     /// # Errors
     /// [`VoxelError::LengthMismatch`], [`VoxelError::EmptyMask`], [`VoxelError::TooManyVoxels`].
@@ -127,7 +127,8 @@ impl HammingFilter {
             .collect())
     }
 
-    /// The transpose of [`Self::apply`]: Σ_f A_fa w_f for each acquired voxel a. For adjoints and the noise's covariance.
+    /// The transpose of [`Self::apply`]: Σ_f A_fa w_f for each acquired voxel a. For adjoints and the noise's
+    /// covariance.
     ///
     /// # Errors
     /// [`VoxelError::LengthMismatch`].

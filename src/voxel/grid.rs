@@ -31,13 +31,13 @@ impl VoxelGrid {
         Ok(VoxelGrid { origin_mm, voxel_mm, shape })
     }
 
-    /// The grid centred on the specimen's block, with extent / edge voxels along each axis, rounded to the nearest whole
-    /// number (at least one).
+    /// The grid centred on the specimen's block, with extent / edge voxels along each axis, rounded to the nearest
+    /// whole number (at least one).
     ///
     /// A scan's grid lies anywhere relative to the sample. On average over that offset, the voxels at least half filled
-    /// number extent / edge along each axis; rounding keeps closest to that and keeps the grid mirror symmetric. Up to half a
-    /// voxel of material at a face then belongs to no voxel. (25.4 × 6.4 × 19.1 mm at 1 × 0.1875 × 0.75 mm: 25 × 34 × 25 =
-    /// 21,250 voxels; volume / voxel volume is 22,079.)
+    /// number extent / edge along each axis; rounding keeps closest to that and keeps the grid mirror symmetric. Up to
+    /// half a voxel of material at a face then belongs to no voxel. (25.4 × 6.4 × 19.1 mm at 1 × 0.1875 × 0.75 mm: 25 ×
+    /// 34 × 25 = 21,250 voxels; volume / voxel volume is 22,079.)
     ///
     /// # Errors
     /// [`VoxelError::InvalidVoxel`], [`VoxelError::TooManyVoxels`].

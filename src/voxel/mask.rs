@@ -19,8 +19,8 @@ pub struct VoxelMask {
 }
 
 impl VoxelMask {
-    /// Voxels of `grid` that `specimen` fills to at least a half. Uncut voxels are measured in closed form, voxels cut by a
-    /// wall by slices.
+    /// Voxels of `grid` that `specimen` fills to at least a half. Uncut voxels are measured in closed form, voxels cut
+    /// by a wall by slices.
     ///
     /// # Errors
     /// [`VoxelError::EmptyMask`].
@@ -126,7 +126,6 @@ pub(crate) mod tests {
 
     pub(crate) fn solid() -> Specimen {
         Specimen {
-            schema: "specimen/1".into(),
             name: "solid".into(),
             test: TestKind::DoubleLapShear,
             block: Block { length_mm: 25.4, thickness_mm: 6.4, width_mm: 19.1 },
@@ -173,8 +172,8 @@ pub(crate) mod tests {
         }
     }
 
-    /// The mean count over random offsets is volume / voxel volume: that of the recordings (20,366 of open-control, with its
-    /// own offset) lies within the scatter.
+    /// The mean count over random offsets is volume / voxel volume: that of the recordings (20,366 of open-control,
+    /// with its own offset) lies within the scatter.
     #[test]
     fn recording_grid_gives_the_recording_mask() {
         let grid = VoxelGrid::new([-14.90630531, -3.61303687, -10.99919987], PUBLISHED_VOXEL, [30, 39, 30]).unwrap();

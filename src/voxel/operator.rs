@@ -9,9 +9,9 @@ use crate::specimen::Specimen;
 /// Sparse operator from nodal fields to voxel averages.
 ///
 /// With sample points X_q and weights w_q (Σ w_q = 1) in the material part of a voxel,
-/// ū_i = Σ_q w_q u_i(X_q) and (∇u)_iJ = Σ_q w_q ∂u_i/∂X_J(X_q). Points in a mirrored half are reflected to the meshed one;
-/// there the field has u_y (mirror in y) or u_z (mirror in z) reversed, as displacements and their derivatives have. Per
-/// voxel the points are condensed to one weight and one gradient weight per node and reflection.
+/// ū_i = Σ_q w_q u_i(X_q) and (∇u)_iJ = Σ_q w_q ∂u_i/∂X_J(X_q). Points in a mirrored half are reflected to the meshed
+/// one; there the field has u_y (mirror in y) or u_z (mirror in z) reversed, as displacements and their derivatives
+/// have. Per voxel the points are condensed to one weight and one gradient weight per node and reflection.
 #[derive(Clone, Debug)]
 pub struct VoxelOperator {
     num_nodes: usize,

@@ -13,11 +13,7 @@ pub type Matrix = [[f64; 3]; 3];
 
 /// κ and terms (μ, α).
 pub fn ogden(bulk_kpa: f64, terms: &[(f64, f64)]) -> Ogden {
-    Ogden {
-        schema: "ogden/1".into(),
-        bulk_kpa,
-        terms: terms.iter().map(|&(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha }).collect(),
-    }
+    Ogden { bulk_kpa, terms: terms.iter().map(|&(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha }).collect() }
 }
 
 /// Ecoflex 00-20, one term.
@@ -34,7 +30,6 @@ pub fn two_terms() -> Ogden {
 pub fn specimen(test: TestKind, extents: Vector, axis: HoleAxis, holes: &[Vector]) -> Specimen {
     let [length_mm, thickness_mm, width_mm] = extents;
     Specimen {
-        schema: "specimen/1".into(),
         name: format!("{test:?} {extents:?} {axis:?} {holes:?}"),
         test,
         block: Block { length_mm, thickness_mm, width_mm },

@@ -1,6 +1,6 @@
 //! Voxels in use, their neighbours, and how well each difference is known.
 
-use super::{WrappedImage, wrapped};
+use super::image::{WrappedImage, wrapped};
 use std::f64::consts::PI;
 
 /// No voxel in use.

@@ -1,10 +1,10 @@
 //! Weighted least-squares unwrapping with congruence.
 //!
-//! Minimises Σ w (ψ_b − ψ_a − δ)² over the smooth phase ψ, δ being the wrapped differences and w one over their variance
-//! (Ghiglia & Romero 1994), by conjugate gradients with the diagonal as preconditioner. A few rounds with
-//! w / (|residual| + ε) move the solution towards least absolute deviations (Ghiglia & Romero 1996), so that a cut with
-//! wrong differences is not smeared over its surroundings. Congruence then adds to each wrapped phase the whole turns that
-//! bring it closest to ψ.
+//! Minimises Σ w (ψ_b − ψ_a − δ)² over the smooth phase ψ, δ being the wrapped differences and w one over their
+//! variance (Ghiglia & Romero 1994), by conjugate gradients with the diagonal as preconditioner. A few rounds with w /
+//! (|residual| + ε) move the solution towards least absolute deviations (Ghiglia & Romero 1996), so that a cut with
+//! wrong differences is not smeared over its surroundings. Congruence then adds to each wrapped phase the whole turns
+//! that bring it closest to ψ.
 
 use super::graph::Graph;
 use super::quality::Groups;

@@ -1,15 +1,17 @@
 //! Unwrapping a phase image in three dimensions.
 //!
-//! Neighbouring voxels are taken to differ by less than half a turn; where noise, dephasing or a strong gradient breaks this,
-//! the answer depends on the path, and the methods differ in which neighbours they trust ([`Method`]). A phase that changes
-//! by many turns along a line of voxels is no difficulty as such.
+//! Neighbouring voxels are taken to differ by less than half a turn; where noise, dephasing or a strong gradient breaks
+//! this, the answer depends on the path, and the methods differ in which neighbours they trust ([`Method`]). A phase
+//! that changes by many turns along a line of voxels is no difficulty as such.
 //!
-//! Whatever the method, a voxel is kept only where its multiple of 2π agrees with all its kept neighbours and where it is
-//! joined to the largest region through differences that the noise cannot have turned ([`UnwrapOptions::min_margin`]); two
-//! methods of different kind must agree about it ([`UnwrapOptions::needs_agreement`]).
-//! Voxels that are not kept are counted by cause. The multiple of 2π of the whole region stays open.
+//! Whatever the method, a voxel is kept only where its multiple of 2π agrees with all its kept neighbours and where it
+//! is joined to the largest region through differences that the noise cannot have turned
+//! ([`UnwrapOptions::min_margin`]); two methods of different kind must agree about it
+//! ([`UnwrapOptions::needs_agreement`]). Voxels that are not kept are counted by cause. The multiple of 2π of the whole
+//! region stays open.
 
 mod graph;
+mod image;
 mod least_squares;
 mod quality;
 mod reliable;
@@ -17,11 +19,14 @@ mod reliable;
 #[cfg(test)]
 mod tests;
 
+pub use image::{WrappedImage, wrapped};
+
 use graph::Graph;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 /// How to decide which differences to trust.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, utoipa::ToSchema)]
+#[schema(as = UnwrapMethod)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
     /// Quality-guided: voxels are joined in the order of each difference's distance from half a turn in units of its
@@ -30,8 +35,8 @@ pub enum Method {
     Margin,
     /// Quality-guided by second differences (Abdul-Rahman et al. 2007, Applied Optics 46, 6623).
     SecondDifference,
-    /// Weighted least squares on the differences, reweighted towards least absolute deviations, then made congruent: the
-    /// smooth solution picks each voxel's multiple of 2π.
+    /// Weighted least squares on the differences, reweighted towards least absolute deviations, then made congruent:
+    /// the smooth solution picks each voxel's multiple of 2π.
     LeastSquares,
 }
 
@@ -40,13 +45,13 @@ pub enum Method {
 pub struct UnwrapOptions {
     /// How to decide which differences to trust.
     pub method: Method,
-    /// Voxels whose phase has a larger standard deviation are left out, rad. At 0.7 two neighbours differ by noise alone
-    /// with a standard deviation of one radian.
+    /// Voxels whose phase has a larger standard deviation are left out, rad. At 0.7 two neighbours differ by noise
+    /// alone with a standard deviation of one radian.
     pub max_phase_sd: f64,
     /// Regions are joined only through differences at least this many standard deviations away from half a turn.
     pub min_margin: f64,
-    /// A second method of the other kind (least squares beside a quality-guided one, [`Method::Margin`] beside least squares)
-    /// must find the same turns; voxels where it does not are left out.
+    /// A second method of the other kind (least squares beside a quality-guided one, [`Method::Margin`] beside least
+    /// squares) must find the same turns; voxels where it does not are left out.
     pub needs_agreement: bool,
 }
 
@@ -54,17 +59,6 @@ impl Default for UnwrapOptions {
     fn default() -> Self {
         UnwrapOptions { method: Method::default(), max_phase_sd: 0.7, min_margin: 2.0, needs_agreement: true }
     }
-}
-
-/// A wrapped phase image with what is known of its noise; lists in the grid's order, x fastest.
-#[derive(Clone, Copy, Debug)]
-pub struct WrappedImage<'a> {
-    /// Voxels along x, y, z.
-    pub shape: [usize; 3],
-    /// Phase, rad; NaN where missing.
-    pub phase: &'a [f64],
-    /// Standard deviation of the phase, rad; not finite outside the mask.
-    pub sd: &'a [f64],
 }
 
 /// An unwrapped image.
@@ -86,12 +80,6 @@ pub struct Unwrapped {
     pub num_unconnected: usize,
 }
 
-/// The phase within (−π, π].
-pub fn wrapped(phase: f64) -> f64 {
-    let turned = phase - TAU * (phase / TAU).round();
-    if turned <= -PI { turned + TAU } else { turned }
-}
-
 /// Unwraps an image. The lists have one entry per voxel; entries beyond the shape are ignored.
 pub fn unwrap(image: &WrappedImage, options: &UnwrapOptions) -> Unwrapped {
     let is_asked = |v: usize| image.phase[v].is_finite() && image.sd[v].is_finite();
@@ -99,10 +87,10 @@ pub fn unwrap(image: &WrappedImage, options: &UnwrapOptions) -> Unwrapped {
     let asked: Vec<usize> = (0..num_image).filter(|&v| is_asked(v)).collect();
     let used: Vec<u32> = asked.iter().filter(|&&v| image.sd[v] <= options.max_phase_sd).map(|&v| v as u32).collect();
     let graph = Graph::new(image, &used);
-    let whole = by(options.method, &graph);
+    let whole = unwrapped_by(options.method, &graph);
     let is_agreed = if options.needs_agreement {
         let other = if options.method == Method::LeastSquares { Method::Margin } else { Method::LeastSquares };
-        agreed(&whole, &by(other, &graph))
+        agreed(&whole, &unwrapped_by(other, &graph))
     } else {
         vec![true; used.len()]
     };
@@ -125,7 +113,7 @@ pub fn unwrap(image: &WrappedImage, options: &UnwrapOptions) -> Unwrapped {
     }
 }
 
-fn by(method: Method, graph: &Graph) -> Vec<f64> {
+fn unwrapped_by(method: Method, graph: &Graph) -> Vec<f64> {
     match method {
         Method::Margin => quality::by_margin(graph),
         Method::SecondDifference => quality::by_second_difference(graph),

@@ -43,8 +43,8 @@ impl PartialEq for Candidate {
 
 impl Eq for Candidate {}
 
-/// Starting from the voxels of `is_kept`, leaves out voxels until no two kept neighbours differ by more than half a turn, then keeps the largest region that is
-/// joined through differences with at least `min_margin`.
+/// Starting from the voxels of `is_kept`, leaves out voxels until no two kept neighbours differ by more than half a
+/// turn, then keeps the largest region that is joined through differences with at least `min_margin`.
 pub(super) fn kept(graph: &Graph, unwrapped: &[f64], mut is_kept: Vec<bool>, min_margin: f64) -> Kept {
     let n = graph.len();
     let is_bad = |a: u32, b: u32| (unwrapped[b as usize] - unwrapped[a as usize]).abs() > PI * (1.0 + 1e-9);

@@ -2,6 +2,7 @@ use super::*;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use std::f64::consts::PI;
 
 const SHAPE: [usize; 3] = [26, 38, 26];
 
@@ -76,7 +77,7 @@ fn unwrapping_table() {
                 let used: Vec<u32> = (0..sd.len() as u32).filter(|&v| sd[v as usize] <= 0.7).collect();
                 let graph = Graph::new(&image, &used);
                 let start = std::time::Instant::now();
-                let whole = by(method, &graph);
+                let whole = unwrapped_by(method, &graph);
                 seconds += start.elapsed().as_secs_f64();
                 let true_used: Vec<f64> = used.iter().map(|&v| truth[v as usize]).collect();
                 wrong += num_wrong(&true_used, &whole);
@@ -157,8 +158,8 @@ fn islands_are_left_out() {
     assert_eq!(unwrap(&none, &UnwrapOptions::default()).num_kept, 0);
 }
 
-/// A dislocation: the phase winds once around a line, so no unwrapping is right everywhere. The kept voxels still agree with
-/// all their kept neighbours.
+/// A dislocation: the phase winds once around a line, so no unwrapping is right everywhere. The kept voxels still agree
+/// with all their kept neighbours.
 #[test]
 fn dislocations_are_cut_open() {
     let shape = [16, 16, 3];

@@ -1,8 +1,13 @@
 //! A background phase that has nothing to do with the drive.
 
-use super::{Category, Cause, CauseParameter, Course, Location};
+use crate::diagnosis::cause::{Category, Cause, CauseName, CauseParameter, Course};
+use crate::diagnosis::entry::{Entry, Origin};
 use crate::diagnosis::scene::Scene;
-use crate::specimen::Specimen;
+use std::sync::Arc;
+
+const NAME: CauseName = CauseName::new("background");
+/// Its line in the registry.
+pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Tested(|_| vec![Arc::new(Background)]) };
 
 /// A polynomial of second degree in the position, added to each component at every drive.
 pub struct Background;
@@ -10,8 +15,8 @@ pub struct Background;
 const TERMS: [&str; 10] = ["1", "x", "y", "z", "xx", "yy", "zz", "xy", "yz", "zx"];
 
 impl Cause for Background {
-    fn name(&self) -> &'static str {
-        "background"
+    fn name(&self) -> CauseName {
+        NAME
     }
 
     fn category(&self) -> Category {
@@ -33,10 +38,6 @@ impl Cause for Background {
         for (n, value) in values.iter().enumerate() {
             scene.image.background_mm[n / TERMS.len()][n % TERMS.len()] += value;
         }
-    }
-
-    fn location(&self, _: &[f64], _: &Specimen) -> Option<Location> {
-        None
     }
 
     fn changes_sample(&self) -> bool {

@@ -1,15 +1,20 @@
 //! The load train gives: the plate moves less than the actuator was told.
 
-use super::{Category, Cause, CauseParameter, Course, Location};
+use crate::diagnosis::cause::{Category, Cause, CauseName, CauseParameter, Course};
+use crate::diagnosis::entry::{Entry, Origin};
 use crate::diagnosis::scene::Scene;
-use crate::specimen::Specimen;
+use std::sync::Arc;
+
+const NAME: CauseName = CauseName::new("compliance");
+/// Its line in the registry.
+pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Tested(|_| vec![Arc::new(Compliance)]) };
 
 /// Real drive = commanded drive − compliance × force.
 pub struct Compliance;
 
 impl Cause for Compliance {
-    fn name(&self) -> &'static str {
-        "compliance"
+    fn name(&self) -> CauseName {
+        NAME
     }
 
     fn category(&self) -> Category {
@@ -26,10 +31,6 @@ impl Cause for Compliance {
 
     fn apply(&self, values: &[f64], scene: &mut Scene) {
         scene.compliance_mm_per_n -= values[0];
-    }
-
-    fn location(&self, _: &[f64], _: &Specimen) -> Option<Location> {
-        None
     }
 
     fn course(&self) -> Course {

@@ -1,16 +1,28 @@
 //! A plate lets go of a part of the sample.
 
-use super::{Category, Cause, CauseParameter, Location};
+use crate::diagnosis::candidate::Candidate;
+use crate::diagnosis::cause::{Category, Cause, CauseName, CauseParameter};
+use crate::diagnosis::entry::{Entry, Origin};
+use crate::diagnosis::error::DiagnosisError;
+use crate::diagnosis::location::Location;
+use crate::diagnosis::maps::FacePatch;
 use crate::diagnosis::scene::Scene;
+use crate::diagnosis::search::Search;
 use crate::fem::Field;
 use crate::specimen::Specimen;
+use std::sync::Arc;
 
-/// Width of the edge of a debonded patch, mm: a third of the spacing of nodes on the face, so that the bond changes smoothly as
-/// the edge passes from node to node.
+const NAME: CauseName = CauseName::new("debond");
+/// Its line in the registry.
+pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Searched(suspects) };
+
+/// Width of the edge of a debonded patch, mm: a third of the spacing of nodes on the face, so that the bond changes
+/// smoothly as the edge passes from node to node.
 const EDGE_MM: f64 = 0.35;
 /// Strips of bond beside a patch that are tried, mm.
 const STRIPS_MM: [f64; 3] = [0.6, 1.3, 2.6];
-/// How loose the inside of the patch is: free but for 1/1000 of the sample's own stiffness, which keeps the patch in place.
+/// How loose the inside of the patch is: free but for 1/1000 of the sample's own stiffness, which keeps the patch in
+/// place.
 const LOOSE: f64 = 0.999;
 
 /// A rectangular patch of a bonded face without bond.
@@ -27,7 +39,24 @@ pub struct Debond {
     pub half_mm: [f64; 2],
 }
 
+/// The patch of each bonded face that explains most.
+fn suspects(search: &mut Search) -> Result<Vec<Candidate>, DiagnosisError> {
+    let patches = search.bond_maps()?.iter().flatten().filter_map(|bond| bond.patch.as_ref());
+    Ok(patches
+        .map(|patch| {
+            let cause = Debond::of(patch);
+            Candidate { values: cause.start(), cause: Arc::new(cause), score: patch.explained }
+        })
+        .collect())
+}
+
 impl Debond {
+    /// Starts from a patch of a map.
+    fn of(patch: &FacePatch) -> Debond {
+        let FacePatch { is_moved_face, axes, face, edges_mm, half_mm, .. } = *patch;
+        Debond { is_moved_face, axes, face, edges_mm, half_mm }
+    }
+
     /// Names of the axes.
     fn axis_name(axis: usize) -> &'static str {
         ["x", "y", "z"][axis]
@@ -61,8 +90,8 @@ impl Debond {
 }
 
 impl Cause for Debond {
-    fn name(&self) -> &'static str {
-        "debond"
+    fn name(&self) -> CauseName {
+        NAME
     }
 
     fn category(&self) -> Category {
@@ -86,11 +115,21 @@ impl Cause for Debond {
         all
     }
 
+    fn variant(&self) -> [i64; 3] {
+        [i64::from(self.is_moved_face), 0, 0]
+    }
+
+    fn max_suspects(&self) -> usize {
+        2
+    }
+
     fn start(&self) -> Vec<f64> {
         self.edges_mm.iter().flatten().copied().collect()
     }
 
-    /// An edge past the face's own feels no slope: whether a strip of bond holds beside it must be tried, and the other way round.
+    /// The misfit does not change while an edge lies past the face's own, so that no slope leads a fit back from there.
+    /// It must be tried whether a strip of bond holds beside that edge, and where a narrow strip was found, whether
+    /// there is one at all.
     fn leaps(&self, values: &[f64]) -> Vec<Vec<f64>> {
         let mut all = Vec::new();
         for (i, &edge) in values.iter().enumerate() {

@@ -1,9 +1,19 @@
 //! Transverse isotropy: the sample is stiffer along one direction.
 
-use super::{Category, Cause, CauseParameter, Location};
+use crate::diagnosis::candidate::Candidate;
+use crate::diagnosis::cause::{Category, Cause, CauseName, CauseParameter};
+use crate::diagnosis::entry::{Entry, Origin};
+use crate::diagnosis::error::DiagnosisError;
+use crate::diagnosis::fibre_map::{FibreDirection, fibre_directions};
+use crate::diagnosis::prior::shear_modulus;
 use crate::diagnosis::scene::Scene;
+use crate::diagnosis::search::Search;
 use crate::fem::Fibre;
-use crate::specimen::Specimen;
+use std::sync::Arc;
+
+const NAME: CauseName = CauseName::new("fibre");
+/// Its line in the registry.
+pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Searched(suspects) };
 
 /// Fibres near a direction.
 pub struct Fibres {
@@ -11,6 +21,24 @@ pub struct Fibres {
     /// Two unit vectors across it, along which the direction may turn.
     across: [[f64; 3]; 2],
     shear_modulus_kpa: f64,
+}
+
+/// Fibres along the directions that explain most; none where the sample has fibres already.
+fn suspects(search: &mut Search) -> Result<Vec<Candidate>, DiagnosisError> {
+    let (material, scene) = (&search.current.material, search.current.scene());
+    if scene.fibre.is_some() {
+        return Ok(Vec::new());
+    }
+    let found = fibre_directions(search.laboratory, material, &scene, &search.current.prediction, search.test)?;
+    let modulus_kpa = shear_modulus(material);
+    Ok(found
+        .into_iter()
+        .map(|FibreDirection { explained, direction, modulus_kpa: start_kpa }| Candidate {
+            cause: Arc::new(Fibres::along(direction, modulus_kpa)),
+            values: vec![start_kpa, 0.0, 0.0],
+            score: explained,
+        })
+        .collect())
 }
 
 fn unit(a: [f64; 3]) -> [f64; 3] {
@@ -39,8 +67,8 @@ impl Fibres {
 }
 
 impl Cause for Fibres {
-    fn name(&self) -> &'static str {
-        "fibre"
+    fn name(&self) -> CauseName {
+        NAME
     }
 
     fn category(&self) -> Category {
@@ -61,11 +89,16 @@ impl Cause for Fibres {
         ]
     }
 
-    fn apply(&self, values: &[f64], scene: &mut Scene) {
-        scene.fibre = Some(Fibre { direction: self.direction(values), modulus_kpa: values[0] });
+    /// The direction in hundredths.
+    fn variant(&self) -> [i64; 3] {
+        self.direction.map(|x| (100.0 * x).round() as i64)
     }
 
-    fn location(&self, _: &[f64], _: &Specimen) -> Option<Location> {
-        None
+    fn max_suspects(&self) -> usize {
+        2
+    }
+
+    fn apply(&self, values: &[f64], scene: &mut Scene) {
+        scene.fibre = Some(Fibre { direction: self.direction(values), modulus_kpa: values[0] });
     }
 }

@@ -1,15 +1,20 @@
 //! The displacement encoding is off by a factor.
 
-use super::{Category, Cause, CauseParameter, Location};
+use crate::diagnosis::cause::{Category, Cause, CauseName, CauseParameter};
+use crate::diagnosis::entry::{Entry, Origin};
 use crate::diagnosis::scene::Scene;
-use crate::specimen::Specimen;
+use std::sync::Arc;
+
+const NAME: CauseName = CauseName::new("gain");
+/// Its line in the registry.
+pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Tested(|_| vec![Arc::new(Gain)]) };
 
 /// Recorded displacement = (1 + gain) × displacement, per axis.
 pub struct Gain;
 
 impl Cause for Gain {
-    fn name(&self) -> &'static str {
-        "gain"
+    fn name(&self) -> CauseName {
+        NAME
     }
 
     fn category(&self) -> Category {
@@ -28,10 +33,6 @@ impl Cause for Gain {
         for a in 0..3 {
             scene.image.gain[a] += values[a];
         }
-    }
-
-    fn location(&self, _: &[f64], _: &Specimen) -> Option<Location> {
-        None
     }
 
     fn changes_sample(&self) -> bool {

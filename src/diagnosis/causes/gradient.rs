@@ -1,9 +1,16 @@
 //! A modulus that varies linearly across the sample.
 
-use super::{Category, Cause, CauseParameter, Location};
+use crate::diagnosis::cause::{Category, Cause, CauseName, CauseParameter};
+use crate::diagnosis::entry::{Entry, Origin};
 use crate::diagnosis::scene::Scene;
 use crate::fem::Field;
 use crate::specimen::Specimen;
+use std::sync::Arc;
+
+const NAME: CauseName = CauseName::new("gradient");
+/// Its line in the registry.
+pub(super) const ENTRY: Entry =
+    Entry { name: NAME, origin: Origin::Tested(|specimen| vec![Arc::new(Gradient::of(specimen))]) };
 
 /// Stiffness × (1 + Σ gᵢ xᵢ / half extent).
 pub struct Gradient {
@@ -19,8 +26,8 @@ impl Gradient {
 }
 
 impl Cause for Gradient {
-    fn name(&self) -> &'static str {
-        "gradient"
+    fn name(&self) -> CauseName {
+        NAME
     }
 
     fn category(&self) -> Category {
@@ -40,9 +47,5 @@ impl Cause for Gradient {
     fn apply(&self, values: &[f64], scene: &mut Scene) {
         let rate = [0, 1, 2].map(|a| values[a] / self.half[a]);
         scene.stiffness.push(Field::new(move |x| 1.0 + (0..3).map(|a| rate[a] * x[a]).sum::<f64>()));
-    }
-
-    fn location(&self, _: &[f64], _: &Specimen) -> Option<Location> {
-        None
     }
 }

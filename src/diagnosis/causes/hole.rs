@@ -1,14 +1,26 @@
 //! A hole of another size or at another place than drawn.
 
-use super::{Category, Cause, CauseParameter, Location};
+use crate::diagnosis::cause::{Category, Cause, CauseName, CauseParameter};
+use crate::diagnosis::entry::{Entry, Origin};
+use crate::diagnosis::location::Location;
 use crate::diagnosis::scene::Scene;
 use crate::specimen::{HoleAxis, Specimen};
+use std::sync::Arc;
+
+const NAME: CauseName = CauseName::new("hole");
+/// Its line in the registry.
+pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Tested(all_of) };
 
 /// Diameter and centre of one hole.
 pub struct HoleError {
     hole: usize,
     axis: HoleAxis,
     range_mm: f64,
+}
+
+/// One suspect per hole.
+fn all_of(specimen: &Specimen) -> Vec<Arc<dyn Cause>> {
+    (0..specimen.holes.len()).map(|hole| Arc::new(HoleError::of(specimen, hole)) as Arc<dyn Cause>).collect()
 }
 
 impl HoleError {
@@ -20,8 +32,8 @@ impl HoleError {
 }
 
 impl Cause for HoleError {
-    fn name(&self) -> &'static str {
-        "hole"
+    fn name(&self) -> CauseName {
+        NAME
     }
 
     fn category(&self) -> Category {
@@ -40,6 +52,14 @@ impl Cause for HoleError {
             CauseParameter::new("center_error_x_mm", 0.1, range),
             CauseParameter::new(format!("center_error_{across}_mm"), 0.1, range),
         ]
+    }
+
+    fn variant(&self) -> [i64; 3] {
+        [self.hole as i64, 0, 0]
+    }
+
+    fn max_suspects(&self) -> usize {
+        2
     }
 
     fn apply(&self, values: &[f64], scene: &mut Scene) {

@@ -1,12 +1,26 @@
 //! A stiff or soft place inside the sample.
 
-use super::{Category, Cause, CauseParameter, Location};
+use crate::diagnosis::balls::{Ball, change_of_ball, log_factor_of_ball};
+use crate::diagnosis::candidate::Candidate;
+use crate::diagnosis::cause::{Category, Cause, CauseName, CauseParameter};
+use crate::diagnosis::entry::{Entry, Origin};
+use crate::diagnosis::error::DiagnosisError;
+use crate::diagnosis::evidence::{EVIDENCE, WORTH_A_FIT};
+use crate::diagnosis::location::Location;
 use crate::diagnosis::scene::Scene;
+use crate::diagnosis::search::Search;
+use crate::diagnosis::supposed::{Supposed, scene_of};
 use crate::fem::Field;
 use crate::specimen::Specimen;
+use std::sync::Arc;
 
-/// Width of the inclusion's edge, mm. Wider ones take the stiffness factor of stiff balls too large and their radius too small, at
-/// twice the width by a tenth of ln f; the field's points in an element are some three times as far apart.
+const NAME: CauseName = CauseName::new("inclusion");
+/// Its line in the registry.
+pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Searched(suspects) };
+
+/// Width of the inclusion's edge, mm. Wider ones take the stiffness factor of stiff balls too large and their radius
+/// too small, at twice the width by a tenth of ln f; the field's points in an element are some three times as far
+/// apart.
 const EDGE_MM: f64 = 0.25;
 
 /// A ball whose stiffness is the surroundings' times a factor.
@@ -21,9 +35,67 @@ pub struct Inclusion {
     pub half_mm: [f64; 3],
 }
 
+/// The inclusions worth a full fit, of the balls that explain much to first order.
+///
+/// Where an inclusion may be the leading cause, every ball is tried with its full stiffness, which first order tells
+/// badly. The best stiff and the best soft one are then taken, because a stiff one above the middle and a soft one
+/// below look alike.
+fn suspects(search: &mut Search) -> Result<Vec<Candidate>, DiagnosisError> {
+    let balls = match search.stiffness_map()? {
+        Some(map) => map.balls.clone(),
+        None => return Ok(Vec::new()),
+    };
+    let best = balls.first().map_or(0.0, |b| b.explained);
+    let is_worth = best > EVIDENCE && best > WORTH_A_FIT * search.top;
+    let mut starts: Vec<(f64, Candidate)> = Vec::new();
+    for ball in balls.into_iter().take(if is_worth { usize::MAX } else { 1 }) {
+        let start = if is_worth { with_full_stiffness(search, &ball)? } else { Some(first_order(&ball)) };
+        starts.extend(start);
+    }
+    starts.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let first = |is_stiff: bool| starts.iter().position(|(_, c)| (c.values[0] > 0.0) == is_stiff);
+    let mut chosen: Vec<usize> = [first(true), first(false)].into_iter().flatten().collect();
+    chosen.sort_unstable();
+    Ok(chosen.into_iter().map(|n| Candidate { score: best, ..starts[n].1.clone() }).collect())
+}
+
+/// A ball as first order tells it, with what it explains.
+fn first_order(ball: &Ball) -> (f64, Candidate) {
+    let cause = Inclusion::of(ball);
+    (ball.explained, Candidate { values: cause.start(), cause: Arc::new(cause), score: ball.explained })
+}
+
+/// A ball with its full stiffness predicted, and what the shape of that prediction explains; `None` where it has no
+/// equilibrium.
+fn with_full_stiffness(search: &mut Search, ball: &Ball) -> Result<Option<(f64, Candidate)>, DiagnosisError> {
+    let (_, mut candidate) = first_order(ball);
+    let supposed = [Supposed { cause: candidate.cause.clone(), values: candidate.values.clone() }];
+    match search.laboratory.predict(&search.current.material, &scene_of(&supposed), search.is_cancelled) {
+        Ok(found) => {
+            let change = found.trace.plus(-1.0, &search.current.prediction.trace);
+            let shape = search.test.test(std::slice::from_ref(&change));
+            // A multiple of the same shape. With the other sign it is another ball's.
+            let part = shape.coefficients[0];
+            let explained = if part > 0.0 { shape.explained } else { 0.0 };
+            candidate.values[0] = log_factor_of_ball(part.max(0.1) * change_of_ball(ball.log_factor));
+            Ok(Some((explained, candidate)))
+        }
+        Err(error) if (search.is_cancelled)() => Err(error),
+        Err(_) => Ok(None),
+    }
+}
+
+impl Inclusion {
+    /// Starts from a ball of the stiffness map.
+    fn of(ball: &Ball) -> Inclusion {
+        let Ball { center_mm, radius_mm, log_factor, half_mm, .. } = *ball;
+        Inclusion { center_mm, radius_mm, log_factor, half_mm }
+    }
+}
+
 impl Cause for Inclusion {
-    fn name(&self) -> &'static str {
-        "inclusion"
+    fn name(&self) -> CauseName {
+        NAME
     }
 
     fn category(&self) -> Category {
@@ -42,6 +114,10 @@ impl Cause for Inclusion {
         let largest = self.half_mm.iter().fold(0.0f64, |s, h| s.max(*h));
         all.push(CauseParameter::new("radius_mm", 0.5, [0.7, largest]));
         all
+    }
+
+    fn max_suspects(&self) -> usize {
+        2
     }
 
     fn start(&self) -> Vec<f64> {

@@ -1,17 +1,23 @@
 //! The moved plate sits out of place.
 
-use super::tilt::moved_plate;
-use super::{Category, Cause, CauseParameter, Course, Location};
+use crate::diagnosis::cause::{Category, Cause, CauseName, CauseParameter, Course};
+use crate::diagnosis::entry::{Entry, Origin};
+use crate::diagnosis::location::Location;
 use crate::diagnosis::scene::Scene;
 use crate::specimen::Specimen;
+use std::sync::Arc;
 
-/// Translation of the moved plate across the drive (along y the gap) and rotation about its centre, alike at every step: it
-/// settled between the reference scan and the first step.
+const NAME: CauseName = CauseName::new("mount");
+/// Its line in the registry.
+pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Tested(|_| vec![Arc::new(Mount)]) };
+
+/// Translation of the moved plate across the drive (along y the gap) and rotation about its centre, alike at every
+/// step: it settled between the reference scan and the first step.
 pub struct Mount;
 
 impl Cause for Mount {
-    fn name(&self) -> &'static str {
-        "mount"
+    fn name(&self) -> CauseName {
+        NAME
     }
 
     fn category(&self) -> Category {
@@ -38,7 +44,7 @@ impl Cause for Mount {
     }
 
     fn location(&self, _: &[f64], specimen: &Specimen) -> Option<Location> {
-        Some(moved_plate(specimen))
+        Some(Location::of_moved_plate(specimen))
     }
 
     fn needs_several_drives(&self) -> bool {

@@ -1,9 +1,16 @@
 //! The moved plate leaves its axis.
 
-use super::tilt::moved_plate;
-use super::{Category, Cause, CauseParameter, Course, Location};
+use crate::diagnosis::cause::{Category, Cause, CauseName, CauseParameter, Course};
+use crate::diagnosis::entry::{Entry, Origin};
+use crate::diagnosis::location::Location;
 use crate::diagnosis::scene::Scene;
 use crate::specimen::Specimen;
+use std::sync::Arc;
+
+const NAME: CauseName = CauseName::new("offaxis");
+/// Its line in the registry.
+pub(super) const ENTRY: Entry =
+    Entry { name: NAME, origin: Origin::Tested(|specimen| vec![Arc::new(OffAxis::of(specimen))]) };
 
 /// Translation of the moved plate across the drive, in proportion to it: along y (the gap changes) and z.
 pub struct OffAxis {
@@ -18,8 +25,8 @@ impl OffAxis {
 }
 
 impl Cause for OffAxis {
-    fn name(&self) -> &'static str {
-        "offaxis"
+    fn name(&self) -> CauseName {
+        NAME
     }
 
     fn category(&self) -> Category {
@@ -41,7 +48,7 @@ impl Cause for OffAxis {
     }
 
     fn location(&self, _: &[f64], specimen: &Specimen) -> Option<Location> {
-        Some(moved_plate(specimen))
+        Some(Location::of_moved_plate(specimen))
     }
 
     fn course(&self) -> Course {

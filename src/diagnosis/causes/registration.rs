@@ -1,15 +1,20 @@
 //! The image lies elsewhere than its header says.
 
-use super::{Category, Cause, CauseParameter, Location};
+use crate::diagnosis::cause::{Category, Cause, CauseName, CauseParameter};
+use crate::diagnosis::entry::{Entry, Origin};
 use crate::diagnosis::scene::Scene;
-use crate::specimen::Specimen;
+use std::sync::Arc;
+
+const NAME: CauseName = CauseName::new("registration");
+/// Its line in the registry.
+pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Tested(|_| vec![Arc::new(Registration)]) };
 
 /// Shift and rotation of the image against the specimen's frame.
 pub struct Registration;
 
 impl Cause for Registration {
-    fn name(&self) -> &'static str {
-        "registration"
+    fn name(&self) -> CauseName {
+        NAME
     }
 
     fn category(&self) -> Category {
@@ -31,10 +36,6 @@ impl Cause for Registration {
             scene.image.shift_mm[a] += values[a];
             scene.image.rotation_rad[a] += values[3 + a].to_radians();
         }
-    }
-
-    fn location(&self, _: &[f64], _: &Specimen) -> Option<Location> {
-        None
     }
 
     fn changes_sample(&self) -> bool {

@@ -1,15 +1,20 @@
 //! The drive's zero is off.
 
-use super::{Category, Cause, CauseParameter, Course, Location};
+use crate::diagnosis::cause::{Category, Cause, CauseName, CauseParameter, Course};
+use crate::diagnosis::entry::{Entry, Origin};
 use crate::diagnosis::scene::Scene;
-use crate::specimen::Specimen;
+use std::sync::Arc;
+
+const NAME: CauseName = CauseName::new("slack");
+/// Its line in the registry.
+pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Tested(|_| vec![Arc::new(Slack)]) };
 
 /// Real drive = commanded drive − slack, at every step: play in the load train, or a start that was not at rest.
 pub struct Slack;
 
 impl Cause for Slack {
-    fn name(&self) -> &'static str {
-        "slack"
+    fn name(&self) -> CauseName {
+        NAME
     }
 
     fn category(&self) -> Category {
@@ -26,10 +31,6 @@ impl Cause for Slack {
 
     fn apply(&self, values: &[f64], scene: &mut Scene) {
         scene.plates[1].translation_mm[0] -= values[0];
-    }
-
-    fn location(&self, _: &[f64], _: &Specimen) -> Option<Location> {
-        None
     }
 
     fn needs_several_drives(&self) -> bool {

@@ -1,15 +1,20 @@
 //! Residual swelling or shrinkage between the plates.
 
-use super::{Category, Cause, CauseParameter, Location};
+use crate::diagnosis::cause::{Category, Cause, CauseName, CauseParameter};
+use crate::diagnosis::entry::{Entry, Origin};
 use crate::diagnosis::scene::Scene;
-use crate::specimen::Specimen;
+use std::sync::Arc;
+
+const NAME: CauseName = CauseName::new("swelling");
+/// Its line in the registry.
+pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Tested(|_| vec![Arc::new(Swelling)]) };
 
 /// Uniform swelling by a volume ratio.
 pub struct Swelling;
 
 impl Cause for Swelling {
-    fn name(&self) -> &'static str {
-        "swelling"
+    fn name(&self) -> CauseName {
+        NAME
     }
 
     fn category(&self) -> Category {
@@ -26,9 +31,5 @@ impl Cause for Swelling {
 
     fn apply(&self, values: &[f64], scene: &mut Scene) {
         scene.log_growth += values[0];
-    }
-
-    fn location(&self, _: &[f64], _: &Specimen) -> Option<Location> {
-        None
     }
 }

@@ -1,8 +1,16 @@
 //! The moved plate turns as it moves.
 
-use super::{Category, Cause, CauseParameter, Course, Location};
+use crate::diagnosis::cause::{Category, Cause, CauseName, CauseParameter, Course};
+use crate::diagnosis::entry::{Entry, Origin};
+use crate::diagnosis::location::Location;
 use crate::diagnosis::scene::Scene;
-use crate::specimen::{Specimen, TestKind};
+use crate::specimen::Specimen;
+use std::sync::Arc;
+
+const NAME: CauseName = CauseName::new("tilt");
+/// Its line in the registry.
+pub(super) const ENTRY: Entry =
+    Entry { name: NAME, origin: Origin::Tested(|specimen| vec![Arc::new(Tilt::of(specimen))]) };
 
 /// Rotation of the moved plate about its centre, in proportion to the drive.
 pub struct Tilt {
@@ -17,8 +25,8 @@ impl Tilt {
 }
 
 impl Cause for Tilt {
-    fn name(&self) -> &'static str {
-        "tilt"
+    fn name(&self) -> CauseName {
+        NAME
     }
 
     fn category(&self) -> Category {
@@ -42,27 +50,10 @@ impl Cause for Tilt {
     }
 
     fn location(&self, _: &[f64], specimen: &Specimen) -> Option<Location> {
-        Some(moved_plate(specimen))
+        Some(Location::of_moved_plate(specimen))
     }
 
     fn course(&self) -> Course {
         Course::InProportion
-    }
-}
-
-/// The bonded face of the moved plate or grip.
-pub(super) fn moved_plate(specimen: &Specimen) -> Location {
-    let b = specimen.block;
-    match specimen.test {
-        TestKind::DoubleLapShear => Location {
-            region: "moved plate".into(),
-            center_mm: [0.0, 0.5 * b.thickness_mm, 0.0],
-            extent_mm: [b.length_mm, 0.0, b.width_mm],
-        },
-        TestKind::Uniaxial => Location {
-            region: "moved grip".into(),
-            center_mm: [0.5 * b.length_mm, 0.0, 0.0],
-            extent_mm: [0.0, b.thickness_mm, b.width_mm],
-        },
     }
 }

@@ -1,7 +1,7 @@
 //! MATLAB data files: versions 5 to 7.2, and 7.3, which is HDF5.
 //!
-//! Read are numeric, logical and character arrays, cells and structures. The version 5 reader is our own: the crates at hand
-//! read no cells, in which MR-u laboratories keep their fields, or bound no decompression.
+//! Read are numeric, logical and character arrays, cells and structures. The version 5 reader is our own: the crates at
+//! hand read no cells, in which MR-u laboratories keep their fields, or bound no decompression.
 
 mod v5;
 mod v73;
@@ -72,7 +72,7 @@ pub enum MatError {
 /// [`MatError`].
 pub fn read_mat(path: &Path, max_values: u64) -> Result<Vec<(String, MatValue)>, MatError> {
     use std::io::{Read, Seek, SeekFrom};
-    let mut file = std::fs::File::open(path)?;
+    let mut file = crate::file::open_regular(path).map_err(crate::file::ReadError::into_io)?;
     let mut header = [0u8; 128];
     if file.read_exact(&mut header).is_err() {
         return Err(MatError::NotMat);

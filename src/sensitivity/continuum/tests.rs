@@ -1,7 +1,7 @@
 //! Homogeneous fields in closed form, and agreement with the voxel sums.
 
 use super::super::information::tests::one_term;
-use super::super::{information::PartialVoxels, integrate_over_voxels};
+use super::super::{PartialVoxels, integrate_over_voxels};
 use super::*;
 use crate::mesh::{MeshOptions, mesh_specimen};
 use crate::specimen::{Block, Outline, Specimen, TestKind};
@@ -10,7 +10,6 @@ use crate::voxel::{Sampling, VoxelMask, VoxelOperator};
 /// A block whose extents are whole voxels, so that voxels and quadrature cover the same volume.
 pub(crate) fn block(name: &str) -> Specimen {
     Specimen {
-        schema: "specimen/1".into(),
         name: name.into(),
         test: TestKind::DoubleLapShear,
         block: Block { length_mm: 12.0, thickness_mm: 4.0, width_mm: 9.0 },

@@ -3,6 +3,7 @@
 use super::super::continuum::tests::block;
 use super::super::information::tests::one_term;
 use super::*;
+use crate::fem::SolveError;
 
 fn scan() -> ScanSettings {
     serde_json::from_str(

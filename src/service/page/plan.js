@@ -34,7 +34,7 @@ export async function planView(content, signal, from) {
     try {
       const found = await post("/v1/specimens/check", { specimen: model.specimen, limits: model.limits, voxel_mm: model.scan.voxel_mm });
       if (mine !== number) return;
-      model.wrong = new Set(found.errors.flatMap((e) => [...e.detail.matchAll(/holes?\[?\s?(\d+)\]?/g)].map((m) => Number(m[1]))));
+      model.wrong = new Set(found.errors.flatMap((e) => [...`${e.pointer} ${e.detail}`.matchAll(/holes?[\/\[ ]?(\d+)/g)].map((m) => Number(m[1]))));
       showReport(found);
     } catch (error) {
       if (mine === number) fill(report, h("p", { class: "bad" }, error.message));

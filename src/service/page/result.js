@@ -120,8 +120,8 @@ function diagnosis(result, files) {
     table(["Parameter", "Value", "95 % interval"], cause.parameters.map((p) => [p.name, digits(p.value), p.interval_95 ? p.interval_95.map((v) => digits(v)).join(" to ") : "not bounded"])),
     cause.location && h("p", { class: "quiet" }, `At the ${cause.location.region}: centre ${cause.location.center_mm.map((v) => digits(v, 3)).join(", ")} mm, extent ${cause.location.extent_mm.map((v) => digits(v, 3)).join(", ")} mm.`))),
   slicesView("What the model leaves: measured less predicted",
-    numbered(files, /^residual-before_(\d+)\.nii\.gz$/).map(([name, n]) => ({
-      label: `drive ${n}`, panels: [["Before: material alone", name], ["After: with the causes", `residual-after_${n}.nii.gz`]].map(([label, file]) => ({ label, href: files.get(file).href })),
+    numbered(files, /^residual_before_(\d+)\.nii\.gz$/).map(([name, n]) => ({
+      label: `drive ${n}`, panels: [["Before: material alone", name], ["After: with the causes", `residual_after_${n}.nii.gz`]].map(([label, file]) => ({ label, href: files.get(file).href })),
     }))),
   pictureSheet(files, [["evidence.svg", "Causes by what they would explain"], ["load-curve.svg", "The load curve"]])];
 }

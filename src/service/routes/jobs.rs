@@ -3,7 +3,7 @@
 use crate::service::access::{Caller, Role};
 use crate::service::app::App;
 use crate::service::hub::Watched;
-use crate::service::kinds::kind_named;
+use crate::job::kind_of_collection;
 use crate::service::problem::Problem;
 use crate::service::store::JobFilter;
 use crate::service::view::{JobEvent, JobList, JobState, JobView};
@@ -53,7 +53,7 @@ pub(super) async fn list(
         return Err(Problem::new("invalid-parameter", format!("limit is {limit}; it must be from 1 to 200")));
     }
     if let Some(kind) = &query.kind
-        && kind_named(kind).is_none()
+        && kind_of_collection(kind).is_none()
     {
         return Err(Problem::new("invalid-parameter", "kind is not one of the kinds of jobs"));
     }

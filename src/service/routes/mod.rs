@@ -35,12 +35,6 @@ struct Document;
 /// The routes and their OpenAPI document.
 pub fn open_api() -> (Router<App>, String) {
     let (router, mut document) = OpenApiRouter::with_openapi(Document::openapi())
-        .routes(routes!(submit::post_evaluation))
-        .routes(routes!(submit::post_design))
-        .routes(routes!(submit::post_sweep))
-        .routes(routes!(submit::post_scan))
-        .routes(routes!(submit::post_calibration))
-        .routes(routes!(submit::post_diagnosis))
         .routes(routes!(recordings::list, recordings::upload))
         .routes(routes!(recordings::get))
         .routes(routes!(jobs::list))
@@ -60,6 +54,11 @@ pub fn open_api() -> (Router<App>, String) {
         .routes(routes!(health::metrics))
         .split_for_parts();
     document.info.version = crate::provenance::VERSION.into();
+    let router = router.merge(submit::router());
+    // The document is compared with the kept one by a test: a failure here cannot pass unseen.
+    if let Err(error) = submit::describe(&mut document) {
+        super::log::error("openapi", &error.to_string());
+    }
     let components = document.components.get_or_insert_with(Default::default);
     components.add_security_scheme("token", SecurityScheme::Http(Http::new(HttpAuthScheme::Bearer)));
     let mut text = document.to_pretty_json().unwrap_or_default();

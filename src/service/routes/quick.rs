@@ -1,11 +1,12 @@
 //! What answers at once: checking and drawing a specimen, its cost, the shipped files, who is asking.
 
 use super::submit::json_body;
-use crate::mesh::{MeshOptions, mesh_specimen};
+use crate::field::FieldError;
+use crate::job::defaults;
+use crate::mesh::{MeshSize, mesh_specimen};
 use crate::service::access::{Caller, Role};
 use crate::service::app::App;
-use crate::service::kinds::{SpecimenSchema, mesh_of};
-use crate::service::problem::{FieldProblem, Problem, parse, pointer_in_message};
+use crate::service::problem::{FieldProblem, Problem};
 use crate::specimen::{LimitMargin, ManufacturingLimits, Specimen, to_svg};
 use axum::Json;
 use axum::body::Bytes;
@@ -19,20 +20,18 @@ use utoipa::ToSchema;
 #[serde(deny_unknown_fields)]
 pub(super) struct CheckRequest {
     /// The specimen.
-    #[schema(value_type = SpecimenSchema)]
     specimen: Specimen,
     /// Limits of what can be made (as in a study).
     #[serde(default)]
-    #[schema(value_type = Object)]
     limits: Option<ManufacturingLimits>,
-    /// The scan's voxel, mm; by default 1 × 0.1875 × 0.75.
+    /// The scan's voxel, mm.
+    #[serde(default = "defaults::voxel_mm")]
+    #[schema(min_items = 3, max_items = 3, default = defaults::voxel_mm)]
+    voxel_mm: [f64; 3],
+    /// Element size.
     #[serde(default)]
-    #[schema(min_items = 3, max_items = 3)]
-    voxel_mm: Option<[f64; 3]>,
-    /// Mesh, as for an evaluation.
-    #[serde(default)]
-    #[schema(max_length = 16)]
-    mesh: Option<String>,
+    #[schema(default = MeshSize::default)]
+    mesh: MeshSize,
 }
 
 /// A limit and how far it is.
@@ -114,32 +113,36 @@ fn check(request: &CheckRequest) -> Result<Checked, Problem> {
         drawing_svg: None,
         cost: None,
     };
+    let below = |errors: Vec<FieldError>, prefix: &str| errors.into_iter().map(|e| e.below(prefix)).collect::<Vec<_>>();
     if let Some(limits) = &request.limits {
-        limits.validate().map_err(|e| Problem::at(pointer_in_message("/limits", &e.to_string()), e.to_string()))?;
+        let errors = below(limits.field_errors(), "/limits");
+        if !errors.is_empty() {
+            return Err(Problem::invalid(errors));
+        }
     }
-    let options: MeshOptions = mesh_of(request.mesh.as_deref(), specimen)?;
-    let voxel = request.voxel_mm.unwrap_or([1.0, 0.1875, 0.75]);
-    let grid = crate::voxel::VoxelGrid::covering(specimen, voxel);
-    if let Err(error) = specimen.validate() {
-        let detail = error.to_string();
-        checked.errors.push(FieldProblem { pointer: pointer_in_message("/specimen", &detail), detail });
+    checked.errors = below(specimen.field_errors(), "/specimen").into_iter().map(Into::into).collect();
+    if !checked.errors.is_empty() {
         return Ok(checked);
     }
-    let grid = grid.map_err(|e| Problem::at("/voxel_mm", e.to_string()))?;
+    let voxel = request.voxel_mm;
+    let grid = crate::voxel::VoxelGrid::covering(specimen, voxel).map_err(|e| {
+        let error = FieldError::new("/voxel_mm", format!("{voxel:?}"), "usable");
+        Problem::invalid(vec![error.remedy(e.to_string())])
+    })?;
     if let Some(limits) = &request.limits {
         let mut margins = limits.check_geometry(specimen, voxel);
         margins.sort_by(|a, b| a.margin_relative.total_cmp(&b.margin_relative));
         checked.margins = margins.into_iter().map(Margin::from).collect();
     }
     checked.drawing_svg = Some(to_svg(specimen));
-    match mesh_specimen(specimen, &options) {
+    match mesh_specimen(specimen, &request.mesh.options(specimen)) {
         Ok(mesh) => {
             let (num_elements, num_nodes, num_voxels) = (mesh.num_elements(), mesh.nodes.len(), grid.num_voxels());
             let seconds_per_drive = seconds(num_nodes, num_voxels);
             checked.cost = Some(Cost { num_elements, num_nodes, num_voxels, seconds_per_drive });
             checked.is_valid = checked.margins.iter().all(|m| m.is_satisfied);
         }
-        Err(error) => checked.errors.push(FieldProblem { pointer: "/specimen".into(), detail: error.to_string() }),
+        Err(error) => checked.errors.push(crate::job::unmeshable("/specimen", &error).into()),
     }
     checked.volume_mm3 = Some(specimen.volume_mm3());
     Ok(checked)
@@ -156,7 +159,7 @@ pub(super) async fn check_specimen(
     body: Bytes,
 ) -> Result<Json<Checked>, Problem> {
     let value = json_body(&headers, &body)?;
-    let request: CheckRequest = parse(&value)?;
+    let request: CheckRequest = crate::field::read(&value).map_err(|e| Problem::invalid(vec![e]))?;
     Ok(Json(app.compute(move || check(&request)).await?))
 }
 
@@ -164,7 +167,7 @@ pub(super) async fn check_specimen(
 #[derive(Serialize, ToSchema)]
 pub(super) struct Library {
     /// Specimens by file name.
-    #[schema(value_type = Vec<SpecimenSchema>)]
+    #[schema(value_type = Vec<Specimen>)]
     specimens: Vec<serde_json::Value>,
     /// Materials: name and content.
     #[schema(value_type = Vec<Object>)]

@@ -1,20 +1,23 @@
-//! Submitting jobs.
+//! Submitting jobs: one address per kind, with the schema of the kind's own request.
 
+use crate::field::FieldError;
+use crate::job::{Job, KINDS, Kind};
 use crate::service::access::{Caller, Role, random_hex};
 use crate::service::app::App;
-use crate::service::kinds::{
-    CalibrationRequest, DiagnosisRequest, EvaluationRequest, ScanRequest, SizeLimits, StudySchema, SweepRequest,
-    kind_named,
-};
 use crate::service::problem::Problem;
 use crate::service::store::{Idempotency, NewJob, Submitted, sha256_hex};
+use crate::service::task::tasks_of;
 use crate::service::view::JobView;
 use crate::specimen::Specimen;
+use axum::Router;
 use axum::body::Bytes;
 use axum::extract::{Extension, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
+use axum::routing::post;
 use serde::Deserialize;
+use serde_json::json;
+use utoipa::openapi::{OpenApi, Paths};
 
 /// Reads a JSON body.
 pub(super) fn json_body(headers: &HeaderMap, body: &[u8]) -> Result<serde_json::Value, Problem> {
@@ -31,40 +34,35 @@ async fn submit(
     caller: Caller,
     headers: HeaderMap,
     body: Bytes,
-    kind: &'static str,
+    kind: &'static Kind,
 ) -> Result<Response, Problem> {
     caller.require(Role::Submit)?;
     let value = json_body(&headers, &body)?;
     let key = idempotency_key(&headers)?;
-    let limits = SizeLimits {
-        max_elements: caller.max_elements.unwrap_or(usize::MAX).min(app.limits.size.max_elements),
-        ..app.limits.size
-    };
-    let job_kind = kind_named(kind).ok_or_else(|| Problem::new("internal", "no such kind of job"))?;
+    let max_elements = caller.max_elements.unwrap_or(usize::MAX).min(app.limits.max_elements);
     let canonical = value.to_string();
-    let wanted = job_kind.recordings(&value);
-    let body = value.clone();
-    let plan = app.compute(move || job_kind.plan(&body, &limits)).await?;
-    for (pointer, recording) in wanted {
-        let row = app.with_store(move |store| store.upload(&recording)).await?;
-        let row = row.ok_or_else(|| Problem::at(pointer, "there is no such recording; upload it first"))?;
-        let manifest: serde_json::Value = serde_json::from_str(&row.manifest).unwrap_or_default();
-        if let Ok(specimen) = Specimen::deserialize(&manifest["specimen"]) {
-            let body = value.clone();
-            app.compute(move || job_kind.check_recording(&body, &specimen, &limits)).await?;
-        }
-    }
+    // The request is read once; from here on it is typed.
+    let job = app.compute(move || kind.job(&value).map_err(Problem::invalid)).await?;
+    let specimens = specimens_of(&app, &job).await?;
+    let (title, tasks, has_gather) = app
+        .compute(move || {
+            job.check_size(&specimens, max_elements).map_err(|e| Problem::from(crate::job::JobError::TooBig(e)))?;
+            let (tasks, has_gather) =
+                tasks_of(&job, max_elements).map_err(|e| Problem::new("internal", e.to_string()))?;
+            Ok((job.title(), tasks, has_gather))
+        })
+        .await?;
     let id = random_hex::<16>().map_err(|e| Problem::new("internal", e.to_string()))?;
-    let fingerprint = sha256_hex(format!("{kind}\n{canonical}").as_bytes());
+    let fingerprint = sha256_hex(format!("{}\n{canonical}", kind.collection).as_bytes());
     let idempotency = key.map(|key| Idempotency { key, fingerprint });
     let job = NewJob {
         id: id.clone(),
-        kind: kind.into(),
+        kind: kind.collection.into(),
         owner: caller.name.clone(),
-        title: plan.title.chars().filter(|c| !c.is_control()).take(200).collect(),
+        title,
         body: canonical,
-        tasks: plan.tasks,
-        has_gather: plan.has_gather,
+        tasks,
+        has_gather,
     };
     let max_queued = app.limits.max_queued_tasks;
     let quota = caller.max_queued_tasks;
@@ -95,46 +93,70 @@ fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, Problem> {
     }
 }
 
-macro_rules! submission {
-    ($name:ident, $path:literal, $kind:literal, $body:ty, $summary:literal) => {
-        #[doc = $summary]
-        #[utoipa::path(
-            post,
-            path = $path,
-            request_body = $body,
-            params(("Idempotency-Key" = Option<String>, Header, description = "The same key gives the same job", min_length = 1, max_length = 200, pattern = "^[!-~]+$")),
-            responses(
-                (status = 202, description = "Accepted", body = JobView, headers(("Location" = String, description = "The job"))),
-                (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
-            ),
-            tag = "jobs"
-        )]
-        pub(super) async fn $name(
-            State(app): State<App>,
-            Extension(caller): Extension<Caller>,
-            headers: HeaderMap,
-            body: Bytes,
-        ) -> Result<Response, Problem> {
-            submit(app, caller, headers, body, $kind).await
-        }
-    };
+/// The specimens of the recordings that a job reads; that there are such recordings is checked on the way.
+async fn specimens_of(app: &App, job: &Job) -> Result<Vec<Specimen>, Problem> {
+    let mut specimens = Vec::new();
+    for wanted in job.inputs() {
+        let name = wanted.name.clone();
+        let row = app.with_store(move |store| store.upload(&name)).await?;
+        let missing = || {
+            let error = FieldError::new(wanted.pointer, wanted.name, "the identifier of an uploaded recording");
+            Problem::invalid(vec![error.remedy("upload it first")])
+        };
+        let row = row.ok_or_else(missing)?;
+        let manifest: serde_json::Value = serde_json::from_str(&row.manifest).unwrap_or_default();
+        specimens.extend(Specimen::deserialize(&manifest["specimen"]));
+    }
+    Ok(specimens)
 }
 
-submission!(post_evaluation, "/v1/evaluations", "evaluations", EvaluationRequest, "Evaluate a specimen.");
-submission!(post_design, "/v1/designs", "designs", StudySchema, "Search for the best specimen of a study.");
-submission!(post_sweep, "/v1/sweeps", "sweeps", SweepRequest, "Evaluate many specimens.");
-submission!(post_scan, "/v1/scans", "scans", ScanRequest, "Scan a specimen synthetically; the result is a recording.");
-submission!(
-    post_calibration,
-    "/v1/calibrations",
-    "calibrations",
-    CalibrationRequest,
-    "Find the material from recordings."
-);
-submission!(
-    post_diagnosis,
-    "/v1/diagnoses",
-    "diagnoses",
-    DiagnosisRequest,
-    "Find where a recording and its model differ, and why."
-);
+/// The addresses of all kinds.
+pub(super) fn router() -> Router<App> {
+    KINDS.iter().fold(Router::new(), |router, kind| {
+        let handler = move |State(app): State<App>,
+                            Extension(caller): Extension<Caller>,
+                            headers: HeaderMap,
+                            body: Bytes| submit(app, caller, headers, body, kind);
+        router.route(&format!("/v1/{}", kind.collection), post(handler))
+    })
+}
+
+/// Adds the addresses of all kinds, with their requests' schemas, to the document.
+///
+/// # Errors
+/// Where a schema is none that OpenAPI knows.
+pub(super) fn describe(document: &mut OpenApi) -> Result<(), serde_json::Error> {
+    let components = document.components.get_or_insert_with(Default::default);
+    let mut paths = serde_json::Map::new();
+    for kind in &KINDS {
+        for (name, schema) in kind.schemas() {
+            components.schemas.entry(name).or_insert(schema);
+        }
+        let problem = json!({ "application/problem+json": { "schema": { "$ref": "#/components/schemas/Problem" } } });
+        let accepted = json!({ "application/json": { "schema": { "$ref": "#/components/schemas/JobView" } } });
+        let key = json!({
+            "name": "Idempotency-Key", "in": "header", "required": false,
+            "description": "The same key gives the same job",
+            "schema": { "type": "string", "minLength": 1, "maxLength": 200, "pattern": "^[!-~]+$" },
+        });
+        let location = json!({ "description": "The job", "schema": { "type": "string" } });
+        let operation = json!({ "post": {
+            "tags": ["jobs"],
+            "summary": kind.about,
+            "operationId": format!("post_{}", kind.collection.replace('-', "_")),
+            "parameters": [key],
+            "requestBody": {
+                "required": true,
+                "content": { "application/json": { "schema": { "$ref": format!("#/components/schemas/{}", kind.schema_name()) } } },
+            },
+            "responses": {
+                "202": { "description": "Accepted", "headers": { "Location": location }, "content": accepted },
+                "default": { "description": "A problem", "content": problem },
+            },
+        } });
+        paths.insert(format!("/v1/{}", kind.collection), operation);
+    }
+    let described: Paths = serde_json::from_value(paths.into())?;
+    document.paths.paths.extend(described.paths);
+    Ok(())
+}

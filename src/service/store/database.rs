@@ -1,7 +1,8 @@
-//! SQLite and PostgreSQL behind one small synchronous door: statements with `$1 … $n`, rows of plain values, transactions.
+//! SQLite and PostgreSQL behind one small synchronous door: statements with `$1 … $n`, rows of plain values,
+//! transactions.
 //!
-//! The same SQL serves both. `{now}` stands for the database's own clock in milliseconds since 1970 (workers' clocks never
-//! matter), `{skip_locked}` for PostgreSQL's row locking; SQLite has one writer at a time and needs none.
+//! The same SQL serves both. `{now}` stands for the database's own clock in milliseconds since 1970 (workers' clocks
+//! never matter), `{skip_locked}` for PostgreSQL's row locking; SQLite has one writer at a time and needs none.
 
 use super::StoreError;
 use std::path::Path;
@@ -168,8 +169,8 @@ impl Database {
         }
     }
 
-    /// Runs `work` in a transaction; it is run again when another transaction was in the way, so it must have no effects
-    /// outside the database.
+    /// Runs `work` in a transaction; it is run again when another transaction was in the way, so it must have no
+    /// effects outside the database.
     ///
     /// # Errors
     /// What `work` returns, or [`StoreError`]; nothing is kept then.

@@ -298,7 +298,8 @@ impl Store {
             .collect())
     }
 
-    /// Cancels a job that has not ended; a running task is told at its next heartbeat. False where there is no such job.
+    /// Cancels a job that has not ended; a running task is told at its next heartbeat. False where there is no such
+    /// job.
     ///
     /// # Errors
     /// [`StoreError`].
@@ -312,7 +313,8 @@ impl Store {
         })
     }
 
-    /// Puts what a failed or cancelled job has not finished back into the queue. False where the job is in no such state.
+    /// Puts what a failed or cancelled job has not finished back into the queue. False where the job is in no such
+    /// state.
     ///
     /// # Errors
     /// [`StoreError`].

@@ -1,10 +1,11 @@
-//! Where jobs, tasks, results and artefacts are kept: SQLite in the data folder, or PostgreSQL shared by several machines.
+//! Where jobs, tasks, results and artefacts are kept: SQLite in the data folder, or PostgreSQL shared by several
+//! machines.
 //!
 //! | Invariant | Kept by |
 //! |---|---|
-//! | a task is run by one worker at a time | a claim is one transaction that takes a lease (SKIP LOCKED on PostgreSQL) |
-//! | a task has exactly one result | a result is taken only from the attempt that holds the task (`attempt` fences late ones) |
-//! | equal evaluations are computed once | results are kept under their content's key; equal tasks do not run side by side |
+//! | a task is run by one worker at a time | a claim is a transaction that takes a lease (SKIP LOCKED in PostgreSQL) |
+//! | a task has exactly one result | a result is taken only from the attempt that holds it (`attempt` fences late ones) |
+//! | equal evaluations are computed once | results are kept under their content's key; equal tasks never run together |
 //! | a task that ends its worker cannot do so for ever | [`MAX_LOSSES`], then it is put aside with a problem |
 
 mod database;

@@ -52,8 +52,8 @@ struct KnownArtefact {
 }
 
 impl Store {
-    /// Claims the next task for `worker`: short jobs before long ones, then oldest first. A running task whose lease is over
-    /// is claimed again; after [`MAX_LOSSES`] it is put aside with `dead_problem`.
+    /// Claims the next task for `worker`: short jobs before long ones, then oldest first. A running task whose lease is
+    /// over is claimed again; after [`MAX_LOSSES`] it is put aside with `dead_problem`.
     ///
     /// # Errors
     /// [`StoreError`].
@@ -149,8 +149,8 @@ impl Store {
         })
     }
 
-    /// Takes a task's result, from the attempt that holds it only. Everything (result, artefacts, what is known under its
-    /// key, the job's state) is one transaction.
+    /// Takes a task's result, from the attempt that holds it only. Everything (result, artefacts, what is known under
+    /// its key, the job's state) is one transaction.
     ///
     /// # Errors
     /// [`StoreError`].

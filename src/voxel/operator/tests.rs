@@ -6,8 +6,8 @@ use super::*;
 use crate::kinematics::decompose;
 use crate::mesh::{ElementKind, MeshOptions, Mirror, mesh_specimen};
 
-/// A structured mesh of hexahedra of the solid block (or its half z ≥ 0): a section in (x, y), its nodes moved by a smooth
-/// map so that the cells are curved while the block's faces stay in place, extruded along z.
+/// A structured mesh of hexahedra of the solid block (or its half z ≥ 0): a section in (x, y), its nodes moved by a
+/// smooth map so that the cells are curved while the block's faces stay in place, extruded along z.
 pub(crate) fn block_mesh(specimen: &Specimen, num: [usize; 3], mirror: Mirror, bend: f64) -> Mesh {
     let b = &specimen.block;
     let high = [0.5 * b.length_mm, 0.5 * b.thickness_mm, 0.5 * b.width_mm];

@@ -1,0 +1,340 @@
+//! The commands that run a job from files and options, one table row each.
+
+use super::error::CliError;
+use super::flag::{Flag, Written};
+use super::input::{read_json, read_text};
+use super::job_command::{Asked, JobCommand, files, value, values};
+use crate::job::kind_of_command;
+use clap::{Arg, ArgAction, ArgMatches, Command};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+use Written::{JsonFile, MeshFactor, Off, OrAuto, TextFile};
+
+/// The commands.
+pub(super) static COMMANDS: &[JobCommand] = &[
+    JobCommand { name: "solve", arguments: of_specimen, flags: SOLVE, fill: specimen },
+    JobCommand { name: "evaluate", arguments: of_specimen, flags: EVALUATE, fill: specimen },
+    JobCommand { name: "scan", arguments: of_specimen, flags: SCAN, fill: scanned },
+    JobCommand { name: "import", arguments: of_files, flags: IMPORT, fill: imported },
+    JobCommand { name: "calibrate", arguments: of_recordings, flags: CALIBRATE, fill: recordings },
+    JobCommand { name: "diagnose", arguments: of_recordings_or_curves, flags: DIAGNOSE, fill: diagnosed },
+    JobCommand { name: "curves", arguments: of_curves, flags: CURVES, fill: curves },
+    JobCommand { name: "uniaxial", arguments: of_curve, flags: UNIAXIAL, fill: curve },
+    JobCommand { name: "paper-tables", arguments: of_nothing, flags: PAPER_TABLES, fill: paper_tables },
+    JobCommand { name: "prove-diagnosis", arguments: of_nothing, flags: PROOF, fill: proof },
+];
+
+const SOLVE: &[Flag] = &[
+    Flag::read("material", "material", JsonFile),
+    Flag::of("drive", "drive_mm"),
+    Flag::of("mesh", "mesh"),
+    Flag::of("full", "is_whole"),
+];
+const EVALUATE: &[Flag] = &[
+    Flag::read("material", "material", JsonFile),
+    Flag::of("drive", "drive_mm"),
+    Flag::of("mesh", "mesh"),
+    Flag::of("full", "is_whole"),
+    Flag::of("median-stretch", "median_stretch"),
+    Flag::of("voxel", "scan/voxel_mm"),
+    Flag::of("noise", "scan/noise_sd_mm"),
+    Flag::of("force-sd", "scan/force_sd_n"),
+];
+const SCAN: &[Flag] = &[
+    Flag::read("material", "material", JsonFile),
+    Flag::of("drive", "drive_mm"),
+    Flag::of("mesh", "mesh"),
+    Flag::of("full", "is_whole"),
+    Flag::of("voxel", "voxel_mm"),
+    Flag::of("offset", "offset_voxels"),
+    Flag::of("snr", "snr"),
+    Flag::of("noise", "noise_sd_mm"),
+    Flag::of("mm-per-radian", "mm_per_radian"),
+    Flag::of("raw", "is_raw"),
+    Flag::of("filter", "filter"),
+    Flag::of("kspace", "kspace/keep"),
+    Flag::of("apodise", "kspace/is_apodised"),
+    Flag::of("force-sd", "force_sd_n"),
+    Flag::of("seed", "seed"),
+];
+const IMPORT: &[Flag] = &[
+    Flag::read("specimen", "specimen", JsonFile),
+    Flag::of("drive", "drive_mm"),
+    Flag::of("unit", "unit"),
+    Flag::of("axes", "axes"),
+    Flag::of("voxel", "voxel_mm"),
+    Flag::of("region", "region"),
+    Flag::of("filter", "filter"),
+    Flag::of("noise", "noise_sd_mm"),
+    Flag::read("load", "load_csv", TextFile),
+    Flag::of("method", "method"),
+    Flag::read("no-agreement", "needs_agreement", Off),
+    Flag::of("anchor", "anchor"),
+];
+const CALIBRATE: &[Flag] = &[
+    Flag::read("terms", "num_terms", OrAuto),
+    Flag::of("rule", "rule"),
+    Flag::of("decrement", "decrement"),
+    Flag::of("objective", "objective"),
+    Flag::of("beta", "beta"),
+    Flag::read("mesh", "mesh_factor", MeshFactor),
+    Flag::read("one-mesh", "has_mesh_allowance", Off),
+    Flag::of("starts", "num_starts"),
+    Flag::of("end-margin", "end_margin_mm"),
+    Flag::of("profile", "has_profiles"),
+    Flag::of("contours", "has_contours"),
+];
+const DIAGNOSE: &[Flag] = &[
+    Flag::read("material", "material", JsonFile),
+    Flag::of("mesh", "mesh_factor"),
+    Flag::of("allowance", "allowance_mm"),
+    Flag::of("max-causes", "max_causes"),
+];
+/// Options of commands that read curves.
+const COLUMNS: [Flag; 5] = [
+    Flag::of("drive-column", "columns/drive_column"),
+    Flag::of("stress-column", "columns/stress_column"),
+    Flag::of("stress-unit", "columns/stress_unit"),
+    Flag::of("length", "columns/length_mm"),
+    Flag::of("area", "columns/area_mm2"),
+];
+/// Options of fits to curves.
+const FITS: [Flag; 3] = [
+    Flag::of("terms", "fit/max_terms"),
+    Flag::of("bulk", "fit/bulk_kpa"),
+    Flag::of("min-alpha-gap", "fit/min_alpha_gap"),
+];
+const CURVES: &[Flag] = &[
+    Flag::of("neo-hookean", "has_neo_hookean_term"),
+    Flag::of("exact", "is_exact"),
+    COLUMNS[0],
+    COLUMNS[1],
+    COLUMNS[2],
+    COLUMNS[3],
+    COLUMNS[4],
+    FITS[0],
+    FITS[1],
+    FITS[2],
+];
+const UNIAXIAL: &[Flag] = &[
+    Flag::read("specimen", "specimen", JsonFile),
+    Flag::of("mesh", "mesh"),
+    COLUMNS[0],
+    COLUMNS[1],
+    COLUMNS[2],
+    COLUMNS[3],
+    COLUMNS[4],
+    FITS[0],
+    FITS[1],
+    FITS[2],
+];
+const PAPER_TABLES: &[Flag] = &[
+    Flag::of("noise", "noise_sd_mm"),
+    Flag::of("force-sd", "force_sd_n"),
+    Flag::of("dumbbell-noise", "dumbbell_noise"),
+    Flag::of("mesh", "mesh_factor"),
+    Flag::of("seed", "seed"),
+    Flag::of("beta", "beta"),
+];
+const PROOF: &[Flag] = &[
+    Flag::of("per-cause", "per_cause"),
+    Flag::of("controls", "controls"),
+    Flag::of("unknown", "unknown"),
+    Flag::of("seed", "seed"),
+    Flag::of("mesh", "mesh_factor"),
+    Flag::of("only", "only"),
+];
+
+fn of_nothing(command: Command) -> Command {
+    command
+}
+
+fn paper_tables(_: &ArgMatches, _: &mut Asked) -> Result<PathBuf, CliError> {
+    Ok("paper".into())
+}
+
+fn proof(_: &ArgMatches, _: &mut Asked) -> Result<PathBuf, CliError> {
+    Ok("two-hole-shear".into())
+}
+
+fn of_specimen(command: Command) -> Command {
+    command.arg(Arg::new("SPECIMEN").help("Specimen file (specimen/1)").required(true))
+}
+
+fn specimen(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliError> {
+    let path = PathBuf::from(value(matches, "SPECIMEN"));
+    asked.set("specimen", read_json(&path)?, path.display().to_string());
+    Ok(path)
+}
+
+fn scanned(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliError> {
+    let path = specimen(matches, asked)?;
+    asked.set("name", stem(&path), path.display().to_string());
+    Ok(path)
+}
+
+/// A file's name without folder and ending.
+fn stem(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+fn of_files(command: Command) -> Command {
+    let help = "A raw recording (folder or JSON file), MATLAB files (.mat), or point clouds (.csv, one per drive)";
+    command.arg(files("FILE", "FILE", help))
+}
+
+fn imported(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliError> {
+    let names = values(matches, "FILE");
+    let first = PathBuf::from(names.first().cloned().unwrap_or_default());
+    let form = match first.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
+        Some("mat") => Some("matlab"),
+        Some("csv") => Some("points"),
+        _ => None,
+    };
+    match (form, names.get(1)) {
+        (Some(form), _) => {
+            asked.set("form", form, "FILE");
+            asked.set("name", stem(&first), "FILE");
+            asked.set("files", names, "FILE");
+        }
+        (None, Some(second)) => {
+            let message = "only one recording at a time; MATLAB files and point clouds alone may be several".into();
+            return Err(CliError::Input { path: second.into(), message });
+        }
+        (None, None) => asked.set("recording", names[0].clone(), first.display().to_string()),
+    }
+    Ok(first)
+}
+
+fn of_recordings(command: Command) -> Command {
+    command.arg(files("RECORDING", "RECORDING", "Folders of recordings (mru-recording/1); all are fitted together"))
+}
+
+fn recordings(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliError> {
+    let names = values(matches, "RECORDING");
+    let first = PathBuf::from(names.first().cloned().unwrap_or_default());
+    asked.set("recordings", names, "RECORDING");
+    Ok(first)
+}
+
+fn of_recordings_or_curves(command: Command) -> Command {
+    let help = "Folders of recordings (mru-recording/1). Several are diagnosed one after the other and then looked at together";
+    let recordings = Arg::new("RECORDING").help(help).num_args(1..).required_unless_present("curve");
+    let help = "A load curve (CSV) of a homogeneous test in place of recordings: uniaxial=FILE, simple-shear=FILE, …; \
+                may be repeated";
+    let curve = Arg::new("curve").long("curve").value_name("TEST=FILE").help(help).conflicts_with("RECORDING");
+    let help = "Curves that are predicted, not fitted: names of files without folder and ending, comma-separated";
+    let kept = Arg::new("keep-back").long("keep-back").value_name("NAME").help(help).requires("curve");
+    let command =
+        command.arg(recordings).arg(curve.action(ArgAction::Append)).arg(kept.value_delimiter(',').action(ArgAction::Append));
+    // The options of load curves alone.
+    LOAD_CURVES.iter().fold(command, |command, flag| {
+        let fields = kind_of_command(LOAD_CURVES_KIND).map(|kind| kind.fields()).unwrap_or_default();
+        match fields.iter().find(|f| f.name == flag.field) {
+            Some(field) => command.arg(flag.arg(field).requires("curve")),
+            None => command,
+        }
+    })
+}
+
+/// What `diagnose --curve` asks for.
+const LOAD_CURVES_KIND: &str = "diagnose-curves";
+const LOAD_CURVES: [Flag; 6] =
+    [Flag::of("shape-factor", "shape_factor"), COLUMNS[0], COLUMNS[1], COLUMNS[2], COLUMNS[3], COLUMNS[4]];
+
+fn diagnosed(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliError> {
+    let curves = values(matches, "curve");
+    if curves.is_empty() {
+        let names = values(matches, "RECORDING");
+        let first = PathBuf::from(names.first().cloned().unwrap_or_default());
+        match &names[..] {
+            [name] => asked.set("recording", name.clone(), name.clone()),
+            _ => asked.set("recordings", names, "RECORDING"),
+        }
+        return Ok(first);
+    }
+    asked.kind = LOAD_CURVES_KIND;
+    let kept = values(matches, "keep-back");
+    let mut found = Vec::new();
+    let first = read_curves(&curves, "curve", asked, &mut |name, _| {
+        let is_kept = kept.iter().any(|k| k == name);
+        found.push(name.to_string());
+        is_kept
+    })?;
+    if let Some(missing) = kept.iter().find(|k| !found.contains(k)) {
+        let message = format!("no curve is named '{missing}' (names are those of the files, without folder and ending)");
+        return Err(CliError::Option { option: "keep-back", message });
+    }
+    let fields = kind_of_command(LOAD_CURVES_KIND).map(|kind| kind.fields()).unwrap_or_default();
+    for flag in LOAD_CURVES {
+        asked.sources.push((format!("/{}", flag.field), format!("--{}", flag.name)));
+        flag.apply(&fields, matches, &mut asked.request)?;
+    }
+    Ok(first)
+}
+
+/// Reads TEST=FILE arguments into the field `curves`; `is_kept_back` is asked with a curve's name and test. Gives the first path.
+fn read_curves(
+    arguments: &[String],
+    option: &'static str,
+    asked: &mut Asked,
+    is_kept_back: &mut dyn FnMut(&str, &str) -> bool,
+) -> Result<PathBuf, CliError> {
+    let mut curves: Vec<Value> = Vec::new();
+    let mut first = None;
+    for (index, argument) in arguments.iter().enumerate() {
+        let Some((test, file)) = argument.split_once('=') else {
+            let message = format!("'{argument}' is not TEST=FILE, such as uniaxial=ut.csv");
+            return Err(CliError::Option { option, message });
+        };
+        let path = PathBuf::from(file);
+        let test = test_named(test, option)?;
+        let name = stem(&path);
+        let csv = read_text(&path)?;
+        curves.push(json!({ "test": test, "name": name, "csv": csv, "is_kept_back": is_kept_back(&name, test) }));
+        asked.sources.push((format!("/curves/{index}"), path.display().to_string()));
+        first.get_or_insert(path);
+    }
+    super::flag::set(&mut asked.request, "curves", curves.into());
+    Ok(first.unwrap_or_default())
+}
+
+/// The name of a homogeneous test as requests spell it.
+fn test_named(name: &str, option: &'static str) -> Result<&'static str, CliError> {
+    match name.replace('_', "-").as_str() {
+        "uniaxial" => Ok("uniaxial"),
+        "equibiaxial" => Ok("equibiaxial"),
+        "pure-shear" | "planar" => Ok("pure_shear"),
+        "simple-shear" => Ok("simple_shear"),
+        other => {
+            let message = format!("'{other}' is not uniaxial, equibiaxial, pure-shear or simple-shear");
+            Err(CliError::Option { option, message })
+        }
+    }
+}
+
+fn of_curves(command: Command) -> Command {
+    let help = "Tests and their curves (CSV): uniaxial=FILE equibiaxial=FILE pure-shear=FILE simple-shear=FILE";
+    let kept = Arg::new("keep-back").long("keep-back").value_name("TEST").value_delimiter(',');
+    let kept = kept.action(ArgAction::Append).help("Tests that are predicted, not fitted, comma-separated");
+    command.arg(files("CURVES", "TEST=FILE", help)).arg(kept)
+}
+
+fn curves(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliError> {
+    let kept: Vec<&str> =
+        values(matches, "keep-back").iter().map(|n| test_named(n, "keep-back")).collect::<Result<_, _>>()?;
+    read_curves(&values(matches, "CURVES"), "curves", asked, &mut |_, test| kept.contains(&test))
+}
+
+fn of_curve(command: Command) -> Command {
+    let help = "Curve (CSV): stretch or strain and nominal stress; or grip displacement and force of a dumb-bell";
+    command.arg(Arg::new("CURVE").help(help).required(true))
+}
+
+fn curve(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliError> {
+    let path = PathBuf::from(value(matches, "CURVE"));
+    asked.set("csv", read_text(&path)?, path.display().to_string());
+    asked.set("name", path.display().to_string(), path.display().to_string());
+    Ok(path)
+}

@@ -1,0 +1,141 @@
+//! Which rules a study violates.
+
+use super::aim::ObjectiveKind;
+use super::study::{MaterialPrior, Range, Study};
+use super::study_error::StudyError;
+use super::study_limits::{
+    MAX_COUNT, MAX_HOLES_TO_TRY, MAX_LENGTH_MM, MAX_RELATIVE_SD, MAX_WEIGHT, MIN_LENGTH_MM, MIN_WEIGHT,
+};
+use crate::field::{FieldError, FieldPath};
+use crate::specimen::{MAX_NAME_LENGTH, Symmetry};
+
+impl Study {
+    /// Checks a study and all of its parts. Call it on a study that was not read by this program's readers.
+    ///
+    /// # Errors
+    /// [`StudyError`]: the first problem found.
+    pub fn validate(&self) -> Result<(), StudyError> {
+        self.problems().into_iter().next().map_or(Ok(()), Err)
+    }
+
+    /// Every rule that the study violates, with pointers into it; the first is that of [`Study::validate`].
+    pub fn field_errors(&self) -> Vec<FieldError> {
+        let base = self.base.field_errors().into_iter().map(|e| e.below("/base"));
+        let limits = self.limits.field_errors().into_iter().map(|e| e.below("/limits"));
+        let materials = self.materials.iter().enumerate().flat_map(|(index, prior)| {
+            let errors = prior.material.field_errors().into_iter();
+            errors.map(move |e| e.below(&format!("/materials/{index}/material")))
+        });
+        let is_of_a_part =
+            |e: &StudyError| matches!(e, StudyError::Base(_) | StudyError::Limits(_) | StudyError::Material { .. });
+        let own = self.problems().into_iter().filter(|e| !is_of_a_part(e)).map(|e| e.field_error());
+        base.chain(limits).chain(materials).chain(own).collect()
+    }
+
+    /// Every rule that the study violates; of the base, the limits and each material the first one.
+    fn problems(&self) -> Vec<StudyError> {
+        let mut problems = Vec::new();
+        problems.extend(self.base.validate().err().map(StudyError::Base));
+        problems.extend(self.limits.validate().err().map(StudyError::Limits));
+        problems.extend(self.scan.field_errors().into_iter().map(StudyError::Scan));
+        let length = self.name.chars().count();
+        if length > MAX_NAME_LENGTH {
+            problems.push(StudyError::NameTooLong { length, limit: MAX_NAME_LENGTH });
+        }
+        self.check_materials(&mut problems);
+        self.check_variation(&mut problems);
+        if self.objective.kind == ObjectiveKind::TellApart && self.materials.len() < 2 {
+            problems.push(StudyError::NothingToTellApart { count: self.materials.len() });
+        }
+        let parameters = |prior: &MaterialPrior| {
+            let names = prior.material.parameters().into_iter().map(|p| p.name());
+            names.filter(|n| n != "kappa").collect::<Vec<_>>()
+        };
+        self.objective.check(&self.materials.iter().map(parameters).collect::<Vec<_>>(), &mut problems);
+        for (part, name, count) in [
+            ("budget", "explore", self.budget.explore),
+            ("budget", "refine", self.budget.refine),
+            ("budget", "iterations", self.budget.iterations),
+            ("budget", "confirm", self.budget.confirm),
+            ("verification", "draws", self.verification.draws),
+        ] {
+            if !(1..=MAX_COUNT).contains(&count) {
+                let (field, allowed) = (FieldPath::of(part).name(name), format!("from 1 to {MAX_COUNT}"));
+                problems.push(StudyError::OutOfRange { field, value: count as f64, allowed });
+            }
+        }
+        let found = match self.limits.symmetry {
+            Symmetry::MirrorY => "mirror_y",
+            Symmetry::MirrorXAndY => "mirror_x_and_y",
+            _ => return problems,
+        };
+        problems.push(StudyError::UnsupportedSymmetry { found });
+        problems
+    }
+
+    fn check_materials(&self, problems: &mut Vec<StudyError>) {
+        if self.materials.is_empty() {
+            problems.push(StudyError::NoMaterials);
+        }
+        for (index, prior) in self.materials.iter().enumerate() {
+            if let Err(error) = prior.material.validate() {
+                problems.push(StudyError::Material { index, name: prior.name.clone(), error });
+            }
+            if self.materials[..index].iter().any(|other| other.name == prior.name) {
+                problems.push(StudyError::SameName { index, name: prior.name.clone() });
+            }
+            let field = |name: &str| FieldPath::of("materials").index(index).name(name);
+            if !(0.0..=MAX_RELATIVE_SD).contains(&prior.relative_sd) {
+                let (value, allowed) = (prior.relative_sd, format!("from 0 to {MAX_RELATIVE_SD}"));
+                problems.push(StudyError::OutOfRange { field: field("relative_sd"), value, allowed });
+            }
+            if !(MIN_WEIGHT..=MAX_WEIGHT).contains(&prior.weight) {
+                let allowed = format!("positive, from {MIN_WEIGHT} to {MAX_WEIGHT}");
+                problems.push(StudyError::OutOfRange { field: field("weight"), value: prior.weight, allowed });
+            }
+        }
+    }
+
+    fn check_variation(&self, problems: &mut Vec<StudyError>) {
+        let vary = &self.vary;
+        let max_holes = vary.hole_count.max;
+        if max_holes > MAX_HOLES_TO_TRY {
+            let field = FieldPath::of("vary").name("hole_count").name("max");
+            let allowed = format!("from 0 to {MAX_HOLES_TO_TRY}");
+            problems.push(StudyError::OutOfRange { field, value: max_holes as f64, allowed });
+        }
+        if vary.hole_count.min > max_holes {
+            problems.push(StudyError::EmptyCountRange { min: vary.hole_count.min, max: max_holes });
+        }
+        if max_holes > 0 && vary.axes.as_ref().is_some_and(Vec::is_empty) {
+            problems.push(StudyError::NoAxes { max_holes });
+        }
+        for (name, interval) in [
+            ("drive_mm", Some(vary.drive_mm)),
+            ("length_mm", vary.length_mm),
+            ("thickness_mm", vary.thickness_mm),
+            ("width_mm", vary.width_mm),
+        ] {
+            if let Some(range) = interval {
+                check_range(name, range, problems);
+            }
+        }
+        if let Some(limit_mm) = self.limits.max_drive_mm
+            && vary.drive_mm.min > limit_mm
+        {
+            problems.push(StudyError::NoDrive { min_mm: vary.drive_mm.min, limit_mm });
+        }
+    }
+}
+
+fn check_range(name: &str, range: Range, problems: &mut Vec<StudyError>) {
+    let field = |end: &str| FieldPath::of("vary").name(name).name(end);
+    if !(MIN_LENGTH_MM..=MAX_LENGTH_MM).contains(&range.min) {
+        let allowed = format!("positive, from {MIN_LENGTH_MM} to {MAX_LENGTH_MM} mm");
+        problems.push(StudyError::OutOfRange { field: field("min"), value: range.min, allowed });
+    }
+    if !(range.max >= range.min && range.max <= MAX_LENGTH_MM) {
+        let allowed = format!("at least its min, at most {MAX_LENGTH_MM} mm");
+        problems.push(StudyError::OutOfRange { field: field("max"), value: range.max, allowed });
+    }
+}

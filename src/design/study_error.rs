@@ -1,0 +1,189 @@
+//! What can be wrong with a study.
+
+use crate::field::{FieldError, FieldPath};
+use crate::material::MaterialError;
+use crate::specimen::{LimitsError, SpecimenError};
+use std::path::PathBuf;
+
+/// Why a study cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum StudyError {
+    /// The text is not a study.
+    #[error("not a study/1: {message}")]
+    Json {
+        /// Line, column and field.
+        message: String,
+    },
+    /// A file that the study names cannot be used.
+    #[error("{}: {message}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// The name is too long.
+    #[error("name has {length} characters; use at most {limit}")]
+    NameTooLong {
+        /// Number of characters.
+        length: usize,
+        /// Most characters.
+        limit: usize,
+    },
+    /// The base specimen is not valid.
+    #[error("base: {0}")]
+    Base(SpecimenError),
+    /// The limits are not valid.
+    #[error("limits: {0}")]
+    Limits(LimitsError),
+    /// The scan is not usable.
+    #[error("scan: {0}")]
+    Scan(FieldError),
+    /// No material is given.
+    #[error("materials is empty; give at least one")]
+    NoMaterials,
+    /// A material is not valid.
+    #[error("material '{name}': {error}")]
+    Material {
+        /// Its place in the list.
+        index: usize,
+        /// Its name.
+        name: String,
+        /// What is wrong with it.
+        error: MaterialError,
+    },
+    /// Two materials have one name, by which results tell them apart.
+    #[error("two materials are called '{name}'; give each its own name")]
+    SameName {
+        /// The later one's place in the list.
+        index: usize,
+        /// The name.
+        name: String,
+    },
+    /// A value is out of its range.
+    #[error("{field} is {value}; it must be {allowed}")]
+    OutOfRange {
+        /// Field of the study.
+        field: FieldPath,
+        /// Its value.
+        value: f64,
+        /// What is allowed.
+        allowed: String,
+    },
+    /// The least number of holes is above the largest.
+    #[error("vary.hole_count: min exceeds max")]
+    EmptyCountRange {
+        /// Least number of holes.
+        min: usize,
+        /// Largest number of holes.
+        max: usize,
+    },
+    /// Holes are asked for, but no direction of theirs is allowed.
+    #[error(
+        "vary.axes is empty and vary.hole_count.max {max_holes}; give directions of the holes, or leave out vary.axes to keep the base's"
+    )]
+    NoAxes {
+        /// Largest number of holes.
+        max_holes: usize,
+    },
+    /// Every drive to try is above the actuator's travel.
+    #[error("vary.drive_mm.min is {min_mm} mm and limits.max_drive_mm {limit_mm} mm; no drive keeps both")]
+    NoDrive {
+        /// Smallest drive to try, mm.
+        min_mm: f64,
+        /// Largest travel, mm.
+        limit_mm: f64,
+    },
+    /// There is nothing to tell apart.
+    #[error("objective.kind: tell_apart needs at least two materials to tell apart")]
+    NothingToTellApart {
+        /// Materials given.
+        count: usize,
+    },
+    /// Weights of parameters are given that nothing uses.
+    #[error("objective.parameter_weights: only `combine: weighted` uses them")]
+    WeightsUnused,
+    /// The kind of objective has no gain per parameter to be weighted.
+    #[error(
+        "objective.combine: weighted needs a kind with a gain per parameter (integrated_sensitivity or \
+         sensitivity_and_promised_sd)"
+    )]
+    NothingToWeigh,
+    /// No material has a parameter of this name.
+    #[error("objective.parameter_weights: no material has '{name}'; the names are mu_1, alpha_1, …")]
+    UnknownParameter {
+        /// The name.
+        name: String,
+    },
+    /// All parameters of a material weigh nothing.
+    #[error("objective.parameter_weights: all weights of a material are zero")]
+    NoWeight,
+    /// A symmetry that the search does not support.
+    #[error("limits.symmetry: a design search supports none, mirror_x, mirror_z, mirror_x_and_z and point")]
+    UnsupportedSymmetry {
+        /// The symmetry, as JSON writes it.
+        found: &'static str,
+    },
+}
+
+impl StudyError {
+    /// The same as an error of a field, with a pointer into the study.
+    pub fn field_error(&self) -> FieldError {
+        use StudyError as E;
+        let weights = "/objective/parameter_weights";
+        match self {
+            E::Json { message } => FieldError::new("", "", "JSON of a study").remedy(message.clone()),
+            E::File { path, message } => {
+                FieldError::new("", path.display(), "a file that can be used").remedy(message.clone())
+            }
+            E::NameTooLong { length, limit } => {
+                FieldError::new("/name", format!("a text of {length} characters"), format!("at most {limit} characters"))
+            }
+            E::Base(error) => error.field_error().below("/base"),
+            E::Limits(error) => error.field_error().below("/limits"),
+            E::Scan(error) => error.clone().below("/scan"),
+            E::NoMaterials => FieldError::new("/materials", "[]", "a list of at least one material"),
+            E::Material { index, error, .. } => error.field_error().below(&format!("/materials/{index}/material")),
+            E::SameName { index, name } => {
+                let pointer = FieldPath::of("materials").index(*index).name("name").pointer();
+                FieldError::new(pointer, format!("{name:?}"), "a name of its own")
+                    .remedy("results tell materials apart by their names")
+            }
+            E::OutOfRange { field, value, allowed } => FieldError::new(field.pointer(), value, allowed.clone()),
+            E::EmptyCountRange { min, max } => {
+                FieldError::new("/vary/hole_count/min", min, format!("at most the max, {max}"))
+            }
+            E::NoAxes { max_holes } => {
+                FieldError::new("/vary/axes", "[]", format!("a list of directions, as up to {max_holes} holes are asked for"))
+                    .remedy("or leave it out to keep the base's direction")
+            }
+            E::NoDrive { min_mm, limit_mm } => {
+                FieldError::new("/vary/drive_mm/min", min_mm, format!("at most limits.max_drive_mm, {limit_mm} mm"))
+            }
+            E::NothingToTellApart { count } => {
+                FieldError::new("/materials", format!("a list of {count}"), "a list of at least two")
+                    .remedy("the objective tell_apart compares materials with each other")
+            }
+            E::WeightsUnused => FieldError::new(weights, "given", "left out")
+                .remedy("only `combine: weighted` uses weights of parameters"),
+            E::NothingToWeigh => {
+                FieldError::new("/objective/combine", "\"weighted\"", "maximin or geometric_mean for this kind").remedy(
+                    "weighted needs a kind with a gain per parameter, integrated_sensitivity or sensitivity_and_promised_sd",
+                )
+            }
+            E::UnknownParameter { name } => {
+                let pointer = FieldPath::of("objective").name("parameter_weights").name(name).pointer();
+                FieldError::new(pointer, "given", "left out").remedy("no material has such a parameter; the names are mu_1, alpha_1, …")
+            }
+            E::NoWeight => {
+                FieldError::new(weights, "a list of zeros", "above zero for at least one parameter of every material")
+            }
+            E::UnsupportedSymmetry { found } => FieldError::new(
+                "/limits/symmetry",
+                format!("{found:?}"),
+                "one of none, mirror_x, mirror_z, mirror_x_and_z and point in a design search",
+            ),
+        }
+    }
+}

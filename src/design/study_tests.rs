@@ -1,0 +1,122 @@
+//! Studies that cannot be searched are refused before any work, each rule with its pointer.
+
+use super::{Study, StudyError};
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// A study that spells everything out.
+fn whole() -> Value {
+    let material =
+        |mu: f64| json!({ "schema": "ogden/1", "bulk_kpa": 2000.0, "terms": [{ "mu_kpa": mu, "alpha": 1.9 }] });
+    json!({
+        "schema": "study/1",
+        "name": "test",
+        "base": {
+            "schema": "specimen/1", "name": "one hole", "test": "double_lap_shear",
+            "block": { "length_mm": 25.4, "thickness_mm": 6.4, "width_mm": 19.1 },
+            "holes": [{ "axis": "thickness", "center_mm": [0.0, 0.0], "diameter_mm": 5.0 }],
+            "drive_mm": [5.0]
+        },
+        "materials": [{ "name": "soft", "material": material(17.0) }, { "name": "stiff", "material": material(34.0) }],
+        "scan": { "voxel_mm": [1.0, 0.5, 0.75], "noise_sd_mm": [0.05, 0.05, 0.05], "force_sd_n": 0.02 },
+        "vary": { "hole_count": { "min": 0, "max": 2 }, "axes": ["thickness"], "drive_mm": { "min": 3.0, "max": 6.0 } },
+        "limits": { "min_ligament_hole_hole_mm": 2.0, "min_ligament_hole_edge_mm": 2.0, "punches_mm": [3.0, 5.0] }
+    })
+}
+
+/// Pointers of what is wrong with the study after a change of the fields at these pointers.
+fn pointers(changes: &[(&str, Value)]) -> Vec<String> {
+    let mut value = whole();
+    for (pointer, new) in changes {
+        let (parent, name) = pointer.rsplit_once('/').expect("a pointer");
+        match value.pointer_mut(parent).expect("the parent is there") {
+            Value::Object(fields) => drop(fields.insert(name.into(), new.clone())),
+            list => list[name.parse::<usize>().expect("an index")] = new.clone(),
+        }
+    }
+    assert!(Study::from_json(&value.to_string(), Path::new("/nowhere")).is_err(), "{changes:?}");
+    Study::from_request(&value).expect_err("it is refused").into_iter().map(|e| e.pointer).collect()
+}
+
+#[test]
+fn a_whole_study_is_read_in_both_ways() {
+    let value = whole();
+    let from_request = Study::from_request(&value).expect("it is valid");
+    assert_eq!(Study::from_json(&value.to_string(), Path::new("/nowhere")).expect("it is valid"), from_request);
+    assert_eq!(from_request.field_errors(), []);
+}
+
+#[test]
+fn each_rule_has_its_pointer() {
+    for (pointer, bad) in [
+        ("/base/drive_mm/0", json!(-1.0)),
+        ("/base/holes/0/diameter_mm", json!(0.0)),
+        ("/materials/1/material/terms/0/alpha", json!(0.0)),
+        ("/materials/1/name", json!("soft")),
+        ("/materials/0/relative_sd", json!(0.6)),
+        ("/materials/0/weight", json!(0.0)),
+        ("/scan/voxel_mm/0", json!(0.0)),
+        ("/scan/noise_sd_mm/2", json!(-1.0)),
+        ("/scan/force_sd_n", json!(0.0)),
+        ("/vary/axes", json!([])),
+        ("/vary/hole_count/max", json!(9)),
+        ("/vary/hole_count/min", json!(3)),
+        ("/vary/drive_mm/min", json!(0.0)),
+        ("/vary/drive_mm/max", json!(2.0)),
+        ("/limits/min_ligament_hole_edge_mm", json!(-1.0)),
+        ("/limits/punches_mm/1", json!(0.0)),
+        ("/limits/punches_mm", json!([])),
+        ("/limits/max_holes", json!(65)),
+        ("/limits/symmetry", json!("mirror_y")),
+        ("/objective", json!({ "kind": "shape" })),
+        ("/objective", json!({ "parameter_weights": { "mu_9": 1.0 } })),
+        ("/budget", json!({ "explore": 0 })),
+        ("/name", json!("a".repeat(201))),
+        ("/schema", json!("study/2")),
+        ("/base/length_mm", json!(3)),
+    ] {
+        let found = pointers(&[(pointer, bad)]);
+        assert!(found.iter().all(|f| f.starts_with(pointer)), "{pointer}: {found:?}");
+    }
+}
+
+/// No direction of holes matters only where holes are asked for.
+#[test]
+fn no_direction_is_needed_without_holes() {
+    let mut value = whole();
+    value["vary"]["axes"] = json!([]);
+    value["vary"]["hole_count"] = json!({ "min": 0, "max": 0 });
+    assert!(Study::from_request(&value).is_ok());
+    value["vary"]["hole_count"]["max"] = 1.into();
+    value["vary"].as_object_mut().map(|vary| vary.remove("axes"));
+    let study = Study::from_request(&value).expect("the base's direction stays");
+    assert_eq!(study.axes(), [crate::specimen::HoleAxis::Thickness]);
+}
+
+#[test]
+fn all_errors_come_at_once() {
+    let found = pointers(&[
+        ("/scan/voxel_mm", json!([0.0, 1.0, 1.0])),
+        ("/vary/axes", json!([])),
+        ("/materials/1/name", json!("soft")),
+        ("/base/samples_in_parallel", json!(0)),
+    ]);
+    assert_eq!(found, ["/base/samples_in_parallel", "/scan/voxel_mm/0", "/materials/1/name", "/vary/axes"]);
+}
+
+#[test]
+fn a_request_names_no_files() {
+    assert_eq!(pointers(&[("/base", json!("two-hole-shear.json"))]), ["/base"]);
+    assert_eq!(pointers(&[("/materials/1/material", json!("soft.json"))]), ["/materials/1/material"]);
+}
+
+#[test]
+fn numbers_that_are_none_are_refused() {
+    let mut study = Study::from_request(&whole()).expect("it is valid");
+    study.scan.force_sd_n = f64::NAN;
+    study.vary.drive_mm.max = f64::INFINITY;
+    study.materials[0].weight = f64::NAN;
+    let found: Vec<String> = study.field_errors().into_iter().map(|e| e.pointer).collect();
+    assert_eq!(found, ["/scan/force_sd_n", "/materials/0/weight", "/vary/drive_mm/max"]);
+    assert!(matches!(study.validate(), Err(StudyError::Scan(_))));
+}

@@ -1,0 +1,104 @@
+//! The last stage: what a diagnosis comes to.
+
+use super::cause_fit::CauseFit;
+use super::error::DiagnosisError;
+use super::fit::fit;
+use super::found::FoundCause;
+use super::inference::Inference;
+use super::metric::Metric;
+use super::prior::FitSettings;
+use super::trace::Trace;
+use crate::calibration::Observed;
+use crate::rate::Verdict;
+
+/// Structured misfit that is left counts as unexplained above this multiple of the allowance (rms).
+const UNEXPLAINED: f64 = 2.0;
+/// Causes of a misfit above that limit explain it where they leave less than this part of it (rms), or no more than the
+/// allowance: the right cause leaves a tenth or less, but for the odd debond; another one in its place about a third.
+const EXPLAINED_LEAVES: f64 = 0.25;
+/// Where causes leave more than this part of the squares unexplained, they are not named but listed as tried.
+const UNEXPLAINED_SHARE: f64 = 0.5;
+/// Iterations of a fit to a part of the voxels, from where the fit to all of them ended.
+const ITERATIONS_OF_PART: usize = 3;
+/// Blocks of the chequerboard along the length and across the width.
+const BLOCKS: f64 = 4.0;
+
+/// How a diagnosis ended: `structured_mm` is the misfit beyond noise (mm rms) without and with the causes.
+pub(super) fn verdict_on(
+    structured_mm: [f64; 2],
+    allowance_mm: f64,
+    causes: &[FoundCause],
+    alternatives: &[FoundCause],
+) -> Verdict {
+    let [before, after] = structured_mm;
+    let limit = UNEXPLAINED * allowance_mm;
+    let is_half_done = before > limit && after > allowance_mm.max(EXPLAINED_LEAVES * before);
+    if after > limit || is_half_done {
+        Verdict::Unexplained
+    } else if causes.is_empty() {
+        Verdict::NoMismatch
+    } else if alternatives.is_empty() {
+        Verdict::Explained
+    } else {
+        Verdict::ExplainedAmbiguously
+    }
+}
+
+/// Whether causes take away the smaller part of what is there, so that they are no explanation of it.
+pub(super) fn explain_too_little(verdict: Verdict, [before, after]: [f64; 2]) -> bool {
+    verdict == Verdict::Unexplained && after.powi(2) > UNEXPLAINED_SHARE * before.powi(2)
+}
+
+/// Rms misfit (mm) on blocks of voxels that the fits did not see, without and with the causes: the two colours of a
+/// chequerboard in turn. `seen` is what each of the two models is compared with.
+///
+/// # Errors
+/// [`DiagnosisError`]: no equilibrium, or the work was cancelled.
+pub(super) fn kept_back_rms_mm(
+    inference: &mut Inference,
+    seen: &[Trace; 2],
+    fits: [&CauseFit; 2],
+) -> Result<[f64; 2], DiagnosisError> {
+    let observed = inference.laboratory.observed();
+    let colours = chequerboard(observed);
+    let bulks = [inference.nominal_bulk, inference.settings.bulk];
+    let mut squares = [0.0; 2];
+    let mut count = 0.0;
+    for colour in [false, true] {
+        let metric = Metric::new(observed, inference.allowance_mm, &|v| colours[v] != colour);
+        for (n, fitted) in fits.into_iter().enumerate() {
+            let settings = FitSettings { max_iterations: ITERATIONS_OF_PART, bulk: bulks[n], ..inference.settings };
+            let Inference { laboratory, is_cancelled, .. } = &mut *inference;
+            let found = fit(laboratory, &metric, &seen[n], &fitted.material, &fitted.causes, &settings, *is_cancelled)?;
+            for field in &found.residual.displacement {
+                for u in field.iter().zip(&colours).filter(|(_, c)| **c == colour).map(|(u, _)| u) {
+                    for x in u.iter().filter(|x| x.is_finite()) {
+                        squares[n] += x * x;
+                        count += if n == 0 { 1.0 } else { 0.0 };
+                    }
+                }
+            }
+        }
+    }
+    Ok(squares.map(|s| (s / f64::max(count, 1.0)).sqrt()))
+}
+
+/// The colour of every voxel on a chequerboard of blocks in the plane of x and z.
+fn chequerboard(observed: &Observed) -> Vec<bool> {
+    let b = observed.specimen.block;
+    observed
+        .mask
+        .voxels
+        .iter()
+        .map(|&v| {
+            let x = observed.mask.grid.center_mm(v as usize);
+            let i = ((x[0] / b.length_mm + 0.5) * BLOCKS).floor() as i64;
+            let k = ((x[2] / b.width_mm + 0.5) * BLOCKS).floor() as i64;
+            (i + k).rem_euclid(2) == 0
+        })
+        .collect()
+}
+
+#[cfg(test)]
+#[path = "conclusion_tests.rs"]
+mod tests;

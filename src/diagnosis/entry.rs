@@ -1,0 +1,42 @@
+//! An entry of the registry: a cause and how a diagnosis comes to suspect it.
+
+use super::candidate::Candidate;
+use super::cause::{Cause, CauseName};
+use super::error::DiagnosisError;
+use super::load_effect::LoadEffect;
+use super::material_cause::MaterialCause;
+use super::search::Search;
+use super::supposed::Supposed;
+use super::trace::Trace;
+use crate::calibration::Observed;
+use crate::specimen::Specimen;
+use std::sync::Arc;
+
+/// One cause of the registry.
+#[derive(Clone, Copy)]
+pub(super) struct Entry {
+    /// Its name. Entries of one name are one cause that is suspected in several ways.
+    pub(super) name: CauseName,
+    /// How it is suspected.
+    pub(super) origin: Origin,
+}
+
+/// How a diagnosis comes to suspect a cause.
+#[derive(Clone, Copy)]
+pub(super) enum Origin {
+    /// It needs no suspicion: every recording is tested for these suspects.
+    Tested(fn(&Specimen) -> Vec<Arc<dyn Cause>>),
+    /// It has a place or a direction, which is searched for first (in a map, for instance).
+    Searched(fn(&mut Search) -> Result<Vec<Candidate>, DiagnosisError>),
+    /// It is an artefact of the image, found in the residual of the nominal model.
+    Artefact {
+        /// All artefacts of a residual, with their sizes.
+        find: fn(&Observed, &Trace) -> Vec<Supposed>,
+        /// What `n` of them are, for messages of progress: "`n` groups of voxels …".
+        in_words: &'static str,
+    },
+    /// It is an effect on the load curve.
+    LoadCurve(&'static dyn LoadEffect),
+    /// It is a change of the material's own law.
+    Material(&'static dyn MaterialCause),
+}

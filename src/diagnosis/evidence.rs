@@ -1,0 +1,34 @@
+//! How much evidence a cause needs: the limits that all stages of a diagnosis share.
+
+use super::metric::Metric;
+use super::trace::Trace;
+use crate::calibration::Observed;
+
+/// A cause must lower the deviance by this much beyond ln n per parameter: very strong evidence, many times over,
+/// because many causes are tried.
+pub(super) const EVIDENCE: f64 = 30.0;
+/// A cause is fitted where it explains more than this part of what the leading one does, to first order.
+pub(super) const WORTH_A_FIT: f64 = 0.1;
+/// A further cause must explain this part of what the ones before it did: a model of a large effect errs by some
+/// percent, which is no effect of its own.
+pub(super) const SMALLEST_SHARE: f64 = 0.02;
+/// An effect is physics where its displacement exceeds this part of the allowance (rms), or its force its own
+/// allowance.
+const SMALLEST_EFFECT: f64 = 1.0;
+
+/// What parameters cost: ln n for each.
+pub(super) fn penalty(metric: &Metric, num_parameters: usize) -> f64 {
+    num_parameters as f64 * (metric.num_data() as f64).ln()
+}
+
+/// Whether a change of the prediction is large enough to be more than a mesh's.
+pub(super) fn is_large(observed: &Observed, effect: &Trace, allowance_mm: f64) -> bool {
+    let is_large_force = observed
+        .steps
+        .iter()
+        .zip(&effect.force)
+        .filter_map(|(s, change)| s.force.map(|f| change.abs() > 4.0 * f.sd_n + 0.01 * f.value_n.abs()))
+        .any(|large| large);
+    let last = Trace { displacement: effect.displacement.last().cloned().into_iter().collect(), force: vec![] };
+    is_large_force || last.rms_mm() > SMALLEST_EFFECT * allowance_mm
+}

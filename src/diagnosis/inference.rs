@@ -1,0 +1,105 @@
+//! Fits of one recording: the laboratory that predicts it, what its misfit weighs, and what is known beforehand.
+
+use super::cause_fit::CauseFit;
+use super::error::DiagnosisError;
+use super::evidence::EVIDENCE;
+use super::fit::{deviance_at, fit};
+use super::laboratory::Laboratory;
+use super::metric::Metric;
+use super::prior::{BulkPrior, FitSettings};
+use super::supposed::Supposed;
+use super::trace::Trace;
+use crate::material::Ogden;
+
+/// Most leaps of a cause after its fit.
+const MAX_LEAPS: usize = 3;
+/// How much worse than the fit (factor on the deviance) the place of a leap may be: there the material has not followed
+/// yet.
+const WORSE_BEFORE_BETTER: f64 = 1.5;
+/// Standard deviation of the logarithm of a modulus that is as good as known.
+pub(super) const KNOWN_LOG_SD: f64 = 0.02;
+
+/// Everything that a fit of the recording needs besides the causes.
+pub(super) struct Inference<'a> {
+    /// Predicts the recording.
+    pub(super) laboratory: Laboratory<'a>,
+    /// What a misfit weighs.
+    pub(super) metric: Metric,
+    /// Priors and stops of fits with causes.
+    pub(super) settings: FitSettings,
+    /// What is known of κ in the nominal model.
+    pub(super) nominal_bulk: BulkPrior,
+    /// What was known of κ before anything was found.
+    pub(super) believed_bulk: BulkPrior,
+    /// Displacement error that meshes may leave, mm rms at the largest drive.
+    pub(super) allowance_mm: f64,
+    /// Element size as a factor on the standard one.
+    pub(super) mesh_factor: f64,
+    /// Whether the work is to stop.
+    pub(super) is_cancelled: &'a dyn Fn() -> bool,
+    /// Is told what is being done.
+    pub(super) progress: &'a dyn Fn(&str),
+}
+
+impl Inference<'_> {
+    /// Fits a material and causes from where they are.
+    ///
+    /// # Errors
+    /// As [`fit`].
+    pub(super) fn fit(
+        &mut self,
+        measured: &Trace,
+        material: &Ogden,
+        causes: &[Supposed],
+    ) -> Result<CauseFit, DiagnosisError> {
+        fit(&mut self.laboratory, &self.metric, measured, material, causes, &self.settings, self.is_cancelled)
+    }
+
+    /// As [`Self::fit`], and then from where the last cause could leap to, as long as that explains more.
+    ///
+    /// # Errors
+    /// As [`fit`].
+    pub(super) fn fit_with_leaps(
+        &mut self,
+        measured: &Trace,
+        material: &Ogden,
+        causes: &[Supposed],
+    ) -> Result<CauseFit, DiagnosisError> {
+        let mut found = self.fit(measured, material, causes)?;
+        for _ in 0..MAX_LEAPS {
+            let limit = WORSE_BEFORE_BETTER * found.deviance;
+            let Some((_, leapt)) = self.best_leap(measured, &found)?.filter(|leap| leap.0 < limit) else { break };
+            match self.fit(measured, &found.material, &leapt) {
+                Ok(other) if other.deviance < found.deviance - EVIDENCE => found = other,
+                Err(error) if (self.is_cancelled)() => return Err(error),
+                _ => break,
+            }
+        }
+        Ok(found)
+    }
+
+    /// Of the leaps of a fit's last cause the one with the smallest deviance, and that deviance; the material stays.
+    fn best_leap(
+        &mut self,
+        measured: &Trace,
+        found: &CauseFit,
+    ) -> Result<Option<(f64, Vec<Supposed>)>, DiagnosisError> {
+        let Some(last) = found.causes.last() else { return Ok(None) };
+        let mut best: Option<(f64, Vec<Supposed>)> = None;
+        for values in last.cause.leaps(&last.values) {
+            let mut leapt = found.causes.clone();
+            if let Some(last) = leapt.last_mut() {
+                last.values = values;
+            }
+            let (laboratory, settings) = (&mut self.laboratory, &self.settings);
+            let deviance =
+                deviance_at(laboratory, &self.metric, measured, &found.material, &leapt, settings, self.is_cancelled);
+            match deviance {
+                Ok(deviance) if best.as_ref().is_none_or(|b| deviance < b.0) => best = Some((deviance, leapt)),
+                Err(error) if (self.is_cancelled)() => return Err(error),
+                _ => {}
+            }
+        }
+        Ok(best)
+    }
+}

@@ -1,0 +1,52 @@
+//! The nominal model: the material alone, fitted to what was recorded.
+
+use super::cause_fit::CauseFit;
+use super::error::DiagnosisError;
+use super::further_term::further_term;
+use super::inference::Inference;
+use super::laboratory::Laboratory;
+use super::scene::Scene;
+use super::trace::Trace;
+use crate::material::{Ogden, OgdenTerm};
+
+/// The material from which the first fit starts: the one believed, or a neo-Hookean one with the modulus of the
+/// measured force and the κ/μ of a rubber.
+///
+/// # Errors
+/// [`DiagnosisError`]: no equilibrium, or the work was cancelled.
+pub(super) fn first_guess(
+    laboratory: &mut Laboratory,
+    believed: Option<&Ogden>,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Ogden, DiagnosisError> {
+    if let Some(believed) = believed {
+        return Ok(believed.clone());
+    }
+    let mut material =
+        Ogden { bulk_kpa: 2000.0, terms: vec![OgdenTerm { mu_kpa: 16.0, alpha: 2.0 }] };
+    let predicted = laboratory.predict(&material, &Scene::default(), is_cancelled)?;
+    let forces = laboratory.measured().force;
+    let ratio = |n: &usize| forces[*n] / predicted.trace.force[*n];
+    if let Some(r) = (0..forces.len()).filter(|n| forces[*n].abs() > 0.0).map(|n| ratio(&n)).find(|r| *r > 0.0) {
+        material.terms[0].mu_kpa *= r;
+        material.bulk_kpa *= r;
+    }
+    Ok(material)
+}
+
+/// The nominal model's fit: as many terms as the material believed (`is_believed`), or one or two as the data call for.
+///
+/// # Errors
+/// As [`first_guess`].
+pub(super) fn fit_nominal(
+    inference: &mut Inference,
+    measured: &Trace,
+    start: &Ogden,
+    is_believed: bool,
+) -> Result<CauseFit, DiagnosisError> {
+    let simplest = inference.fit(measured, start, &[])?;
+    if is_believed {
+        return Ok(simplest);
+    }
+    Ok(further_term(inference, measured, &simplest)?.map_or(simplest, |found| found.0))
+}

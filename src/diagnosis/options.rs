@@ -1,0 +1,50 @@
+//! Settings of a diagnosis.
+
+use super::cause::CauseName;
+use super::error::DiagnosisError;
+use crate::material::Ogden;
+
+/// Settings of [`super::diagnose()`].
+#[derive(Clone, Debug)]
+pub struct DiagnosisOptions {
+    /// Element size as a factor on the standard one, from 0.3 to 5.
+    pub mesh_factor: f64,
+    /// The displacement error that meshes may leave, mm rms at the largest drive; `None` for a thousandth of that
+    /// drive.
+    pub allowance_mm: Option<f64>,
+    /// The material as believed; its number of terms is then the nominal one.
+    pub prior: Option<Ogden>,
+    /// Most causes. A cause that a round of tests adds counts twice, one that the load curve or the material tells of
+    /// counts once, an artefact of the image not at all; no round begins once the count is reached.
+    pub max_causes: usize,
+    /// Drift of the load cell where the recording does not state it, N.
+    pub force_sd_n: f64,
+    /// Causes that are not to be supposed.
+    pub left_out: Vec<CauseName>,
+}
+
+impl Default for DiagnosisOptions {
+    fn default() -> Self {
+        DiagnosisOptions {
+            mesh_factor: 1.35,
+            allowance_mm: None,
+            prior: None,
+            max_causes: 3,
+            force_sd_n: 0.02,
+            left_out: Vec::new(),
+        }
+    }
+}
+
+impl DiagnosisOptions {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// [`DiagnosisError::Setting`] with the first setting that is out of its range.
+    pub fn check(&self) -> Result<(), DiagnosisError> {
+        if (0.3..=5.0).contains(&self.mesh_factor) {
+            return Ok(());
+        }
+        Err(DiagnosisError::Setting { name: "the mesh factor", value: self.mesh_factor, requirement: "from 0.3 to 5" })
+    }
+}

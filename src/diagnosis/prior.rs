@@ -1,0 +1,56 @@
+//! What is known of a material before a fit, and when a fit stops.
+
+use crate::material::Ogden;
+
+/// What is known of κ beforehand: ln κ is Gaussian.
+#[derive(Clone, Copy, Debug)]
+pub struct BulkPrior {
+    /// Centre, kPa.
+    pub center_kpa: f64,
+    /// Standard deviation of ln κ.
+    pub log_sd: f64,
+}
+
+/// What is known of the initial shear modulus beforehand: its logarithm is Gaussian. Without any force the displacement
+/// says nothing of it, only of its ratio to κ.
+#[derive(Clone, Copy, Debug)]
+pub struct ShearPrior {
+    /// Centre, kPa.
+    pub center_kpa: f64,
+    /// Standard deviation of its logarithm.
+    pub log_sd: f64,
+}
+
+impl ShearPrior {
+    /// Squared distance, its gradient's negative half and the curvature's half, in scaled parameters (κ first).
+    pub(super) fn terms(&self, material: &Ogden) -> (f64, Vec<f64>, f64) {
+        let modulus = shear_modulus(material);
+        let away = (self.center_kpa / modulus).ln();
+        let weight = self.log_sd.powi(-2);
+        let mut slope = vec![0.0];
+        for t in &material.terms {
+            // Modulus and exponent of a term act alike on ½ μ α.
+            let share = 0.5 * t.mu_kpa * t.alpha / modulus;
+            slope.extend([share, share]);
+        }
+        (weight * away * away, slope, weight * away)
+    }
+}
+
+/// Settings of a fit.
+#[derive(Clone, Copy, Debug)]
+pub struct FitSettings {
+    /// Most iterations, rejected ones included.
+    pub max_iterations: usize,
+    /// κ.
+    pub bulk: BulkPrior,
+    /// The shear modulus, where no force was recorded.
+    pub shear: Option<ShearPrior>,
+    /// Converged when the linear model promises to lower the deviance by less than this.
+    pub tolerance: f64,
+}
+
+/// ½ Σ μᵢαᵢ, kPa.
+pub fn shear_modulus(material: &Ogden) -> f64 {
+    material.terms.iter().map(|t| 0.5 * t.mu_kpa * t.alpha).sum()
+}

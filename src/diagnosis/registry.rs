@@ -1,0 +1,118 @@
+//! The causes that a diagnosis supposes.
+
+use super::candidate::Candidate;
+use super::cause::{Cause, CauseName};
+use super::causes::REGISTRY;
+use super::entry::{Entry, Origin};
+use super::error::DiagnosisError;
+use super::load_effect::LoadEffect;
+use super::material_cause::MaterialCause;
+use super::search::Search;
+use super::supposed::Supposed;
+use super::trace::Trace;
+use crate::calibration::Observed;
+use crate::specimen::Specimen;
+use std::sync::Arc;
+
+/// The names of all causes, in the order of the registry.
+pub fn cause_names() -> Vec<CauseName> {
+    Registry::standard().names()
+}
+
+/// The causes that a diagnosis supposes.
+#[derive(Clone)]
+pub(super) struct Registry {
+    entries: Vec<Entry>,
+}
+
+impl Registry {
+    /// All causes.
+    pub(super) fn standard() -> Registry {
+        Registry { entries: REGISTRY.to_vec() }
+    }
+
+    /// Without the causes of some names.
+    ///
+    /// # Errors
+    /// [`DiagnosisError::UnknownCause`] for a name that no cause has.
+    pub(super) fn without(mut self, names: &[CauseName]) -> Result<Registry, DiagnosisError> {
+        let known = self.names();
+        if let Some(name) = names.iter().find(|n| !known.contains(n)) {
+            let known = known.iter().map(|n| n.as_str()).collect::<Vec<_>>().join(", ");
+            return Err(DiagnosisError::UnknownCause { name: name.as_str(), known });
+        }
+        self.entries.retain(|e| !names.contains(&e.name));
+        Ok(self)
+    }
+
+    /// The names, each once, in order.
+    pub(super) fn names(&self) -> Vec<CauseName> {
+        let mut names: Vec<CauseName> = Vec::new();
+        for entry in &self.entries {
+            if !names.contains(&entry.name) {
+                names.push(entry.name);
+            }
+        }
+        names
+    }
+
+    /// Suspects for which every recording of a specimen is tested.
+    pub(super) fn tested(&self, specimen: &Specimen) -> Vec<Arc<dyn Cause>> {
+        let of_entry = |entry: &Entry| match entry.origin {
+            Origin::Tested(suspects) => suspects(specimen),
+            _ => Vec::new(),
+        };
+        self.entries.iter().flat_map(of_entry).collect()
+    }
+
+    /// Suspects with a place or a direction, added to `candidates` cause by cause.
+    ///
+    /// # Errors
+    /// [`DiagnosisError`].
+    pub(super) fn search(&self, search: &mut Search, candidates: &mut Vec<Candidate>) -> Result<(), DiagnosisError> {
+        for entry in &self.entries {
+            if let Origin::Searched(suspects) = entry.origin {
+                search.top = candidates.iter().fold(0.0, |top: f64, c| top.max(c.score));
+                candidates.extend(suspects(search)?);
+            }
+        }
+        Ok(())
+    }
+
+    /// Artefacts of a residual; `progress` is told how many there are.
+    pub(super) fn artefacts(&self, observed: &Observed, residual: &Trace, progress: &dyn Fn(&str)) -> Vec<Supposed> {
+        let mut all = Vec::new();
+        for entry in &self.entries {
+            if let Origin::Artefact { find, in_words } = entry.origin {
+                let found = find(observed, residual);
+                if !found.is_empty() {
+                    progress(&format!("{} {in_words}", found.len()));
+                }
+                all.extend(found);
+            }
+        }
+        all
+    }
+
+    /// Effects on the load curve.
+    pub(super) fn load_effects(&self) -> Vec<&'static dyn LoadEffect> {
+        let of_entry = |entry: &Entry| match entry.origin {
+            Origin::LoadCurve(effect) => Some(effect),
+            _ => None,
+        };
+        self.entries.iter().filter_map(of_entry).collect()
+    }
+
+    /// Causes in the material's own law.
+    pub(super) fn material_causes(&self) -> Vec<&'static dyn MaterialCause> {
+        let of_entry = |entry: &Entry| match entry.origin {
+            Origin::Material(cause) => Some(cause),
+            _ => None,
+        };
+        self.entries.iter().filter_map(of_entry).collect()
+    }
+}
+
+#[cfg(test)]
+#[path = "registry_tests.rs"]
+mod tests;

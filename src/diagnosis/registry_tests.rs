@@ -1,0 +1,131 @@
+use super::*;
+use crate::diagnosis::diagnose::diagnose_among;
+use crate::diagnosis::scene::Scene;
+use crate::diagnosis::test_recordings::{material, options, recorded};
+
+/// A cause as its own file would hold it: its name, its entry, its model.
+mod turned_image {
+    use crate::diagnosis::cause::{Category, Cause, CauseName, CauseParameter};
+    use crate::diagnosis::entry::{Entry, Origin};
+    use crate::diagnosis::scene::Scene;
+    use std::sync::Arc;
+
+    pub(super) const NAME: CauseName = CauseName::new("turned_image");
+    pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Tested(|_| vec![Arc::new(TurnedImage)]) };
+
+    /// The image is turned about y.
+    struct TurnedImage;
+
+    impl Cause for TurnedImage {
+        fn name(&self) -> CauseName {
+            NAME
+        }
+
+        fn category(&self) -> Category {
+            Category::Acquisition
+        }
+
+        fn description(&self) -> String {
+            "the image is turned about y".into()
+        }
+
+        fn parameters(&self) -> Vec<CauseParameter> {
+            vec![CauseParameter::new("degrees_about_y", 0.5, [-20.0, 20.0])]
+        }
+
+        fn apply(&self, values: &[f64], scene: &mut Scene) {
+            scene.image.rotation_rad[1] += values[0].to_radians();
+        }
+
+        fn changes_sample(&self) -> bool {
+            false
+        }
+    }
+}
+
+/// The one line that registers the cause above beside all others.
+fn with_turned_image() -> Registry {
+    Registry { entries: [REGISTRY, &[turned_image::ENTRY]].concat() }
+}
+
+/// One file and one line: the diagnosis tests, ranks, fits, names and measures a cause that it never heard of.
+#[test]
+fn a_new_cause_is_an_entry() {
+    let mut scene = Scene::default();
+    scene.image.rotation_rad[1] = 3f64.to_radians();
+    let recording = recorded(&material(), &scene);
+    let found = diagnose_among(&with_turned_image(), &recording, &options(), &|_| {}, &|| false).unwrap();
+    let ranked = found.ranked.iter().find(|r| r.identity.name == turned_image::NAME).unwrap();
+    assert!(ranked.score > 100.0 && ranked.fitted.is_some(), "{ranked:?}");
+    // The registration of the registry turns about y too, with five more parameters to pay for.
+    let cause = &found.causes[0];
+    assert_eq!(cause.name, turned_image::NAME, "{:?}", found.ranked);
+    let (name, degrees, _) = &cause.parameters[0];
+    // Hundreds of voxels with 0.01 mm of noise, turned by up to 0.5 mm.
+    assert!(name == "degrees_about_y" && (degrees - 3.0).abs() < 0.05, "{degrees}");
+    // Without that line it is not known.
+    assert!(!cause_names().contains(&turned_image::NAME));
+}
+
+/// The names that results may hold, as the exchange format lists them.
+#[test]
+fn names_are_those_of_the_format() {
+    let mut names: Vec<&str> = cause_names().into_iter().map(CauseName::as_str).collect();
+    names.sort_unstable();
+    let expected = [
+        "background",
+        "bond",
+        "cell",
+        "compliance",
+        "compressibility",
+        "debond",
+        "fibre",
+        "gain",
+        "gradient",
+        "hole",
+        "inclusion",
+        "mount",
+        "mullins",
+        "offaxis",
+        "registration",
+        "relaxation",
+        "slack",
+        "swelling",
+        "terms",
+        "tilt",
+        "wrap",
+    ];
+    assert_eq!(names, expected);
+}
+
+/// All ways to suspect a cause that is left out go with it; a name that is none is an error which lists the names.
+#[test]
+fn causes_are_left_out_by_name() {
+    let cell = CauseName::new("cell");
+    let all = Registry::standard();
+    let left = all.clone().without(&[cell]).unwrap();
+    assert_eq!(all.load_effects().len() - left.load_effects().len(), 2);
+    assert!(left.load_effects().iter().all(|e| e.name() != cell));
+    let error = all.without(&[CauseName::new("tlit")]).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("'tlit'") && error.contains("tilt"), "{error}");
+}
+
+/// Entries and what they hold go by one name.
+#[test]
+fn entries_are_named_as_what_they_hold() {
+    let mut specimen = Specimen::from_json(include_str!("../../geometries/two-hole-shear.json")).unwrap();
+    specimen.drive_mm = vec![1.0, 2.0];
+    for entry in REGISTRY {
+        match entry.origin {
+            Origin::Tested(suspects) => assert!(suspects(&specimen).iter().all(|c| c.name() == entry.name)),
+            Origin::LoadCurve(effect) => assert_eq!(effect.name(), entry.name),
+            Origin::Material(cause) => assert_eq!(cause.name(), entry.name),
+            Origin::Searched(_) | Origin::Artefact { .. } => {}
+        }
+    }
+    // Holes are suspects of one name and different identities.
+    let suspects = Registry::standard().tested(&specimen);
+    for (n, a) in suspects.iter().enumerate() {
+        assert!(suspects[..n].iter().all(|b| a.identity() != b.identity()), "{}", a.description());
+    }
+}

@@ -1,0 +1,146 @@
+//! Rounds: in each, all suspects are tested to first order, the leading ones are fitted in full, and the best is kept
+//! where the evidence for it is strong enough.
+
+use super::candidate::Candidate;
+use super::cause_fit::CauseFit;
+use super::error::DiagnosisError;
+use super::evidence::{EVIDENCE, SMALLEST_SHARE, is_large, penalty};
+use super::experiment::experiments;
+use super::findings::Findings;
+use super::found::FoundCause;
+use super::inference::Inference;
+use super::ranked::Ranked;
+use super::registry::Registry;
+use super::score_round::{RoundScope, leading, score_suspects};
+use super::supposed::Supposed;
+use super::trace::Trace;
+
+/// Two fits end in the same place where their predictions differ by less than this part of the cause's effect.
+const SAME_EFFECT: f64 = 0.2;
+/// Causes whose fits differ by less than this in deviance cannot be told apart.
+const AMBIGUITY: f64 = 15.0;
+
+/// A fit with one more cause.
+struct Trial {
+    /// Fall of the deviance, less ln n per parameter of the cause.
+    gain: f64,
+    fit: CauseFit,
+}
+
+/// Adds causes round by round, until no further one is called for or `max_causes` are named.
+///
+/// # Errors
+/// [`DiagnosisError`]: the work was cancelled, or the fit so far has no derivatives.
+pub(super) fn add_causes(
+    inference: &mut Inference,
+    registry: &Registry,
+    findings: &mut Findings,
+    measured: &Trace,
+    max_causes: usize,
+    has_load_curve: bool,
+) -> Result<(), DiagnosisError> {
+    let mut round = 0;
+    while num_named(findings) < max_causes {
+        round += 1;
+        (inference.progress)(&format!("round {round}: testing causes"));
+        let scope = RoundScope { has_load_curve, has_maps: round == 1 };
+        let (candidates, maps) = score_suspects(inference, registry, &findings.current, scope)?;
+        findings.maps.extend(maps);
+        findings.ranked.extend(candidates.iter().map(|c| Ranked {
+            identity: c.cause.identity(),
+            description: c.cause.description(),
+            score: c.score,
+            fitted: None,
+            round,
+        }));
+        let trials = fit_leading(inference, &candidates, findings, measured, round);
+        if !take_best(inference, findings, trials)? {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// What counts towards the most causes: all that are named, and once more those of them that are in the fit. Artefacts
+/// do not count.
+fn num_named(findings: &Findings) -> usize {
+    findings.current.causes.iter().filter(|c| !c.cause.is_artefact()).count() + findings.causes.len()
+}
+
+/// Fits the leading candidates in full, the best first; those without a fit are left out.
+fn fit_leading(
+    inference: &mut Inference,
+    candidates: &[Candidate],
+    findings: &mut Findings,
+    measured: &Trace,
+    round: usize,
+) -> Vec<Trial> {
+    let mut trials: Vec<Trial> = Vec::new();
+    for c in leading(candidates) {
+        if (inference.is_cancelled)() {
+            break;
+        }
+        (inference.progress)(&format!("round {round}: fitting '{}'", c.cause.description()));
+        let current = &findings.current;
+        let mut supposed = current.causes.clone();
+        supposed.push(Supposed { cause: c.cause.clone(), values: c.values.clone() });
+        let Ok(fit) = inference.fit_with_leaps(measured, &current.material, &supposed) else { continue };
+        let gain = current.deviance - fit.deviance - penalty(&inference.metric, c.values.len());
+        // Suspects without an identity of their own, as two balls, share the last entry.
+        let identity = c.cause.identity();
+        if let Some(ranked) = findings.ranked.iter_mut().rev().find(|r| r.identity == identity) {
+            ranked.fitted = Some(gain);
+        }
+        trials.push(Trial { gain, fit });
+    }
+    trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    trials
+}
+
+/// Names the best trial as a cause where the evidence for it is strong enough, with what cannot be told apart from it;
+/// whether it did.
+fn take_best(inference: &mut Inference, findings: &mut Findings, trials: Vec<Trial>) -> Result<bool, DiagnosisError> {
+    let mut trials = trials.into_iter();
+    let Some(best) = trials.next() else { return Ok(false) };
+    let effect = best.fit.prediction.trace.plus(-1.0, &findings.current.prediction.trace);
+    let is_too_little = best.gain < EVIDENCE.max(SMALLEST_SHARE * findings.explained());
+    if is_too_little || !is_large(inference.laboratory.observed(), &effect, inference.allowance_mm) {
+        return Ok(false);
+    }
+    for other in trials {
+        if best.gain - other.gain < AMBIGUITY && !is_same(&best.fit, &other.fit, &effect) {
+            let alternative = alternative(inference, &findings.current, &best.fit, &other)?;
+            findings.alternatives.push(alternative);
+        }
+    }
+    findings.causes.push(last_cause(inference, &best, &effect));
+    findings.current = best.fit;
+    Ok(true)
+}
+
+/// Whether two fits are two starts of one cause that ended in one place; `effect` is that of the first.
+fn is_same(best: &CauseFit, other: &CauseFit, effect: &Trace) -> bool {
+    let name_of = |fit: &CauseFit| fit.causes.last().map(|c| c.cause.name());
+    let apart = other.prediction.trace.plus(-1.0, &best.prediction.trace);
+    name_of(other) == name_of(best) && apart.rms_mm() < SAME_EFFECT * effect.rms_mm()
+}
+
+/// What the data cannot tell apart from the best, with the experiments that would.
+fn alternative(
+    inference: &mut Inference,
+    current: &CauseFit,
+    best: &CauseFit,
+    other: &Trial,
+) -> Result<FoundCause, DiagnosisError> {
+    let effect = other.fit.prediction.trace.plus(-1.0, &current.prediction.trace);
+    let mut found = last_cause(inference, other, &effect);
+    (inference.progress)(&format!("looking for the experiment that would tell '{}' apart", found.description));
+    found.experiments = experiments(inference, [best, &other.fit])?;
+    Ok(found)
+}
+
+/// The cause that a trial added, with its effect on the prediction.
+fn last_cause(inference: &Inference, trial: &Trial, effect: &Trace) -> FoundCause {
+    let last = trial.fit.causes.len() - 1;
+    FoundCause::of_fit(&trial.fit, last, inference.laboratory.observed()).with_evidence(trial.gain, effect.rms_mm())
+}

@@ -1,0 +1,127 @@
+//! Reading files that a user names: regular files only, and never more than a limit.
+//!
+//! A pipe would block, a device such as `/dev/zero` never ends, and the size that the system tells for some files (those
+//! of `/proc`) is not what they hold. So the kind is checked before and after opening, and the limit while reading.
+
+use sha2::{Digest, Sha256};
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::Path;
+
+/// Why a file was not read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReadError {
+    /// It is a folder, a pipe, a device or a socket.
+    #[error("not a regular file; give the path of one, not of a folder, a pipe or a device")]
+    NotRegular,
+    /// It holds more than allowed.
+    #[error("more than {limit} bytes")]
+    TooLarge {
+        /// Most bytes.
+        limit: u64,
+    },
+    /// What the system said.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+}
+
+impl ReadError {
+    /// The same as an error of the system, for errors that hold one.
+    pub fn into_io(self) -> io::Error {
+        match self {
+            ReadError::Io(error) => error,
+            other => io::Error::new(io::ErrorKind::InvalidInput, other),
+        }
+    }
+}
+
+/// Opens a regular file to read from it.
+///
+/// # Errors
+/// [`ReadError::NotRegular`], [`ReadError::Io`].
+pub fn open_regular(path: &Path) -> Result<File, ReadError> {
+    // Before opening: to open a pipe waits for its other end.
+    if !fs::metadata(path)?.is_file() {
+        return Err(ReadError::NotRegular);
+    }
+    let file = File::open(path)?;
+    if file.metadata()?.is_file() { Ok(file) } else { Err(ReadError::NotRegular) }
+}
+
+/// The content of a regular file of at most `max_bytes`.
+///
+/// # Errors
+/// [`ReadError`].
+pub fn read_limited(path: &Path, max_bytes: u64) -> Result<Vec<u8>, ReadError> {
+    let file = open_regular(path)?;
+    let mut bytes = Vec::new();
+    file.take(max_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > max_bytes { Err(ReadError::TooLarge { limit: max_bytes }) } else { Ok(bytes) }
+}
+
+/// The text of a regular file of at most `max_bytes`.
+///
+/// # Errors
+/// [`ReadError`]; [`io::ErrorKind::InvalidData`] where the content is not UTF-8.
+pub fn read_text_limited(path: &Path, max_bytes: u64) -> Result<String, ReadError> {
+    let no_text = |_| io::Error::new(io::ErrorKind::InvalidData, "the file holds no UTF-8 text");
+    Ok(String::from_utf8(read_limited(path, max_bytes)?).map_err(no_text)?)
+}
+
+/// SHA-256 of the content of a regular file, hexadecimal. The file is not held in memory.
+///
+/// # Errors
+/// [`ReadError::NotRegular`], [`ReadError::Io`].
+pub fn digest_of_file(path: &Path) -> Result<String, ReadError> {
+    let mut file = open_regular(path)?;
+    let mut hash = Sha256::new();
+    let mut block = vec![0u8; 1 << 16];
+    loop {
+        match file.read(&mut block)? {
+            0 => return Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()),
+            length => hash.update(&block[..length]),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_regular_file_is_read_up_to_its_limit() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("ten");
+        fs::write(&path, "0123456789").expect("written");
+        assert_eq!(read_text_limited(&path, 10).expect("it fits"), "0123456789");
+        assert!(matches!(read_limited(&path, 9), Err(ReadError::TooLarge { limit: 9 })));
+        assert!(matches!(read_limited(&folder.path().join("none"), 9), Err(ReadError::Io(_))));
+        fs::write(&path, [0xff, 0xfe]).expect("written");
+        assert!(
+            matches!(read_text_limited(&path, 10), Err(ReadError::Io(e)) if e.kind() == io::ErrorKind::InvalidData)
+        );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn pipes_devices_and_folders_are_refused_without_waiting() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let pipe = folder.path().join("pipe");
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status().expect("mkfifo runs");
+        assert!(made.success());
+        for path in [pipe.as_path(), folder.path(), Path::new("/dev/zero")] {
+            assert!(matches!(read_limited(path, 10), Err(ReadError::NotRegular)), "{}", path.display());
+        }
+    }
+
+    /// The system says that files of `/proc` are empty; the limit holds all the same.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_file_of_unknown_size_is_limited_while_reading() {
+        let path = Path::new("/proc/self/status");
+        assert_eq!(fs::metadata(path).expect("it is there").len(), 0);
+        assert!(matches!(read_limited(path, 10), Err(ReadError::TooLarge { limit: 10 })));
+        assert!(!read_limited(path, 1 << 20).expect("it fits").is_empty());
+    }
+}

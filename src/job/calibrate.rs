@@ -1,0 +1,198 @@
+//! Calibrate: the material from recordings, with its uncertainty and the number of terms.
+
+use super::request::{InputForm, InputUse};
+use super::subject::check_mesh;
+use super::{Context, JobError, Outcome, Progress, Request, Run, defaults, summary};
+use crate::calibration::{
+    CalibrateOptions, Calibration, CalibrationResult, ContourOptions, DECREMENT_THRESHOLD, Objective, Observed,
+    PAPER_BETA, Rule, TermCount, calibrate,
+};
+use crate::field::FieldError;
+use crate::mesh::{MeshOptions, MeshSize};
+use crate::recording::write_vectors;
+use crate::report::calibration_report;
+use crate::specimen::Specimen;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// What is minimised.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ObjectiveName {
+    /// χ² by the noise.
+    #[default]
+    Weighted,
+    /// The paper's loss.
+    Paper,
+}
+
+/// Body of a calibration.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CalibrationRequest {
+    /// Recordings (mru-recording/1); all are fitted together.
+    #[schema(min_items = 1, max_items = 20)]
+    pub recordings: Vec<String>,
+    /// Number of Ogden terms; chosen by the rule where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1, maximum = 5)]
+    pub num_terms: Option<usize>,
+    /// Rule that decides the number of terms.
+    #[serde(default)]
+    #[schema(default = Rule::default)]
+    pub rule: Rule,
+    /// Smallest decrement of the paper's loss that keeps a term.
+    #[serde(default = "decrement")]
+    #[schema(minimum = 0.0, maximum = 1e12, default = decrement)]
+    pub decrement: f64,
+    /// What is minimised: chi-square by the noise, or the paper's loss.
+    #[serde(default)]
+    #[schema(default = ObjectiveName::default)]
+    pub objective: ObjectiveName,
+    /// Weight of the force in the paper's loss.
+    #[serde(default = "beta")]
+    #[schema(minimum = 0.0, maximum = 1e12, default = beta)]
+    pub beta: f64,
+    /// Element size as a factor on the standard one.
+    #[serde(default = "mesh_factor")]
+    #[schema(minimum = 0.2, maximum = 5.0, default = mesh_factor)]
+    pub mesh_factor: f64,
+    /// Whether a second mesh widens the intervals by the error of the first.
+    #[serde(default = "defaults::yes")]
+    #[schema(default = defaults::yes)]
+    pub has_mesh_allowance: bool,
+    /// Starts tried for every number of terms.
+    #[serde(default = "num_starts")]
+    #[schema(minimum = 1, maximum = 20, default = num_starts)]
+    pub num_starts: usize,
+    /// Voxels nearer than this to the ends of a sheared block are left out, mm.
+    #[serde(default)]
+    #[schema(minimum = 0.0, maximum = 1000.0, default = 0.0)]
+    pub end_margin_mm: f64,
+    /// Profile likelihoods of all parameters.
+    #[serde(default)]
+    pub has_profiles: bool,
+    /// Contours of the losses around the estimate.
+    #[serde(default)]
+    pub has_contours: bool,
+}
+
+fn decrement() -> f64 {
+    DECREMENT_THRESHOLD
+}
+
+fn beta() -> f64 {
+    PAPER_BETA
+}
+
+fn mesh_factor() -> f64 {
+    CalibrateOptions::default().mesh_factor
+}
+
+fn num_starts() -> usize {
+    CalibrateOptions::default().num_starts
+}
+
+impl CalibrationRequest {
+    fn options(&self) -> CalibrateOptions {
+        let default = CalibrateOptions::default();
+        CalibrateOptions {
+            terms: self.num_terms.map_or(default.terms, TermCount::Fixed),
+            objective: match self.objective {
+                ObjectiveName::Weighted => Objective::Weighted,
+                ObjectiveName::Paper => Objective::Paper { beta: self.beta },
+            },
+            rule: self.rule,
+            decrement_threshold: self.decrement,
+            mesh_factor: self.mesh_factor,
+            has_mesh_allowance: self.has_mesh_allowance,
+            num_starts: self.num_starts,
+            has_profiles: self.has_profiles,
+            contours: self.has_contours.then(|| ContourOptions { beta: self.beta, ..ContourOptions::default() }),
+            ..default
+        }
+    }
+
+    /// The recordings as they are compared, and their names.
+    fn observed(&self, context: &Context) -> Result<(Vec<Observed>, Vec<String>), JobError> {
+        let (mut observed, mut names) = (Vec::new(), Vec::new());
+        for (index, read) in context.recordings.iter().enumerate() {
+            let recording = &read.recording;
+            let unfit = |e: &dyn std::fmt::Display| {
+                let error = FieldError::new(format!("/recordings/{index}"), &recording.id, "fit for a calibration");
+                JobError::from(error.remedy(e.to_string()))
+            };
+            let mut ready = Observed::new(recording, defaults::force_sd_n()).map_err(|e| unfit(&e))?;
+            if self.end_margin_mm > 0.0 && ready.leave_out_ends(self.end_margin_mm) == 0 {
+                let allowed = "small enough to leave a voxel";
+                return Err(JobError::at("/end_margin_mm", self.end_margin_mm, allowed));
+            }
+            observed.push(ready);
+            names.push(recording.id.clone());
+        }
+        Ok((observed, names))
+    }
+}
+
+impl Request for CalibrationRequest {
+    const COMMAND: &'static str = "calibrate";
+    const COLLECTION: &'static str = "calibrations";
+    const ABOUT: &'static str = "The material, from recordings of a specimen, with its uncertainty.";
+
+    fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
+        Ok(Box::new(self))
+    }
+}
+
+impl Run for CalibrationRequest {
+    fn title(&self) -> String {
+        match &self.recordings[..] {
+            [one] => format!("calibration on {one}"),
+            several => format!("calibration on {} recordings", several.len()),
+        }
+    }
+
+    fn inputs(&self) -> Vec<InputUse> {
+        InputUse::of_list("/recordings", &self.recordings, InputForm::Displacements)
+    }
+
+    fn check_size(&self, specimens: &[Specimen], max_elements: usize) -> Result<(), FieldError> {
+        let mesh = MeshSize::Factor(self.mesh_factor);
+        specimens.iter().try_for_each(|s| check_mesh(s, mesh, "/mesh_factor", max_elements))
+    }
+
+    fn run(&self, context: &Context) -> Result<Outcome, JobError> {
+        let options = self.options();
+        let (observed, names) = self.observed(context)?;
+        let on_stage = |text: &str| context.progress(&Progress::stage(text));
+        let mesh = |s: &Specimen, factor: f64| MeshOptions::scaled(s, factor);
+        let found = calibrate(&observed, &mesh, &options, &on_stage, &|| context.is_cancelled())
+            .map_err(|e| context.failed(&e))?;
+        let result =
+            CalibrationResult::new(&found, &observed, &names, options.objective, context.input_hash.clone());
+        let mut outcome = Outcome::new("calibration.json", &result, summary::calibration(&result))?;
+        add_fields(&mut outcome, &found, &observed)?;
+        let (pictures, report) = calibration_report(&found, &result, &observed);
+        outcome.add_pictures(pictures);
+        outcome.add("report.html", report.to_html());
+        outcome.add("material.json", result.material.to_json());
+        Ok(outcome)
+    }
+}
+
+/// Per recording and drive what was measured, what the material predicts, and the rest, as images.
+fn add_fields(outcome: &mut Outcome, found: &Calibration, observed: &[Observed]) -> Result<(), JobError> {
+    for (r, recording) in observed.iter().enumerate() {
+        for (s, step) in recording.steps.iter().enumerate() {
+            let model = found.fit.predicted(r, s);
+            let rest: Vec<[f64; 3]> =
+                step.displacement.iter().zip(model).map(|(u, m)| [0, 1, 2].map(|c| u[c] - m[c])).collect();
+            for (what, values) in [("measured", &step.displacement[..]), ("model", model), ("misfit", &rest[..])] {
+                let name = format!("{what}_{}_{}.nii.gz", r + 1, s + 1);
+                let spread = recording.mask.spread(values, [f64::NAN; 3]);
+                outcome.add_written(false, |folder| write_vectors(folder, &name, &recording.mask.grid, &spread))?;
+            }
+        }
+    }
+    Ok(())
+}

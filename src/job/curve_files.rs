@@ -1,0 +1,148 @@
+//! Curves as requests hold them: the text of a CSV file, and how its columns are understood.
+
+use super::JobError;
+use crate::field::FieldError;
+use crate::homogeneous::{CsvCurve, CsvOptions, Curve, CurveFitOptions, HomogeneousTest, StressUnit, read_csv};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// How the columns of a curve's file are understood.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CurveColumns {
+    /// Column of stretch, strain, shear or displacement; by its name where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(max_length = 200)]
+    pub drive_column: Option<String>,
+    /// Column of nominal stress or force; by its name where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(max_length = 200)]
+    pub stress_column: Option<String>,
+    /// Unit of a stress column whose name does not say it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stress_unit: Option<StressUnit>,
+    /// Gauge length in mm, for displacement columns.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub length_mm: Option<f64>,
+    /// Area under the force in mm², for force columns.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-6, maximum = 1e12)]
+    pub area_mm2: Option<f64>,
+}
+
+impl CurveColumns {
+    fn options(&self) -> CsvOptions {
+        CsvOptions {
+            drive_column: self.drive_column.clone(),
+            stress_column: self.stress_column.clone(),
+            stress_unit: self.stress_unit,
+            length_mm: self.length_mm,
+            area_mm2: self.area_mm2,
+        }
+    }
+
+    /// A curve's text as read; `pointer` is that of the text.
+    ///
+    /// # Errors
+    /// The field and what is wrong with its content.
+    pub(super) fn read(&self, csv: &str, test: HomogeneousTest, pointer: &str) -> Result<CsvCurve, FieldError> {
+        read_csv(csv, test, &self.options()).map_err(|e| unfit(pointer, &e))
+    }
+}
+
+/// A curve that cannot be used.
+pub(super) fn unfit(pointer: &str, error: &dyn std::fmt::Display) -> FieldError {
+    FieldError::new(pointer, "a curve that cannot be used", "a table of a drive and a stress").remedy(error.to_string())
+}
+
+/// A test and its curve.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TestCurve {
+    /// The test.
+    pub test: HomogeneousTest,
+    /// Name in results; the test's where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(max_length = 200)]
+    pub name: Option<String>,
+    /// The text of the CSV file.
+    #[schema(min_length = 1, max_length = 50000000)]
+    pub csv: String,
+    /// Predict it instead of fitting it.
+    #[serde(default)]
+    pub is_kept_back: bool,
+}
+
+/// Refuses columns whose unit is not that of a stretch and a stress.
+pub(super) fn needs_stress_and_stretch(csv: &CsvCurve, pointer: &str) -> Result<(), FieldError> {
+    if csv.is_displacement {
+        return Err(unfit(pointer, &"the drive is a displacement; give length_mm, or a column of stretch or strain"));
+    }
+    if csv.is_force {
+        return Err(unfit(pointer, &"the stress is a force; give area_mm2, or a column of nominal stress"));
+    }
+    Ok(())
+}
+
+impl TestCurve {
+    /// The curve of stretch and stress; `pointer` is that of this entry.
+    ///
+    /// # Errors
+    /// The field and what is wrong with its content.
+    pub(super) fn curve(&self, columns: &CurveColumns, pointer: &str) -> Result<Curve, FieldError> {
+        let pointer = format!("{pointer}/csv");
+        let csv = columns.read(&self.csv, self.test, &pointer)?;
+        needs_stress_and_stretch(&csv, &pointer)?;
+        Curve::new(self.test.name(), self.test, &csv.drive, &csv.stress).map_err(|e| unfit(&pointer, &e))
+    }
+}
+
+/// Settings of fits to curves.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CurveFitSettings {
+    /// Fits with one to this many Ogden terms.
+    #[serde(default = "max_terms")]
+    #[schema(minimum = 1, maximum = 4, default = max_terms)]
+    pub max_terms: usize,
+    /// Bulk modulus in kPa, held; the incompressible limit where it is left out, since homogeneous tests do not determine it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-6, maximum = 1e12)]
+    pub bulk_kpa: Option<f64>,
+    /// Smallest distance of two exponents.
+    #[serde(default = "min_alpha_gap")]
+    #[schema(minimum = 0.0, maximum = 40.0, default = min_alpha_gap)]
+    pub min_alpha_gap: f64,
+}
+
+fn max_terms() -> usize {
+    CurveFitOptions::default().max_terms
+}
+
+fn min_alpha_gap() -> f64 {
+    CurveFitOptions::default().min_alpha_gap
+}
+
+impl Default for CurveFitSettings {
+    fn default() -> Self {
+        CurveFitSettings { max_terms: max_terms(), bulk_kpa: None, min_alpha_gap: min_alpha_gap() }
+    }
+}
+
+impl CurveFitSettings {
+    pub(super) fn options(&self, neo_hookean: bool) -> CurveFitOptions {
+        CurveFitOptions {
+            max_terms: self.max_terms,
+            neo_hookean,
+            bulk_kpa: self.bulk_kpa,
+            min_alpha_gap: self.min_alpha_gap,
+            ..CurveFitOptions::default()
+        }
+    }
+}
+
+/// A fit that failed: its curves are what can be changed.
+pub(super) fn fit_failed(error: &dyn std::fmt::Display) -> JobError {
+    JobError::NoSolution(error.to_string())
+}

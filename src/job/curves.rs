@@ -1,0 +1,116 @@
+//! Curves: joint fits to homogeneous tests, and the prediction of a test kept back.
+
+use super::curve_files::{CurveColumns, CurveFitSettings, TestCurve, fit_failed};
+use super::{Context, JobError, Outcome, Request, Run, summary};
+use crate::field::FieldError;
+use crate::homogeneous::{
+    Curve, CurveFit, CurveFitSequence, CurveMatch, CurveParameter, Interval, fit_curves, matches_of,
+};
+use crate::provenance::VERSION;
+use crate::report::fit_picture;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// Body of a joint fit.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CurvesRequest {
+    /// Tests and their curves.
+    #[schema(min_items = 1, max_items = 64)]
+    pub curves: Vec<TestCurve>,
+    /// Hold one term neo-Hookean (alpha = 2).
+    #[serde(default)]
+    pub has_neo_hookean_term: bool,
+    /// Print and predict with exactly `fit.max_terms` terms instead of the number that BIC takes.
+    #[serde(default)]
+    pub is_exact: bool,
+    /// How columns are understood.
+    #[serde(default)]
+    pub columns: CurveColumns,
+    /// Settings of the fits.
+    #[serde(default)]
+    pub fit: CurveFitSettings,
+}
+
+/// Result (`curves/1`): the fields of `calibration/1` for the fit that is used, and all fits.
+#[derive(Serialize)]
+struct CurvesResult<'a> {
+    schema: &'static str,
+    version: &'static str,
+    input_hash: &'a str,
+    num_terms: usize,
+    parameters: &'a [CurveParameter],
+    initial_shear_modulus_kpa: Interval,
+    chi2_per_datum: f64,
+    fits: &'a CurveFitSequence,
+    kept_back: Vec<CurveMatch>,
+}
+
+struct CheckedCurves {
+    request: CurvesRequest,
+    fitted: Vec<Curve>,
+    kept_back: Vec<Curve>,
+}
+
+impl Request for CurvesRequest {
+    const COMMAND: &'static str = "curves";
+    const COLLECTION: &'static str = "curve-fits";
+    const ABOUT: &'static str = "Ogden terms fitted to curves of several homogeneous tests together.";
+
+    fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
+        let (mut fitted, mut kept_back, mut errors) = (Vec::new(), Vec::new(), Vec::new());
+        for (index, entry) in self.curves.iter().enumerate() {
+            match entry.curve(&self.columns, &format!("/curves/{index}")) {
+                Ok(curve) if entry.is_kept_back => kept_back.push(curve),
+                Ok(curve) => fitted.push(curve),
+                Err(error) => errors.push(error),
+            }
+        }
+        if errors.is_empty() && fitted.is_empty() {
+            errors.push(FieldError::new("/curves", "all kept back", "at least one curve that is fitted"));
+        }
+        if errors.is_empty() { Ok(Box::new(CheckedCurves { request: self, fitted, kept_back })) } else { Err(errors) }
+    }
+}
+
+impl Run for CheckedCurves {
+    fn title(&self) -> String {
+        format!("fit of {} curves", self.fitted.len())
+    }
+
+    fn run(&self, context: &Context) -> Result<Outcome, JobError> {
+        let settings = &self.request.fit;
+        let mut options = settings.options(self.request.has_neo_hookean_term);
+        options.also_stable_at = self.kept_back.iter().flat_map(|c| c.states.iter().copied()).collect();
+        context.step("fit", 0, 1);
+        let sequence = fit_curves(&self.fitted, &options).map_err(|e| fit_failed(&e))?;
+        let used = if self.request.is_exact {
+            let wanted = |f: &&CurveFit| f.num_terms == settings.max_terms;
+            let missing = || fit_failed(&format!("no stable material with {} terms was found", settings.max_terms));
+            sequence.fits.iter().find(wanted).ok_or_else(missing)?
+        } else {
+            sequence.chosen()
+        };
+        let predicted = matches_of(&used.terms(), used.bulk_kpa, &self.kept_back)
+            .ok_or_else(|| fit_failed(&"the fitted material has no response in a state kept back"))?;
+        let result = CurvesResult {
+            schema: "curves/1",
+            version: VERSION,
+            input_hash: &context.input_hash,
+            num_terms: used.num_terms,
+            parameters: &used.parameters,
+            initial_shear_modulus_kpa: used.initial_shear_modulus_kpa,
+            chi2_per_datum: used.chi2_per_datum,
+            fits: &sequence,
+            kept_back: predicted,
+        };
+        let text = summary::curves(&sequence, used, &result.kept_back);
+        let mut outcome = Outcome::new("curves.json", &result, text)?;
+        let all: Vec<(&Curve, bool)> =
+            self.fitted.iter().map(|c| (c, false)).chain(self.kept_back.iter().map(|c| (c, true))).collect();
+        let mut fits: Vec<&CurveFit> = vec![used];
+        fits.extend(sequence.fits.iter().filter(|f| f.num_terms != used.num_terms));
+        outcome.add("curves.svg", fit_picture("Curves: the fit (full) and the others (dashed)", &all, &fits));
+        Ok(outcome)
+    }
+}

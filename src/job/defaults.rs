@@ -1,0 +1,63 @@
+//! The material, mesh and scan that are taken where a request leaves them out.
+
+use crate::material::Ogden;
+use crate::sensitivity::{PartialVoxels, ScanSettings};
+use crate::specimen::Specimen;
+
+/// Ecoflex 00-20 as calibrated in the paper: κ 2173 kPa, μ₁ 17.0 kPa, α₁ 1.91.
+pub fn ecoflex() -> Ogden {
+    shipped(Ogden::from_json(include_str!("../../geometries/materials/ecoflex-0020.json")))
+}
+
+/// The published two-hole double-lap shear specimen.
+pub fn two_hole_shear() -> Specimen {
+    shipped(Specimen::from_json(include_str!("../../geometries/two-hole-shear.json")))
+}
+
+/// The ISO 37 type 4 dumb-bell.
+pub fn dumbbell() -> Specimen {
+    shipped(Specimen::from_json(include_str!("../../geometries/iso37-type4.json")))
+}
+
+/// The paper's voxels, 1 × 0.1875 × 0.75 mm; 0.05 mm and 0.02 N noise.
+pub fn scan() -> ScanSettings {
+    ScanSettings {
+        voxel_mm: voxel_mm(),
+        noise_sd_mm: [0.05; 3],
+        force_sd_n: force_sd_n(),
+        partial_voxels: PartialVoxels::default(),
+    }
+}
+
+/// Edges of the paper's voxels, mm.
+pub fn voxel_mm() -> [f64; 3] {
+    [1.0, 0.1875, 0.75]
+}
+
+/// Standard deviation of a load cell's mean, N.
+pub fn force_sd_n() -> f64 {
+    0.02
+}
+
+/// Yes.
+pub fn yes() -> bool {
+    true
+}
+
+/// A file that is part of the program; a test reads them all.
+fn shipped<T, E: std::fmt::Display>(read: Result<T, E>) -> T {
+    match read {
+        Ok(value) => value,
+        Err(error) => unreachable!("a shipped file is damaged: {error}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn shipped_files_can_be_read() {
+        assert_eq!(super::ecoflex().terms.len(), 1);
+        assert_eq!(super::two_hole_shear().holes.len(), 2);
+        assert!(super::dumbbell().holes.is_empty());
+    }
+}

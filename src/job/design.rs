@@ -1,0 +1,174 @@
+//! Design: the best specimen under the limits of a study, with the evidence.
+
+use super::design_pictures::pictures;
+use super::subject::{add_drawings, check_count, unmeshable};
+use super::{Context, JobError, Outcome, Progress, Request, Run, summary};
+use crate::calibration::{ParameterSpread, VerifyOptions, verify_in_full};
+use crate::design::{
+    Checkpoint, CheckpointError, DesignResult, MaterialVerification, SearchError, Study, Unfinished,
+    VerificationSettings, search, study_hash,
+};
+use crate::field::FieldError;
+use crate::material::Ogden;
+use crate::mesh::{MeshOptions, mesh_specimen};
+use crate::provenance::input_hash;
+use crate::report::design_report;
+use crate::specimen::Specimen;
+use serde_json::{Value, json};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Most evaluations that a study may ask for.
+const MAX_EVALUATIONS: usize = 20_000;
+
+impl Request for Study {
+    const COMMAND: &'static str = "design";
+    const COLLECTION: &'static str = "designs";
+    const ABOUT: &'static str = "The best specimen under the limits of a study, with the evidence.";
+
+    fn read(value: &Value) -> Result<Study, Vec<FieldError>> {
+        Study::from_request(value)
+    }
+
+    fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
+        let mut errors = Vec::new();
+        let budget = self.budget;
+        let evaluations = budget
+            .refine
+            .saturating_mul(budget.iterations)
+            .saturating_add(budget.explore)
+            .saturating_add(budget.confirm)
+            .saturating_mul(self.materials.len());
+        if evaluations > MAX_EVALUATIONS {
+            let found = format!("a budget of about {evaluations} evaluations");
+            errors.push(FieldError::new("/budget", found, format!("at most {MAX_EVALUATIONS}")));
+        }
+        if errors.is_empty() { Ok(Box::new(CheckedStudy(self))) } else { Err(errors) }
+    }
+}
+
+struct CheckedStudy(Study);
+
+/// What a specimen's verification gives: the spreads, and why a fit failed where one did.
+type Verified = (Vec<ParameterSpread>, Option<String>);
+
+impl Run for CheckedStudy {
+    fn title(&self) -> String {
+        self.0.name.clone()
+    }
+
+    fn check_size(&self, _: &[Specimen], max_elements: usize) -> Result<(), FieldError> {
+        let base = &self.0.base;
+        let fine = mesh_specimen(base, &MeshOptions::fine(base))
+            .map_err(|e| unmeshable("/base", &e))?;
+        check_count(fine.num_elements(), "/base", max_elements)
+    }
+
+    fn run(&self, context: &Context) -> Result<Outcome, JobError> {
+        let study = &self.0;
+        let checkpoint = self.checkpoint(context)?;
+        if checkpoint.num_resumed() > 0 {
+            let text = format!("resuming: {} evaluations taken from the checkpoint", checkpoint.num_resumed());
+            context.progress(&Progress::stage(&text));
+        }
+        let show = |p: &crate::design::Progress| {
+            context.progress(&Progress { best: p.best, ..Progress::new(p.stage, p.done, p.total) });
+        };
+        let found = search(study, &checkpoint, &show, &|| context.is_cancelled()).map_err(|e| match e {
+            SearchError::Stopped { unfinished } => stopped(&unfinished),
+            other => context.failed(&other),
+        })?;
+        let mut result = DesignResult::new(study, &found)
+            .ok_or_else(|| JobError::NoSolution("nothing was confirmed; widen the limits".into()))?;
+        if study.verification.is_on {
+            match self.verified(&result, &checkpoint, context) {
+                Some(verified) => result.add_verification(verified),
+                None => return Err(stopped(&found.unfinished(study, "verify"))),
+            }
+        }
+        if let Some(message) = checkpoint.write_failure() {
+            let text = format!("the checkpoint could not be written to the end ({message}); the result is complete");
+            context.progress(&Progress::stage(&text));
+        }
+        let mut outcome = Outcome::new("design.json", &result, summary::design(&result))?;
+        let pictures = pictures(study, &result, &mut outcome)?;
+        outcome.add("report.html", design_report(&result, &pictures));
+        let mut best = result.best.specimen.clone();
+        best.name = format!("{} (designed for: {})", best.name, result.name).chars().take(200).collect();
+        add_drawings(&mut outcome, &best, "best-specimen")?;
+        Ok(outcome)
+    }
+}
+
+/// A search that was stopped, with what it had found.
+fn stopped(unfinished: &Unfinished) -> JobError {
+    let mut kept = Outcome::new("unfinished-design.json", unfinished, unfinished.summary()).ok();
+    if let (Some(kept), Some(best)) = (kept.as_mut(), &unfinished.best) {
+        let mut specimen = best.specimen.clone();
+        specimen.name = format!("{} (unfinished search for: {})", specimen.name, unfinished.name);
+        kept.add("unfinished-best-specimen.json", specimen.to_json());
+    }
+    JobError::Stopped { summary: unfinished.summary(), unfinished: kept.map(Box::new) }
+}
+
+impl CheckedStudy {
+    /// What earlier runs of this search found.
+    fn checkpoint(&self, context: &Context) -> Result<Checkpoint, JobError> {
+        let Some(path) = context.surroundings.checkpoint("checkpoint.jsonl") else {
+            return Ok(Checkpoint::in_memory());
+        };
+        // The search does not depend on the verification: a search without it can be verified later.
+        let searched = Study { verification: VerificationSettings::default(), ..self.0.clone() };
+        Checkpoint::open(&path, &study_hash(&searched)).map_err(|e| match e {
+            CheckpointError::Io { .. } => JobError::Internal(e.to_string()),
+            other => JobError::Checkpoint(other.to_string()),
+        })
+    }
+
+    /// Best and base with every material, `None` where it was stopped. What is done is kept in the checkpoint. A specimen that
+    /// cannot be verified is a finding, not a failed job.
+    fn verified(
+        &self,
+        result: &DesignResult,
+        checkpoint: &Checkpoint,
+        context: &Context,
+    ) -> Option<Vec<MaterialVerification>> {
+        let study = &self.0;
+        let draws = study.verification.draws;
+        let total = 2 * study.materials.len() * draws;
+        let done = AtomicUsize::new(0);
+        let is_cancelled = || context.is_cancelled();
+        let of = |specimen: &Specimen, material: &Ogden| -> Option<Verified> {
+            let options = VerifyOptions::new(specimen, draws, study.seed);
+            let before = done.load(Ordering::Relaxed);
+            let on_draw = || {
+                let count = done.fetch_add(1, Ordering::Relaxed) + 1;
+                let best = Some(result.best.objective);
+                context.progress(&Progress { best, ..Progress::new("verify", count, total) });
+            };
+            let key = input_hash(&json!({
+                "specimen": specimen, "material": material, "kind": "verification", "truth_mesh": options.truth_mesh,
+                "fit_mesh": options.fit_mesh, "max_iterations": options.fit.max_iterations,
+            }));
+            let verified = checkpoint.get_or(&key, || {
+                match verify_in_full(specimen, material, &study.scan, &options, &on_draw, &is_cancelled) {
+                    Ok(found) => {
+                        let reason = found.fits.iter().find_map(|fit| fit.as_ref().err().map(ToString::to_string));
+                        Some((found.spreads, reason))
+                    }
+                    Err(_) if context.is_cancelled() => None,
+                    Err(error) => Some((Vec::new(), Some(error.to_string()))),
+                }
+            });
+            done.store(before + draws, Ordering::Relaxed);
+            verified
+        };
+        let mut verified = Vec::new();
+        for prior in &study.materials {
+            let (best, best_failure) = of(&result.best.specimen, &prior.material)?;
+            let (base, base_failure) = of(&result.base.specimen, &prior.material)?;
+            let material = prior.name.clone();
+            verified.push(MaterialVerification { material, best, base, best_failure, base_failure });
+        }
+        Some(verified)
+    }
+}

@@ -1,0 +1,170 @@
+//! Evaluate: what a scan of a specimen would see and what it would tell about the material.
+
+use super::subject::{add_drawings, check_mesh, driven, model_of};
+use super::{Context, JobError, Outcome, Request, Run, defaults, summary};
+use crate::field::FieldError;
+use crate::material::Ogden;
+use crate::mesh::MeshSize;
+use crate::report::{bar_pictures, histogram_picture, map_pictures, surface_json, vtu_of};
+use crate::sensitivity::{DriveSelection, EvaluationError, EvaluationOptions, ScanSettings, evaluate_model};
+use crate::specimen::Specimen;
+use crate::voxel::VoxelGrid;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// Most voxels of a scan: a voxel has several sample points, and more would not fit into a few gigabytes.
+const MAX_VOXELS: usize = 2_000_000;
+
+/// Body of an evaluation.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EvaluationRequest {
+    /// The specimen (`specimen/1`).
+    pub specimen: Specimen,
+    /// The material (`ogden/1`); Ecoflex 00-20 where it is left out.
+    #[serde(default = "defaults::ecoflex")]
+    pub material: Ogden,
+    /// The scan; 1 × 0.1875 × 0.75 mm voxels, 0.05 mm and 0.02 N noise where it is left out.
+    #[serde(default = "defaults::scan")]
+    #[schema(default = defaults::scan)]
+    pub scan: ScanSettings,
+    /// Drives in mm instead of the specimen's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(min_items = 1, max_items = 1000)]
+    pub drive_mm: Option<Vec<f64>>,
+    /// Evaluate at the drive that reaches this median stretch instead of at given drives.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(exclusive_minimum = 1.0, maximum = 5.0)]
+    pub median_stretch: Option<f64>,
+    /// Element size.
+    #[serde(default)]
+    #[schema(default = MeshSize::default)]
+    pub mesh: MeshSize,
+    /// Mesh the whole specimen even where it has mirror planes.
+    #[serde(default)]
+    pub is_whole: bool,
+    /// Whether pictures, fields and drawings are made; without them there are numbers alone.
+    #[serde(default = "defaults::yes")]
+    #[schema(default = defaults::yes)]
+    pub has_files: bool,
+}
+
+/// A checked evaluation.
+pub(super) struct CheckedEvaluation {
+    request: EvaluationRequest,
+    drives: DriveSelection,
+}
+
+impl EvaluationRequest {
+    /// Everything that is wrong with it beyond the limits of single fields, and the drives that it asks for.
+    pub(super) fn checked(self) -> Result<CheckedEvaluation, Vec<FieldError>> {
+        let mut errors: Vec<FieldError> = Vec::new();
+        driven(&self.specimen, self.drive_mm.as_ref(), &mut errors);
+        errors.extend(self.material.field_errors().into_iter().map(|e| e.below("/material")));
+        errors.extend(self.scan.field_errors().into_iter().map(|e| e.below("/scan")));
+        if let (Some(stretch), Some(_)) = (self.median_stretch, &self.drive_mm) {
+            let error = FieldError::new("/median_stretch", stretch, "left out where drive_mm is given");
+            errors.push(error.remedy("give one of the two"));
+        }
+        if errors.is_empty()
+            && let Err(error) = check_grid(&self.specimen, &self.scan)
+        {
+            errors.push(error);
+        }
+        if !errors.is_empty() {
+            return Err(errors);
+        }
+        let drives = match (self.median_stretch, &self.drive_mm) {
+            (Some(target), _) => DriveSelection::MedianStretch(target),
+            (None, Some(drives)) => DriveSelection::DriveMm(drives.clone()),
+            (None, None) => DriveSelection::DriveMm(self.specimen.drive_mm.clone()),
+        };
+        Ok(CheckedEvaluation { request: self, drives })
+    }
+}
+
+/// Whether the scan's grid can be held in memory.
+fn check_grid(specimen: &Specimen, scan: &ScanSettings) -> Result<(), FieldError> {
+    let grid = VoxelGrid::covering(specimen, scan.voxel_mm)
+        .map_err(|e| FieldError::new("/scan/voxel_mm", format!("{:?}", scan.voxel_mm), "usable").remedy(e.to_string()))?;
+    if grid.num_voxels() <= MAX_VOXELS {
+        return Ok(());
+    }
+    let found = format!("{:?}, which makes {} voxels", scan.voxel_mm, grid.num_voxels());
+    let allowed = format!("large enough for at most {MAX_VOXELS} voxels");
+    Err(FieldError::new("/scan/voxel_mm", found, allowed))
+}
+
+impl Request for EvaluationRequest {
+    const COMMAND: &'static str = "evaluate";
+    const COLLECTION: &'static str = "evaluations";
+    const ABOUT: &'static str = "What a scan of a specimen would see, and what it would tell about the material.";
+
+    fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
+        Ok(Box::new(self.checked()?))
+    }
+}
+
+impl CheckedEvaluation {
+    fn options(&self) -> EvaluationOptions {
+        let specimen = &self.request.specimen;
+        let mut mesh = self.request.mesh.options(specimen);
+        mesh.use_mirror &= !self.request.is_whole;
+        EvaluationOptions { mesh, ..EvaluationOptions::standard(specimen) }
+    }
+}
+
+impl Run for CheckedEvaluation {
+    fn title(&self) -> String {
+        self.request.specimen.name.clone()
+    }
+
+    fn check_size(&self, _: &[Specimen], max_elements: usize) -> Result<(), FieldError> {
+        check_mesh(&self.request.specimen, self.request.mesh, "/mesh", max_elements)
+    }
+
+    fn equal_work(&self) -> Option<(serde_json::Value, bool)> {
+        let r = &self.request;
+        let content = serde_json::json!({
+            "specimen": r.specimen, "material": r.material, "scan": r.scan, "drives": self.drives,
+            "mesh": self.options().mesh,
+        });
+        Some((content, !r.has_files))
+    }
+
+    fn run(&self, context: &Context) -> Result<Outcome, JobError> {
+        let EvaluationRequest { specimen, material, scan, .. } = &self.request;
+        context.step("solve", 0, 2);
+        let options = self.options();
+        let mut model = model_of(specimen, &options.mesh, context)?;
+        let cancelled = || context.is_cancelled();
+        let (evaluation, maps) =
+            evaluate_model(&mut model, specimen, material, scan, &self.drives, &options, &cancelled)
+                .map_err(|e| match e {
+                    EvaluationError::Solve(_) | EvaluationError::MedianStretchNotReached { .. } => context.failed(&e),
+                    other => FieldError::new("", "an evaluation that cannot be made", "one that can")
+                        .remedy(other.to_string())
+                        .into(),
+                })?;
+        let text = summary::evaluation(&specimen.name, &evaluation);
+        let mut outcome = Outcome::new("evaluation.json", &evaluation, text)?;
+        if !self.request.has_files {
+            return Ok(outcome);
+        }
+        context.step("pictures", 1, 2);
+        let panels: Vec<_> = maps
+            .drives
+            .iter()
+            .enumerate()
+            .map(|(index, d)| (format!("drive {:.2} mm", d.drive_mm), &maps, index))
+            .collect();
+        outcome.add("histogram.svg", histogram_picture(&panels));
+        outcome.add_pictures(map_pictures(&maps).into_iter().chain(bar_pictures(&evaluation)));
+        if let Some(state) = maps.equilibria.last() {
+            outcome.add("solution.vtu", vtu_of(&model, material, state).map_err(|e| context.failed(&e))?);
+            outcome.add("surface.json", surface_json(&model, material, state).map_err(|e| context.failed(&e))?);
+        }
+        add_drawings(&mut outcome, specimen, "specimen")?;
+        Ok(outcome)
+    }
+}

@@ -1,0 +1,330 @@
+//! Import: raw phases, MATLAB files and point clouds become a recording of displacements.
+
+use super::outcome::{WithRecording, recording_identifier, to_json};
+use super::request::{InputForm, InputUse};
+use super::{Context, JobError, Outcome, Request, Run, summary};
+use crate::acquisition::unwrap::{Method, UnwrapOptions};
+use crate::acquisition::{Anchor, ReconstructOptions, StepReport, reconstruct};
+use crate::field::FieldError;
+use crate::provenance::VERSION;
+use crate::recording::{
+    Filter, ImportOptions, LoadCurve, ReadLimits, Recording, mat, read_points, recording_from_mat,
+    recording_from_points, write_vectors,
+};
+use crate::report::displacement_picture;
+use crate::specimen::Specimen;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use utoipa::ToSchema;
+
+/// Unit of length of a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LengthUnit {
+    /// Millimetres.
+    #[default]
+    Mm,
+    /// Metres.
+    M,
+    /// Micrometres.
+    Um,
+}
+
+impl LengthUnit {
+    fn in_mm(self) -> f64 {
+        match self {
+            LengthUnit::Mm => 1.0,
+            LengthUnit::M => 1e3,
+            LengthUnit::Um => 1e-3,
+        }
+    }
+}
+
+/// What the files hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FileForm {
+    /// MATLAB arrays.
+    Matlab,
+    /// Point clouds as CSV, one file per drive.
+    Points,
+}
+
+/// Body of an import: a `recording` of raw phases, or `files`.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ImportRequest {
+    /// A recording of raw phases.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recording: Option<String>,
+    /// MATLAB files, or point clouds (one per drive), in place of a recording.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 1000)]
+    pub files: Vec<String>,
+    /// What the files hold.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub form: Option<FileForm>,
+    /// Name of the recording that is made from files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(max_length = 200)]
+    pub name: Option<String>,
+    /// The specimen (specimen/1); needed for files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub specimen: Option<Specimen>,
+    /// Drives in mm, one per step.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 1000)]
+    pub drive_mm: Vec<f64>,
+    /// The files' unit of length.
+    #[serde(default)]
+    #[schema(default = LengthUnit::default)]
+    pub unit: LengthUnit,
+    /// Axes along the indices of MATLAB arrays, such as y,z,x or -y,z,-x.
+    #[serde(default = "axes")]
+    #[schema(max_length = 16, default = axes)]
+    pub axes: String,
+    /// Voxel size in mm: along the indices of MATLAB arrays, or x,y,z to average points in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(min_items = 3, max_items = 3)]
+    pub voxel_mm: Option<[f64; 3]>,
+    /// Which of several separate regions of the mask, counted along the thickness from 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1, maximum = 1000)]
+    pub region: Option<usize>,
+    /// Filter: applied to raw phases after unwrapping; for files the one that they went through.
+    #[serde(default)]
+    #[schema(default = Filter::default)]
+    pub filter: Filter,
+    /// Noise of the displacement in mm, where known, of files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(min_items = 3, max_items = 3)]
+    pub noise_sd_mm: Option<[f64; 3]>,
+    /// Loading history: the text of a CSV file with the columns time_s, drive_mm, force_n.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(max_length = 50000000)]
+    pub load_csv: Option<String>,
+    /// How phases are unwrapped.
+    #[serde(default)]
+    #[schema(default = Method::default)]
+    pub method: Method,
+    /// Leave out voxels for which a second method finds another multiple of 2π.
+    #[serde(default = "super::defaults::yes")]
+    #[schema(default = super::defaults::yes)]
+    pub needs_agreement: bool,
+    /// Zero of the phase: phase zero is no displacement, take off what the fixed plate shows, or nothing.
+    #[serde(default)]
+    #[schema(default = Anchor::default)]
+    pub anchor: Anchor,
+}
+
+fn axes() -> String {
+    "y,z,x".into()
+}
+
+/// The result of an import (`import/1`).
+#[derive(Serialize)]
+pub(super) struct ImportResult {
+    schema: &'static str,
+    version: &'static str,
+    input_hash: String,
+    pub id: String,
+    pub num_voxels: usize,
+    pub noise_sd_mm: Option<[f64; 3]>,
+    pub steps: Vec<ImportStep>,
+}
+
+/// One drive of an import.
+#[derive(Serialize)]
+pub(super) struct ImportStep {
+    pub drive_mm: f64,
+    pub num_complete: usize,
+    pub reconstruction: Option<StepReport>,
+}
+
+/// A recording, the standard deviations of its voxels, and how its phases were unwrapped.
+type Imported = (Recording, Vec<Vec<[f64; 3]>>, Vec<StepReport>);
+
+struct CheckedImport {
+    request: ImportRequest,
+    load: Option<LoadCurve>,
+}
+
+impl ImportRequest {
+    /// What files need and recordings must not have, and the other way round.
+    fn check_forms(&self, errors: &mut Vec<FieldError>) {
+        let is_of_files = !self.files.is_empty();
+        if self.recording.is_some() == is_of_files {
+            let error = FieldError::new("/recording", "neither alone nor left out", "given, or files in its place");
+            errors.push(error.remedy("give one of the two"));
+        }
+        if is_of_files && self.specimen.is_none() {
+            let error = FieldError::new("/specimen", "", "given");
+            errors.push(error.remedy("the files do not say what was scanned"));
+        }
+        if is_of_files && self.form.is_none() {
+            errors.push(FieldError::new("/form", "", "given with files"));
+        }
+        for error in self.specimen.iter().flat_map(Specimen::field_errors) {
+            errors.push(error.below("/specimen"));
+        }
+        if ImportOptions::parse_axes(&self.axes).is_none() {
+            let allowed = "x, y and z once each, such as y,z,x or -y,z,-x";
+            errors.push(FieldError::new("/axes", format!("{:?}", self.axes), allowed));
+        }
+        for (name, values) in [("voxel_mm", self.voxel_mm), ("noise_sd_mm", self.noise_sd_mm)] {
+            for (axis, value) in values.into_iter().flatten().enumerate() {
+                if !(value > 0.0 && value <= 1e6) {
+                    errors.push(FieldError::new(format!("/{name}/{axis}"), value, "above 0 and at most 1000000"));
+                }
+            }
+        }
+    }
+
+    fn import_options(&self) -> Option<ImportOptions> {
+        Some(ImportOptions {
+            id: self.name.clone().unwrap_or_else(|| "imported".into()),
+            unit_mm: self.unit.in_mm(),
+            axes: ImportOptions::parse_axes(&self.axes)?,
+            voxel_mm_by_index: self.voxel_mm,
+            region: self.region,
+            drive_mm: self.drive_mm.clone(),
+            filter: self.filter,
+            noise_sd_mm: self.noise_sd_mm,
+        })
+    }
+}
+
+impl Request for ImportRequest {
+    const COMMAND: &'static str = "import";
+    const COLLECTION: &'static str = "imports";
+    const ABOUT: &'static str = "Raw phases, MATLAB files or point clouds as a recording of displacements.";
+
+    fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
+        let mut errors = Vec::new();
+        self.check_forms(&mut errors);
+        let mut load = None;
+        if let Some(text) = &self.load_csv {
+            match LoadCurve::from_csv(text, Path::new("load_csv")) {
+                Ok(curve) => load = Some(curve),
+                Err(error) => {
+                    let unfit = FieldError::new("/load_csv", "a table that cannot be read", "a loading history");
+                    errors.push(unfit.remedy(error.to_string()));
+                }
+            }
+        }
+        if errors.is_empty() { Ok(Box::new(CheckedImport { request: self, load })) } else { Err(errors) }
+    }
+}
+
+/// A file that cannot be used.
+fn unfit(pointer: &str, path: &Path, error: &dyn std::fmt::Display) -> JobError {
+    FieldError::new(pointer, path.display(), "a file that can be read").remedy(error.to_string()).into()
+}
+
+impl CheckedImport {
+    fn from_phases(&self, context: &Context) -> Result<Imported, JobError> {
+        let mut raw = context
+            .raw_recordings
+            .first()
+            .cloned()
+            .ok_or_else(|| JobError::Internal("the raw recording was not read".into()))?;
+        if let Some(specimen) = &self.request.specimen {
+            raw.specimen.clone_from(specimen);
+        }
+        let unwrap = UnwrapOptions {
+            method: self.request.method,
+            needs_agreement: self.request.needs_agreement,
+            ..UnwrapOptions::default()
+        };
+        let settings = ReconstructOptions { unwrap, anchor: self.request.anchor, filter: self.request.filter };
+        let found = reconstruct(&raw, &settings).map_err(|e| context.failed(&e))?;
+        Ok((found.recording, found.sd_mm, found.steps))
+    }
+
+    fn from_files(&self, files: &[PathBuf]) -> Result<Recording, JobError> {
+        let missing = || JobError::Internal("a checked import has a specimen and a form".into());
+        let specimen = self.request.specimen.as_ref().ok_or_else(missing)?;
+        let options = self.request.import_options().ok_or_else(missing)?;
+        let limits = ReadLimits::default();
+        let first = files.first().ok_or_else(missing)?;
+        match self.request.form.ok_or_else(missing)? {
+            FileForm::Matlab => {
+                // Positions and masks may lie in files of their own.
+                let mut variables = Vec::new();
+                for (index, path) in files.iter().enumerate() {
+                    let found = mat::read_mat(path, limits.max_values)
+                        .map_err(|e| unfit(&format!("/files/{index}"), path, &e))?;
+                    variables.extend(found);
+                }
+                recording_from_mat(&variables, specimen, &options).map_err(|e| unfit("/files", first, &e))
+            }
+            FileForm::Points => {
+                let max_points = usize::try_from(limits.max_values / 8).unwrap_or(usize::MAX);
+                let mut steps = Vec::new();
+                for (index, path) in files.iter().enumerate() {
+                    let fail = |e: &dyn std::fmt::Display| unfit(&format!("/files/{index}"), path, e);
+                    let bytes = crate::file::read_limited(path, limits.max_file_bytes).map_err(|e| fail(&e))?;
+                    let text = String::from_utf8(bytes).map_err(|e| fail(&e))?;
+                    steps.push(read_points(&text, path, max_points).map_err(|e| fail(&e))?);
+                }
+                let voxel = options.voxel_mm_by_index;
+                recording_from_points(&steps, specimen, voxel, &options).map_err(|e| unfit("/files", first, &e))
+            }
+        }
+    }
+}
+
+impl Run for CheckedImport {
+    fn title(&self) -> String {
+        let named = self.request.name.as_ref().or(self.request.recording.as_ref());
+        named.map_or_else(|| "import".into(), |name| format!("import of {name}"))
+    }
+
+    fn inputs(&self) -> Vec<InputUse> {
+        match &self.request.recording {
+            Some(name) => {
+                vec![InputUse { pointer: "/recording".into(), name: name.clone(), form: InputForm::RawPhases }]
+            }
+            None => InputUse::of_list("/files", &self.request.files, InputForm::File),
+        }
+    }
+
+    fn run(&self, context: &Context) -> Result<Outcome, JobError> {
+        context.step("import", 0, 1);
+        let (mut recording, sd, reports) = match self.request.recording {
+            Some(_) => self.from_phases(context)?,
+            None => (self.from_files(&context.files)?, Vec::new(), Vec::new()),
+        };
+        if let Some(load) = &self.load {
+            recording.load = Some(load.clone());
+        }
+        let mut reports = reports.into_iter();
+        let is_complete = |u: &&[f64; 3]| u.iter().all(|x| x.is_finite());
+        let steps = recording.steps.iter().map(|s| ImportStep {
+            drive_mm: s.drive_mm,
+            num_complete: s.displacement.iter().filter(is_complete).count(),
+            reconstruction: reports.next(),
+        });
+        let result = ImportResult {
+            schema: "import/1",
+            version: VERSION,
+            input_hash: context.input_hash.clone(),
+            id: recording.id.clone(),
+            num_voxels: recording.num_voxels(),
+            noise_sd_mm: recording.noise_sd_mm,
+            steps: steps.collect(),
+        };
+        let mut outcome = Outcome { summary: summary::import(&result), ..Outcome::default() };
+        outcome.add_written(true, |folder| recording.write(folder))?;
+        let named = WithRecording { result: &result, recording: recording_identifier(&outcome.recording()) };
+        (outcome.result, outcome.result_name) = (to_json(&named)?, "import.json");
+        for (n, sd) in sd.iter().enumerate() {
+            let name = format!("sd_{}.nii.gz", n + 1);
+            outcome.add_written(false, |folder| write_vectors(folder, &name, &recording.grid, sd))?;
+        }
+        for n in 0..recording.steps.len() {
+            outcome.add(format!("displacement_{}.svg", n + 1), displacement_picture(&recording, n));
+        }
+        Ok(outcome)
+    }
+}

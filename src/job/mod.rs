@@ -1,0 +1,49 @@
+//! What the program can be asked to do: one file per kind of job, the same for the command, the service and every other door.
+//!
+//! A *request* says what is wanted (its fields, units, defaults and limits stand once, in its type; the command's options, the
+//! OpenAPI document and the reference in the docs come from there). It is *checked*, which names everything that is wrong
+//! with it at once, and then *run* in *surroundings* that hand it recordings, take its progress, keep its checkpoint and may
+//! cancel it. The *outcome* is a result and files: the command writes them into a folder, the service stores them.
+//!
+//! A new kind of job is one file here, with a type that implements [`Request`], and one line in [`KINDS`].
+
+mod calibrate;
+mod compare;
+mod curve_files;
+mod curves;
+pub mod defaults;
+mod design;
+mod design_pictures;
+mod diagnose;
+mod error;
+mod evaluate;
+mod evaluation_list;
+mod evaluation_table;
+mod import;
+mod kind;
+mod load_curves;
+mod outcome;
+mod paper_tables;
+mod proof;
+mod reference;
+mod request;
+mod scan;
+mod schema;
+mod scratch;
+mod solve;
+mod subject;
+mod summary;
+mod surroundings;
+mod sweep;
+mod uniaxial;
+
+pub use error::{Failure, JobError};
+pub use kind::{Job, KINDS, Kind, Part, kind_of_collection, kind_of_command, kind_of_task};
+pub use evaluate::EvaluationRequest;
+pub use outcome::{File, MediaType, Outcome, recording_identifier};
+pub use reference::reference;
+pub use request::{Context, InputForm, InputUse, Request, Run};
+pub use scratch::ScratchFolder;
+pub use subject::unmeshable;
+pub use schema::{FieldForm, RequestField, check_against, fields_of};
+pub use surroundings::{InputFile, Progress, Surroundings};

@@ -1,0 +1,152 @@
+//! What every kind of request and every checked request can do.
+
+use super::{JobError, Outcome, Part, Progress, Surroundings};
+use crate::field::FieldError;
+use crate::recording::{RawRecording, ReadRecording};
+use crate::specimen::Specimen;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+use std::path::PathBuf;
+use utoipa::ToSchema;
+
+/// A request of one kind: the one definition of its fields, their units, defaults and limits.
+///
+/// Limits of single fields stand in the attributes of the type's schema and are checked from there; [`check`](Self::check)
+/// adds what concerns several fields or their content.
+pub trait Request: Serialize + DeserializeOwned + ToSchema + Send + Sync + 'static {
+    /// Name of the command, such as `calibrate`; also the name of the job's folder of results.
+    const COMMAND: &'static str;
+    /// Name in the service's addresses, such as `calibrations`.
+    const COLLECTION: &'static str;
+    /// What it does, in one sentence.
+    const ABOUT: &'static str;
+
+    /// The request in `value`, whose fields fit the schema.
+    ///
+    /// # Errors
+    /// What does not fit, each with its JSON pointer.
+    fn read(value: &Value) -> Result<Self, Vec<FieldError>> {
+        crate::field::read(value).map_err(|e| vec![e])
+    }
+
+    /// The request, ready to run.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it, each with its JSON pointer.
+    fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>>;
+}
+
+/// What a job reads under a name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum InputForm {
+    /// A recording of displacements.
+    Displacements,
+    /// A recording of wrapped phases.
+    RawPhases,
+    /// A file of a laboratory's own format.
+    File,
+}
+
+/// Something that a request names and the job reads.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct InputUse {
+    /// JSON pointer to the name.
+    pub pointer: String,
+    /// The name: a path for the command, an identifier for the service.
+    pub name: String,
+    /// What is read.
+    pub form: InputForm,
+}
+
+impl InputUse {
+    /// `names`, which stand in a list at `pointer`.
+    pub fn of_list(pointer: &str, names: &[String], form: InputForm) -> Vec<InputUse> {
+        let of = |(index, name): (usize, &String)| InputUse {
+            pointer: format!("{pointer}/{index}"),
+            name: name.clone(),
+            form,
+        };
+        names.iter().enumerate().map(of).collect()
+    }
+}
+
+/// A checked request.
+pub trait Run: Send + Sync {
+    /// What the job is called in lists.
+    fn title(&self) -> String;
+
+    /// What it reads beyond the request.
+    fn inputs(&self) -> Vec<InputUse> {
+        Vec::new()
+    }
+
+    /// Whether its meshes have at most `max_elements` elements; `specimens` are those of its recordings. Meshes once.
+    ///
+    /// # Errors
+    /// The field that decides, with the number of elements.
+    fn check_size(&self, _specimens: &[Specimen], _max_elements: usize) -> Result<(), FieldError> {
+        Ok(())
+    }
+
+    /// What decides the result, where other requests may have the same: its content, and whether the result is numbers alone
+    /// (which those of a request with files answer too). `None` where the request itself is that content.
+    fn equal_work(&self) -> Option<(Value, bool)> {
+        None
+    }
+
+    /// The parts into which the work divides, each for any worker; empty for work that does not divide.
+    fn parts(&self) -> Vec<Part> {
+        Vec::new()
+    }
+
+    /// Does the work.
+    ///
+    /// # Errors
+    /// [`JobError`].
+    fn run(&self, context: &Context) -> Result<Outcome, JobError>;
+
+    /// Puts the results of the [`parts`](Self::parts) together, in their order.
+    ///
+    /// # Errors
+    /// [`JobError`].
+    fn gather(&self, _results: Vec<Result<Value, super::Failure>>) -> Result<Outcome, JobError> {
+        Err(JobError::Internal("this kind of job has no parts".into()))
+    }
+}
+
+/// What a running job has at hand.
+pub struct Context<'a> {
+    /// The door's side.
+    pub surroundings: &'a dyn Surroundings,
+    /// SHA-256 of the kind, the canonical request and the content of every file that the job reads, hexadecimal.
+    pub input_hash: String,
+    /// The recordings of displacements that the request names, in its order.
+    pub recordings: Vec<ReadRecording>,
+    /// The raw recordings that the request names, in its order.
+    pub raw_recordings: Vec<RawRecording>,
+    /// The files that the request names, in its order.
+    pub files: Vec<PathBuf>,
+}
+
+impl Context<'_> {
+    /// Whether to stop.
+    pub fn is_cancelled(&self) -> bool {
+        self.surroundings.is_cancelled()
+    }
+
+    /// Tells how far the job is.
+    pub fn progress(&self, progress: &Progress) {
+        self.surroundings.progress(progress);
+    }
+
+    /// Tells what is done now, of so many steps.
+    pub fn step(&self, stage: &str, done: usize, total: usize) {
+        self.progress(&Progress::new(stage, done, total));
+    }
+
+    /// A failed computation, or a stop where the job was cancelled.
+    pub fn failed(&self, error: &dyn std::fmt::Display) -> JobError {
+        JobError::unless_cancelled(self.is_cancelled(), error)
+    }
+}

@@ -1,0 +1,269 @@
+//! Scan: a synthetic recording of a specimen as the scanner and the load cell would give it.
+
+use super::outcome::{WithRecording, recording_identifier, to_json};
+use super::subject::{check_mesh, driven};
+use super::{Context, JobError, Outcome, Request, Run, defaults, summary};
+use crate::acquisition::{
+    KSpace, LoadProgram, ReconstructOptions, Reconstruction, Scan, ScanOptions, ScanResult, Window, reconstruct, scan,
+};
+use crate::fem::SolveOptions;
+use crate::field::FieldError;
+use crate::material::Ogden;
+use crate::mesh::MeshSize;
+use crate::provenance::VERSION;
+use crate::recording::{Filter, write_vectors};
+use crate::report::{displacement_picture, raw_picture};
+use crate::specimen::Specimen;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use utoipa::ToSchema;
+
+/// Voxels around the specimen from which noise is estimated.
+const MARGIN_VOXELS: usize = 3;
+/// Noise of a full voxel's displacement where none is given, mm.
+const NOISE_SD_MM: [f64; 3] = [0.01; 3];
+/// Most voxels of a scan.
+const MAX_VOXELS: usize = 2_000_000;
+
+/// What is lost of k-space.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct KSpaceRequest {
+    /// Part kept along x, y, z, each above 0 and at most 1.
+    #[serde(default = "all_of_kspace")]
+    #[schema(min_items = 3, max_items = 3, default = all_of_kspace)]
+    pub keep: [f64; 3],
+    /// Weight the kept part with a Hamming window.
+    #[serde(default)]
+    pub is_apodised: bool,
+}
+
+fn all_of_kspace() -> [f64; 3] {
+    [1.0; 3]
+}
+
+/// Body of a scan.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ScanRequest {
+    /// The specimen (`specimen/1`).
+    pub specimen: Specimen,
+    /// The material (`ogden/1`); Ecoflex 00-20 where it is left out.
+    #[serde(default = "defaults::ecoflex")]
+    pub material: Ogden,
+    /// Drives in mm instead of the specimen's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(min_items = 1, max_items = 1000)]
+    pub drive_mm: Option<Vec<f64>>,
+    /// Element size.
+    #[serde(default)]
+    #[schema(default = MeshSize::default)]
+    pub mesh: MeshSize,
+    /// Mesh the whole specimen even where it has mirror planes.
+    #[serde(default)]
+    pub is_whole: bool,
+    /// Name that the recording begins with; the specimen's where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(max_length = 200)]
+    pub name: Option<String>,
+    /// Edges of a voxel, mm.
+    #[serde(default = "defaults::voxel_mm")]
+    #[schema(min_items = 3, max_items = 3, default = defaults::voxel_mm)]
+    pub voxel_mm: [f64; 3],
+    /// Offset of the grid from the specimen's centre in voxels, each from −1 to 1.
+    #[serde(default)]
+    #[schema(min_items = 3, max_items = 3, default = no_offset)]
+    pub offset_voxels: [f64; 3],
+    /// Signal-to-noise ratio of a full voxel along x, y, z; from the noise where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(min_items = 3, max_items = 3)]
+    pub snr: Option<[f64; 3]>,
+    /// Noise of a full voxel's displacement, mm, one standard deviation; 0.01 where neither it nor the ratio is given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(min_items = 3, max_items = 3)]
+    pub noise_sd_mm: Option<[f64; 3]>,
+    /// Displacement per phase, mm/rad: a turn is 2π times this. By default one turn per millimetre.
+    #[serde(default = "mm_per_radian")]
+    #[schema(min_items = 3, max_items = 3, default = mm_per_radian)]
+    pub mm_per_radian: [f64; 3],
+    /// Filter on the displacements.
+    #[serde(default)]
+    #[schema(default = Filter::default)]
+    pub filter: Filter,
+    /// What is lost of k-space; nothing where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kspace: Option<KSpaceRequest>,
+    /// Noise of the load cell's mean (slow drift), N, one standard deviation.
+    #[serde(default = "defaults::force_sd_n")]
+    #[schema(minimum = 0.0, maximum = 1e9, default = defaults::force_sd_n)]
+    pub force_sd_n: f64,
+    /// Leave wrapped phases and magnitudes instead of displacements.
+    #[serde(default)]
+    pub is_raw: bool,
+    /// Seed of all noise.
+    #[serde(default = "seed")]
+    #[schema(default = seed)]
+    pub seed: u64,
+}
+
+fn no_offset() -> [f64; 3] {
+    [0.0; 3]
+}
+
+fn mm_per_radian() -> [f64; 3] {
+    [0.5 * std::f64::consts::FRAC_1_PI; 3]
+}
+
+fn seed() -> u64 {
+    1
+}
+
+struct CheckedScan {
+    request: ScanRequest,
+    /// At the drives that are asked for.
+    specimen: Specimen,
+    options: ScanOptions,
+}
+
+impl ScanRequest {
+    /// The scanner's settings; what is wrong is added to `errors`.
+    fn options(&self, specimen: &Specimen, errors: &mut Vec<FieldError>) -> Option<ScanOptions> {
+        if let (Some(snr), Some(_)) = (self.snr, self.noise_sd_mm) {
+            let error = FieldError::new("/snr", format!("{snr:?}"), "left out where noise_sd_mm is given");
+            errors.push(error.remedy("give one of the two"));
+        }
+        let triples = [("mm_per_radian", Some(self.mm_per_radian)), ("noise_sd_mm", self.noise_sd_mm), ("snr", self.snr)];
+        for (name, values) in triples {
+            for (axis, value) in values.into_iter().flatten().enumerate() {
+                if !(value > 1e-100 && value <= 1e100) {
+                    errors.push(FieldError::new(format!("/{name}/{axis}"), value, "above 0 and finite"));
+                }
+            }
+        }
+        for (axis, value) in self.offset_voxels.into_iter().enumerate() {
+            crate::field::within(errors, &format!("/offset_voxels/{axis}"), value, -1.0..=1.0);
+        }
+        let window = |k: &KSpaceRequest| if k.is_apodised { Window::Hamming } else { Window::None };
+        let kspace = self.kspace.map(|k| KSpace { keep: k.keep, window: window(&k) });
+        if let Some(Err(error)) = kspace.map(|k| k.check()) {
+            let keep = kspace.map(|k| k.keep).unwrap_or_default();
+            let allowed = "above 0 and at most 1 along each axis";
+            errors.push(FieldError::new("/kspace/keep", format!("{keep:?}"), allowed).remedy(error.to_string()));
+        }
+        if !errors.is_empty() {
+            return None;
+        }
+        let unfit = |allowed: String| FieldError::new("/voxel_mm", format!("{:?}", self.voxel_mm), allowed);
+        let grid = match ScanOptions::grid_around(specimen, self.voxel_mm, MARGIN_VOXELS, self.offset_voxels) {
+            Ok(grid) if grid.num_voxels() <= MAX_VOXELS => grid,
+            Ok(grid) => {
+                let error = unfit(format!("large enough for at most {MAX_VOXELS} voxels"));
+                errors.push(error.remedy(format!("these make {}: use larger voxels", grid.num_voxels())));
+                return None;
+            }
+            Err(error) => {
+                errors.push(unfit("usable".into()).remedy(error.to_string()));
+                return None;
+            }
+        };
+        let noise = self.noise_sd_mm.unwrap_or(NOISE_SD_MM);
+        let snr = self.snr.unwrap_or([0, 1, 2].map(|axis| self.mm_per_radian[axis] / noise[axis]));
+        let load = LoadProgram { drift_sd_n: self.force_sd_n, ..LoadProgram::default() };
+        Some(ScanOptions { grid, mm_per_radian: self.mm_per_radian, snr, kspace, load, seed: self.seed })
+    }
+}
+
+impl Request for ScanRequest {
+    const COMMAND: &'static str = "scan";
+    const COLLECTION: &'static str = "scans";
+    const ABOUT: &'static str =
+        "A synthetic MR-u recording of a specimen: phases with noise, unwrapped, and the loading history.";
+
+    fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
+        let mut errors = Vec::new();
+        let specimen = driven(&self.specimen, self.drive_mm.as_ref(), &mut errors);
+        errors.extend(self.material.field_errors().into_iter().map(|e| e.below("/material")));
+        if self.is_raw && self.filter != Filter::None {
+            let error = FieldError::new("/filter", json!(self.filter), "none where raw phases are asked for");
+            errors.push(error.remedy("the filter belongs to displacements; leave out one of the two"));
+        }
+        match self.options(&specimen, &mut errors) {
+            Some(options) if errors.is_empty() => Ok(Box::new(CheckedScan { request: self, specimen, options })),
+            _ => Err(errors),
+        }
+    }
+}
+
+impl Run for CheckedScan {
+    fn title(&self) -> String {
+        format!("scan of {}", self.specimen.name)
+    }
+
+    fn check_size(&self, _: &[Specimen], max_elements: usize) -> Result<(), FieldError> {
+        check_mesh(&self.specimen, self.request.mesh, "/mesh", max_elements)
+    }
+
+    fn run(&self, context: &Context) -> Result<Outcome, JobError> {
+        let (specimen, material, options) = (&self.specimen, &self.request.material, &self.options);
+        let hash = context.input_hash.clone();
+        let mut mesh = self.request.mesh.options(specimen);
+        mesh.use_mirror &= !self.request.is_whole;
+        mesh.max_elements = mesh.max_elements.min(context.surroundings.max_elements());
+        context.step(&format!("scanning at {} drives", specimen.drive_mm.len()), 0, 3);
+        let name = self.request.name.as_ref().unwrap_or(&specimen.name);
+        let id = format!("{}-seed-{}", plain(name), options.seed);
+        let cancelled = || context.is_cancelled();
+        let mut made = scan(&id, specimen, material, &mesh, &SolveOptions::default(), options, &cancelled)
+            .map_err(|e| context.failed(&e))?;
+        made.raw.notes = Some(json!({
+            "synthetic": { "program": format!("lambdak {VERSION}"), "input_hash": hash, "seed": options.seed },
+        }));
+        context.step("reconstruct", 1, 3);
+        let found = if self.request.is_raw {
+            None
+        } else {
+            let settings = ReconstructOptions { filter: self.request.filter, ..ReconstructOptions::default() };
+            Some(reconstruct(&made.raw, &settings).map_err(|e| context.failed(&e))?)
+        };
+        context.step("files", 2, 3);
+        let result = ScanResult::new(&made, options, found.as_ref(), hash).map_err(|e| context.failed(&e))?;
+        let text = summary::scan(&specimen.name, &result);
+        let mut outcome = Outcome { summary: text, ..Outcome::default() };
+        add_files(&mut outcome, &made, found.as_ref())?;
+        let named = WithRecording { result: &result, recording: recording_identifier(&outcome.recording()) };
+        (outcome.result, outcome.result_name) = (to_json(&named)?, "scan-result.json");
+        let truth = json!({ "material": material, "scan": result });
+        outcome.add("scan.json", to_json(&truth)?);
+        outcome.add("material.json", material.to_json());
+        Ok(outcome)
+    }
+}
+
+/// The recording, the estimated noise of every voxel, pictures.
+fn add_files(outcome: &mut Outcome, made: &Scan, found: Option<&Reconstruction>) -> Result<(), JobError> {
+    match found {
+        None => outcome.add_written(true, |folder| made.raw.write(folder))?,
+        Some(found) => {
+            outcome.add_written(true, |folder| found.recording.write(folder))?;
+            for (n, sd) in found.sd_mm.iter().enumerate() {
+                let name = format!("sd_{}.nii.gz", n + 1);
+                outcome.add_written(false, |folder| write_vectors(folder, &name, &found.recording.grid, sd))?;
+            }
+        }
+    }
+    for n in 0..made.raw.steps.len() {
+        outcome.add(format!("raw_{}.svg", n + 1), raw_picture(&made.raw, n));
+        if let Some(found) = found {
+            outcome.add(format!("displacement_{}.svg", n + 1), displacement_picture(&found.recording, n));
+        }
+    }
+    Ok(())
+}
+
+/// A recording's name from a specimen's or file's.
+fn plain(name: &str) -> String {
+    let text: String =
+        name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect();
+    let parts: Vec<&str> = text.split('-').filter(|p| !p.is_empty()).collect();
+    if parts.is_empty() { "scan".into() } else { parts.join("-").chars().take(60).collect() }
+}

@@ -1,0 +1,96 @@
+//! Solve: forces and fields of a specimen at its drives.
+
+use super::subject::{check_mesh, driven, model_of};
+use super::{Context, JobError, Outcome, Request, Run, defaults, summary};
+use crate::fem::{Equilibrium, QuadraturePoint, SolveOptions, SolveResult};
+use crate::field::FieldError;
+use crate::kinematics::decompose;
+use crate::material::Ogden;
+use crate::mesh::MeshSize;
+use crate::report::{deformed_picture, vtu_of};
+use crate::specimen::Specimen;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// Body of a forward solution.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SolveRequest {
+    /// The specimen (`specimen/1`).
+    pub specimen: Specimen,
+    /// The material (`ogden/1`); Ecoflex 00-20 where it is left out.
+    #[serde(default = "defaults::ecoflex")]
+    pub material: Ogden,
+    /// Drives in mm instead of the specimen's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(min_items = 1, max_items = 1000)]
+    pub drive_mm: Option<Vec<f64>>,
+    /// Element size.
+    #[serde(default)]
+    #[schema(default = MeshSize::default)]
+    pub mesh: MeshSize,
+    /// Mesh the whole specimen even where it has mirror planes.
+    #[serde(default)]
+    pub is_whole: bool,
+}
+
+struct CheckedSolve {
+    request: SolveRequest,
+    /// At the drives that are asked for.
+    specimen: Specimen,
+}
+
+impl Request for SolveRequest {
+    const COMMAND: &'static str = "solve";
+    const COLLECTION: &'static str = "solves";
+    const ABOUT: &'static str = "Forces and fields of a specimen at its drives, by finite elements.";
+
+    fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
+        let mut errors = Vec::new();
+        let specimen = driven(&self.specimen, self.drive_mm.as_ref(), &mut errors);
+        errors.extend(self.material.field_errors().into_iter().map(|e| e.below("/material")));
+        if errors.is_empty() { Ok(Box::new(CheckedSolve { request: self, specimen })) } else { Err(errors) }
+    }
+}
+
+impl Run for CheckedSolve {
+    fn title(&self) -> String {
+        self.specimen.name.clone()
+    }
+
+    fn check_size(&self, _: &[Specimen], max_elements: usize) -> Result<(), FieldError> {
+        check_mesh(&self.specimen, self.request.mesh, "/mesh", max_elements)
+    }
+
+    fn run(&self, context: &Context) -> Result<Outcome, JobError> {
+        let (specimen, material) = (&self.specimen, &self.request.material);
+        let mut options = self.request.mesh.options(specimen);
+        options.use_mirror &= !self.request.is_whole;
+        let mut model = model_of(specimen, &options, context)?;
+        let mut result = SolveResult::new(&model, context.input_hash.clone());
+        let mut last: Option<Equilibrium> = None;
+        for (index, &drive) in specimen.drive_mm.iter().enumerate() {
+            context.step(&format!("solving drive {drive} mm"), index, specimen.drive_mm.len());
+            let found = model
+                .solve(material, drive, last.as_ref(), &SolveOptions::default(), &|| context.is_cancelled())
+                .map_err(|e| context.failed(&e))?;
+            let fields = model.quadrature_fields(material, &found);
+            result.push(&found, extremes(&fields), model.statistics());
+            last = Some(found);
+        }
+        let mut outcome = Outcome::new("solve.json", &result, summary::solve(&specimen.name, &result))?;
+        if let Some(state) = &last {
+            outcome.add("solution.vtu", vtu_of(&model, material, state).map_err(|e| context.failed(&e))?);
+            outcome.add("deformed.svg", deformed_picture(&model, material, state).map_err(|e| context.failed(&e))?);
+        }
+        Ok(outcome)
+    }
+}
+
+/// Largest principal stretch, smallest and largest det F.
+fn extremes(fields: &[QuadraturePoint]) -> [f64; 3] {
+    fields.iter().fold([f64::NEG_INFINITY, f64::INFINITY, f64::NEG_INFINITY], |[s, low, high], q| {
+        let d = decompose(&q.deformation_gradient);
+        [s.max(d.principal_stretches[0]), low.min(d.jacobian), high.max(d.jacobian)]
+    })
+}

@@ -1,0 +1,65 @@
+//! A design search as text.
+
+use crate::design::{DesignEntry, DesignResult};
+
+/// The result as text.
+pub(in crate::job) fn design(result: &DesignResult) -> String {
+    let mut text = format!("{}\n\n", result.name);
+    for sentence in &result.findings {
+        text += &format!("* {sentence}\n");
+    }
+    text += "\n  design                                     drive mm   force N   gain   closest limit\n";
+    let line = |label: &str, e: &DesignEntry| {
+        format!(
+            "  {:<42} {:>8.2} {:>9.2} {:>6.3}   {}\n",
+            label,
+            e.specimen.drive_mm.last().copied().unwrap_or(0.0),
+            e.force_n(),
+            e.objective,
+            if e.is_within_limits { e.closest_limit.clone() } else { format!("not kept: {}", e.not_kept()) }
+        )
+    };
+    text += &line("base", &result.base);
+    for (index, entry) in result.ranked.iter().take(8).enumerate() {
+        text += &line(&format!("{}. {}", index + 1, entry.specimen.name), entry);
+    }
+    text += "\n  gains of the best over the base (above 1: better)\n";
+    text += "  material     parameter   integrated sensitivity   promised standard deviation\n";
+    for g in &result.best.gains {
+        let show = |v: Option<f64>| v.map_or("-".into(), |v| format!("{v:.3}"));
+        text += &format!(
+            "  {:<12} {:<11} {:>22} {:>29}\n",
+            g.material,
+            g.parameter,
+            show(g.integrated_sensitivity),
+            show(g.promised_sd)
+        );
+    }
+    for v in &result.verification_by_material {
+        text += &format!("\n  verification on synthetic noisy scans, material \"{}\"\n", v.material);
+        text += "  specimen   parameter        truth         mean     found sd   promised sd   ratio   draws\n";
+        for (label, list) in [("best", &v.best), ("base", &v.base)] {
+            for p in list {
+                let show = |v: Option<f64>, digits: usize| {
+                    v.filter(|v| v.is_finite()).map_or("-".into(), |v| format!("{v:.digits$}"))
+                };
+                let ratio = p.promised_sd.map(|sd| p.found_sd / sd);
+                text += &format!(
+                    "  {:<10} {:<10} {:>11.4} {:>12} {:>12} {:>13} {:>7} {:>7}\n",
+                    label,
+                    p.parameter,
+                    p.truth,
+                    show(Some(p.mean), 4),
+                    show(Some(p.found_sd), 4),
+                    show(p.promised_sd, 4),
+                    show(ratio, 2),
+                    p.draws
+                );
+            }
+        }
+    }
+    for sentence in result.verification_failures() {
+        text += &format!("\n* {sentence}\n");
+    }
+    text
+}

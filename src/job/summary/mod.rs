@@ -1,0 +1,25 @@
+//! What matters of each result, as text for a terminal.
+
+mod calibration;
+mod curves;
+mod design;
+mod diagnosis;
+mod evaluation;
+mod load_curves;
+mod paper_tables;
+mod proof;
+mod scan;
+mod solve;
+mod sweep;
+
+pub(super) use calibration::calibration;
+pub(super) use curves::{curves, uniaxial};
+pub(super) use design::design;
+pub(super) use diagnosis::{diagnosis, together};
+pub(super) use evaluation::evaluation;
+pub(super) use load_curves::load_curves;
+pub(super) use paper_tables::paper_tables;
+pub(super) use proof::proof;
+pub(super) use scan::{import, scan};
+pub(super) use solve::solve;
+pub(super) use sweep::sweep;

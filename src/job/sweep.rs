@@ -1,0 +1,113 @@
+//! Sweep: a study of many designs, evaluated in parts.
+
+use super::{Context, Failure, JobError, Kind, Outcome, Part, Request, Run, summary};
+use crate::field::FieldError;
+use crate::material::Ogden;
+use crate::mesh::MeshSize;
+use crate::report::sweep_report;
+use crate::sensitivity::ScanSettings;
+use crate::specimen::Specimen;
+use crate::sweep::{Collected, Outcome as TaskOutcome, SweepResult, SweepStudy, SweepTable, TaskInputs, tasks, to_parquet};
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use utoipa::ToSchema;
+
+/// The kind of a sweep's parts; it has no address of its own.
+pub(super) static TASK_KIND: Kind = Kind::of::<SweepTaskRequest>();
+
+impl Request for SweepStudy {
+    const COMMAND: &'static str = "sweep";
+    const COLLECTION: &'static str = "sweep-studies";
+    const ABOUT: &'static str = "Many designs evaluated: a table of what each would tell.";
+
+    fn read(value: &Value) -> Result<SweepStudy, Vec<FieldError>> {
+        SweepStudy::from_request(value)
+    }
+
+    fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
+        Ok(Box::new(CheckedSweep(self)))
+    }
+}
+
+struct CheckedSweep(SweepStudy);
+
+impl Run for CheckedSweep {
+    fn title(&self) -> String {
+        self.0.name.clone()
+    }
+
+    fn parts(&self) -> Vec<Part> {
+        let study = &self.0;
+        let part = |task: crate::sweep::Task| {
+            let TaskInputs { specimen, material, scan, mesh } = task.inputs(study);
+            let inputs = json!({ "specimen": specimen, "material": material, "scan": scan, "mesh": mesh });
+            Part { kind: &TASK_KIND, request: inputs }
+        };
+        tasks(study).into_iter().map(part).collect()
+    }
+
+    fn run(&self, _: &Context) -> Result<Outcome, JobError> {
+        Err(JobError::Internal("a sweep runs in parts".into()))
+    }
+
+    fn gather(&self, results: Vec<Result<Value, Failure>>) -> Result<Outcome, JobError> {
+        let study = &self.0;
+        let failed = |e: &dyn std::fmt::Display| JobError::Internal(e.to_string());
+        let mut collected = Collected::default();
+        for (index, result) in results.into_iter().enumerate() {
+            let outcome = match result {
+                Ok(value) => TaskOutcome::deserialize(value).map_err(|e| failed(&e))?,
+                Err(failure) => TaskOutcome::Failed { kind: "internal".into(), reason: failure.detail },
+            };
+            collected.outcomes.insert(index, outcome);
+        }
+        let table = SweepTable::new(study, &collected).map_err(|e| failed(&e))?;
+        let result = SweepResult::new(study, &table);
+        let mut outcome = Outcome::new("sweep.json", &result, summary::sweep(study, &result))?;
+        outcome.add("table.csv", table.to_csv());
+        outcome.add("table.parquet", to_parquet(&table).map_err(|e| failed(&e))?);
+        outcome.add("report.html", sweep_report(&result, &table));
+        Ok(outcome)
+    }
+}
+
+/// One task of a sweep.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+struct SweepTaskRequest {
+    /// The design. One that cannot be made is a result.
+    specimen: Specimen,
+    /// The material.
+    material: Ogden,
+    /// The scan.
+    scan: ScanSettings,
+    /// Element size.
+    mesh: MeshSize,
+}
+
+impl Request for SweepTaskRequest {
+    const COMMAND: &'static str = "sweep-task";
+    const COLLECTION: &'static str = "sweep-tasks";
+    const ABOUT: &'static str = "One task of a sweep.";
+
+    fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
+        Ok(Box::new(self))
+    }
+}
+
+impl Run for SweepTaskRequest {
+    fn title(&self) -> String {
+        self.specimen.name.clone()
+    }
+
+    fn run(&self, context: &Context) -> Result<Outcome, JobError> {
+        let inputs = TaskInputs {
+            specimen: self.specimen.clone(),
+            material: self.material.clone(),
+            scan: self.scan,
+            mesh: self.mesh,
+        };
+        let outcome = inputs.evaluate(&|| context.is_cancelled()).ok_or_else(JobError::stopped)?;
+        Outcome::new("task.json", &outcome, "")
+    }
+}

@@ -1,0 +1,51 @@
+//! A material in a file (`ogden/1`): the fields of [`Ogden`] behind the tag that names the format.
+
+use super::limits::{MAX_ALPHA, MAX_MODULUS_KPA, SCHEMA};
+use super::{MAX_TERMS, Ogden, OgdenTerm};
+use crate::field::schema::{list_of, number_above, number_within, schema_of_file, schema_tag, schema_type};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+schema_tag!(MaterialTag, SCHEMA);
+
+schema_type! {
+    /// The bulk modulus κ, kPa.
+    BulkKpa = number_above(0.0).maximum(Some(MAX_MODULUS_KPA));
+    /// A modulus μ of a term, kPa.
+    pub(super) MuKpa = number_within(-MAX_MODULUS_KPA..=MAX_MODULUS_KPA);
+    /// An exponent α of a term, which is not zero.
+    pub(super) Alpha = number_within(-MAX_ALPHA..=MAX_ALPHA);
+    /// Terms of the strain energy.
+    Terms = list_of::<OgdenTerm>(1..=MAX_TERMS), of OgdenTerm;
+}
+
+/// An Ogden material (`ogden/1`).
+#[derive(Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, expecting = "struct Ogden")]
+#[schema(as = MaterialSchema)]
+pub(super) struct OgdenFile {
+    /// Always `ogden/1`.
+    schema: MaterialTag,
+    /// κ, kPa.
+    #[schema(value_type = BulkKpa)]
+    bulk_kpa: f64,
+    /// Terms.
+    #[schema(value_type = Terms)]
+    terms: Vec<OgdenTerm>,
+}
+
+impl From<OgdenFile> for Ogden {
+    fn from(file: OgdenFile) -> Ogden {
+        let OgdenFile { schema: MaterialTag, bulk_kpa, terms } = file;
+        Ogden { bulk_kpa, terms }
+    }
+}
+
+impl From<Ogden> for OgdenFile {
+    fn from(material: Ogden) -> OgdenFile {
+        let Ogden { bulk_kpa, terms } = material;
+        OgdenFile { schema: MaterialTag, bulk_kpa, terms }
+    }
+}
+
+schema_of_file!(Ogden, OgdenFile);

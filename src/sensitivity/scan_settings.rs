@@ -1,0 +1,103 @@
+//! The scan of an experiment that is being planned: its grid and its noise.
+
+use super::information::{LEAST_SD, MeasurementNoise};
+use crate::field::schema::{number_above, numbers, schema_type};
+use crate::field::{FieldError, FieldPath};
+use crate::voxel::VoxelMask;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+schema_type! {
+    /// Three lengths along x, y and z, mm, each above 0.
+    PositiveTripleMm = numbers(number_above(0.0), 3..=3);
+    /// A standard deviation of the force, N.
+    ForceSdN = number_above(0.0);
+}
+
+/// How much a partly filled voxel counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PartialVoxels {
+    /// As every voxel of the mask: `noise_sd_mm` is that of the values given, as in recordings.
+    #[default]
+    Uniform,
+    /// By its signal: the phase noise of an image goes as 1/magnitude and the magnitude as the filled part, so the
+    /// weight w is the filled part squared.
+    Signal,
+}
+
+impl PartialVoxels {
+    /// Weights w of the voxels of a mask.
+    pub fn weights(self, mask: &VoxelMask) -> Vec<f64> {
+        mask.material_fraction
+            .iter()
+            .map(|f| match self {
+                PartialVoxels::Uniform => 1.0,
+                PartialVoxels::Signal => f * f,
+            })
+            .collect()
+    }
+}
+
+/// The scan: grid and noise.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = ScanSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ScanSettings {
+    /// Edges of a voxel, mm.
+    #[schema(value_type = PositiveTripleMm)]
+    pub voxel_mm: [f64; 3],
+    /// Standard deviation of a voxel's displacement along x, y, z, mm.
+    #[schema(value_type = PositiveTripleMm)]
+    pub noise_sd_mm: [f64; 3],
+    /// Standard deviation of the load cell's force (all samples together), N.
+    #[schema(value_type = ForceSdN)]
+    pub force_sd_n: f64,
+    /// Weight of partly filled voxels.
+    #[serde(default)]
+    pub partial_voxels: PartialVoxels,
+}
+
+impl ScanSettings {
+    /// The noise alone.
+    pub fn noise(&self) -> MeasurementNoise {
+        MeasurementNoise { displacement_sd_mm: self.noise_sd_mm, force_sd_n: self.force_sd_n }
+    }
+
+    /// Every number that is not what it must be: edges of voxels and standard deviations are positive and finite.
+    pub fn field_errors(&self) -> Vec<FieldError> {
+        let mut errors = Vec::new();
+        let mut check = |path: FieldPath, value: f64, least: f64| {
+            if !(value > least && value.is_finite()) {
+                errors.push(FieldError::new(path.pointer(), value, "a finite number above 0"));
+            }
+        };
+        for (axis, edge) in self.voxel_mm.into_iter().enumerate() {
+            check(FieldPath::of("voxel_mm").index(axis), edge, 0.0);
+        }
+        for (axis, sd) in self.noise_sd_mm.into_iter().enumerate() {
+            check(FieldPath::of("noise_sd_mm").index(axis), sd, LEAST_SD);
+        }
+        check(FieldPath::of("force_sd_n"), self.force_sd_n, LEAST_SD);
+        errors
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_useless_number_is_told_with_its_pointer() {
+        let scan = ScanSettings {
+            voxel_mm: [0.0, 1.0, f64::NAN],
+            noise_sd_mm: [0.05, -1.0, 0.05],
+            force_sd_n: f64::INFINITY,
+            partial_voxels: PartialVoxels::default(),
+        };
+        let pointers: Vec<String> = scan.field_errors().into_iter().map(|e| e.pointer).collect();
+        assert_eq!(pointers, ["/voxel_mm/0", "/voxel_mm/2", "/noise_sd_mm/1", "/force_sd_n"]);
+        let fine = ScanSettings { voxel_mm: [1.0; 3], noise_sd_mm: [0.05; 3], force_sd_n: 0.02, ..scan };
+        assert_eq!(fine.field_errors(), []);
+    }
+}
