@@ -51,7 +51,7 @@ fn recording(folder: &Path) {
     let request = json!({
         "specimen": file("solid-shear.json"), "drive_mm": [1.0], "mesh": "5", "voxel_mm": [3.0, 1.0, 3.0], "seed": 3,
     });
-    let outcome = job("scan", &request).run(&Folders).unwrap();
+    let outcome = lambdak::job::run(&job("scan", &request), &Folders).unwrap();
     std::fs::create_dir_all(folder).unwrap();
     for (name, bytes) in outcome.recording() {
         std::fs::write(folder.join(name), bytes).unwrap();

@@ -55,7 +55,8 @@ pub(super) fn run(matches: &ArgMatches) -> Result<(), CliError> {
         asked.sources.push((format!("/{}", flag.field), format!("--{}", flag.name)));
         flag.apply(&fields, matches, &mut asked.request)?;
     }
-    let outcome = asked.job()?.run(&Terminal::new(None, None)).map_err(|e| asked.failure(e, None))?;
+    let ran = crate::job::run(&asked.job()?, &Terminal::new(None, None));
+    let outcome = ran.map_err(|e| asked.failure(e, None))?;
     for (option, name) in [("junit", "comparison.xml"), ("markdown", "comparison.md")] {
         let found = outcome.files.iter().find(|f| f.name == name);
         if let (Some(path), Some(file)) = (matches.get_one::<String>(option), found) {

@@ -162,7 +162,7 @@ pub(super) fn run_asked(
         Some(ResultsFolder::open(default_path(common.out.as_deref(), named, command), command)?)
     };
     let terminal = Terminal::new(folder.as_ref().map(ResultsFolder::path), limit);
-    let ran = job.run(&terminal);
+    let ran = crate::job::run(&job, &terminal);
     terminal.clear();
     let outcome = ran.map_err(|e| asked.failure(e, folder.as_ref()))?;
     leave(&outcome, folder.as_ref(), common.json)

@@ -1,6 +1,6 @@
 //! Why a job has no outcome.
 
-use super::Outcome;
+use super::outcome::{Outcome, OutcomeError};
 use crate::field::{FieldError, in_lines};
 use serde::{Deserialize, Serialize};
 
@@ -61,6 +61,12 @@ impl JobError {
 impl From<FieldError> for JobError {
     fn from(error: FieldError) -> JobError {
         JobError::Invalid(vec![error])
+    }
+}
+
+impl From<OutcomeError> for JobError {
+    fn from(error: OutcomeError) -> JobError {
+        JobError::Internal(error.to_string())
     }
 }
 

@@ -5,9 +5,8 @@
 
 use super::evaluate::EvaluationRequest;
 use super::evaluation_table::{Entry, evaluation_table};
-use super::kind::kind_of_command;
 use super::outcome::to_json;
-use super::{Context, Failure, JobError, Outcome, Part, Request, Run};
+use super::{Context, Failure, JobError, Outcome, Part, PartKind, Request, Run};
 use crate::field::FieldError;
 use crate::provenance::VERSION;
 use crate::sweep::{latin_hypercube_points, to_parquet};
@@ -232,12 +231,11 @@ impl Run for CheckedList {
     }
 
     fn parts(&self) -> Vec<Part> {
-        let Some(kind) = kind_of_command(EvaluationRequest::COMMAND) else { return Vec::new() };
         let part = |value: &Value| {
             let mut request = value.clone();
             // Only numbers are kept.
             request["has_files"] = false.into();
-            Part { kind, request }
+            Part { kind: PartKind::Evaluation, request }
         };
         self.evaluations.iter().map(part).collect()
     }

@@ -1,38 +1,17 @@
-//! The kinds of jobs, and a job of any kind.
+//! What a kind of job is, and a job of any kind.
 
+use super::part::Part;
 use super::request::{Context, InputForm, InputUse, Request, Run};
 use super::schema::{RequestField, RequestSchema};
-use super::{Failure, InputFile, JobError, Outcome, Progress, Surroundings};
+use super::{Failure, JobError, Outcome, Surroundings};
 use crate::field::FieldError;
 use crate::provenance::{VERSION, input_hash};
-use crate::recording::{RawRecording, ReadRecording};
 use crate::specimen::Specimen;
 use serde_json::{Value, json};
 use std::borrow::Cow;
-use std::path::PathBuf;
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use utoipa::openapi::RefOr;
 use utoipa::openapi::schema::Schema;
-
-/// The kinds that this program runs.
-pub static KINDS: [Kind; 15] = [
-    Kind::of::<super::solve::SolveRequest>(),
-    Kind::of::<super::evaluate::EvaluationRequest>(),
-    Kind::of::<super::evaluation_list::EvaluationListRequest>(),
-    Kind::of::<super::scan::ScanRequest>(),
-    Kind::of::<super::import::ImportRequest>(),
-    Kind::of::<super::calibrate::CalibrationRequest>(),
-    Kind::of::<super::diagnose::DiagnosisRequest>(),
-    Kind::of::<super::load_curves::LoadCurvesRequest>(),
-    Kind::of::<super::curves::CurvesRequest>(),
-    Kind::of::<super::uniaxial::UniaxialRequest>(),
-    Kind::of::<crate::design::Study>(),
-    Kind::of::<crate::sweep::SweepStudy>(),
-    Kind::of::<super::compare::CompareRequest>(),
-    Kind::of::<super::paper_tables::PaperTablesRequest>(),
-    Kind::of::<super::proof::ProofRequest>(),
-];
 
 /// A kind of job.
 pub struct Kind {
@@ -109,30 +88,6 @@ impl Kind {
         let (request, run) = (self.checked)(request)?;
         Ok(Job { kind: self, request, run })
     }
-}
-
-/// The kind whose command has this name.
-pub fn kind_of_command(name: &str) -> Option<&'static Kind> {
-    KINDS.iter().find(|kind| kind.command == name)
-}
-
-/// The kind with this name in the service's addresses.
-pub fn kind_of_collection(name: &str) -> Option<&'static Kind> {
-    KINDS.iter().find(|kind| kind.collection == name)
-}
-
-/// The kind of a task, which may be one that has no address.
-pub fn kind_of_task(command: &str) -> Option<&'static Kind> {
-    kind_of_command(command).or_else(|| Some(&super::sweep::TASK_KIND).filter(|kind| kind.command == command))
-}
-
-/// A part of a job that any worker may run.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Part {
-    /// The kind of its request.
-    pub kind: &'static Kind,
-    /// Its request.
-    pub request: Value,
 }
 
 impl PartialEq for Kind {
@@ -240,79 +195,13 @@ impl Job {
         input_hash(&json!({ "kind": self.kind.command, "request": canonical }))
     }
 
-    /// Reads what the request names, hashes what goes in, and does the work.
+    /// Reads what the request names, hashes what goes in, and does work that does not divide ([`super::run`] does any work).
     ///
     /// # Errors
     /// [`JobError`].
-    pub fn run(&self, surroundings: &dyn Surroundings) -> Result<Outcome, JobError> {
-        let parts = self.run.parts();
-        if !parts.is_empty() {
-            return self.run_parts(&parts, surroundings);
-        }
+    pub(super) fn run_whole(&self, surroundings: &dyn Surroundings) -> Result<Outcome, JobError> {
         let context = self.context(surroundings)?;
         let outcome = self.run.run(&context)?;
         Ok(Outcome { input_hash: context.input_hash, ..outcome })
-    }
-
-    /// Runs all parts on all threads and gathers their results.
-    fn run_parts(&self, parts: &[Part], surroundings: &dyn Surroundings) -> Result<Outcome, JobError> {
-        use rayon::prelude::*;
-        let done = AtomicUsize::new(0);
-        let results: Vec<Result<Value, Failure>> = parts
-            .par_iter()
-            .with_max_len(1)
-            .map(|part| {
-                let found = part.job().and_then(|job| job.run(&Quiet(surroundings)));
-                let count = done.fetch_add(1, Ordering::Relaxed) + 1;
-                surroundings.progress(&Progress::new("evaluate", count, parts.len()));
-                let value = |outcome: Outcome| serde_json::from_str(&outcome.result);
-                match found {
-                    Ok(outcome) => value(outcome).map_err(|e| Failure::from(&JobError::Internal(e.to_string()))),
-                    Err(error) => Err(Failure::from(&error)),
-                }
-            })
-            .collect();
-        if surroundings.is_cancelled() { Err(JobError::stopped()) } else { self.gather(results) }
-    }
-}
-
-impl Part {
-    /// The part, ready to run.
-    ///
-    /// # Errors
-    /// [`JobError::Invalid`].
-    pub fn job(&self) -> Result<Job, JobError> {
-        self.kind.job(&self.request).map_err(JobError::Invalid)
-    }
-}
-
-/// The surroundings of a part: its own progress and checkpoints are of no interest.
-struct Quiet<'a>(&'a dyn Surroundings);
-
-impl Surroundings for Quiet<'_> {
-    fn recording(&self, name: &str) -> Result<ReadRecording, JobError> {
-        self.0.recording(name)
-    }
-
-    fn raw_recording(&self, name: &str) -> Result<ReadRecording<RawRecording>, JobError> {
-        self.0.raw_recording(name)
-    }
-
-    fn file(&self, name: &str) -> Result<InputFile, JobError> {
-        self.0.file(name)
-    }
-
-    fn progress(&self, _: &Progress) {}
-
-    fn is_cancelled(&self) -> bool {
-        self.0.is_cancelled()
-    }
-
-    fn checkpoint(&self, _: &str) -> Option<PathBuf> {
-        None
-    }
-
-    fn max_elements(&self) -> usize {
-        self.0.max_elements()
     }
 }

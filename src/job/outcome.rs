@@ -1,6 +1,5 @@
 //! What a job leaves: a result, a summary in words, and files.
 
-use super::JobError;
 use crate::recording::RecordingError;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -86,6 +85,11 @@ pub struct File {
     pub is_of_recording: bool,
 }
 
+/// Why an outcome cannot be put together: a fault of the program or of the machine.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct OutcomeError(String);
+
 /// What a job leaves.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Outcome {
@@ -107,12 +111,12 @@ impl Outcome {
     /// An outcome of `result` without files.
     ///
     /// # Errors
-    /// [`JobError::Internal`] for a value that JSON cannot hold.
+    /// [`OutcomeError`] for a value that JSON cannot hold.
     pub fn new<T: Serialize>(
         result_name: &'static str,
         result: &T,
         summary: impl Into<String>,
-    ) -> Result<Outcome, JobError> {
+    ) -> Result<Outcome, OutcomeError> {
         let result = to_json(result)?;
         Ok(Outcome { result, result_name, summary: summary.into(), ..Outcome::default() })
     }
@@ -134,12 +138,12 @@ impl Outcome {
     /// Adds the files that `write` leaves in a fresh folder.
     ///
     /// # Errors
-    /// [`JobError::Internal`] where they cannot be written or read back.
+    /// [`OutcomeError`] where they cannot be written or read back.
     pub fn add_written(
         &mut self,
         is_of_recording: bool,
         write: impl FnOnce(&Path) -> Result<(), RecordingError>,
-    ) -> Result<(), JobError> {
+    ) -> Result<(), OutcomeError> {
         for (name, bytes) in written(write)? {
             let media_type = MediaType::of_name(&name);
             self.files.push(File { name, media_type, bytes, is_of_recording });
@@ -178,9 +182,9 @@ pub fn recording_identifier(files: &BTreeMap<String, Vec<u8>>) -> String {
 /// JSON, indented, with a final line break.
 ///
 /// # Errors
-/// [`JobError::Internal`] for a value that JSON cannot hold.
-pub fn to_json<T: Serialize>(value: &T) -> Result<String, JobError> {
-    let mut text = serde_json::to_string_pretty(value).map_err(|e| JobError::Internal(e.to_string()))?;
+/// [`OutcomeError`] for a value that JSON cannot hold.
+pub fn to_json<T: Serialize>(value: &T) -> Result<String, OutcomeError> {
+    let mut text = serde_json::to_string_pretty(value).map_err(|e| OutcomeError(e.to_string()))?;
     text.push('\n');
     Ok(text)
 }
@@ -188,8 +192,8 @@ pub fn to_json<T: Serialize>(value: &T) -> Result<String, JobError> {
 /// What `write` leaves in a fresh folder, by name.
 fn written(
     write: impl FnOnce(&Path) -> Result<(), RecordingError>,
-) -> Result<BTreeMap<String, Vec<u8>>, JobError> {
-    let failed = |e: &dyn std::fmt::Display| JobError::Internal(format!("a temporary folder: {e}"));
+) -> Result<BTreeMap<String, Vec<u8>>, OutcomeError> {
+    let failed = |e: &dyn std::fmt::Display| OutcomeError(format!("a temporary folder: {e}"));
     let scratch = super::scratch::ScratchFolder::new().map_err(|e| failed(&e))?;
     write(scratch.path()).map_err(|e| failed(&e))?;
     let mut files = BTreeMap::new();

@@ -1,19 +1,11 @@
 //! Sweep: a study of many designs, evaluated in parts.
 
-use super::{Context, Failure, JobError, Kind, Outcome, Part, Request, Run, summary};
+use super::{Context, Failure, JobError, Outcome, Part, PartKind, Request, Run, summary};
 use crate::field::FieldError;
-use crate::material::Ogden;
-use crate::mesh::MeshSize;
 use crate::report::sweep_report;
-use crate::sensitivity::ScanSettings;
-use crate::specimen::Specimen;
 use crate::sweep::{Collected, Outcome as TaskOutcome, SweepResult, SweepStudy, SweepTable, TaskInputs, tasks, to_parquet};
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use serde_json::{Value, json};
-use utoipa::ToSchema;
-
-/// The kind of a sweep's parts; it has no address of its own.
-pub(super) static TASK_KIND: Kind = Kind::of::<SweepTaskRequest>();
 
 impl Request for SweepStudy {
     const COMMAND: &'static str = "sweep";
@@ -41,7 +33,7 @@ impl Run for CheckedSweep {
         let part = |task: crate::sweep::Task| {
             let TaskInputs { specimen, material, scan, mesh } = task.inputs(study);
             let inputs = json!({ "specimen": specimen, "material": material, "scan": scan, "mesh": mesh });
-            Part { kind: &TASK_KIND, request: inputs }
+            Part { kind: PartKind::SweepTask, request: inputs }
         };
         tasks(study).into_iter().map(part).collect()
     }
@@ -68,46 +60,5 @@ impl Run for CheckedSweep {
         outcome.add("table.parquet", to_parquet(&table).map_err(|e| failed(&e))?);
         outcome.add("report.html", sweep_report(&result, &table));
         Ok(outcome)
-    }
-}
-
-/// One task of a sweep.
-#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-struct SweepTaskRequest {
-    /// The design. One that cannot be made is a result.
-    specimen: Specimen,
-    /// The material.
-    material: Ogden,
-    /// The scan.
-    scan: ScanSettings,
-    /// Element size.
-    mesh: MeshSize,
-}
-
-impl Request for SweepTaskRequest {
-    const COMMAND: &'static str = "sweep-task";
-    const COLLECTION: &'static str = "sweep-tasks";
-    const ABOUT: &'static str = "One task of a sweep.";
-
-    fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
-        Ok(Box::new(self))
-    }
-}
-
-impl Run for SweepTaskRequest {
-    fn title(&self) -> String {
-        self.specimen.name.clone()
-    }
-
-    fn run(&self, context: &Context) -> Result<Outcome, JobError> {
-        let inputs = TaskInputs {
-            specimen: self.specimen.clone(),
-            material: self.material.clone(),
-            scan: self.scan,
-            mesh: self.mesh,
-        };
-        let outcome = inputs.evaluate(&|| context.is_cancelled()).ok_or_else(JobError::stopped)?;
-        Outcome::new("task.json", &outcome, "")
     }
 }

@@ -5,7 +5,7 @@ use super::problem::Problem;
 use super::recordings::StoredSurroundings;
 use super::store::{Claimed, Finished, Store, StoreError, TaskResult};
 use super::task::TaskInput;
-use crate::job::{Failure, JobError, Outcome, kind_of_collection};
+use crate::job::{Failure, JobError, Outcome, kind_of_collection, run};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
@@ -185,11 +185,11 @@ fn run_job(store: &Store, task: &Claimed, surroundings: StoredSurroundings) -> R
         let input: TaskInput = serde_json::from_str(&task.input).map_err(unreadable)?;
         let job = input.job()?;
         let surroundings = StoredSurroundings { max_elements: input.max_elements, ..surroundings };
-        return match job.run(&surroundings) {
+        return match run(&job, &surroundings) {
             // A damaged checkpoint: the work starts afresh.
             Err(JobError::Checkpoint(_)) => {
                 let _ = std::fs::remove_file(surroundings.checkpoint);
-                job.run(&surroundings)
+                run(&job, &surroundings)
             }
             ran => ran,
         };

@@ -1,7 +1,7 @@
 //! What is stored of a task: the kind and request of its job, or of a part of it, and the limits it was accepted with.
 
 use super::store::{NUMBERS_ONLY, NewTask};
-use crate::job::{Job, JobError, kind_of_task};
+use crate::job::{Job, JobError, job_of_part, kind_of_part, kind_of_task};
 use serde::{Deserialize, Serialize};
 
 /// A task's input as it is stored.
@@ -39,11 +39,11 @@ pub fn tasks_of(job: &Job, max_elements: usize) -> Result<(Vec<NewTask>, bool), 
     if parts.is_empty() {
         return Ok((vec![task(job)?], false));
     }
-    let tasks = parts.iter().map(|part| match part.job() {
+    let tasks = parts.iter().map(|part| match job_of_part(part) {
         Ok(job) => task(&job),
         // A part that cannot be run is a result: it fails when its turn comes.
         Err(_) => {
-            let input = TaskInput { kind: part.kind.command.into(), request: part.request.clone(), max_elements };
+            let input = TaskInput { kind: kind_of_part(part.kind).command.into(), request: part.request.clone(), max_elements };
             Ok(NewTask { input: serde_json::to_string(&input)?, cache_key: String::new() })
         }
     });
