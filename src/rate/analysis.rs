@@ -17,8 +17,8 @@ use crate::homogeneous::{Curve, CurveFitError, CurveFitOptions, CurveMatch, fit_
 /// use lambdak::homogeneous::HomogeneousTest;
 /// use lambdak::rate::{LoadCurve, LoadCurveOptions, PronyTerm, Verdict, analyse_load_curve, relax};
 ///
-/// // A neo-Hookean adhesive layer of 10 kPa in shear, up and down at two rates, that relaxes: in shear of a neo-Hookean
-/// // material the stress is linear, so `relax` makes the data.
+/// // A neo-Hookean adhesive layer of 10 kPa in shear, up and down at two rates, that relaxes: in shear of a
+/// // neo-Hookean material the stress is linear, so `relax` makes the data.
 /// let curve = |name: &str, rate: f64| {
 ///     let time: Vec<f64> = (1..=80).map(|i| f64::from(i) / 40.0 / rate).collect();
 ///     let shear: Vec<f64> = time.iter().map(|t| 0.2 * (1.0 - (1.0 - rate * t).abs())).collect();

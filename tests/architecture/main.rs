@@ -15,19 +15,15 @@ use std::collections::{BTreeMap, BTreeSet};
 const ARGUED_CIRCLES: [(&[&str], &str); 0] = [];
 
 /// Rooms with circles that are being removed. To be emptied.
-const CIRCLES_TO_REMOVE: [&str; 7] = ["calibration", "design", "diagnosis", "fem", "homogeneous", "rate", "service"];
+const CIRCLES_TO_REMOVE: [&str; 3] = ["diagnosis", "fem", "service"];
 
 /// Folders and files whose comments are being wrapped. To be emptied.
-const COMMENTS_TO_WRAP: [&str; 13] = [
-    "src/calibration/",
+const COMMENTS_TO_WRAP: [&str; 9] = [
     "src/cli/",
-    "src/design/",
     "src/diagnosis/",
     "src/fem/",
-    "src/homogeneous/",
     "src/material/",
     "src/proof/",
-    "src/rate/",
     "src/recording/read.rs",
     "src/sensitivity/",
     "src/service/",
@@ -44,12 +40,8 @@ const LONG_FUNCTIONS: [&str; 1] = ["src/diagnosis/diagnose.rs: diagnose"];
 const MAX_ARGUMENTS: usize = 7;
 
 /// Functions with more arguments, as `file: function`.
-const MANY_ARGUMENTS: [&str; 4] = [
-    "src/design/tell_apart.rs: nearest",
-    "src/fem/model.rs: assemble_directional",
-    "src/service/app.rs: finish",
-    "src/service/runner.rs: keep",
-];
+const MANY_ARGUMENTS: [&str; 3] =
+    ["src/fem/model.rs: assemble_directional", "src/service/app.rs: finish", "src/service/runner.rs: keep"];
 
 /// Columns at which comment lines end.
 const MAX_COMMENT_COLUMNS: usize = 120;
