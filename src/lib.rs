@@ -1,8 +1,8 @@
 //! lambdak designs the specimen from which one full-field (MR-u) scan tells the most about a soft material.
 //!
 //! The rooms stand on one another in this order; a room uses only those before it:
-//! [`field`], [`file`], [`provenance`] → [`specimen`] → [`mesh`], [`material`] → [`fem`] → [`kinematics`], [`homogeneous`],
-//! [`rate`], [`voxel`] → [`sensitivity`] → [`recording`], [`acquisition`] → [`calibration`] → [`diagnosis`], [`design`]
+//! [`field`], [`file`], [`provenance`], [`optimise`] → [`specimen`] → [`mesh`], [`material`] → [`fem`] → [`kinematics`],
+//! [`homogeneous`], [`rate`], [`voxel`] → [`sensitivity`] → [`recording`], [`acquisition`] → [`calibration`] → [`diagnosis`], [`design`]
 //! → [`proof`] → [`sweep`] → [`slurm`], [`report`] → [`compare`] → [`job`] → [`service`] → [`cli`].
 //!
 //! One unit system inside: lengths mm, moduli and stresses kPa, times s. Stress × area is then
@@ -22,6 +22,7 @@ pub mod job;
 pub mod kinematics;
 pub mod material;
 pub mod mesh;
+pub mod optimise;
 pub mod proof;
 pub mod provenance;
 pub mod rate;

@@ -1,4 +1,5 @@
-//! The gradient of the objective by the discrete adjoint: one linear solve per drive, whatever the number of parameters.
+//! The gradient of the objective by the discrete adjoint: one linear solve per drive, whatever the number of
+//! parameters.
 //!
 //! The fit itself uses the sensitivities, which also give the curvature. This gradient is independent of them.
 

@@ -1,9 +1,10 @@
 //! What neither our mesh nor the data resolve: an allowance for discretisation errors.
 //!
-//! A synthetic recording comes from somebody's mesh, and ours has an error too. Fits on two meshes tell ours: the difference of
-//! the estimates, carried to the limit of fine meshes, is what our mesh shifts a parameter by. The data's error is unknown;
-//! it is taken to be of the same kind and, to one standard deviation, a stated multiple of ours. Its effect on each parameter
-//! is added to the covariance, and the misfit that it leaves after a fit is no evidence of anything else.
+//! A synthetic recording comes from somebody's mesh, and ours has an error too. Fits on two meshes tell ours: the
+//! difference of the estimates, carried to the limit of fine meshes, is what our mesh shifts a parameter by. The data's
+//! error is unknown; it is taken to be of the same kind and, to one standard deviation, a stated multiple of ours. Its
+//! effect on each parameter is added to the covariance, and the misfit that it leaves after a fit is no evidence of
+//! anything else.
 //!
 //! Weighing data down where meshes differ does not help: errors of meshes look like changes of the exponents to a few
 //! micrometres, so that what is weighed down in the misfit is weighed down in the sensitivities too.

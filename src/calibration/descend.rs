@@ -1,12 +1,14 @@
 //! Levenberg–Marquardt descent within the limits of [`super::step`], from a start whose equilibria are known.
 
 use super::error::CalibrationError;
-use super::fit::FitOptions;
-use super::step::Constraints;
+use super::options::FitOptions;
+use super::prediction::{Prediction, SolverWork};
+use super::step::{self, Constraints};
 use super::stress_path::StressPath;
-use super::system::{NormalSystem, Prediction, Work};
+use super::system::NormalSystem;
 use crate::fem::SolveError;
 use crate::material::Ogden;
+use crate::optimise::{self, Damping, LeastSquares, Raise, Rules, Shortening, Stop};
 
 /// Where a descent ended.
 #[derive(Debug)]
@@ -24,7 +26,7 @@ pub(super) struct Descent {
     /// The objective at the start and after every accepted step.
     pub(super) history: Vec<f64>,
     /// What the trials took; the start's work is not in it.
-    pub(super) work: Work,
+    pub(super) work: SolverWork,
 }
 
 impl Descent {
@@ -57,11 +59,30 @@ pub(super) struct Start {
     pub(super) path: StressPath,
 }
 
+/// Compares predictions with the data.
+pub(super) type Evaluate<'a> = dyn Fn(&[Prediction]) -> Result<NormalSystem, CalibrationError> + 'a;
+
 /// A step that gains less than this part of what it promised was poor.
 const GOOD_PART: f64 = 0.25;
+/// Equal up to the equilibria's accuracy counts: near the optimum nothing is gained any more.
+const EQUAL: f64 = 1e-9;
+/// What a step that failed or was poor does to the damping.
+const RAISE: Raise = Raise { factor: 10.0, at_least: 1e-3 };
+/// No damping as long as steps are good: an equilibrium costs far more than a step.
+const DAMPING: Damping = Damping {
+    start: 0.0,
+    good_part: GOOD_PART,
+    negligible: 1e-6,
+    least: 0.0,
+    small_gain: 0.0,
+    poor_part: GOOD_PART,
+    after_poor: RAISE,
+    after_rejection: RAISE,
+    largest: f64::INFINITY,
+};
 
-/// How steps are taken: along the stresses or straight. Stresses fail where two terms become one: the promised stress is then
-/// out of reach of any material.
+/// How steps are taken: along the stresses or straight. Stresses fail where two terms become one: the promised stress
+/// is then out of reach of any material.
 struct Way {
     is_followed: bool,
     num_poor: usize,
@@ -79,9 +100,103 @@ impl Way {
     }
 }
 
+/// A material's predictions and their normal system.
+struct Point {
+    predictions: Vec<Prediction>,
+    system: NormalSystem,
+}
+
+/// A fit as [`optimise::descend`] sees it.
+struct DescentProblem<'a, 'p> {
+    constraints: &'a Constraints,
+    tolerance: f64,
+    path: StressPath,
+    /// The objective of pure noise.
+    expected: f64,
+    predict: &'a mut Predict<'p>,
+    evaluate: &'a Evaluate<'a>,
+    way: Way,
+    failure: Option<SolveError>,
+    work: SolverWork,
+}
+
+impl DescentProblem<'_, '_> {
+    /// The whole step to the optimum of the linear model, and how far that is in standard deviations. Where the misfit
+    /// is more than noise, so are the standard deviations in which the distance counts.
+    fn outlook(&self, system: &NormalSystem) -> Result<(step::Step, f64), CalibrationError> {
+        let full = self.constraints.step(system, 0.0, false)?;
+        let distance = full.distance / (system.chi2 / self.expected.max(1.0)).max(1.0).sqrt();
+        Ok((full, distance))
+    }
+}
+
+impl LeastSquares for DescentProblem<'_, '_> {
+    type Point = Point;
+    type Linear = ();
+    type Error = CalibrationError;
+
+    fn objective(&self, at: &Point) -> f64 {
+        at.system.chi2
+    }
+
+    fn linearise(&mut self, _: &Point) -> Result<Option<()>, CalibrationError> {
+        Ok(Some(()))
+    }
+
+    fn step(&mut self, at: &Point, (): &(), damping: f64) -> Result<Option<optimise::Step>, CalibrationError> {
+        // A small step alone proves nothing: damping makes steps small. The whole one tells how far the optimum is.
+        if self.outlook(&at.system)?.1 < self.tolerance {
+            return Ok(None);
+        }
+        let step = self.constraints.step(&at.system, damping, true)?;
+        Ok(Some(optimise::Step { change: step.change, promised: step.distance * step.distance }))
+    }
+
+    fn trial(
+        &mut self,
+        at: &Point,
+        (): &(),
+        step: &optimise::Step,
+        part: f64,
+    ) -> Result<Option<Point>, CalibrationError> {
+        let Some(present) = at.predictions.first() else {
+            let name = "the number of recordings";
+            return Err(CalibrationError::InvalidValue { name, value: 0.0, requirement: "positive" });
+        };
+        let change = &step.change * part;
+        let material = if self.way.is_followed {
+            self.path.moved(self.constraints, &at.system, &present.material, &change)?
+        } else {
+            at.system.moved(&present.material, &change)
+        };
+        match (self.predict)(&material, &at.predictions) {
+            Ok(predictions) => {
+                self.failure = None;
+                predictions.iter().for_each(|p| self.work.add(p.work));
+                let system = (self.evaluate)(&predictions)?;
+                Ok(Some(Point { predictions, system }))
+            }
+            Err(CalibrationError::Solve(cause @ SolveError::Cancelled { .. })) => Err(cause.into()),
+            Err(CalibrationError::Solve(cause)) => {
+                self.failure = Some(cause);
+                self.way.is_lost(&self.path);
+                Ok(None)
+            }
+            Err(other) => Err(other),
+        }
+    }
+
+    fn on_good_step(&mut self) {
+        self.way.num_poor = 0;
+    }
+
+    fn has_other_way(&mut self) -> bool {
+        !self.way.is_lost(&self.path)
+    }
+}
+
 /// Descends until the optimum is reached or the iterations run out. `predict` solves a material near given predictions,
-/// `evaluate` compares with the data; `expected` is the objective of pure noise. Where the misfit is more than noise, so are
-/// the standard deviations in which the distance from the optimum counts.
+/// `evaluate` compares with the data; `expected` is the objective of pure noise.
 ///
 /// # Errors
 /// Those of the calls; a trial without an equilibrium is no error.
@@ -91,70 +206,38 @@ pub(super) fn descend(
     start: Start,
     expected: f64,
     predict: &mut Predict,
-    evaluate: &dyn Fn(&[Prediction]) -> Result<NormalSystem, CalibrationError>,
+    evaluate: &Evaluate,
 ) -> Result<Descent, CalibrationError> {
-    let Start { mut predictions, path } = start;
-    let mut system = evaluate(&predictions)?;
-    let mut history = vec![system.chi2];
-    let mut work = Work::default();
-    let mut damping = 0.0;
-    let mut way = Way { is_followed: true, num_poor: 0 };
-    let mut failure = None;
-    let mut iterations = 0;
-    loop {
-        let full = constraints.step(&system, 0.0, false)?;
-        let distance = full.distance / (system.chi2 / expected.max(1.0)).max(1.0).sqrt();
-        let is_converged = distance < options.tolerance;
-        if is_converged || iterations >= options.max_iterations {
-            let reached = full.reached;
-            return Ok(Descent {
-                predictions,
-                system,
-                is_converged,
-                failure,
-                iterations,
-                distance,
-                reached,
-                history,
-                work,
-            });
-        }
-        iterations += 1;
-        let step = constraints.step(&system, damping, true)?;
-        let Some(present) = predictions.first() else {
-            return Err(CalibrationError::NotConverged { iterations, distance, limit: options.tolerance });
-        };
-        let trial = if way.is_followed {
-            path.moved(constraints, &system, &present.material, &step.change)?
-        } else {
-            system.moved(&present.material, &step.change)
-        };
-        match predict(&trial, &predictions) {
-            Ok(next) => {
-                failure = None;
-                next.iter().for_each(|p| work.add(p.work));
-                let next_system = evaluate(&next)?;
-                let is_good = system.chi2 - next_system.chi2 >= GOOD_PART * step.distance * step.distance;
-                // Equal up to the equilibria's accuracy counts: near the optimum nothing is gained any more.
-                if next_system.chi2 <= system.chi2 * (1.0 + 1e-9) {
-                    predictions = next;
-                    system = next_system;
-                    history.push(system.chi2);
-                }
-                if is_good {
-                    way.num_poor = 0;
-                    damping = if damping > 1e-6 { damping * 0.1 } else { 0.0 };
-                } else if way.is_lost(&path) {
-                    damping = (damping * 10.0).max(1e-3);
-                }
-            }
-            Err(CalibrationError::Solve(cause @ SolveError::Cancelled { .. })) => return Err(cause.into()),
-            Err(CalibrationError::Solve(cause)) => {
-                failure = Some(cause);
-                way.is_lost(&path);
-                damping = (damping * 10.0).max(1e-3);
-            }
-            Err(other) => return Err(other),
-        }
-    }
+    let Start { predictions, path } = start;
+    let start = Point { system: evaluate(&predictions)?, predictions };
+    let mut problem = DescentProblem {
+        constraints,
+        tolerance: options.tolerance,
+        path,
+        expected,
+        predict,
+        evaluate,
+        way: Way { is_followed: true, num_poor: 0 },
+        failure: None,
+        work: SolverWork::default(),
+    };
+    let rules = Rules {
+        shortening: Shortening::Damped(DAMPING),
+        tolerated_rise: EQUAL,
+        stop: Stop::after_trials(options.max_iterations),
+    };
+    let found = optimise::descend(&mut problem, start, (), &rules)?;
+    let Point { predictions, system } = found.at;
+    let (full, distance) = problem.outlook(&system)?;
+    Ok(Descent {
+        predictions,
+        is_converged: distance < options.tolerance,
+        failure: problem.failure,
+        iterations: found.num_trials,
+        distance,
+        reached: full.reached,
+        history: found.history,
+        work: problem.work,
+        system,
+    })
 }

@@ -2,9 +2,9 @@
 
 use crate::fem::{PrepareError, SolveError};
 use crate::material::MaterialError;
+use crate::optimise::SolverStatus;
 use crate::sensitivity::InformationError;
 use crate::voxel::VoxelError;
-use clarabel::solver::SolverStatus;
 
 /// Why a calibration has no result.
 #[derive(Debug, thiserror::Error)]
@@ -88,8 +88,8 @@ pub enum CalibrationError {
 }
 
 impl CalibrationError {
-    /// Whether this is an outcome of one set of data, which another draw of noise need not share. All others are mistakes
-    /// of the set-up or a cancellation.
+    /// Whether this is an outcome of one set of data, which another draw of noise need not share. All others are
+    /// mistakes of the set-up or a cancellation.
     pub fn is_of_the_data(&self) -> bool {
         match self {
             CalibrationError::NotConverged { .. }

@@ -1,93 +1,27 @@
 //! Maximum-likelihood fit of Ogden parameters to voxel displacements and forces.
 //!
 //! Levenberg–Marquardt on the χ² of [`super::system`], with ∂u/∂ξ and ∂F/∂ξ from the factorised tangent and the model
-//! averaged over the voxels as the data are. Every equilibrium starts from the last one. The step keeps to the limits of
-//! [`super::step`]: each μᵢαᵢ keeps its sign, exponents keep their order and distance, κ stays where the elements are good.
+//! averaged over the voxels as the data are. Every equilibrium starts from the last one. The step keeps to the limits
+//! of [`super::step`]: each μᵢαᵢ keeps its sign, exponents keep their order and distance, κ stays where the elements
+//! are good.
 //!
 //! The fit has converged when the optimum of the linear model at the present parameters is nearer than a fraction of a
-//! standard deviation, in every combination of parameters. A small step alone proves nothing: damping makes steps small.
-//! Where the misfit is more than noise the standard deviation is that of the misfit.
+//! standard deviation, in every combination of parameters. A small step alone proves nothing: damping makes steps
+//! small. Where the misfit is more than noise the standard deviation is that of the misfit.
 
 use super::descend::{Descent, Start, descend};
 use super::error::CalibrationError;
+use super::options::{Bulk, FitOptions, check_options};
+use super::prediction::Prediction;
 use super::step::Constraints;
 use super::stress_path::StressPath;
 use super::synthetic::Measurement;
-use super::system::{NormalSystem, Prediction};
+use super::system::NormalSystem;
 use super::target::Target;
-use crate::fem::{Equilibrium, ForwardModel, SolveOptions};
+use crate::fem::{Equilibrium, ForwardModel};
 use crate::material::{Ogden, Parameter};
 use crate::sensitivity::{FisherInformation, ScanSettings};
 use crate::voxel::VoxelOperator;
-
-/// What is known of κ, which nearly incompressible materials hardly show.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Bulk {
-    /// Nothing: κ is fitted.
-    #[default]
-    Free,
-    /// ln κ is Gaussian: the prior of `bulk_log_prior_sd` in an evaluation.
-    LogPrior {
-        /// Centre, kPa.
-        center_kpa: f64,
-        /// Standard deviation of ln κ.
-        log_sd: f64,
-    },
-    /// κ stays as in the start.
-    Held,
-}
-
-/// Parameters that a fit leaves as they are, by their place in κ, μ₁, α₁, μ₂, …
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Held(u32);
-
-impl Held {
-    /// Also the parameter at `index`; none beyond the 31st.
-    pub fn with(self, index: usize) -> Held {
-        Held(self.0 | 1u32.checked_shl(index as u32).unwrap_or(0))
-    }
-
-    /// Whether the parameter at `index` is held.
-    pub fn contains(self, index: usize) -> bool {
-        self.0 & 1u32.checked_shl(index as u32).unwrap_or(0) != 0
-    }
-
-    /// How many are held.
-    pub fn count(self) -> usize {
-        self.0.count_ones() as usize
-    }
-}
-
-/// Settings of [`fit`].
-#[derive(Clone, Copy, Debug)]
-pub struct FitOptions {
-    /// Levenberg–Marquardt iterations, rejected ones included.
-    pub max_iterations: usize,
-    /// Converged when the optimum of the linear model is nearer than this, in standard deviations of the worst combination
-    /// of parameters.
-    pub tolerance: f64,
-    /// Smallest distance η of two exponents. The paper's is 1.
-    pub min_alpha_gap: f64,
-    /// κ.
-    pub bulk: Bulk,
-    /// Further parameters that stay as in the start.
-    pub held: Held,
-    /// The equilibria.
-    pub solve: SolveOptions,
-}
-
-impl Default for FitOptions {
-    fn default() -> Self {
-        FitOptions {
-            max_iterations: 25,
-            tolerance: 0.02,
-            min_alpha_gap: 1.0,
-            bulk: Bulk::Free,
-            held: Held::default(),
-            solve: SolveOptions::default(),
-        }
-    }
-}
 
 /// A fitted material. Its existence means that the fit converged; one that did not is a [`CalibrationError`].
 #[derive(Clone, Debug)]
@@ -157,8 +91,8 @@ impl FitStart {
         FitStart { options: FitOptions { bulk, ..self.options }, ..self.clone() }
     }
 
-    /// Fits `data`, which must be of the start's drives. The result depends on the data and the start alone, not on what
-    /// `model` solved before.
+    /// Fits `data`, which must be of the start's drives. The result depends on the data and the start alone, not on
+    /// what `model` solved before.
     ///
     /// # Errors
     /// [`CalibrationError`].
@@ -219,30 +153,6 @@ pub fn fit(
     data.check(operator.num_voxels(), data.drives_mm.len())?;
     let start = FitStart::new(model, operator, &data.drives_mm, start, options, is_cancelled)?;
     start.fit(model, operator, scan, data, is_cancelled)
-}
-
-pub(super) fn check_options(options: &FitOptions) -> Result<(), CalibrationError> {
-    let positive = |name, value: f64| {
-        let requirement = "positive and finite";
-        if value > 0.0 && value.is_finite() {
-            Ok(())
-        } else {
-            Err(CalibrationError::InvalidValue { name, value, requirement })
-        }
-    };
-    positive("tolerance", options.tolerance)?;
-    if !(options.min_alpha_gap >= 0.0 && options.min_alpha_gap.is_finite()) {
-        return Err(CalibrationError::InvalidValue {
-            name: "min_alpha_gap",
-            value: options.min_alpha_gap,
-            requirement: "finite and not negative",
-        });
-    }
-    if let Bulk::LogPrior { center_kpa, log_sd } = options.bulk {
-        positive("the prior's centre of kappa", center_kpa)?;
-        positive("the prior's standard deviation of ln kappa", log_sd)?;
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -1,4 +1,6 @@
-use super::super::system::{NormalSystem, Prediction};
+use super::super::options::Held;
+use super::super::prediction::Prediction;
+use super::super::system::NormalSystem;
 use super::super::test_problem::{ogden, same_mesh, scan, tight, truth};
 use super::*;
 use crate::fem::SolveError;

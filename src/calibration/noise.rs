@@ -11,11 +11,12 @@ const MAD_TO_SD: f64 = 1.482_602_218_505_602;
 /// Third differences: they take away what is quadratic in the position.
 const WEIGHTS: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
 
-/// Noise per component (mm) from third differences between neighbours along the axis of the smallest voxel edge, robustly:
-/// 1.4826 × median |difference| / √var, over the voxels marked in `flags`. `fields` are displacements on the grid.
+/// Noise per component (mm) from third differences between neighbours along the axis of the smallest voxel edge,
+/// robustly: 1.4826 × median |difference| / √var, over the voxels marked in `flags`. `fields` are displacements on the
+/// grid.
 ///
-/// Third differences of independent noise have the variance Σ w² σ² = 20 σ²; after the 2×2×2 filter neighbours are correlated
-/// by ½ and it is 5 σ².
+/// Third differences of independent noise have the variance Σ w² σ² = 20 σ²; after the 2×2×2 filter neighbours are
+/// correlated by ½ and it is 5 σ².
 ///
 /// # Errors
 /// [`CalibrationError::InvalidValue`] where there are too few runs of four neighbours, or no noise at all.

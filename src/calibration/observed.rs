@@ -1,5 +1,5 @@
-//! A recording made ready for comparison with a model: its voxels, its noise, and the operator that sees a model as the scan
-//! saw the sample.
+//! A recording made ready for comparison with a model: its voxels, its noise, and the operator that sees a model as the
+//! scan saw the sample.
 
 use super::error::CalibrationError;
 use super::noise::estimate_noise_sd_mm;
@@ -8,8 +8,8 @@ use crate::recording::{Filter, Recording};
 use crate::specimen::Specimen;
 use crate::voxel::{HammingFilter, Sampling, VoxelMask, VoxelOperator};
 
-/// Least filled part of a voxel that is compared: the average over a sliver is that of a place on the wall, where the made
-/// sample may differ from the drawing.
+/// Least filled part of a voxel that is compared: the average over a sliver is that of a place on the wall, where the
+/// made sample may differ from the drawing.
 const LEAST_FRACTION: f64 = 0.3;
 
 /// A force with its uncertainty.
@@ -98,8 +98,8 @@ impl Observed {
         })
     }
 
-    /// Takes as missing what lies within `margin_mm` of the ends x = ±length/2 of a sheared block. The bonded edges end there:
-    /// strains are singular, so meshes and glue lines differ most. Returns how many voxels are left.
+    /// Takes as missing what lies within `margin_mm` of the ends x = ±length/2 of a sheared block. The bonded edges end
+    /// there: strains are singular, so meshes and glue lines differ most. Returns how many voxels are left.
     pub fn leave_out_ends(&mut self, margin_mm: f64) -> usize {
         let limit = 0.5 * self.specimen.block.length_mm - margin_mm;
         let is_left: Vec<bool> =
@@ -113,8 +113,8 @@ impl Observed {
     }
 
     /// How many neighbouring values carry the same noise: 1 without a filter, 8 for `hamming2` (the sum of the noise's
-    /// correlations with all neighbours, (½ + 1 + ½)³). For fields smoother than the filter, a sum of n values knows as much
-    /// as n / this independent ones.
+    /// correlations with all neighbours, (½ + 1 + ½)³). For fields smoother than the filter, a sum of n values knows as
+    /// much as n / this independent ones.
     pub fn noise_correlation(&self) -> f64 {
         match self.filter {
             Filter::None => 1.0,
@@ -130,7 +130,8 @@ impl Observed {
         self.shifted_view(specimen, mesh, [0.0; 3])
     }
 
-    /// As [`Self::view`] with the voxels where they would be if the image lay `shift_mm` further along than its header says.
+    /// As [`Self::view`] with the voxels where they would be if the image lay `shift_mm` further along than its header
+    /// says.
     ///
     /// # Errors
     /// As [`Self::view`].
@@ -167,8 +168,8 @@ pub struct View {
 }
 
 impl View {
-    /// Voxel averages (filtered as the data were) of a nodal field, in the order of the compared voxels; NaN where the mesh's
-    /// specimen has no material.
+    /// Voxel averages (filtered as the data were) of a nodal field, in the order of the compared voxels; NaN where the
+    /// mesh's specimen has no material.
     ///
     /// # Errors
     /// [`CalibrationError::Voxel`] where `field` is not of the mesh.
@@ -251,7 +252,8 @@ mod tests {
     use super::super::test_problem::{block, coarse, same_mesh, truth};
     use super::*;
 
-    /// A linear field: whole voxels see its slope times the shift, voxels that leave the sample see what is left of them.
+    /// A linear field: whole voxels see its slope times the shift, voxels that leave the sample see what is left of
+    /// them.
     #[test]
     fn shifted_voxels_see_what_lies_there() {
         let specimen = block();

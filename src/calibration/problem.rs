@@ -2,11 +2,12 @@
 
 use super::descend::{Descent, Start, descend};
 use super::error::CalibrationError;
-use super::fit::{Bulk, FitOptions, Held, check_options};
 use super::observed::{Observed, View};
+use super::options::{Bulk, FitOptions, Held, check_options};
+use super::prediction::{Prediction, SolverWork};
 use super::step::Constraints;
 use super::stress_path::StressPath;
-use super::system::{NormalSystem, Prediction, Work};
+use super::system::NormalSystem;
 use super::target::{Objective, Target};
 use crate::fem::{Equilibrium, ForwardModel, SolveOptions};
 use crate::kinematics::IDENTITY;
@@ -34,7 +35,8 @@ pub struct RecordingFit {
     pub material: Ogden,
     /// Fisher information at the estimate with the objective's weights, prior included.
     pub information: FisherInformation,
-    /// Covariance of the estimate under the noise: the inverse information, or the sandwich where weights and noise differ.
+    /// Covariance of the estimate under the noise: the inverse information, or the sandwich where weights and noise
+    /// differ.
     pub covariance: Covariance,
     /// χ²: values by their variances, filtered ones once per acquired voxel.
     pub chi2: f64,
@@ -42,9 +44,9 @@ pub struct RecordingFit {
     pub chi2_per_datum: f64,
     /// What the covariance is to be multiplied with because the misfit is more than noise; 1 where it is not.
     pub misfit_factor: f64,
-    /// √(objective − its expectation) where the misfit is more than noise, else zero: the size of the structured misfit in
-    /// units of the noise. An error of that size and of the shape of a parameter's sensitivity would shift the parameter by
-    /// this times its standard deviation (Cauchy–Schwarz).
+    /// √(objective − its expectation) where the misfit is more than noise, else zero: the size of the structured misfit
+    /// in units of the noise. An error of that size and of the shape of a parameter's sensitivity would shift the
+    /// parameter by this times its standard deviation (Cauchy–Schwarz).
     pub structured_misfit: f64,
     /// Numbers compared.
     pub num_data: usize,
@@ -63,15 +65,15 @@ pub struct RecordingFit {
     /// The objective at the start and after every accepted step.
     pub history: Vec<f64>,
     /// What the fit took, its start included.
-    pub work: Work,
+    pub work: SolverWork,
     /// Parameters that were not fitted.
     pub held: Held,
     pub(super) predictions: Vec<Prediction>,
 }
 
 impl RecordingFit {
-    /// Standard deviation of a parameter from the noise, widened where the misfit is more than noise; none where the data do
-    /// not determine it or it was held.
+    /// Standard deviation of a parameter from the noise, widened where the misfit is more than noise; none where the
+    /// data do not determine it or it was held.
     pub fn sd(&self, parameter: Parameter) -> Option<f64> {
         let index = self.information.index_of(parameter).ok()?;
         if self.held.contains(index) {
@@ -90,7 +92,7 @@ impl RecordingFit {
     /// ½ Σ μᵢαᵢ, kPa, and its standard deviation by the delta method.
     pub fn initial_shear_modulus(&self) -> (f64, Option<f64>) {
         let terms = &self.material.terms;
-        let value = 0.5 * terms.iter().map(|t| t.mu_kpa * t.alpha).sum::<f64>();
+        let value = self.material.initial_shear_modulus_kpa();
         let mut gradient = vec![0.0];
         for term in terms {
             gradient.extend([0.5 * term.alpha, 0.5 * term.mu_kpa]);
@@ -184,8 +186,8 @@ impl<'a> CalibrationProblem<'a> {
         predict(self.observed, &mut self.models, &self.views, material, near, solve, is_cancelled)
     }
 
-    /// Fits from `start`; `near` is an earlier fit of this problem whose equilibria are used as first guesses. A fit that
-    /// does not converge comes back as such.
+    /// Fits from `start`; `near` is an earlier fit of this problem whose equilibria are used as first guesses. A fit
+    /// that does not converge comes back as such.
     ///
     /// # Errors
     /// [`CalibrationError`].
@@ -202,7 +204,8 @@ impl<'a> CalibrationProblem<'a> {
         self.descend_from(first, start, options, is_cancelled)
     }
 
-    /// Fits from where `from` stands, an earlier fit on this mesh, whose equilibria and derivatives are taken as they are.
+    /// Fits from where `from` stands, an earlier fit on this mesh, whose equilibria and derivatives are taken as they
+    /// are.
     pub(super) fn fit_from(
         &mut self,
         from: &RecordingFit,
@@ -221,7 +224,7 @@ impl<'a> CalibrationProblem<'a> {
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<RecordingFit, CalibrationError> {
         let constraints = Constraints::new(start, options)?;
-        let mut work = Work::default();
+        let mut work = SolverWork::default();
         first.iter().for_each(|p| work.add(p.work));
         let CalibrationProblem { observed, models, views, objective } = self;
         let path = first
@@ -364,7 +367,7 @@ fn finished(
         distance,
         reached_limits: reached,
         history,
-        work: Work::default(),
+        work: SolverWork::default(),
         held,
         predictions,
     })

@@ -1,7 +1,7 @@
 //! Profile likelihood: what the objective loses when one parameter is held off its optimum and all others follow.
 
 use super::error::CalibrationError;
-use super::fit::FitOptions;
+use super::options::FitOptions;
 use super::problem::{CalibrationProblem, RecordingFit};
 use crate::material::Parameter;
 use serde::{Deserialize, Serialize};

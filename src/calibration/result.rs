@@ -1,10 +1,10 @@
 //! The result of a calibration (`calibration/1`).
 
-use super::calibrate::Calibration;
 use super::contours::Contour;
 use super::observed::Observed;
+use super::outcome::Calibration;
+use super::prediction::SolverWork;
 use super::profile::Profile;
-use super::system::Work;
 use super::target::{Objective, PAPER_BETA};
 use super::terms::TermSelection;
 use crate::material::Ogden;
@@ -53,7 +53,7 @@ pub struct CalibrationResult {
     /// Iterations of the last fit, and the work of all fits.
     pub iterations: usize,
     /// Equilibria, Newton iterations, factorisations.
-    pub work: Work,
+    pub work: SolverWork,
     /// Version of the program.
     pub version: String,
     /// SHA-256 of recordings and settings, hexadecimal.
@@ -76,7 +76,8 @@ pub struct ParameterResult {
     pub mesh_error: f64,
     /// Standard deviation from discretisation errors, those of the data included.
     pub discretisation_sd: f64,
-    /// What the structured part of the misfit may have shifted it by, at most; zero where the misfit is that of the noise.
+    /// What the structured part of the misfit may have shifted it by, at most; zero where the misfit is that of the
+    /// noise.
     pub possible_shift: f64,
     /// Whether the standard deviation is below half of the value.
     pub identifiable: bool,

@@ -1,10 +1,12 @@
-//! Synthetic stand-ins of the published experiments: two-hole specimens at 2.5 and 5 mm, raw and filtered, each fitted with
-//! one, two and three terms by the paper's objective.
+//! Synthetic stand-ins of the published experiments: two-hole specimens at 2.5 and 5 mm, raw and filtered, each fitted
+//! with one, two and three terms by the paper's objective.
 
-use super::calibrate::{CalibrateOptions, Calibration, TermCount, calibrate};
+use super::calibrate::calibrate;
+use super::calibrate_options::{CalibrateOptions, TermCount};
 use super::contours::{Contour, ContourOptions, contours};
 use super::error::CalibrationError;
 use super::observed::Observed;
+use super::outcome::Calibration;
 use super::problem::CalibrationProblem;
 use super::synthetic::SyntheticScan;
 use super::target::{Objective, PAPER_BETA};

@@ -1,10 +1,11 @@
 //! Where fits start: from a force by hand's formula, and new terms by what they promise to gain.
 
 use super::error::CalibrationError;
-use super::fit::{FitOptions, Held};
 use super::observed::Observed;
+use super::options::{FitOptions, Held};
+use super::prediction::Prediction;
 use super::problem::{CalibrationProblem, RecordingFit};
-use super::system::{Prediction, raw_sums};
+use super::system::raw_sums;
 use super::target::Target;
 use crate::material::{MAX_TERMS, Ogden, OgdenTerm};
 use crate::specimen::TestKind;
@@ -24,8 +25,8 @@ const NEXT_EXPONENTS: [f64; 15] =
 /// A further term starts with a part of the shear modulus in this range.
 const FIRST_SHARE: [f64; 2] = [2e-3, 0.3];
 
-/// Shear modulus (kPa) that a homogeneous test of the block's outline would need for the first force: F = G A d / t in shear,
-/// 3 G A d / l in tension.
+/// Shear modulus (kPa) that a homogeneous test of the block's outline would need for the first force: F = G A d / t in
+/// shear, 3 G A d / l in tension.
 fn shear_modulus_kpa(observed: &[Observed]) -> f64 {
     for recording in observed {
         let specimen = &recording.specimen;
@@ -78,7 +79,7 @@ impl Candidates {
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Candidates, CalibrationError> {
         let old = &fit.material;
-        let shear = shear_of(old);
+        let shear = old.initial_shear_modulus_kpa();
         let gap = 1.1 * options.min_alpha_gap;
         let exponents: Vec<f64> =
             NEXT_EXPONENTS.into_iter().filter(|a| old.terms.iter().all(|t| (t.alpha - a).abs() > gap)).collect();
@@ -95,13 +96,13 @@ impl Candidates {
         Ok(Candidates { old: old.clone(), held: fit.held, groups })
     }
 
-    /// The fit's material with one term more, in the order of the decrease of the objective that the new term promises: for
-    /// each exponent the new μ that the linear model likes best, all old parameters moving along. At most `count`, each with
-    /// the decrease promised.
+    /// The fit's material with one term more, in the order of the decrease of the objective that the new term promises:
+    /// for each exponent the new μ that the linear model likes best, all old parameters moving along. At most `count`,
+    /// each with the decrease promised.
     pub(super) fn ranked(&self, targets: &[Target], count: usize) -> Vec<(f64, Ogden)> {
         let old = &self.old;
         let num_old = 2 * old.terms.len() + 1;
-        let shear = shear_of(old);
+        let shear = old.initial_shear_modulus_kpa();
         let mut candidates: Vec<(f64, Ogden)> = Vec::new();
         for (chunk, predictions) in &self.groups {
             let (matrix, gradient) = raw_sums(predictions, targets);
@@ -146,17 +147,13 @@ impl Candidates {
         chosen
     }
 
-    /// The decrease of the objective that a further term promises where the data are what `other`, a fit on another mesh,
-    /// predicts: a term that the meshes' difference asks for.
+    /// The decrease of the objective that a further term promises where the data are what `other`, a fit on another
+    /// mesh, predicts: a term that the meshes' difference asks for.
     pub(super) fn promise_of_mesh(&self, targets: &[Target], other: &RecordingFit) -> f64 {
         let moved: Vec<Target> =
             targets.iter().zip(&other.predictions).map(|(t, p)| t.with_measured(&p.displacements, &p.states)).collect();
         self.ranked(&moved, 1).first().map_or(0.0, |(gain, _)| *gain)
     }
-}
-
-fn shear_of(material: &Ogden) -> f64 {
-    0.5 * material.terms.iter().map(|t| t.mu_kpa * t.alpha).sum::<f64>()
 }
 
 /// Starts with one term more than `fit`, the most promising first, at most `count`; see [`Candidates`].

@@ -87,7 +87,8 @@ fn exponents_keep_their_distance() {
     assert!((step.change[4] - (-0.4 - 3.2 * violation)).abs() < 1e-6);
 }
 
-/// A second term that stands at the smallest distance of exponents and fades: other limits are farther away by seven decades.
+/// A second term that stands at the smallest distance of exponents and fades: other limits are farther away by seven
+/// decades.
 #[test]
 fn limits_far_away_do_not_spoil_the_step() {
     let start = ogden(2173.0, &[[1.2, 8.0], [17.0, 1.9]]);
@@ -111,8 +112,8 @@ fn limits_far_away_do_not_spoil_the_step() {
     // No step within the limits does better: steps drawn around the found one, cut to the limits on the way from rest.
     let value = |x: &DVector<f64>| 0.5 * x.dot(&(&matrix * x)) - s.gradient.dot(x);
     let limits = constraints.limits(&s, true);
-    let used = |l: &Limit, x: &DVector<f64>| l.coefficients.iter().map(|&(i, c)| c * x[i]).sum::<f64>();
-    assert!(limits.iter().all(|l| used(l, &step.change) <= l.room + 1e-9), "{:?}", step.reached);
+    let used = |l: &NamedLimit, x: &DVector<f64>| l.limit.value(x.as_slice());
+    assert!(limits.iter().all(|l| used(l, &step.change) <= l.limit.bound + 1e-9), "{:?}", step.reached);
     let mut state = 1u64;
     let mut random = || {
         state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
@@ -121,8 +122,11 @@ fn limits_far_away_do_not_spoil_the_step() {
     for n in 0..20_000 {
         let size = 10f64.powi(-(n % 6));
         let mut x = DVector::from_fn(5, |i, _| step.change[i] + size * random() / root(i));
-        let part =
-            limits.iter().filter(|l| used(l, &x) > l.room).map(|l| (l.room / used(l, &x)).max(0.0)).fold(1.0, f64::min);
+        let part = limits
+            .iter()
+            .filter(|l| used(l, &x) > l.limit.bound)
+            .map(|l| (l.limit.bound / used(l, &x)).max(0.0))
+            .fold(1.0, f64::min);
         x *= part;
         assert!(value(&x) >= value(&step.change) - 1e-9, "{x} is better than {}", step.change);
     }

@@ -1,11 +1,11 @@
 //! Steps along which the stresses change as promised, not the parameters.
 //!
-//! Displacements and forces depend on the parameters through the stresses alone, and far more nearly linearly on stresses
-//! than on parameters: a two-term fit has a valley, along which the stress at the largest stretches stays, and in the
-//! parameters that valley is curved. A step by the linear model leaves it soon. Here a step δ of the parameters is read as one
-//! of the stresses, t₀ + D δ with D = ∂t/∂ξ over the states that the specimen visits, and the parameters are moved to those
-//! whose stresses come nearest to it within the limits of a step, in the least squares weighted by volume. To first order that is the step itself, so that
-//! nothing changes at the optimum; it costs no equilibrium.
+//! Displacements and forces depend on the parameters through the stresses alone, and far more nearly linearly on
+//! stresses than on parameters: a two-term fit has a valley, along which the stress at the largest stretches stays, and
+//! in the parameters that valley is curved. A step by the linear model leaves it soon. Here a step δ of the parameters
+//! is read as one of the stresses, t₀ + D δ with D = ∂t/∂ξ over the states that the specimen visits, and the parameters
+//! are moved to those whose stresses come nearest to it within the limits of a step, in the least squares weighted by
+//! volume. To first order that is the step itself, so that nothing changes at the optimum; it costs no equilibrium.
 
 use super::error::CalibrationError;
 use super::step::Constraints;
@@ -13,17 +13,20 @@ use super::system::NormalSystem;
 use crate::fem::{Equilibrium, ForwardModel};
 use crate::kinematics::principal_stretches;
 use crate::material::Ogden;
+use crate::optimise::{self, LeastSquares, Rules, Shortening, Step, Stop};
 use nalgebra::{DMatrix, DVector};
 
 /// States kept of those visited: enough for a smooth family of functions with a handful of parameters.
 const NUM_STATES: usize = 256;
-/// Gauss–Newton iterations of the inner fit, and halvings of one's step.
-const MAX_ITERATIONS: usize = 20;
-const MAX_HALVINGS: usize = 6;
-/// The inner fit has converged when its squared misfit falls by less than this part.
-const TOLERANCE: f64 = 1e-6;
-/// Beyond this many times the length of the linear step (ln |μ|, relative α) the linear step is taken: the promise is then
-/// met, if at all, by quite another material.
+/// The fit of the stresses: Gauss–Newton steps that are halved where they do not help, until the squared misfit falls
+/// by less than a millionth.
+const RULES: Rules = Rules {
+    shortening: Shortening::Halved { num_lengths: 6 },
+    tolerated_rise: 0.0,
+    stop: Stop { max_trials: usize::MAX, max_steps: 20, least_relative_gain: Some(1e-6) },
+};
+/// Beyond this many times the length of the linear step (ln |μ|, relative α) the linear step is taken: the promise is
+/// then met, if at all, by quite another material.
 const LARGEST_DETOUR: f64 = 2.0;
 
 /// Visited states: their traceless logarithmic principal strains and the root of their volume.
@@ -82,25 +85,11 @@ impl StressPath {
         }
         let (stresses, slopes) = self.stresses(material);
         let wanted = stresses + slopes * step;
-        let missed = |m: &Ogden| (&wanted - self.stresses(m).0).norm_squared();
-        let mut near = Ogden { bulk_kpa: linear.bulk_kpa, ..material.clone() };
-        let mut error = missed(&near);
-        for _ in 0..MAX_ITERATIONS {
-            let inner = self.system(system, &near, &wanted);
-            let mut change = limits.step(&inner, 0.0, true)?.change;
-            let better = (0..MAX_HALVINGS).find_map(|_| {
-                let trial = inner.moved(&near, &change);
-                let next = missed(&trial);
-                change *= 0.5;
-                (next < error).then_some((trial, next))
-            });
-            let Some((trial, next)) = better else { break };
-            let is_done = error - next < TOLERANCE * error;
-            (near, error) = (trial, next);
-            if is_done {
-                break;
-            }
-        }
+        let near = Ogden { bulk_kpa: linear.bulk_kpa, ..material.clone() };
+        let mut inner = StressFit { path: self, limits, outer: system, wanted: &wanted };
+        let start = inner.point(near);
+        let own_system = self.system(system, &start.material, &wanted);
+        let StressPoint { material: near, misfit } = optimise::descend(&mut inner, start, own_system, &RULES)?.at;
         let length = |m: &Ogden| {
             let moved = m.terms.iter().zip(&material.terms);
             moved
@@ -109,7 +98,12 @@ impl StressPath {
                 .sqrt()
         };
         let is_near = length(&near) < LARGEST_DETOUR * length(&linear);
-        Ok(if is_near && error < missed(&linear) { near } else { linear })
+        Ok(if is_near && misfit < self.misfit(&linear, &wanted) { near } else { linear })
+    }
+
+    /// Σ (wanted − stress)² of a material.
+    fn misfit(&self, material: &Ogden, wanted: &DVector<f64>) -> f64 {
+        (wanted - self.stresses(material).0).norm_squared()
     }
 
     /// The normal equations of the fit of `material`'s stresses to `wanted`, in scaled parameters.
@@ -149,9 +143,58 @@ impl StressPath {
     }
 }
 
+/// A material and how far its stresses are from those wanted.
+struct StressPoint {
+    material: Ogden,
+    misfit: f64,
+}
+
+/// The fit of a material's stresses to those that a step promises, within the limits of a step.
+struct StressFit<'a> {
+    path: &'a StressPath,
+    limits: &'a Constraints,
+    outer: &'a NormalSystem,
+    wanted: &'a DVector<f64>,
+}
+
+impl StressFit<'_> {
+    fn point(&self, material: Ogden) -> StressPoint {
+        StressPoint { misfit: self.path.misfit(&material, self.wanted), material }
+    }
+}
+
+impl LeastSquares for StressFit<'_> {
+    type Point = StressPoint;
+    type Linear = NormalSystem;
+    type Error = CalibrationError;
+
+    fn objective(&self, at: &StressPoint) -> f64 {
+        at.misfit
+    }
+
+    fn linearise(&mut self, at: &StressPoint) -> Result<Option<NormalSystem>, CalibrationError> {
+        Ok(Some(self.path.system(self.outer, &at.material, self.wanted)))
+    }
+
+    fn step(&mut self, _: &StressPoint, linear: &NormalSystem, damping: f64) -> Result<Option<Step>, CalibrationError> {
+        let step = self.limits.step(linear, damping, true)?;
+        Ok(Some(Step { change: step.change, promised: step.distance * step.distance }))
+    }
+
+    fn trial(
+        &mut self,
+        at: &StressPoint,
+        linear: &NormalSystem,
+        step: &Step,
+        part: f64,
+    ) -> Result<Option<StressPoint>, CalibrationError> {
+        Ok(Some(self.point(linear.moved(&at.material, &(&step.change * part)))))
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::fit::{FitOptions, Held};
+    use super::super::options::{FitOptions, Held};
     use super::super::test_problem::{block, coarse, ogden};
     use super::*;
     use crate::fem::SolveOptions;

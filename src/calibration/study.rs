@@ -1,22 +1,24 @@
-//! Calibrations of many noisy scans of one truth: do the intervals cover, is the spread the promised one, is the number of
-//! terms found?
+//! Calibrations of many noisy scans of one truth: do the intervals cover, is the spread the promised one, is the number
+//! of terms found?
 //!
-//! The truth is solved on another mesh than the one fitted on. What that mesh shifts is told apart from the noise by a fit to
-//! the noiseless scan: coverage by the noise's intervals is that of the truth plus this shift, coverage by the whole intervals,
-//! which allow for discretisation, that of the truth itself. Whether a term can be found at all is said by the
-//! increase δ of χ² of the best model with a term less on the noiseless scan: the decrease seen in a draw is then distributed
-//! as noncentral χ² with two degrees of freedom, and BIC asks for 2 ln n.
+//! The truth is solved on another mesh than the one fitted on. What that mesh shifts is told apart from the noise by a
+//! fit to the noiseless scan: coverage by the noise's intervals is that of the truth plus this shift, coverage by the
+//! whole intervals, which allow for discretisation, that of the truth itself. Whether a term can be found at all is
+//! said by the increase δ of χ² of the best model with a term less on the noiseless scan: the decrease seen in a draw
+//! is then distributed as noncentral χ² with two degrees of freedom, and BIC asks for 2 ln n.
 //!
-//! A model's prediction does not depend on the noise: fits of a draw start from the optimum of the noiseless scan, whose
-//! equilibria and derivatives all draws share. The first draws are also fitted from blind starts, which must end in the same
-//! optimum.
+//! A model's prediction does not depend on the noise: fits of a draw start from the optimum of the noiseless scan,
+//! whose equilibria and derivatives all draws share. The first draws are also fitted from blind starts, which must end
+//! in the same optimum.
 
 use super::allowance::ERROR_OVER_SHIFT;
-use super::calibrate::{CalibrateOptions, MESH_RATIO, Run, falling};
+use super::calibrate::MESH_RATIO;
+use super::calibrate_options::CalibrateOptions;
 use super::error::CalibrationError;
 use super::observed::Observed;
 use super::problem::{CalibrationProblem, RecordingFit};
 use super::profile::TWO_SIDED_95;
+use super::run::{Run, with_falling_exponents};
 use super::starts::Candidates;
 use super::synthetic::SyntheticScan;
 use super::terms::{Rule, SETTLED, choose, compare};
@@ -184,7 +186,7 @@ pub fn study(
         let recording = synthetic.recording("draw", &case.specimen, data, case.filter)?;
         Ok([Observed::new(&recording, case.scan.force_sd_n)?])
     };
-    let truth = falling(&case.truth);
+    let truth = with_falling_exponents(&case.truth);
     let num_terms = truth.terms.len();
     let clean = observe(synthetic.noiseless())?;
     let new_problem = |factor: f64| -> Result<CalibrationProblem<'_>, CalibrationError> {
@@ -338,7 +340,8 @@ fn summarise(draws: &[Draw], truth: &Ogden, noiseless: &RecordingFit, coarse: &R
     }
 }
 
-/// P(noncentral χ² with two degrees of freedom and noncentrality `expected` > `needed`), by Sankaran's normal approximation.
+/// P(noncentral χ² with two degrees of freedom and noncentrality `expected` > `needed`), by Sankaran's normal
+/// approximation.
 fn detection_probability(expected: f64, needed: f64) -> f64 {
     let (k, l) = (2.0, expected);
     let h = 1.0 - 2.0 / 3.0 * (k + l) * (k + 3.0 * l) / (k + 2.0 * l).powi(2);

@@ -23,7 +23,8 @@ fn case(truth: Ogden, filter: Filter, draws: usize, max_terms: usize) -> StudyCa
     }
 }
 
-/// A small version of the study: coverage, spread and number of terms, on another mesh than the truth's, plain and filtered.
+/// A small version of the study: coverage, spread and number of terms, on another mesh than the truth's, plain and
+/// filtered.
 #[test]
 fn intervals_cover_and_terms_are_found() {
     for filter in [Filter::None, Filter::Hamming2] {

@@ -108,8 +108,8 @@ impl SyntheticScan {
         &self.truth
     }
 
-    /// `data` of this scan as a recording of `specimen`, filtered or not. After the filter the noise stated is that of a mean of
-    /// eight.
+    /// `data` of this scan as a recording of `specimen`, filtered or not. After the filter the noise stated is that of
+    /// a mean of eight.
     ///
     /// # Errors
     /// [`CalibrationError::Voxel`] where the filter has nothing to average.

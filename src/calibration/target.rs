@@ -1,13 +1,13 @@
 //! What a fit compares with: measured values, their weights in the objective, and the noise that they carry.
 //!
-//! The objective is Σ_drives [ Σ_voxels w Σ_c p_c (u_c − ū_c)² + p_F (F − F_model)² ]. With p = 1/σ² it is χ²; with other p
-//! (the paper's ℓ_u + βℓ_F, or values that share their noise with their neighbours) the covariance of the estimate is a
-//! sandwich of the objective's curvature and the noise's true covariance.
+//! The objective is Σ_drives [ Σ_voxels w Σ_c p_c (u_c − ū_c)² + p_F (F − F_model)² ]. With p = 1/σ² it is χ²; with
+//! other p (the paper's ℓ_u + βℓ_F, or values that share their noise with their neighbours) the covariance of the
+//! estimate is a sandwich of the objective's curvature and the noise's true covariance.
 
 use super::error::CalibrationError;
 use super::observed::{Observed, View};
+use super::prediction::Prediction;
 use super::synthetic::Measurement;
-use super::system::Prediction;
 use crate::fem::Equilibrium;
 use crate::sensitivity::ScanSettings;
 use nalgebra::DMatrix;
@@ -15,8 +15,8 @@ use nalgebra::DMatrix;
 /// What a fit minimises.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Objective {
-    /// χ²: every value with the inverse of its variance. Values that share their noise (after a filter) count as one per
-    /// acquired voxel.
+    /// χ²: every value with the inverse of its variance. Values that share their noise (after a filter) count as one
+    /// per acquired voxel.
     #[default]
     Weighted,
     /// The paper's ℓ_u + βℓ_F, means over the drives.

@@ -1,10 +1,11 @@
 //! How many terms: three rules, all shown, one deciding.
 //!
 //! * The paper's: a term stays while it lowers ℓ_u + βℓ_F by more than a threshold.
-//! * The F-test: F = (Δχ²/2) / (χ²/(n − p)) of the larger model, p-value (1 + 2F/(n − p))^(−(n−p)/2). The exponent of a term
-//!   that is not there has no value, so the true p-value is larger by about the number of exponents that could be told apart.
-//! * The Bayesian information criterion: Δχ²/s² against 2 ln n, with s² the misfit per datum of the largest model. It needs
-//!   no noise level and, with n in the ten thousands, is the strictest.
+//! * The F-test: F = (Δχ²/2) / (χ²/(n − p)) of the larger model, p-value (1 + 2F/(n − p))^(−(n−p)/2). The exponent of a
+//!   term that is not there has no value, so the true p-value is larger by about the number of exponents that could be
+//!   told apart.
+//! * The Bayesian information criterion: Δχ²/s² against 2 ln n, with s² the misfit per datum of the largest model. It
+//!   needs no noise level and, with n in the ten thousands, is the strictest.
 
 use super::problem::RecordingFit;
 use crate::material::{Ogden, OgdenTerm};
@@ -26,7 +27,8 @@ pub enum Rule {
 
 /// Level of the F-test.
 pub const F_TEST_LEVEL: f64 = 0.01;
-/// Smallest decrement of ℓ that keeps a term: between those that the paper kept and those that it did not (its Table 2).
+/// Smallest decrement of ℓ that keeps a term: between those that the paper kept and those that it did not (its Table
+/// 2).
 pub const DECREMENT_THRESHOLD: f64 = 1e-5;
 /// A term that nowhere makes a larger part of the stress is faded.
 const FADED_SHARE: f64 = 1e-3;
@@ -112,8 +114,8 @@ pub(super) fn compare(rows: &mut [TermRow], num_data: usize) {
     }
 }
 
-/// Within this many standard deviations of the optimum of the linear model a fit has settled: what it may still gain, at most
-/// one in χ², is within the noise, and could only add to the evidence for its terms.
+/// Within this many standard deviations of the optimum of the linear model a fit has settled: what it may still gain,
+/// at most one in χ², is within the noise, and could only add to the evidence for its terms.
 pub(super) const SETTLED: f64 = 1.0;
 
 /// Whether `row` is worth its last term by a rule; an unstable or unsettled term never is.
@@ -133,8 +135,8 @@ pub(super) fn choose(rows: &[TermRow], rule: Rule, threshold: f64) -> usize {
     1 + rows.iter().skip(1).take_while(|r| is_kept(r, rule, threshold)).count()
 }
 
-/// The largest part that a term has of the stress, over the isochoric principal stretches `visited`: of a term with a large
-/// exponent μα may be nothing and the stress at large stretches much.
+/// The largest part that a term has of the stress, over the isochoric principal stretches `visited`: of a term with a
+/// large exponent μα may be nothing and the stress at large stretches much.
 fn largest_share(material: &Ogden, term: &OgdenTerm, visited: &[[f64; 3]]) -> f64 {
     let size = |terms: &[OgdenTerm], stretches: &[f64; 3]| {
         let stress = stretches.map(|s| terms.iter().map(|t| t.mu_kpa * s.powf(t.alpha)).sum::<f64>());
@@ -203,7 +205,8 @@ mod tests {
         }
     }
 
-    /// Δχ² of 15 over 10⁴ data: the F-test keeps the term (p = e^(−7.5) to first order), BIC (2 ln 10⁴ = 18.4) does not.
+    /// Δχ² of 15 over 10⁴ data: the F-test keeps the term (p = e^(−7.5) to first order), BIC (2 ln 10⁴ = 18.4) does
+    /// not.
     #[test]
     fn rules_differ_as_they_should() {
         let mut rows = vec![row(1, 10_015.0, 3e-3), row(2, 10_000.0, 2.98e-3), row(3, 9_999.0, 2.98e-3)];

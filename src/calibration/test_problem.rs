@@ -1,6 +1,6 @@
 //! A small problem for the tests of this room: a solid block, sheared to 1, on a coarse mesh.
 
-use super::fit::FitOptions;
+use super::options::FitOptions;
 use super::synthetic::SyntheticScan;
 use crate::fem::{ForwardModel, SolveOptions};
 use crate::material::{Ogden, OgdenTerm};

@@ -1,4 +1,5 @@
-//! Verification of a design: calibrate on many noisy synthetic scans and set the spread found beside the spread promised.
+//! Verification of a design: calibrate on many noisy synthetic scans and set the spread found beside the spread
+//! promised.
 //!
 //! The truth is solved on a finer and different mesh. Every draw is fitted from one blind start, off the truth in every
 //! parameter; only the equilibria of that start are shared, because they do not depend on the data. Two errors are told
@@ -6,9 +7,10 @@
 //! which is what a fit to the noiseless scan misses the truth by.
 
 use super::error::CalibrationError;
-use super::fit::{Bulk, Fit, FitOptions, FitStart};
+use super::fit::{Fit, FitStart};
+use super::options::{Bulk, FitOptions};
+use super::prediction::Prediction;
 use super::synthetic::SyntheticScan;
-use super::system::Prediction;
 use crate::fem::ForwardModel;
 use crate::material::{Ogden, Parameter};
 use crate::mesh::MeshOptions;
@@ -121,12 +123,12 @@ fn blind_start(truth: &Ogden, bulk: Bulk) -> Ogden {
     start
 }
 
-/// Calibrates on `options.draws` noisy scans of `truth`; draws run in parallel, each from the same blind start, and come
-/// back in order, with the same bits at any number of threads. `on_draw` is called after each.
+/// Calibrates on `options.draws` noisy scans of `truth`; draws run in parallel, each from the same blind start, and
+/// come back in order, with the same bits at any number of threads. `on_draw` is called after each.
 ///
 /// # Errors
-/// [`CalibrationError`] where the truth or the start cannot be solved, the settings are wrong or the work was cancelled.
-/// A draw whose fit does not converge is counted.
+/// [`CalibrationError`] where the truth or the start cannot be solved, the settings are wrong or the work was
+/// cancelled. A draw whose fit does not converge is counted.
 pub fn verify(
     specimen: &Specimen,
     truth: &Ogden,

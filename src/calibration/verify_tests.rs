@@ -62,8 +62,8 @@ fn mean_is_shifted_by_the_mesh() {
     assert!(spreads.iter().any(|s| s.discretisation_bias.unwrap().abs() > 0.1 * s.promised_sd.unwrap()));
 }
 
-/// One model or two: the same bits. The models must be alike; other tests of this process may disturb the ordering of the
-/// unknowns while one is made, so a pair is made until it is.
+/// One model or two: the same bits. The models must be alike; other tests of this process may disturb the ordering of
+/// the unknowns while one is made, so a pair is made until it is.
 #[test]
 fn threads_do_not_change_the_estimates() {
     let specimen = block();

@@ -1,7 +1,8 @@
-//! The checkpoint: every finished evaluation as one line of JSON, so that a stopped or crashed search goes on where it was.
+//! The checkpoint: every finished evaluation as one line of JSON, so that a stopped or crashed search goes on where it
+//! was.
 //!
-//! The search is deterministic, so a resumed run asks for the same evaluations in the same order and takes them from here;
-//! floats are written with the digits that read back to the same bits. A half-written last line is dropped.
+//! The search is deterministic, so a resumed run asks for the same evaluations in the same order and takes them from
+//! here; floats are written with the digits that read back to the same bits. A half-written last line is dropped.
 
 use crate::file::read_limited;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -48,7 +49,8 @@ pub enum CheckpointError {
 /// Largest checkpoint that is read, bytes; one of a long search has some hundred megabytes.
 const MAX_BYTES: u64 = 1 << 34;
 
-/// What the evaluations hold. Those of another meaning must not be read: their lists of derivatives are told apart by place alone.
+/// What the evaluations hold. Those of another meaning must not be read: their lists of derivatives are told apart by
+/// place alone.
 const FORMAT: &str = "evaluations/2";
 
 #[derive(Serialize, Deserialize)]
@@ -171,11 +173,11 @@ mod tests {
         let mut file = OpenOptions::new().append(true).open(&path).expect("it exists");
         file.write_all(b"{\"key\":\"b\",\"val").expect("writable");
         drop(file);
-        let again = Checkpoint::open(&path, "abc").expect("the half line is dropped");
-        assert_eq!(again.num_resumed(), 1);
-        assert_eq!(again.get_or("a", || None::<f64>), Some(0.1 + 0.2));
-        assert_eq!(again.get_or("b", || Some(2.0)), Some(2.0));
-        drop(again);
+        let reopened = Checkpoint::open(&path, "abc").expect("the half line is dropped");
+        assert_eq!(reopened.num_resumed(), 1);
+        assert_eq!(reopened.get_or("a", || None::<f64>), Some(0.1 + 0.2));
+        assert_eq!(reopened.get_or("b", || Some(2.0)), Some(2.0));
+        drop(reopened);
         assert_eq!(Checkpoint::open(&path, "abc").expect("still good").num_resumed(), 2);
         assert!(matches!(Checkpoint::open(&path, "other"), Err(CheckpointError::OtherStudy { .. })));
     }
@@ -210,9 +212,9 @@ mod tests {
         drop(first);
         let text = std::fs::read_to_string(&path).expect("readable");
         std::fs::write(&path, text.replace("\"b\"", "\"b")).expect("writable");
-        let again = Checkpoint::open(&path, "abc").expect("usable");
-        assert_eq!(again.num_resumed(), 1);
-        assert_eq!(again.get_or("c", || Some(4.0)), Some(4.0));
+        let reopened = Checkpoint::open(&path, "abc").expect("usable");
+        assert_eq!(reopened.num_resumed(), 1);
+        assert_eq!(reopened.get_or("c", || Some(4.0)), Some(4.0));
     }
 
     /// Every finite float comes back with its bits, also through the file.
@@ -234,8 +236,8 @@ mod tests {
         let first = Checkpoint::open(&path, "abc").expect("a new file");
         first.get_or("a", || Some(values.clone()));
         drop(first);
-        let again = Checkpoint::open(&path, "abc").expect("usable");
-        let back = again.get_or("a", || None::<Vec<f64>>).expect("it is there");
+        let reopened = Checkpoint::open(&path, "abc").expect("usable");
+        let back = reopened.get_or("a", || None::<Vec<f64>>).expect("it is there");
         assert!(values.iter().zip(&back).all(|(a, b)| a.to_bits() == b.to_bits()));
     }
 }

@@ -1,13 +1,13 @@
 //! Confirmation: a design at the reported fidelity, standard mesh and the scan's own voxels, for every material.
 
 use super::aim::{Normalisation, ObjectiveKind};
+use super::evaluation_failure::EvaluationFailure;
+use super::evaluator::{Evaluated, Evaluator};
+use super::material_samples::sample_materials;
 use super::objective::{Judged, Reference};
-use super::response::{
-    Evaluated, EvaluationFailure, Evaluator, Response, criteria_as_relative_sd, log_or_undetermined, normalised,
-    sample_materials, tearing_stretch,
-};
+use super::response::{Response, criteria_as_relative_sd, log_or_undetermined, normalised, tearing_stretch};
 use super::study::Study;
-use super::tell_apart::{log_separation, nearest, state_of};
+use super::tell_apart::{Imitation, log_separation, state_of};
 use crate::fem::{Equilibrium, ForwardModel};
 use crate::kinematics::principal_stretches;
 use crate::sensitivity::{
@@ -56,8 +56,8 @@ pub struct MaterialEvaluation {
     pub tearing_stretch: f64,
     /// Force, N.
     pub force_n: f64,
-    /// Distance of this material's scan from the closest fit of an earlier material to it, in noise standard deviations; null for
-    /// the first material, and where the study does not ask to tell materials apart.
+    /// Distance of this material's scan from the closest fit of an earlier material to it, in noise standard
+    /// deviations; null for the first material, and where the study does not ask to tell materials apart.
     #[serde(default)]
     pub separation_sd: Option<f64>,
 }
@@ -123,9 +123,15 @@ pub fn confirm(
         let mut closest = f64::INFINITY;
         for (earlier, (_, start)) in solved.iter().enumerate().take(later) {
             let (material, theirs) = (&study.materials[earlier].material, &solved[later].0);
-            let fit =
-                nearest(study, &mut model, material, start, start.drive_mm, theirs, &options.solve, is_cancelled)?;
-            closest = closest.min(fit.distance_sd);
+            let imitation = Imitation {
+                study,
+                model: &mut model,
+                theirs,
+                drive_mm: start.drive_mm,
+                solve: &options.solve,
+                is_cancelled,
+            };
+            closest = closest.min(imitation.nearest(material, start)?.distance_sd);
         }
         by_material[later].separation_sd = Some(closest);
     }
@@ -149,9 +155,9 @@ pub fn confirm(
     })
 }
 
-/// Responses at every material sample. Those at the central values are the evaluations'; a variant's is the centre's plus the
-/// difference that the variant makes on the search's mesh: differences of logarithms at one mesh are far more accurate than
-/// the values, and cost little.
+/// Responses at every material sample. Those at the central values are the evaluations'; a variant's is the centre's
+/// plus the difference that the variant makes on the search's mesh: differences of logarithms at one mesh are far more
+/// accurate than the values, and cost little.
 fn responses(
     study: &Study,
     specimen: &Specimen,

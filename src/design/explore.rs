@@ -8,8 +8,8 @@ use rand_chacha::ChaCha8Rng;
 /// Attempts at one sample before it is given up.
 const ATTEMPTS: usize = 60;
 
-/// Geometry margins of a specimen, mm (voxels for the voxel limit): ≥ 0 where the limits are kept. Their number depends on
-/// the number of holes alone.
+/// Geometry margins of a specimen, mm (voxels for the voxel limit): ≥ 0 where the limits are kept. Their number depends
+/// on the number of holes alone.
 pub fn geometry_margins(specimen: &Specimen, limits: &ManufacturingLimits, voxel_mm: [f64; 3]) -> Vec<f64> {
     let mut margins = Vec::new();
     for ligament in specimen.ligaments() {

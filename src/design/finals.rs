@@ -1,14 +1,16 @@
-//! The end of a search: confirmation of the finalists on the finer mesh, and the repair of those that keep a limit in the
-//! search and break it there.
+//! The end of a search: confirmation of the finalists on the finer mesh, and the repair of those that keep a limit in
+//! the search and break it there.
 
 use super::confirm::{Confirmed, confirm};
+use super::evaluation_failure::EvaluationFailure;
 use super::local::{LocalSettings, improve};
+use super::material_samples::sample_materials;
 use super::objective::Reference;
-use super::problem::Problem;
-use super::response::{EvaluationFailure, sample_materials};
-use super::search::{Progress, Search, SearchError};
+use super::search_error::SearchError;
+use super::search_run::{Progress, SearchRun};
 use super::space::Subspace;
 use super::state::{Finalist, State};
+use super::structure_problem::StructureProblem;
 use crate::provenance::input_hash;
 use crate::specimen::Specimen;
 use rayon::prelude::*;
@@ -20,10 +22,11 @@ const MAX_REPAIRS: usize = 2;
 /// Evaluations of one repair at most.
 const REPAIR_EVALUATIONS: usize = 6;
 
-type Attempt = Option<Result<Confirmed, EvaluationFailure>>;
+/// A confirmation, or why there is none; `None` where it was cancelled.
+type Confirmation = Option<Result<Confirmed, EvaluationFailure>>;
 
-impl Search<'_> {
-    fn confirmed(&self, specimen: &Specimen) -> Attempt {
+impl SearchRun<'_> {
+    fn confirmed(&self, specimen: &Specimen) -> Confirmation {
         let key = input_hash(&serde_json::json!({ "specimen": specimen, "kind": "confirm" }));
         self.checkpoint.get_or(&key, || match confirm(self.study, specimen, &|| (self.is_cancelled)()) {
             Err(EvaluationFailure::Cancelled) => None,
@@ -44,7 +47,7 @@ impl Search<'_> {
         let specimens: Vec<&Specimen> = std::iter::once(base).chain(finalists.iter().map(|f| &f.specimen)).collect();
         let (total, done) = (specimens.len(), AtomicUsize::new(0));
         let best = state.history.last().copied();
-        let results: Vec<Attempt> = specimens
+        let results: Vec<Confirmation> = specimens
             .par_iter()
             .map(|specimen| {
                 let result = self.confirmed(specimen);
@@ -109,8 +112,8 @@ impl Search<'_> {
         Ok((base, ranked))
     }
 
-    /// Improves a finalist anew with its margins shifted to what the confirmation gave, and confirms where that ends. `None`
-    /// where nothing came of it.
+    /// Improves a finalist anew with its margins shifted to what the confirmation gave, and confirms where that ends.
+    /// `None` where nothing came of it.
     fn repair(
         &self,
         finalist: &Finalist,
@@ -127,7 +130,7 @@ impl Search<'_> {
             let total = REPAIR_EVALUATIONS;
             (self.progress)(&Progress { stage: "repair", done: count.min(total), total, best });
         };
-        let problem = Problem::new(self, &shifted, &spaces[*index], &on_evaluation);
+        let problem = StructureProblem::new(self, &shifted, &spaces[*index], &on_evaluation);
         // Near the start: what broke is small.
         let settings = LocalSettings { max_evaluations: REPAIR_EVALUATIONS, radius: 0.05, smallest_radius: 1e-4 };
         let improved = improve(&problem, start, &settings);
@@ -144,7 +147,8 @@ impl Search<'_> {
     }
 }
 
-/// Confirmed less searched margin of each limit, where it is smaller: the search fidelity's error, as seen at this design.
+/// Confirmed less searched margin of each limit, where it is smaller: the search fidelity's error, as seen at this
+/// design.
 fn shifts(fine: &Reference, confirmed: &Confirmed, finalist: &Finalist) -> Vec<Vec<f64>> {
     let fine = confirmed.judged(fine).worst_margins;
     let of_prior = |(f, c): (&Vec<f64>, &Vec<f64>)| f.iter().zip(c).map(|(f, c)| (f - c).min(0.0)).collect();

@@ -1,7 +1,7 @@
 //! What a result says, in plain words: each sentence is computed from the numbers beside it.
 
 use super::aim::Normalisation;
-use super::result::DesignEntry;
+use super::entry::DesignEntry;
 use super::study::Study;
 use crate::sensitivity::IDENTIFIABILITY_LIMIT;
 use serde::{Deserialize, Serialize};

@@ -1,14 +1,11 @@
-//! Local improvement: sequential quadratic programming in a trust region, subproblems by Clarabel.
+//! Local improvement: sequential quadratic programming in a trust region.
 //!
-//! Maximise t − ½ δᵀ B δ − ρ Σ slack over the step δ (scaled variables), with t below every linearised gain (or equal to
-//! their weighted mean), the linearised geometry margins kept exactly, the response margins up to a penalised slack, bounds
-//! and ‖δ‖∞ ≤ Δ. B is a damped BFGS approximation of the curvature of the Lagrangian. Every iterate keeps the geometry
-//! limits: a step that breaks one is shortened. A failed evaluation shortens the step as well.
+//! Maximise t − ½ δᵀ B δ − ρ Σ slack over the step δ (scaled variables), with t below every linearised gain (or equal
+//! to their weighted mean), the linearised geometry margins kept exactly, the response margins up to a penalised slack,
+//! bounds and ‖δ‖∞ ≤ Δ. B is a damped BFGS approximation of the curvature of the Lagrangian. Every iterate keeps the
+//! geometry limits: a step that breaks one is shortened. A failed evaluation shortens the step as well.
 
-use clarabel::algebra::CscMatrix;
-use clarabel::solver::{
-    DefaultSettingsBuilder, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus, SupportedConeT,
-};
+use crate::optimise::{LinearLimit, Precision, QuadraticProgramme, SolverStatus};
 use nalgebra::{DMatrix, DVector};
 
 /// Values and gradients at a point. Gradients are per unit of the scaled variables.
@@ -49,6 +46,12 @@ impl LocalModel {
 
 /// Weight of a broken response margin (both are logarithms of ratios).
 const PENALTY: f64 = 10.0;
+
+/// Curvature of the unknowns in which the programme is linear: enough for it to be strictly convex, too little to be
+/// felt.
+const LINEAR_CURVATURE: f64 = 1e-9;
+/// Iterations of the interior point. What it has by then is a step that the evaluation judges.
+const MAX_ITERATIONS: u32 = 80;
 
 /// The problem that [`improve`] works on.
 pub trait LocalProblem {
@@ -136,8 +139,8 @@ pub fn improve(problem: &dyn LocalProblem, start: &[f64], settings: &LocalSettin
     Some(Improved { x, merit, history })
 }
 
-/// A step within the bounds. What an interior-point solution leaves of the way to a bound is taken: a drive of 7 mm, not of
-/// 6.999999.
+/// A step within the bounds. What an interior-point solution leaves of the way to a bound is taken: a drive of 7 mm,
+/// not of 6.999999.
 fn moved(x: &[f64], step: &DVector<f64>) -> Vec<f64> {
     const AT_BOUND: f64 = 1e-6;
     let snapped = |v: f64| {
@@ -193,26 +196,17 @@ fn subproblem(
     let is_minimum = model.weights.is_empty();
     // Unknowns: δ (n), t, slack per margin.
     let size = n + 1 + num_margins;
-    let mut p = CscBuilder::new(size, size);
-    for j in 0..n {
-        for i in 0..=j {
-            p.push(i, j, hessian[(i, j)]);
-        }
-    }
-    for j in n..size {
-        p.push(j, j, 1e-9);
-    }
-    let mut q = vec![0.0; size];
-    q[n] = -1.0;
-    q[n + 1..].fill(PENALTY);
-    // Rows a·unknowns ≤ b.
-    let mut rows: Vec<(Vec<(usize, f64)>, f64)> = Vec::new();
+    let mut slope = vec![0.0; size];
+    slope[n] = -1.0;
+    slope[n + 1..].fill(PENALTY);
+    let mut limits: Vec<LinearLimit> = Vec::new();
+    let mut limit = |coefficients: Vec<(usize, f64)>, bound: f64| limits.push(LinearLimit { coefficients, bound });
     let gradient_row = |g: &[f64]| g.iter().enumerate().map(|(i, v)| (i, -v)).collect::<Vec<_>>();
     if is_minimum {
         for (value, g) in model.gains.iter().zip(&model.gain_gradients) {
             let mut row = gradient_row(g);
             row.push((n, 1.0));
-            rows.push((row, *value));
+            limit(row, *value);
         }
     } else {
         let mut mean = vec![0.0; n];
@@ -223,48 +217,42 @@ fn subproblem(
         }
         let mut row = gradient_row(&mean);
         row.push((n, 1.0));
-        rows.push((row, model.objective()));
+        limit(row, model.objective());
     }
     for (m, (value, g)) in model.margins.iter().zip(&model.margin_gradients).enumerate() {
         let mut row = gradient_row(g);
         row.push((n + 1 + m, -1.0));
-        rows.push((row, *value));
-        rows.push((vec![(n + 1 + m, -1.0)], 0.0));
+        limit(row, *value);
+        limit(vec![(n + 1 + m, -1.0)], 0.0);
     }
     for (value, g) in problem.geometry(x).iter().zip(geometry_gradient(problem, x)) {
-        rows.push((gradient_row(&g), *value));
+        limit(gradient_row(&g), *value);
     }
     for (i, xi) in x.iter().enumerate() {
         let reach = if problem.is_free(i) { radius } else { 0.0 };
-        rows.push((vec![(i, 1.0)], reach.min(1.0 - xi)));
-        rows.push((vec![(i, -1.0)], reach.min(*xi)));
+        limit(vec![(i, 1.0)], reach.min(1.0 - xi));
+        limit(vec![(i, -1.0)], reach.min(*xi));
     }
-    let mut a = CscBuilder::new(rows.len(), size);
-    let mut b = Vec::with_capacity(rows.len());
-    for (r, (row, limit)) in rows.iter().enumerate() {
-        for &(c, v) in row {
-            a.push(r, c, v);
-        }
-        b.push(*limit);
-    }
-    let cones: [SupportedConeT<f64>; 1] = [NonnegativeConeT(rows.len())];
-    let settings = DefaultSettingsBuilder::default().verbose(false).max_iter(80).build().ok()?;
-    let mut solver = DefaultSolver::new(&p.finish(), &q, &a.finish(), &b, &cones, settings).ok()?;
-    solver.solve();
+    let programme = QuadraticProgramme {
+        curvature: hessian,
+        further_curvature: &vec![LINEAR_CURVATURE; size - n],
+        slope: &slope,
+        limits: &limits,
+    };
+    let solution = programme.solve(&Precision { max_iterations: MAX_ITERATIONS, ..Precision::default() })?;
     // A step of reduced accuracy is still a step: the evaluation decides. Anything else is none.
-    match solver.solution.status {
+    match solution.status {
         SolverStatus::Solved
         | SolverStatus::AlmostSolved
         | SolverStatus::InsufficientProgress
         | SolverStatus::MaxIterations => {}
         _ => return None,
     }
-    let solution = &solver.solution.x;
-    if solution.iter().any(|v| !v.is_finite()) {
+    if solution.x.iter().any(|v| !v.is_finite()) {
         return None;
     }
-    let step = DVector::from_iterator(n, solution[..n].iter().map(|d| d.clamp(-radius, radius)));
-    let z = &solver.solution.z;
+    let step = DVector::from_iterator(n, solution.x[..n].iter().map(|d| d.clamp(-radius, radius)));
+    let z = &solution.multipliers;
     let mut multipliers = Vec::with_capacity(num_gains + num_margins);
     if is_minimum {
         multipliers.extend(z[..num_gains].iter().copied());
@@ -295,35 +283,6 @@ fn geometry_gradient(problem: &dyn LocalProblem, x: &[f64]) -> Vec<Vec<f64>> {
     rows
 }
 
-/// Collects entries by column.
-struct CscBuilder {
-    rows: usize,
-    columns: Vec<Vec<(usize, f64)>>,
-}
-
-impl CscBuilder {
-    fn new(rows: usize, columns: usize) -> Self {
-        CscBuilder { rows, columns: vec![Vec::new(); columns] }
-    }
-
-    fn push(&mut self, row: usize, column: usize, value: f64) {
-        self.columns[column].push((row, value));
-    }
-
-    fn finish(mut self) -> CscMatrix<f64> {
-        let (mut pointers, mut indices, mut values) = (vec![0], Vec::new(), Vec::new());
-        for column in &mut self.columns {
-            column.sort_by_key(|e| e.0);
-            for &(r, v) in column.iter() {
-                indices.push(r);
-                values.push(v);
-            }
-            pointers.push(indices.len());
-        }
-        CscMatrix::new(self.rows, self.columns.len(), pointers, indices, values)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -350,8 +309,8 @@ mod tests {
         }
     }
 
-    /// The optimum: gains equal, x at the margin or the geometry limit. With x = 0.6, 1 − 0.01 − (y − 0.9)² = 1.2 − y has
-    /// the root y = (2.8 − √(2.8² − 4·1.02))/2 = 0.4302; x + y = 1.03 keeps the geometry, so it is the optimum.
+    /// The optimum: gains equal, x at the margin or the geometry limit. With x = 0.6, 1 − 0.01 − (y − 0.9)² = 1.2 − y
+    /// has the root y = (2.8 − √(2.8² − 4·1.02))/2 = 0.4302; x + y = 1.03 keeps the geometry, so it is the optimum.
     #[test]
     fn finds_the_kink_on_the_margin() {
         let settings = LocalSettings { max_evaluations: 60, radius: 0.2, smallest_radius: 1e-6 };

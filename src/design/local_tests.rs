@@ -33,7 +33,7 @@ impl LocalProblem for Problem {
     }
 }
 
-fn one(gain: f64, gradient: Vec<f64>) -> LocalModel {
+fn linear_model(gain: f64, gradient: Vec<f64>) -> LocalModel {
     LocalModel {
         gains: vec![gain],
         weights: Vec::new(),
@@ -54,7 +54,7 @@ fn geometry_is_never_broken() {
         let target = [0.5, 0.45, 0.5, 0.5];
         let weight = [1.0, 2.0, 1.0, 1.0];
         let gain = -(0..4).map(|i| weight[i] * (x[i] - target[i]).powi(2)).sum::<f64>();
-        Some(one(gain, (0..4).map(|i| -2.0 * weight[i] * (x[i] - target[i])).collect()))
+        Some(linear_model(gain, (0..4).map(|i| -2.0 * weight[i] * (x[i] - target[i])).collect()))
     }
     let problem = Problem::new(pull, |x| vec![(x[2] - x[0]).hypot(x[3] - x[1]) - 0.4]);
     let found = improve(&problem, &[0.1, 0.2, 0.9, 0.7], &patient()).expect("the start evaluates");
@@ -67,7 +67,7 @@ fn geometry_is_never_broken() {
 #[test]
 fn a_start_beyond_a_limit_comes_back() {
     fn disc(x: &[f64]) -> Option<LocalModel> {
-        let mut model = one(x[0] + x[1], vec![1.0, 1.0]);
+        let mut model = linear_model(x[0] + x[1], vec![1.0, 1.0]);
         model.margins = vec![0.5 - x[0] * x[0] - x[1] * x[1]];
         model.margin_gradients = vec![vec![-2.0 * x[0], -2.0 * x[1]]];
         Some(model)
@@ -81,7 +81,7 @@ fn a_start_beyond_a_limit_comes_back() {
 #[test]
 fn failures_shorten_steps() {
     fn wall(x: &[f64]) -> Option<LocalModel> {
-        (x[0] <= 0.6).then(|| one(x[0], vec![1.0]))
+        (x[0] <= 0.6).then(|| linear_model(x[0], vec![1.0]))
     }
     let found = improve(&Problem::new(wall, |_| Vec::new()), &[0.3], &patient()).expect("the start evaluates");
     assert!(found.x[0] > 0.59 && found.x[0] <= 0.6, "{found:?}");
@@ -91,7 +91,7 @@ fn failures_shorten_steps() {
 /// A corner of the box.
 #[test]
 fn bounds_hold() {
-    let problem = Problem::new(|x| Some(one(2.0 * x[0] - x[1], vec![2.0, -1.0])), |_| Vec::new());
+    let problem = Problem::new(|x| Some(linear_model(2.0 * x[0] - x[1], vec![2.0, -1.0])), |_| Vec::new());
     let found = improve(&problem, &[0.5, 0.5], &patient()).expect("it evaluates");
     assert!((found.x[0] - 1.0).abs() < 1e-6 && found.x[1].abs() < 1e-6, "{found:?}");
 }
@@ -100,7 +100,7 @@ fn bounds_hold() {
 #[test]
 fn not_a_number_is_no_step() {
     fn broken(x: &[f64]) -> Option<LocalModel> {
-        Some(one(if x[0] > 0.6 { f64::NAN } else { x[0] }, vec![1.0]))
+        Some(linear_model(if x[0] > 0.6 { f64::NAN } else { x[0] }, vec![1.0]))
     }
     let found = improve(&Problem::new(broken, |_| Vec::new()), &[0.3], &patient()).expect("the start evaluates");
     assert!(found.x[0] > 0.59 && found.x[0] <= 0.6 && found.merit.is_finite(), "{found:?}");

@@ -1,8 +1,12 @@
 //! The search for a better specimen.
 
 mod aim;
+mod candidate;
 mod checkpoint;
 mod confirm;
+mod entry;
+mod evaluation_failure;
+mod evaluator;
 mod explore;
 mod finals;
 mod findings;
@@ -10,19 +14,23 @@ mod findings;
 mod grid_tests;
 mod inline;
 mod local;
+mod material_samples;
 mod objective;
-mod problem;
 mod response;
 mod result;
 mod search;
+mod search_error;
+mod search_run;
 #[cfg(test)]
 mod search_tests;
 mod space;
 mod state;
+mod structure_problem;
 mod study;
 mod study_check;
 mod study_error;
 mod study_file;
+mod study_hash;
 mod study_limits;
 #[cfg(test)]
 mod study_tests;
@@ -30,21 +38,25 @@ mod tell_apart;
 mod unfinished;
 
 pub use aim::{Combine, Guard, Normalisation, Objective, ObjectiveKind};
+pub use candidate::Candidate;
 pub use checkpoint::{Checkpoint, CheckpointError};
 pub use confirm::{Confirmed, CriterionValues, Gain, MaterialEvaluation, confirm};
+pub use entry::DesignEntry;
+pub use evaluation_failure::EvaluationFailure;
+pub use evaluator::{Evaluated, Evaluator};
 pub use explore::{geometry_margins, is_makeable, sample};
 pub use findings::Disagreement;
 pub(crate) use inline::Inline;
 pub use local::{Improved, LocalModel, LocalProblem, LocalSettings, improve};
+pub use material_samples::{MaterialSample, sample_materials};
 pub use objective::{Judged, Reference};
-pub use response::{
-    Evaluated, EvaluationFailure, Evaluator, MaterialSample, Response, TEARING_FRACTION, sample_materials,
-    tearing_stretch,
-};
-pub use result::{DesignEntry, DesignResult, MaterialVerification, Verification};
-pub use search::{Found, Progress, ProgressSink, SearchError, base_at_drive, search, study_hash};
+pub use response::{Response, TEARING_FRACTION, tearing_stretch};
+pub use result::{DesignResult, MaterialVerification, Verification};
+pub use search::{Found, base_at_drive, search};
+pub use search_error::SearchError;
+pub use search_run::{Progress, ProgressSink};
 pub use space::{Orbit, Structure, Subspace, Variable, subspaces};
-pub use state::Candidate;
 pub use study::{Budget, CountRange, MaterialPrior, Range, Study, Vary, VerificationSettings};
 pub use study_error::StudyError;
+pub use study_hash::study_hash;
 pub use unfinished::Unfinished;

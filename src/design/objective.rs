@@ -1,8 +1,10 @@
-//! From responses to the objective and the response limits, all as logarithms of ratios: 0 is the base specimen, or a limit
-//! just met; larger is better.
+//! From responses to the objective and the response limits, all as logarithms of ratios: 0 is the base specimen, or a
+//! limit just met; larger is better.
 
 use super::aim::{Combine, ObjectiveKind};
-use super::response::{Evaluated, MaterialSample, Response};
+use super::evaluator::Evaluated;
+use super::material_samples::MaterialSample;
+use super::response::Response;
 use super::study::Study;
 use crate::specimen::ManufacturingLimits;
 
@@ -97,8 +99,8 @@ impl<'a> Reference<'a> {
             gain_gradients: vec![Vec::new(); num_variables],
             margin_gradients: vec![Vec::new(); num_variables],
         };
-        // Each prior's gains are averaged over its samples (a design must not bank on one guess of the parameters); limits
-        // must hold at each of them.
+        // Each prior's gains are averaged over its samples (a design must not bank on one guess of the parameters);
+        // limits must hold at each of them.
         let num_priors = self.study.materials.len();
         for prior in 0..num_priors {
             let of_prior: Vec<usize> = (0..self.samples.len()).filter(|&s| self.samples[s].prior == prior).collect();

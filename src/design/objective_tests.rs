@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::design::aim::{Guard, Objective};
-use crate::design::response::sample_materials;
+use crate::design::material_samples::sample_materials;
 use std::path::Path;
 
 fn study() -> Study {
@@ -37,8 +37,8 @@ fn judged(study: &Study, own: [Response; 3]) -> (Judged, f64) {
     (judged, objective)
 }
 
-/// Weights ½, ¼, ¼: the central value's gain of 4 and the variants' of 1 average to 4^½ = 2. The limits are those of the
-/// worst sample: a force of 6 N with one variant breaks 5 N although the mean keeps it.
+/// Weights ½, ¼, ¼: the central value's gain of 4 and the variants' of 1 average to 4^½ = 2. The limits are those of
+/// the worst sample: a force of 6 N with one variant breaks 5 N although the mean keeps it.
 #[test]
 fn gains_are_averaged_and_limits_are_the_worst() {
     let own = [

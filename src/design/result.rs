@@ -1,14 +1,13 @@
 //! The result of a design search (`design/1`) and what it says in plain words.
 
 use super::aim::Objective;
-use super::confirm::{Confirmed, MaterialEvaluation};
+use super::entry::DesignEntry;
 use super::findings::{Disagreement, disagreement, findings};
-use super::search::{Found, study_hash};
+use super::search::Found;
 use super::study::Study;
+use super::study_hash::study_hash;
 use crate::calibration::ParameterSpread;
 use crate::provenance::VERSION;
-use crate::sensitivity::Evaluation;
-use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
 
 /// A finished search.
@@ -25,8 +24,8 @@ pub struct DesignResult {
     pub best: DesignEntry,
     /// Every confirmed design, best first, those within every limit before others.
     pub ranked: Vec<DesignEntry>,
-    /// Indices in `ranked` of the trade-off between information (D-optimal figure of the first material) and force: none
-    /// of the others has both less force and a smaller standard deviation.
+    /// Indices in `ranked` of the trade-off between information (D-optimal figure of the first material) and force:
+    /// none of the others has both less force and a smaller standard deviation.
     pub pareto: Vec<usize>,
     /// Where integrated sensitivity and Fisher information rank designs differently, per material.
     pub disagreement: Vec<Disagreement>,
@@ -50,33 +49,6 @@ pub struct DesignResult {
     pub version: String,
     /// SHA-256 of the study, hexadecimal.
     pub input_hash: String,
-}
-
-/// One design of a result.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct DesignEntry {
-    /// The design; its only drive is the one it is scanned at.
-    pub specimen: Specimen,
-    /// The first material's evaluation.
-    pub evaluation: Evaluation,
-    /// Gain over the base specimen.
-    pub objective: f64,
-    /// The limit with the smallest margin, in words.
-    pub closest_limit: String,
-    /// Everything confirmed: all materials, gains, limits.
-    pub by_material: Vec<MaterialEvaluation>,
-    /// Gains per material and parameter.
-    pub gains: Vec<super::confirm::Gain>,
-    /// Every limit, closest first.
-    pub limits: Vec<crate::specimen::LimitMargin>,
-    /// Whether all limits and the guard are kept.
-    pub is_within_limits: bool,
-    /// Volume of material, mm³.
-    pub volume_mm3: f64,
-    /// What is to be known about how it came here: a limit that only the fine mesh broke, or a repair.
-    #[serde(default)]
-    pub remark: Option<String>,
 }
 
 /// Spread found against spread promised.
@@ -105,42 +77,6 @@ pub struct MaterialVerification {
     /// The same of the base specimen.
     #[serde(default)]
     pub base_failure: Option<String>,
-}
-
-impl DesignEntry {
-    /// `None` where nothing was evaluated.
-    fn of(confirmed: &Confirmed) -> Option<DesignEntry> {
-        Some(DesignEntry {
-            specimen: confirmed.specimen.clone(),
-            evaluation: confirmed.by_material.first()?.evaluation.clone(),
-            objective: confirmed.objective,
-            closest_limit: confirmed.closest_limit().map_or("none".into(), |m| {
-                format!("{}: {:.3} (limit {:.3}, margin {:.1} %)", m.name, m.value, m.limit, 100.0 * m.margin_relative)
-            }),
-            by_material: confirmed.by_material.clone(),
-            gains: confirmed.gains.clone(),
-            limits: confirmed.limits.clone(),
-            is_within_limits: confirmed.is_within_limits,
-            volume_mm3: confirmed.volume_mm3,
-            remark: confirmed.remark.clone(),
-        })
-    }
-
-    /// D-optimal figure of the first material: generalised relative standard deviation.
-    pub fn information(&self) -> Option<f64> {
-        self.by_material.first()?.relative_sd_by_criterion.d_optimal
-    }
-
-    /// Limits that are not kept, in words; guards are meant where every limit is.
-    pub fn not_kept(&self) -> String {
-        let names: Vec<&str> = self.limits.iter().filter(|m| !m.is_satisfied).map(|m| m.name.as_str()).collect();
-        if names.is_empty() { "guard on the promised standard deviations".into() } else { names.join(", ") }
-    }
-
-    /// Largest force over the materials, N.
-    pub fn force_n(&self) -> f64 {
-        self.by_material.iter().map(|m| m.force_n).fold(0.0, f64::max)
-    }
 }
 
 impl DesignResult {

@@ -1,65 +1,24 @@
-//! The search: explore every structure with samples, refine the best with gradients, confirm the best of those on a finer
-//! mesh with the scan's own voxels. Deterministic by seed at any number of threads: batches are fixed, every evaluation
-//! depends on its own input alone, results are taken in order.
+//! The search: explore every structure with samples, refine the best with gradients, confirm the best of those on a
+//! finer mesh with the scan's own voxels. Deterministic by seed at any number of threads: batches are fixed, every
+//! evaluation depends on its own input alone, results are taken in order.
 
-use super::checkpoint::{Checkpoint, CheckpointError};
+use super::candidate::Candidate;
+use super::checkpoint::Checkpoint;
 use super::confirm::Confirmed;
+use super::evaluator::Evaluator;
 use super::explore::{is_makeable, sample};
 use super::local::{LocalSettings, improve};
 use super::objective::Reference;
-use super::problem::{Log, Problem};
-use super::response::{Evaluated, EvaluationFailure, Evaluator};
+use super::search_error::SearchError;
+use super::search_run::{Attempt, Progress, ProgressSink, SearchRun};
 use super::space::{Subspace, subspaces};
-use super::state::{Candidate, State};
+use super::state::State;
+use super::structure_problem::{Log, StructureProblem};
 use super::study::Study;
 use super::unfinished::Unfinished;
-use crate::provenance::{VERSION, input_hash};
 use crate::specimen::Specimen;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
-
-/// Why a search has no result.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SearchError {
-    /// The base specimen cannot be evaluated, so there is nothing to compare with.
-    #[error("the base specimen cannot be evaluated: {cause}; change the base, its drive or the material")]
-    Base {
-        /// Why.
-        cause: EvaluationFailure,
-    },
-    /// No design could be evaluated.
-    #[error("none of {tried} designs could be evaluated and kept within the limits; widen the limits or the ranges")]
-    NothingFeasible {
-        /// Designs tried.
-        tried: usize,
-    },
-    /// The checkpoint.
-    #[error(transparent)]
-    Checkpoint(#[from] CheckpointError),
-    /// Stopped from outside.
-    #[error("{}", unfinished.summary())]
-    Stopped {
-        /// What was found until then.
-        unfinished: Box<Unfinished>,
-    },
-}
-
-/// How far a search is.
-#[derive(Clone, Debug)]
-pub struct Progress {
-    /// `base`, `explore`, `refine`, `confirm`, `repair`, `verify`.
-    pub stage: &'static str,
-    /// Finished in this stage.
-    pub done: usize,
-    /// Of.
-    pub total: usize,
-    /// Largest objective so far (gain over the base), of designs within the limits.
-    pub best: Option<f64>,
-}
-
-/// Receives progress; called from several threads.
-pub type ProgressSink<'a> = &'a (dyn Fn(&Progress) + Sync);
 
 /// What the search found, best first.
 #[derive(Clone, Debug)]
@@ -96,21 +55,6 @@ impl Found {
     }
 }
 
-type Tried = Result<Evaluated, EvaluationFailure>;
-
-pub(super) struct Search<'a> {
-    pub study: &'a Study,
-    pub evaluator: Evaluator<'a>,
-    pub checkpoint: &'a Checkpoint,
-    pub is_cancelled: &'a (dyn Fn() -> bool + Sync),
-    pub progress: ProgressSink<'a>,
-}
-
-/// Hash of a study, which a checkpoint must share.
-pub fn study_hash(study: &Study) -> String {
-    input_hash(&serde_json::json!({ "study": study, "version": VERSION }))
-}
-
 /// The base specimen at one drive: its largest within the study's range, or the range's largest.
 pub fn base_at_drive(study: &Study) -> Specimen {
     let range = study.drive_range();
@@ -131,26 +75,17 @@ pub fn search(
     progress: ProgressSink,
     is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Found, SearchError> {
-    let run = Search { study, evaluator: Evaluator::new(study), checkpoint, is_cancelled, progress };
+    let run = SearchRun { study, evaluator: Evaluator::new(study), checkpoint, is_cancelled, progress };
     run.run()
 }
 
-impl Search<'_> {
-    pub fn tried(&self, specimen: &Specimen, subspace: Option<&Subspace>) -> Option<Tried> {
-        let kind = if subspace.is_some() { "gradient" } else { "value" };
-        let key = input_hash(&serde_json::json!({ "specimen": specimen, "kind": kind }));
-        self.checkpoint.get_or(&key, || match self.evaluator.evaluate(specimen, subspace, &|| (self.is_cancelled)()) {
-            Err(EvaluationFailure::Cancelled) => None,
-            other => Some(other),
-        })
-    }
-
+impl SearchRun<'_> {
     fn run(&self) -> Result<Found, SearchError> {
         let study = self.study;
         let report = |stage, done, total, best| (self.progress)(&Progress { stage, done, total, best });
         report("base", 0, 1, None);
         let base_specimen = base_at_drive(study);
-        let base = match self.tried(&base_specimen, None) {
+        let base = match self.evaluated(&base_specimen, None) {
             None => return Err(State::default().stopped(study, "base")),
             Some(Err(cause)) => return Err(SearchError::Base { cause }),
             Some(Ok(evaluated)) => evaluated,
@@ -180,7 +115,8 @@ impl Search<'_> {
     ) -> Result<(), SearchError> {
         let study = self.study;
         let total = study.budget.explore;
-        // The base at every drive limit, if it can be made, then two rounds: all structures alike, then the better half.
+        // The base at every drive limit, if it can be made, then two rounds: all structures alike, then the better
+        // half.
         let mut batch: Vec<(usize, Vec<f64>)> = Vec::new();
         for (index, space) in spaces.iter().enumerate() {
             for drive in [base.drive_mm[0], study.drive_range().max] {
@@ -227,11 +163,11 @@ impl Search<'_> {
         let best_before = state.history.last().copied();
         // Largest merit seen by any thread, for display only.
         let best = std::sync::Mutex::new(best_before);
-        let results: Vec<Option<Tried>> = batch
+        let results: Vec<Option<Attempt>> = batch
             .par_iter()
             .map(|(space, vector)| {
-                let tried = self.tried(&spaces[*space].specimen(vector), None);
-                if let (Some(Ok(evaluated)), Ok(mut best)) = (&tried, best.lock()) {
+                let attempt = self.evaluated(&spaces[*space].specimen(vector), None);
+                if let (Some(Ok(evaluated)), Ok(mut best)) = (&attempt, best.lock()) {
                     let judged = reference.judge(evaluated);
                     if judged.margins.iter().all(|m| *m >= 0.0) {
                         let gain = reference.objective(&judged).exp();
@@ -241,7 +177,7 @@ impl Search<'_> {
                 let shown = best.lock().ok().and_then(|b| *b);
                 let count = done.fetch_add(1, Ordering::Relaxed) + 1;
                 (self.progress)(&Progress { stage: "explore", done: count.min(total), total, best: shown });
-                tried
+                attempt
             })
             .collect();
         let mut was_stopped = false;
@@ -276,7 +212,7 @@ impl Search<'_> {
         let outcomes: Vec<(Log, bool)> = starts
             .par_iter()
             .map(|(index, start)| {
-                let problem = Problem::new(self, reference, &spaces[*index], &on_evaluation);
+                let problem = StructureProblem::new(self, reference, &spaces[*index], &on_evaluation);
                 let settings = LocalSettings { max_evaluations: budget.iterations, ..LocalSettings::default() };
                 improve(&problem, start, &settings);
                 let was_stopped = problem.was_stopped.load(Ordering::Relaxed);

@@ -1,4 +1,5 @@
-//! The whole search on a small study: the same bits at any number of threads and after a stop; what it confirms can be made.
+//! The whole search on a small study: the same bits at any number of threads and after a stop; what it confirms can be
+//! made.
 
 use super::*;
 use crate::specimen::Specimen;
@@ -161,8 +162,8 @@ fn random_study(draw: &mut Draw) -> Study {
     study
 }
 
-/// Whatever a study's limits are, no design that is sampled breaks one that geometry alone decides, and no drive lies above
-/// the actuator's.
+/// Whatever a study's limits are, no design that is sampled breaks one that geometry alone decides, and no drive lies
+/// above the actuator's.
 #[test]
 fn random_studies_propose_only_what_can_be_made() {
     let mut draw = Draw(7);
@@ -186,8 +187,8 @@ fn random_studies_propose_only_what_can_be_made() {
     assert!(num_designs > 500, "{num_designs} designs are no test");
 }
 
-/// Whole searches on random studies: what is returned as the best keeps every limit, confirmed; or the study is refused as one
-/// without a solution.
+/// Whole searches on random studies: what is returned as the best keeps every limit, confirmed; or the study is refused
+/// as one without a solution.
 #[test]
 fn random_studies_never_return_what_breaks_a_limit() {
     let mut draw = Draw(11);

@@ -1,7 +1,8 @@
 //! The search space: a few discrete structures (kind of test, direction and symmetry orbits of the holes), each with a
 //! continuous vector.
 //!
-//! Holes come in orbits under the study's mirrors: a hole on a mirror plane is its own image, others bring theirs along.
+//! Holes come in orbits under the study's mirrors: a hole on a mirror plane is its own image, others bring theirs
+//! along.
 
 use super::study::{Range, Study};
 use crate::mesh::DesignVariable;
@@ -302,8 +303,8 @@ impl Subspace {
         }
     }
 
-    /// The vector of a specimen of this structure at `drive_mm`, or `None` where it is of another one, lacks the study's
-    /// symmetry or is out of range.
+    /// The vector of a specimen of this structure at `drive_mm`, or `None` where it is of another one, lacks the
+    /// study's symmetry or is out of range.
     pub fn vector_of(&self, specimen: &Specimen, drive_mm: f64) -> Option<Vec<f64>> {
         if specimen.test != self.structure.test || specimen.holes.len() != self.structure.num_holes() {
             return None;
@@ -333,8 +334,8 @@ impl Subspace {
         Some(vector)
     }
 
-    /// For each orbit the hole that stands for it (on the positive side of every mirror), where the holes are exactly the
-    /// orbits of this structure.
+    /// For each orbit the hole that stands for it (on the positive side of every mirror), where the holes are exactly
+    /// the orbits of this structure.
     fn representatives(&self, holes: &[Hole]) -> Option<Vec<Hole>> {
         let near = |a: f64, b: f64| (a - b).abs() <= MIRROR_TOLERANCE_MM;
         let mut left: Vec<Hole> = holes.to_vec();

@@ -1,27 +1,12 @@
 //! What a search has seen, and what it takes from there into its next stage.
 
+use super::candidate::Candidate;
+use super::evaluation_failure::EvaluationFailure;
 use super::objective::{Judged, Reference};
-use super::response::EvaluationFailure;
-use super::search::SearchError;
+use super::search_error::SearchError;
 use super::study::Study;
 use super::unfinished::Unfinished;
 use crate::specimen::Specimen;
-use serde::{Deserialize, Serialize};
-
-/// One design that the search has seen.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Candidate {
-    /// The design; its only drive is the one it is scanned at.
-    pub specimen: Specimen,
-    /// Gain over the base at search fidelity.
-    pub objective: f64,
-    /// ln of the objective less penalties.
-    pub merit: f64,
-    /// Whether force, stretch and guard limits hold at search fidelity.
-    pub is_within_limits: bool,
-    /// Where it came from.
-    pub stage: String,
-}
 
 /// A design on its way to confirmation.
 #[derive(Clone, Debug)]

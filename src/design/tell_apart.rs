@@ -1,16 +1,22 @@
 //! Telling materials apart: each material of a study taken as true in turn, every earlier one fitted to its scan.
 //!
-//! Materials stand from the simple to the rich: a rich one can imitate a simple one it contains, so that only the simple one's
-//! best fit to the rich one's scan says how well a scan decides between them (Atkinson and Fedorov 1975).
+//! Materials stand from the simple to the rich: a rich one can imitate a simple one it contains, so that only the
+//! simple one's best fit to the rich one's scan says how well a scan decides between them (Atkinson and Fedorov 1975).
 
-use super::response::EvaluationFailure;
+use super::evaluation_failure::EvaluationFailure;
 use super::study::Study;
 use crate::fem::{Equilibrium, ForwardModel, SolveOptions, Tangent};
 use crate::material::{Ogden, Parameter};
+use crate::optimise::{LeastSquares, Rules, Shortening, Step, Stop, descend};
 use crate::sensitivity::{InformationError, MaterialState, Separation, separation_over_quadrature};
+use nalgebra::DVector;
 
-/// Most Gauss–Newton steps.
-const MAX_STEPS: usize = 10;
+/// At most ten Gauss–Newton steps, each tried whole, then halved down to a sixteenth.
+const RULES: Rules = Rules {
+    shortening: Shortening::Halved { num_lengths: 5 },
+    tolerated_rise: 0.0,
+    stop: Stop { max_trials: usize::MAX, max_steps: 10, least_relative_gain: None },
+};
 /// Converged where a step gains less than this part of the squared distance…
 const GAIN: f64 = 1e-5;
 /// … or than this many squared standard deviations, which no experiment sees.
@@ -53,54 +59,76 @@ pub(super) fn separation(
     separation_over_quadrature(model.mesh(), &fields, ours, theirs, &study.scan.noise(), voxel_volume)
 }
 
-/// Fits `material`, whose equilibrium at `drive` is `start`, to the scan of `theirs`. Where a step has no equilibrium, it is
-/// halved; where none helps, the distance is that of the linear step from there.
-pub(super) fn nearest(
-    study: &Study,
-    model: &mut ForwardModel,
-    material: &Ogden,
-    start: &Equilibrium,
-    drive: f64,
-    theirs: &MaterialState,
-    options: &SolveOptions,
-    is_cancelled: &dyn Fn() -> bool,
-) -> Result<Nearest, EvaluationFailure> {
-    let positions = model.mesh().nodes.clone();
-    let (mut material, mut equilibrium) = (material.clone(), start.clone());
-    let mut state = state_of(&equilibrium, &mut model.tangent(&material, &equilibrium)?)?;
-    let mut from_here = separation(study, model, &positions, &material, &state, theirs)?;
-    for _ in 0..MAX_STEPS {
-        if from_here.gained < SMALLEST_GAIN + GAIN * from_here.distance_sd.powi(2) {
-            break;
-        }
-        let misfit = from_here.distance_sd.powi(2) + from_here.gained;
-        let mut part = 1.0;
-        let better = loop {
-            let next = moved(&material, &from_here.steps, part);
-            let solved = if next.validate().is_ok() {
-                model.solve(&next, drive, Some(&equilibrium), options, is_cancelled).ok()
-            } else {
-                None
-            };
-            if is_cancelled() {
-                return Err(EvaluationFailure::Cancelled);
-            }
-            if let Some(found) = solved {
-                let reached = state_of(&found, &mut model.tangent(&next, &found)?)?;
-                let there = separation(study, model, &positions, &next, &reached, theirs)?;
-                if there.distance_sd.powi(2) + there.gained < misfit {
-                    break Some((next, found, reached, there));
-                }
-            }
-            part *= 0.5;
-            if part < 0.05 {
-                break None;
-            }
-        };
-        let Some(better) = better else { break };
-        (material, equilibrium, state, from_here) = better;
+/// A scan that other materials imitate as well as they can.
+pub(super) struct Imitation<'a> {
+    pub study: &'a Study,
+    pub model: &'a mut ForwardModel,
+    /// What was scanned.
+    pub theirs: &'a MaterialState,
+    /// The drive of the scan, mm.
+    pub drive_mm: f64,
+    pub solve: &'a SolveOptions,
+    pub is_cancelled: &'a dyn Fn() -> bool,
+}
+
+/// An imitating material, what it does, and how far that is from the scan.
+pub(super) struct Imitator {
+    material: Ogden,
+    equilibrium: Equilibrium,
+    state: MaterialState,
+    separation: Separation,
+}
+
+impl Imitation<'_> {
+    /// Fits `material`, whose equilibrium at the drive is `start`, to the scan. Where a step has no equilibrium, it is
+    /// halved; where none helps, the distance is that of the linear step from there.
+    pub fn nearest(mut self, material: &Ogden, start: &Equilibrium) -> Result<Nearest, EvaluationFailure> {
+        let first = self.imitator(material.clone(), start.clone())?;
+        let found = descend(&mut self, first, (), &RULES)?.at;
+        let Imitator { material, equilibrium, state, separation } = found;
+        Ok(Nearest { material, equilibrium, state, distance_sd: separation.distance_sd })
     }
-    Ok(Nearest { material, equilibrium, state, distance_sd: from_here.distance_sd })
+
+    fn imitator(&mut self, material: Ogden, equilibrium: Equilibrium) -> Result<Imitator, EvaluationFailure> {
+        let state = state_of(&equilibrium, &mut self.model.tangent(&material, &equilibrium)?)?;
+        let positions = &self.model.mesh().nodes;
+        let separation = separation(self.study, self.model, positions, &material, &state, self.theirs)?;
+        Ok(Imitator { material, equilibrium, state, separation })
+    }
+}
+
+impl LeastSquares for Imitation<'_> {
+    type Point = Imitator;
+    type Linear = ();
+    type Error = EvaluationFailure;
+
+    /// Squared distance from the scan: what a linear step leaves, and what it takes away.
+    fn objective(&self, at: &Imitator) -> f64 {
+        at.separation.distance_sd.powi(2) + at.separation.gained
+    }
+
+    fn linearise(&mut self, _: &Imitator) -> Result<Option<()>, EvaluationFailure> {
+        Ok(Some(()))
+    }
+
+    fn step(&mut self, at: &Imitator, (): &(), _: f64) -> Result<Option<Step>, EvaluationFailure> {
+        let Separation { gained, distance_sd, .. } = at.separation;
+        let is_worth_it = !(gained < SMALLEST_GAIN + GAIN * distance_sd.powi(2));
+        Ok(is_worth_it.then(|| Step { change: DVector::from_column_slice(&at.separation.steps), promised: gained }))
+    }
+
+    fn trial(&mut self, at: &Imitator, (): &(), step: &Step, part: f64) -> Result<Option<Imitator>, EvaluationFailure> {
+        let next = moved(&at.material, step.change.as_slice(), part);
+        let solved = if next.validate().is_ok() {
+            self.model.solve(&next, self.drive_mm, Some(&at.equilibrium), self.solve, self.is_cancelled).ok()
+        } else {
+            None
+        };
+        if (self.is_cancelled)() {
+            return Err(EvaluationFailure::Cancelled);
+        }
+        solved.map(|found| self.imitator(next, found)).transpose()
+    }
 }
 
 /// The material after a part of a step, no parameter changed by more than [`LARGEST_STEP`]; κ by its logarithm.
@@ -112,8 +140,9 @@ fn moved(material: &Ogden, steps: &[f64], part: f64) -> Ogden {
     let mut next = material.clone();
     for (parameter, r) in material.parameters().into_iter().zip(relative) {
         let value = material.value(parameter);
-        let by = part * r;
-        next.set(parameter, if parameter == Parameter::Kappa { value * by.exp() } else { value + by * value.abs() });
+        let change = part * r;
+        let moved = if parameter == Parameter::Kappa { value * change.exp() } else { value + change * value.abs() };
+        next.set(parameter, moved);
     }
     next
 }

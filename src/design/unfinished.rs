@@ -1,8 +1,8 @@
 //! What a stopped search has found so far.
 
-use super::search::study_hash;
-use super::state::Candidate;
+use super::candidate::Candidate;
 use super::study::Study;
+use super::study_hash::study_hash;
 use crate::provenance::VERSION;
 use serde::{Deserialize, Serialize};
 

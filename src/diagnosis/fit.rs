@@ -9,6 +9,7 @@ use super::scene::Scene;
 use super::supposed::{Supposed, paths_of, scene_of};
 use super::trace::Trace;
 use crate::material::{Ogden, Parameter};
+use crate::optimise::{Damping, End, LeastSquares, Raise, Rules, Shortening, Step, Stop, descend};
 use nalgebra::{DMatrix, DVector};
 
 /// Standard deviation of the prior of a cause's parameter around its start, in scales of the parameter. It is wide: it
@@ -119,45 +120,78 @@ pub fn fit_members(
         }
         Err(error) => return Err(error),
     };
-    let (mut matrix, mut gradient) = whole_system(members, &at, &columns, num);
-    let mut damping = 0.0f64;
-    let mut iterations = 0;
-    loop {
+    let linear = whole_system(members, &at, &columns, num);
+    let mut problem = MembersProblem { members, num_parameters: num, tolerance: settings.tolerance, is_cancelled };
+    let rules = Rules {
+        shortening: Shortening::Damped(Damping { small_gain: 0.2 * settings.tolerance, ..DAMPING }),
+        tolerated_rise: 0.0,
+        stop: Stop::after_trials(settings.max_iterations),
+    };
+    let found = descend(&mut problem, at, linear, &rules)?;
+    // Where no direction helps any more, the iterations count as used up.
+    let iterations = if found.end == End::Stuck { settings.max_iterations } else { found.num_trials };
+    Ok(fitted_members(members, found.at, &found.linear.0, iterations))
+}
+
+/// The damping of these fits: none as long as steps help.
+const DAMPING: Damping = Damping {
+    start: 0.0,
+    good_part: 0.0,
+    negligible: 1e-3,
+    least: 0.0,
+    small_gain: 0.0,
+    poor_part: 0.0,
+    after_poor: Raise { factor: 10.0, at_least: 1e-2 },
+    after_rejection: Raise { factor: 10.0, at_least: 1e-2 },
+    largest: 1e6,
+};
+
+/// The fit of all members as [`descend`] sees it.
+struct MembersProblem<'f, 'a, 'b> {
+    members: &'f mut [Member<'a, 'b>],
+    num_parameters: usize,
+    tolerance: f64,
+    is_cancelled: &'f dyn Fn() -> bool,
+}
+
+impl LeastSquares for MembersProblem<'_, '_, '_> {
+    type Point = Point;
+    /// Half the Hessian of the deviance, and its negative half gradient.
+    type Linear = (DMatrix<f64>, DVector<f64>);
+    type Error = DiagnosisError;
+
+    fn objective(&self, at: &Point) -> f64 {
+        at.deviance()
+    }
+
+    /// A state without a definite tangent is on the verge of instability: no better place to be.
+    fn linearise(&mut self, at: &Point) -> Result<Option<Self::Linear>, DiagnosisError> {
+        let columns = columns_at(self.members, at).ok();
+        Ok(columns.map(|c| whole_system(self.members, at, &c, self.num_parameters)))
+    }
+
+    fn step(
+        &mut self,
+        _: &Point,
+        (matrix, gradient): &Self::Linear,
+        damping: f64,
+    ) -> Result<Option<Step>, DiagnosisError> {
+        let num = self.num_parameters;
         let mut damped = matrix.clone();
         for i in 0..num {
             damped[(i, i)] += damping * matrix[(i, i)].max(1e-12);
         }
-        let step = damped.clone().cholesky().map(|c| c.solve(&gradient)).unwrap_or_else(|| DVector::zeros(num));
-        let promised = 2.0 * gradient.dot(&step) - step.dot(&(&matrix * &step));
-        if promised < settings.tolerance || iterations >= settings.max_iterations {
-            return Ok(fitted_members(members, at, &matrix, iterations));
-        }
-        iterations += 1;
-        let (next_material, next_causes) = moved(members, &at, &step);
-        let better = match evaluate(members, next_material, next_causes, is_cancelled) {
-            // A state without a definite tangent is on the verge of instability: no better place to be.
-            Ok(next) if next.deviance() < at.deviance() => columns_at(members, &next).ok().map(|c| (next, c)),
-            Ok(_) => None,
-            Err(_) if !is_cancelled() => None,
-            Err(error) => return Err(error),
-        };
-        match better {
-            Some((next, columns)) => {
-                let gained = at.deviance() - next.deviance();
-                at = next;
-                (matrix, gradient) = whole_system(members, &at, &columns, num);
-                damping = if damping > 1e-3 { damping * 0.1 } else { 0.0 };
-                if gained < 0.2 * settings.tolerance {
-                    damping = 0.0;
-                }
-            }
-            None => {
-                damping = (damping * 10.0).max(1e-2);
-                if damping > 1e6 {
-                    // No direction helps any more.
-                    iterations = settings.max_iterations;
-                }
-            }
+        let change = damped.cholesky().map(|c| c.solve(gradient)).unwrap_or_else(|| DVector::zeros(num));
+        let promised = 2.0 * gradient.dot(&change) - change.dot(&(matrix * &change));
+        Ok(if promised < self.tolerance { None } else { Some(Step { change, promised }) })
+    }
+
+    fn trial(&mut self, at: &Point, _: &Self::Linear, step: &Step, part: f64) -> Result<Option<Point>, DiagnosisError> {
+        let (material, causes) = moved(self.members, at, &(&step.change * part));
+        match evaluate(self.members, material, causes, self.is_cancelled) {
+            Ok(next) => Ok(Some(next)),
+            Err(_) if !(self.is_cancelled)() => Ok(None),
+            Err(error) => Err(error),
         }
     }
 }

@@ -459,7 +459,7 @@ fn hole_variables(hole: usize) -> [DesignVariable; 3] {
 
 /// Stiffness (kPa/mm) of the sample under a node of its bond: shear modulus / node spacing.
 fn bond_scale(material: &Ogden) -> f64 {
-    let mu: f64 = material.terms.iter().map(|t| 0.5 * t.mu_kpa * t.alpha).sum();
+    let mu = material.initial_shear_modulus_kpa();
     mu.abs() / BOND_LENGTH_MM
 }
 

@@ -12,7 +12,7 @@
 use super::elastic_table::ElasticTable;
 use super::load_effect::{EffectParameter, ForceChange, LoadEffect, LoadReadings};
 use super::memory_kernel::MemoryKernel;
-use crate::homogeneous::{LeastSquaresOptions, Limit, covariance, minimise};
+use crate::optimise::{LeastSquaresOptions, LinearLimit, covariance, minimise};
 use crate::rate::memory;
 use crate::recording::LoadCurve;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -176,8 +176,8 @@ impl LoadProblem {
         let mut limits = Vec::new();
         let mut largest_step = vec![0.3; num_material];
         let mut bound = |i: usize, [low, high]: [f64; 2]| {
-            limits.push(Limit::at_least(i, low));
-            limits.push(Limit::at_most(i, high));
+            limits.push(LinearLimit::at_least(i, low));
+            limits.push(LinearLimit::at_most(i, high));
         };
         for i in 0..num_material {
             bound(i, [-0.8, 4.0]);

@@ -52,5 +52,5 @@ pub struct FitSettings {
 
 /// ½ Σ μᵢαᵢ, kPa.
 pub fn shear_modulus(material: &Ogden) -> f64 {
-    material.terms.iter().map(|t| 0.5 * t.mu_kpa * t.alpha).sum()
+    material.initial_shear_modulus_kpa()
 }

@@ -182,7 +182,7 @@ impl Newton<'_> {
 
     /// What a residual is measured against: the forces on the plates, or, near rest, μ × 1 mm².
     fn reaction_scale(&self) -> f64 {
-        let mu = self.material.terms.iter().map(|t| 0.5 * t.mu_kpa * t.alpha).sum::<f64>().abs().max(1e-12);
+        let mu = self.material.initial_shear_modulus_kpa().abs().max(1e-12);
         let (mesh, residual) = (self.assembler.mesh(), &self.linearisation.residual);
         let mut s = 0.0;
         for v in mesh.moved_nodes.iter().chain(&mesh.fixed_nodes) {

@@ -1,8 +1,9 @@
-//! The compressible Ogden material of `ogden/1` in homogeneous states: the free stretches solved by Newton's method, the
-//! nominal stress and its derivatives with respect to κ, μᵢ, αᵢ.
+//! The compressible Ogden material of `ogden/1` in homogeneous states: the free stretches solved by Newton's method,
+//! the nominal stress and its derivatives with respect to κ, μᵢ, αᵢ.
 //!
-//! With e = ln λ and ē = e − ⅓ Σ e the Kirchhoff stresses are τⱼ = Σᵢ μᵢ (e^{αᵢēⱼ} − ⅓ Σₘ e^{αᵢēₘ}) + κ Σ e; a free face
-//! means τ₃ = 0. By the implicit function theorem dP₁/dξ = (∂τ₁/∂ξ − (∂τ₁/∂x)(∂τ₃/∂x)⁻¹ ∂τ₃/∂ξ)/λ₁, x the free log stretch.
+//! With e = ln λ and ē = e − ⅓ Σ e the Kirchhoff stresses are τⱼ = Σᵢ μᵢ (e^{αᵢēⱼ} − ⅓ Σₘ e^{αᵢēₘ}) + κ Σ e; a free
+//! face means τ₃ = 0. By the implicit function theorem dP₁/dξ = (∂τ₁/∂ξ − (∂τ₁/∂x)(∂τ₃/∂x)⁻¹ ∂τ₃/∂ξ)/λ₁, x the free log
+//! stretch.
 
 use super::deformation::Deformation;
 use crate::material::{Ogden, Parameter};
@@ -172,7 +173,7 @@ pub fn respond(material: &Ogden, deformation: &Deformation) -> Result<Response, 
 
 #[cfg(test)]
 mod tests {
-    use super::super::deformation::{HomogeneousTest, ShearTerm, incompressible_stress};
+    use super::super::deformation::{HomogeneousTest, incompressible_stress};
     use super::*;
     use crate::material::{OgdenTerm, first_piola_kirchhoff_stress};
 
@@ -197,8 +198,8 @@ mod tests {
         all
     }
 
-    /// The general first Piola–Kirchhoff stress at the found stretches: free faces free, the others equal; rounding of κ ln J
-    /// (1e-13 of κ) over stretches of order one.
+    /// The general first Piola–Kirchhoff stress at the found stretches: free faces free, the others equal; rounding of
+    /// κ ln J (1e-13 of κ) over stretches of order one.
     #[test]
     fn agrees_with_the_tensor_form() {
         for bulk in [60.0, 2000.0, 1e5] {
@@ -261,8 +262,7 @@ mod tests {
     /// κ → ∞: the difference to the closed form falls as 1/κ (ratio 100 for κ 100 times larger, to a tenth).
     #[test]
     fn incompressible_limit() {
-        let terms: Vec<ShearTerm> =
-            material(1.0).terms.iter().map(|t| ShearTerm { modulus_kpa: t.mu_kpa * t.alpha, alpha: t.alpha }).collect();
+        let terms = material(1.0).shear_terms();
         for deformation in states() {
             let limit = incompressible_stress(&terms, &deformation);
             let gap = |bulk| respond(&material(bulk), &deformation).unwrap().nominal_stress_kpa[0] - limit;

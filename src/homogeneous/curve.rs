@@ -2,7 +2,8 @@
 
 use super::deformation::{Deformation, HomogeneousTest};
 
-/// Largest principal stretch ratio (or shear) that is taken for data of soft matter; beyond it a column or unit is wrong.
+/// Largest principal stretch ratio (or shear) that is taken for data of soft matter; beyond it a column or unit is
+/// wrong.
 const LARGEST_STRETCH: f64 = 50.0;
 
 /// Nominal stresses over homogeneous states.

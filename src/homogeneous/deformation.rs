@@ -2,9 +2,10 @@
 //!
 //! In the incompressible limit every test's nominal stress has one form,
 //! P = w Σᵢ cᵢ D(αᵢ; e₁, e₃) with cᵢ = μᵢαᵢ and D(α; a, b) = (e^{αa} − e^{αb})/α,
-//! where e₁ is the log stretch along the test's axis, e₃ that of the direction whose traction vanishes, and w the reference
-//! area's factor. Written in (c, α) it is smooth through α = 0, and ½ Σ c is the initial shear modulus.
+//! where e₁ is the log stretch along the test's axis, e₃ that of the direction whose traction vanishes, and w the
+//! reference area's factor. Written in (c, α) it is smooth through α = 0, and ½ Σ c is the initial shear modulus.
 
+use crate::material::{ShearTerm, power_difference};
 use serde::{Deserialize, Serialize};
 
 /// A homogeneous test: how the drive becomes a deformation and which nominal stress the load cell sees.
@@ -79,8 +80,8 @@ impl Deformation {
         }
     }
 
-    /// Principal log stretches of the incompressible state. For simple shear the first belongs to asinh(γ/2), whatever its
-    /// sign.
+    /// Principal log stretches of the incompressible state. For simple shear the first belongs to asinh(γ/2), whatever
+    /// its sign.
     pub fn log_stretches(&self) -> [f64; 3] {
         match *self {
             Deformation::Uniaxial { stretch } => [stretch.ln(), -0.5 * stretch.ln(), -0.5 * stretch.ln()],
@@ -102,38 +103,6 @@ impl Deformation {
     }
 }
 
-/// One Ogden term as curves see it: c = μα and α.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ShearTerm {
-    /// c = μα, kPa.
-    pub modulus_kpa: f64,
-    /// α.
-    pub alpha: f64,
-}
-
-impl ShearTerm {
-    /// μ = c/α, kPa; infinite at α = 0.
-    pub fn mu_kpa(&self) -> f64 {
-        self.modulus_kpa / self.alpha
-    }
-}
-
-/// D(α; a, b) = (e^{αa} − e^{αb})/α and ∂D/∂α, without loss of digits at small α.
-pub fn power_difference(alpha: f64, a: f64, b: f64) -> (f64, f64) {
-    let (middle, half) = (0.5 * (a + b), 0.5 * (a - b));
-    let z = alpha * half;
-    // sinh z / z and its derivative; the series' next term at |z| = 0.03 is below 1e-15.
-    let (sinhc, derivative) = if z.abs() < 0.03 {
-        let s = z * z;
-        (1.0 + s / 6.0 * (1.0 + s / 20.0 * (1.0 + s / 42.0)), z / 3.0 * (1.0 + s / 10.0 * (1.0 + s / 28.0)))
-    } else {
-        let sinhc = z.sinh() / z;
-        (sinhc, (z.cosh() - sinhc) / z)
-    };
-    let scale = 2.0 * half * (alpha * middle).exp();
-    (scale * sinhc, scale * (middle * sinhc + half * derivative))
-}
-
 /// Nominal stress (kPa) of the incompressible material along the test's axis.
 pub fn incompressible_stress(terms: &[ShearTerm], deformation: &Deformation) -> f64 {
     let (e1, e3, weight) = deformation.form();
@@ -150,6 +119,7 @@ pub fn incompressible_derivative(term: &ShearTerm, deformation: &Deformation) ->
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::material::initial_shear_modulus_kpa;
 
     fn terms() -> Vec<ShearTerm> {
         vec![ShearTerm { modulus_kpa: 30.0, alpha: 1.9 }, ShearTerm { modulus_kpa: 4.0, alpha: -3.0 }]
@@ -187,10 +157,11 @@ mod tests {
         }
     }
 
-    /// Small strains: E = 3G uniaxial, 6G equibiaxial, 4G pure shear, G simple shear; second order is of relative size 1e-6.
+    /// Small strains: E = 3G uniaxial, 6G equibiaxial, 4G pure shear, G simple shear; second order is of relative size
+    /// 1e-6.
     #[test]
     fn initial_slopes() {
-        let g: f64 = 0.5 * terms().iter().map(|t| t.modulus_kpa).sum::<f64>();
+        let g = initial_shear_modulus_kpa(&terms());
         for (test, factor) in [
             (HomogeneousTest::Uniaxial, 3.0),
             (HomogeneousTest::Equibiaxial, 6.0),

@@ -1,15 +1,18 @@
-//! The traditional route: a dumb-bell's force over grip displacement, converted to the gauge's stretch by finite elements.
+//! The traditional route: a dumb-bell's force over grip displacement, converted to the gauge's stretch by finite
+//! elements.
 //!
-//! Shoulders and grips take part of the displacement, and how much depends on the material's curve. Conversion and fit are
-//! repeated in turn: fit → finite elements at a few displacements → gauge stretch over displacement → fit, until the
-//! stretches stay where they are.
+//! Shoulders and grips take part of the displacement, and how much depends on the material's curve. Conversion and fit
+//! are repeated in turn: fit → finite elements at a few displacements → gauge stretch over displacement → fit, until
+//! the stretches stay where they are.
 
 use super::curve::{Curve, CurveError};
-use super::deformation::{HomogeneousTest, ShearTerm};
-use super::fit::{CurveFitError, CurveFitOptions, material_of};
+use super::deformation::HomogeneousTest;
+use super::fit::material_of;
+use super::fit_options::{CurveFitError, CurveFitOptions};
 use super::result::{CurveFitSequence, fit_curves};
 use super::table::{ForceTable, TableError};
 use crate::fem::{ForwardModel, PrepareError, SolveError, SolveOptions};
+use crate::material::ShearTerm;
 use crate::mesh::MeshOptions;
 use crate::specimen::{Outline, Specimen, dumbbell};
 use serde::{Deserialize, Serialize};
@@ -62,7 +65,8 @@ pub struct DumbbellFit {
     pub num_rounds: usize,
     /// Largest change of a gauge strain in the last round, relative to the largest strain.
     pub last_change: f64,
-    /// Largest |finite element force − data| relative to the largest force: the whole route checked against the raw data.
+    /// Largest |finite element force − data| relative to the largest force: the whole route checked against the raw
+    /// data.
     pub force_mismatch: f64,
     /// κ of the finite elements, kPa.
     pub bulk_kpa: f64,

@@ -1,87 +1,19 @@
 //! Joint fits of Ogden terms to curves of homogeneous tests.
 //!
-//! Unknowns are ln|cᵢ| and αᵢ (c = μα keeps its sign; the trade of c against α is a straight valley in ln c). Starts come from
-//! linear fits over a grid of exponents; each good one is refined by Levenberg–Marquardt under αᵢ ≥ αᵢ₊₁ + η and the range
-//! of α. Up to two terms have c > 0 each; with more, a term may have c < 0 where the material stays stable on the way to
-//! every state of the data.
+//! Unknowns are ln|cᵢ| and αᵢ (c = μα keeps its sign; the trade of c against α is a straight valley in ln c). Starts
+//! come from linear fits over a grid of exponents; each good one is refined by Levenberg–Marquardt under αᵢ ≥ αᵢ₊₁ + η
+//! and the range of α. Up to two terms have c > 0 each; with more, a term may have c < 0 where the material stays
+//! stable on the way to every state of the data.
 
 use super::compressible::respond;
-use super::curve::{Curve, CurveError, CurveMatch};
-use super::deformation::{Deformation, ShearTerm, incompressible_derivative, incompressible_stress};
-use super::least_squares::{Evaluation, LeastSquaresOptions, Limit, Minimum, minimise};
-use super::stability::is_stable;
+use super::curve::{Curve, CurveMatch};
+use super::deformation::{Deformation, incompressible_derivative, incompressible_stress};
+use super::fit_options::{CurveFitError, CurveFitOptions};
+use super::loading_path::is_stable;
 use super::starts::{Start, starts};
-use crate::material::{MAX_TERMS, Ogden, OgdenTerm};
+use crate::material::{MAX_TERMS, Ogden, OgdenTerm, ShearTerm};
+use crate::optimise::{Evaluation, LeastSquaresOptions, LinearLimit, Minimum, minimise};
 use nalgebra::{DMatrix, DVector};
-
-/// Settings of [`fit_terms`] and [`super::fit_curves`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct CurveFitOptions {
-    /// Fits with 1 to this many terms.
-    pub max_terms: usize,
-    /// Whether the first term is a neo-Hookean one, α = 2 held.
-    pub neo_hookean: bool,
-    /// κ, kPa: held where given; without it the incompressible limit is fitted.
-    pub bulk_kpa: Option<f64>,
-    /// Smallest distance η of two exponents.
-    pub min_alpha_gap: f64,
-    /// Range of the exponents.
-    pub alpha_range: [f64; 2],
-    /// States beyond the data in which a material with negative products μα must be stable too: those that will be predicted.
-    pub also_stable_at: Vec<Deformation>,
-    /// Starts that are refined per number of terms.
-    pub num_starts: usize,
-}
-
-impl Default for CurveFitOptions {
-    fn default() -> Self {
-        CurveFitOptions {
-            max_terms: 3,
-            neo_hookean: false,
-            bulk_kpa: None,
-            min_alpha_gap: 1.0,
-            alpha_range: [-20.0, 20.0],
-            also_stable_at: Vec::new(),
-            num_starts: 6,
-        }
-    }
-}
-
-/// Why curves could not be fitted.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum CurveFitError {
-    /// A curve is not usable.
-    #[error(transparent)]
-    Curve(#[from] CurveError),
-    /// A setting is out of its range.
-    #[error("{name} is {value}; {requirement}")]
-    Setting {
-        /// Which one.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// What is needed.
-        requirement: &'static str,
-    },
-    /// More unknowns than data.
-    #[error("{num_terms} terms need more than {num_data} data points; ask for fewer terms")]
-    TooFewData {
-        /// Terms.
-        num_terms: usize,
-        /// Data points.
-        num_data: usize,
-    },
-    /// No start led anywhere.
-    #[error(
-        "no stable material with {num_terms} terms was found for these curves; check the stresses' signs and units, or ask \
-         for another number of terms"
-    )]
-    NoFit {
-        /// Terms.
-        num_terms: usize,
-    },
-}
 
 /// The best fit with a given number of terms.
 #[derive(Clone, Debug)]
@@ -230,11 +162,11 @@ fn refine(curves: &[Curve], start: &Start, options: &CurveFitOptions) -> Option<
     };
     let mut limits = Vec::new();
     for i in 0..sign.len() {
-        limits.push(Limit::at_least(2 * i + 1, options.alpha_range[0]));
-        limits.push(Limit::at_most(2 * i + 1, options.alpha_range[1]));
+        limits.push(LinearLimit::at_least(2 * i + 1, options.alpha_range[0]));
+        limits.push(LinearLimit::at_most(2 * i + 1, options.alpha_range[1]));
         if i > 0 {
             let coefficients = vec![(2 * i + 1, 1.0), (2 * i - 1, -1.0)];
-            limits.push(Limit { coefficients, bound: -options.min_alpha_gap });
+            limits.push(LinearLimit { coefficients, bound: -options.min_alpha_gap });
         }
     }
     // A held exponent has no derivative; a step of zero keeps it from drifting by rounding.

@@ -60,7 +60,8 @@ fn a_stable_negative_term_is_found() {
     assert!(fit.sum_of_squares < 1e-8, "{} {:?}", fit.sum_of_squares, fit.terms);
 }
 
-/// 500 draws of a two-term material with 1 % noise: the 95 % intervals hold the truth in 90 to 99 % of them (binomial 95 % ± 3 %), and BIC takes two terms in at least 95 %.
+/// 500 draws of a two-term material with 1 % noise: the 95 % intervals hold the truth in 90 to 99 % of them (binomial
+/// 95 % ± 3 %), and BIC takes two terms in at least 95 %.
 #[test]
 fn intervals_cover_and_terms_are_counted() {
     let truth = [term(4.0, 6.0), term(25.0, 1.5)];

@@ -11,29 +11,28 @@ mod curve;
 mod deformation;
 mod dumbbell;
 mod fit;
-mod least_squares;
+mod fit_options;
+mod loading_path;
 mod result;
 mod selection;
-mod stability;
 mod stand_in;
 mod starts;
 mod statistics;
 mod table;
 
+pub use crate::material::ShearTerm;
 pub use compressible::{HomogeneousError, Response, respond};
 pub use csv::{CsvCurve, CsvError, CsvOptions, StressUnit, read_csv};
 pub use curve::{Curve, CurveError, CurveMatch};
-pub use deformation::{
-    Deformation, HomogeneousTest, ShearTerm, incompressible_derivative, incompressible_stress, power_difference,
-};
+pub use deformation::{Deformation, HomogeneousTest, incompressible_derivative, incompressible_stress};
 pub use dumbbell::{DumbbellError, DumbbellFit, DumbbellOptions, GaugePoint, fit_dumbbell, gauge_stretches};
-pub use fit::{CurveFitError, CurveFitOptions, TermFit, fit_terms, matches_of, material_of, model_stress};
-pub use least_squares::{Evaluation, LeastSquaresOptions, Limit, Minimum, covariance, minimise};
+pub use fit::{TermFit, fit_terms, matches_of, material_of, model_stress};
+pub use fit_options::{CurveFitError, CurveFitOptions};
+pub use loading_path::is_stable;
 pub use result::{CurveFit, CurveFitSequence, CurveParameter, Interval, fit_curves};
 pub use selection::{
     F_LEVEL, MIN_DECREMENT, ModelEvidence, Selection, bic, compare, independent_count, neighbour_correlation,
 };
-pub use stability::{is_stable, smallest_stiffness};
 pub use stand_in::{GAUGE_STRETCHES, TRUTH, UniaxialRow, UniaxialStandIn, UniaxialStandInOptions, uniaxial_stand_in};
 pub use statistics::{erf, f_exceedance, t_quantile};
 pub use table::{ForceTable, TableError};

@@ -1,12 +1,12 @@
 //! Fits with one to N terms, the choice among them, and what is known of the parameters.
 
 use super::curve::{Curve, CurveMatch};
-use super::deformation::ShearTerm;
-use super::fit::{CurveFitError, CurveFitOptions, TermFit, fit_terms, matches_of};
-use super::least_squares::covariance;
+use super::fit::{TermFit, fit_terms, matches_of};
+use super::fit_options::{CurveFitError, CurveFitOptions};
 use super::selection::{Selection, compare, independent_count};
-use super::stability::smallest_stiffness;
 use super::statistics::t_quantile;
+use crate::material::{ShearTerm, initial_shear_modulus_kpa, smallest_relative_stiffness};
+use crate::optimise::covariance;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -102,7 +102,8 @@ impl CurveFitSequence {
 
 /// Fits with 1 to `options.max_terms` terms to all curves together, and the choice among them.
 ///
-/// A number of terms for which the data are too few, or no stable material is found, ends the sequence; the first must exist.
+/// A number of terms for which the data are too few, or no stable material is found, ends the sequence; the first must
+/// exist.
 ///
 /// # Errors
 /// [`CurveFitError`].
@@ -200,14 +201,14 @@ fn describe(curves: &[Curve], fit: &TermFit, options: &CurveFitOptions) -> Curve
         })
         .collect();
     // ½ Σ c: its gradient in ln c is ½ c.
-    let modulus = 0.5 * fit.terms.iter().map(|t| t.modulus_kpa).sum::<f64>();
+    let modulus = initial_shear_modulus_kpa(&fit.terms);
     let gradient = DMatrix::from_fn(1, n, |_, i| if i % 2 == 0 { 0.5 * fit.terms[i / 2].modulus_kpa } else { 0.0 });
     let modulus_sd = (&gradient * &log_covariance * gradient.transpose())[(0, 0)].max(0.0).sqrt();
     let matches = matches_of(&fit.terms, options.bulk_kpa, curves).unwrap_or_default();
     let smallest = curves
         .iter()
         .flat_map(|c| c.states.iter())
-        .map(|s| smallest_stiffness(&fit.terms, s))
+        .map(|s| smallest_relative_stiffness(&fit.terms, s.log_stretches()))
         .fold(f64::INFINITY, f64::min);
     CurveFit {
         num_terms: fit.terms.len(),

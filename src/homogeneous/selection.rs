@@ -1,5 +1,5 @@
-//! Which of several nested models the data call for: the decrement of the misfit, an F-test and the Bayesian information
-//! criterion, side by side.
+//! Which of several nested models the data call for: the decrement of the misfit, an F-test and the Bayesian
+//! information criterion, side by side.
 
 use super::statistics::f_exceedance;
 use serde::{Deserialize, Serialize};
@@ -43,7 +43,8 @@ pub struct Selection {
     pub by_bic: usize,
     /// The rule that decides: `bic`.
     pub decides: String,
-    /// Data points, and how many independent ones they are worth given the correlation of the richest model's residuals.
+    /// Data points, and how many independent ones they are worth given the correlation of the richest model's
+    /// residuals.
     pub num_data: usize,
     /// See `num_data`.
     pub num_independent: f64,
@@ -102,8 +103,8 @@ pub fn neighbour_correlation(residuals: &[&[f64]]) -> f64 {
     if squares > 0.0 && pairs > 0.0 { (products / pairs) / (squares / count) } else { 0.0 }
 }
 
-/// How many independent data the residuals are worth, n (1 − ρ)/(1 + ρ) for a correlation ρ of neighbours that noise alone
-/// would not show (more than two standard deviations 1/√n); at least `least`.
+/// How many independent data the residuals are worth, n (1 − ρ)/(1 + ρ) for a correlation ρ of neighbours that noise
+/// alone would not show (more than two standard deviations 1/√n); at least `least`.
 pub fn independent_count(residuals: &[&[f64]], least: f64) -> f64 {
     let n: f64 = residuals.iter().map(|r| r.len() as f64).sum();
     let rho = neighbour_correlation(residuals);
@@ -126,8 +127,8 @@ mod tests {
         assert!(independent_count(&[&slow], 5.0) < 10.0);
     }
 
-    /// A second parameter that halves the misfit of 100 data pays by all rules; one that takes 1 % pays by none: BIC's price
-    /// is ln 100 = 4.6 against 100 ln(1/0.99) = 1.0.
+    /// A second parameter that halves the misfit of 100 data pays by all rules; one that takes 1 % pays by none: BIC's
+    /// price is ln 100 = 4.6 against 100 ln(1/0.99) = 1.0.
     #[test]
     fn rules_agree_on_clear_cases() {
         let models = [("a".to_string(), 1, 2.0), ("b".to_string(), 2, 1.0), ("c".to_string(), 3, 0.99)];

@@ -1,12 +1,13 @@
-//! A synthetic stand-in of the published uniaxial test: a dumb-bell of a stiffening material, pulled by finite elements to a
-//! gauge stretch of 4, its force with noise, and the fits of the paper's Table 1.
+//! A synthetic stand-in of the published uniaxial test: a dumb-bell of a stiffening material, pulled by finite elements
+//! to a gauge stretch of 4, its force with noise, and the fits of the paper's Table 1.
 
 use super::curve::Curve;
-use super::deformation::{HomogeneousTest, ShearTerm};
+use super::deformation::HomogeneousTest;
 use super::dumbbell::{DumbbellError, DumbbellOptions, fit_dumbbell, gauge_stretches};
-use super::fit::CurveFitOptions;
+use super::fit_options::CurveFitOptions;
 use super::result::{CurveFit, fit_curves};
 use crate::fem::ForwardModel;
+use crate::material::{ShearTerm, initial_shear_modulus_kpa};
 use crate::mesh::MeshOptions;
 use crate::specimen::{Specimen, dumbbell};
 use rand::SeedableRng;
@@ -14,8 +15,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-/// Gauge stretches at which fits end: the published 2, and 4 instead of 4.5, which the shoulders of the meshed dumb-bell do not
-/// reach.
+/// Gauge stretches at which fits end: the published 2, and 4 instead of 4.5, which the shoulders of the meshed
+/// dumb-bell do not reach.
 pub const GAUGE_STRETCHES: [f64; 2] = [2.0, 4.0];
 /// What made the data: the initial response of the paper's neo-Hookean fit and the stiffening of its free two-term fit.
 /// The paper's own two-term fits with a held neo-Hookean term do not stiffen within the data.
@@ -76,7 +77,7 @@ pub fn uniaxial_stand_in(
     options: &UniaxialStandInOptions,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<UniaxialStandIn, DumbbellError> {
-    let modulus = 0.5 * TRUTH.iter().map(|t| t.modulus_kpa).sum::<f64>();
+    let modulus = initial_shear_modulus_kpa(&TRUTH);
     let bulk_kpa = BULK_RATIO * modulus;
     let truth_mesh = MeshOptions::scaled(specimen, options.truth_factor);
     let mut model = ForwardModel::of_specimen(specimen, &truth_mesh)?;
@@ -160,14 +161,15 @@ mod tests {
         assert_eq!(rows[..5], expected);
         for row in &found.rows {
             let g = row.fit.initial_shear_modulus_kpa.value;
-            // One free term over the whole curve is a wrong model; the others are within the noise's and the meshes' reach.
+            // One free term over the whole curve is a wrong model; the others are within the noise's and the meshes'
+            // reach.
             if row.fit.num_terms > 1 || row.largest_stretch < 3.0 {
                 assert!((g / found.true_initial_shear_modulus_kpa - 1.0).abs() < 0.1, "{g}");
             }
         }
         assert!(found.stretch_error < 0.05, "{}", found.stretch_error);
-        // What is left is noise, 10⁻³ of the largest force (squared, over the mean square, 3·10⁻⁶), and the conversion between
-        // meshes; a wrong model leaves far more.
+        // What is left is noise, 10⁻³ of the largest force (squared, over the mean square, 3·10⁻⁶), and the conversion
+        // between meshes; a wrong model leaves far more.
         let left = |row: usize| found.rows[row].relative_squares;
         assert!(left(2) < 3e-5 && left(4) > 10.0 * left(2), "{} {}", left(2), left(4));
     }

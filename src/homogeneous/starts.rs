@@ -1,8 +1,9 @@
 //! Where fits start: at given exponents the stress is linear in c, so a grid of exponents is searched by linear fits.
 
 use super::curve::Curve;
-use super::deformation::{ShearTerm, incompressible_derivative};
-use super::fit::CurveFitOptions;
+use super::deformation::incompressible_derivative;
+use super::fit_options::CurveFitOptions;
+use crate::material::ShearTerm;
 use nalgebra::{DMatrix, DVector};
 
 /// Distance of the grid's exponents.
@@ -138,8 +139,8 @@ impl Columns {
         }
     }
 
-    /// Σ squares and c of the linear fit; with `is_positive` the columns that would be negative are left out and then given a
-    /// small part.
+    /// Σ squares and c of the linear fit; with `is_positive` the columns that would be negative are left out and then
+    /// given a small part.
     fn fit(&self, set: &[usize], is_positive: bool) -> Option<(f64, Vec<f64>)> {
         let mut used: Vec<usize> = (0..set.len()).collect();
         let solution = loop {

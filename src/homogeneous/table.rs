@@ -116,7 +116,8 @@ impl ForceTable {
     /// Force and its slope at a drive.
     ///
     /// # Errors
-    /// [`TableError::Outside`] for a drive more than 1 % of the table's length beyond it; up to there the end's slope goes on.
+    /// [`TableError::Outside`] for a drive more than 1 % of the table's length beyond it; up to there the end's slope
+    /// goes on.
     pub fn at(&self, drive: f64) -> Result<(f64, f64), TableError> {
         let [low, high] = self.range();
         let margin = OVERRUN * (high - low);

@@ -7,12 +7,18 @@ mod limits;
 mod ogden_lanes;
 mod point;
 mod read;
+mod shear_modulus;
+mod shear_term;
+mod stability;
 
 pub use error::MaterialError;
 pub use lanes::{LANES, Lanes};
 pub use limits::{MAX_ALPHA, MAX_MODULUS_KPA, MIN_ALPHA, SCHEMA};
 pub use ogden_lanes::{MAX_TERMS, SpectralState, Tensor};
 pub use point::{energy_density, first_piola_kirchhoff_stress, material_tangent, stress_parameter_derivative};
+pub use shear_modulus::initial_shear_modulus_kpa;
+pub use shear_term::{ShearTerm, power_difference};
+pub use stability::{least_relative_stiffness, smallest_principal_stiffness_kpa, smallest_relative_stiffness};
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

@@ -1,6 +1,7 @@
 //! Reading, writing and validating a material (`ogden/1`).
 
 use super::limits::{MAX_ALPHA, MAX_MODULUS_KPA, MIN_ALPHA, SCHEMA};
+use super::stability::has_stable_product;
 use super::{MAX_TERMS, MaterialError, Ogden};
 use crate::field::{FieldError, FieldPath};
 use crate::specimen::JsonProblem;
@@ -65,7 +66,7 @@ impl Ogden {
             self.check_term(term, &mut problems);
         }
         if problems.is_empty() {
-            let value = 0.5 * self.terms.iter().map(|term| term.mu_kpa * term.alpha).sum::<f64>();
+            let value = self.initial_shear_modulus_kpa();
             if value <= 0.0 {
                 problems.push(MaterialError::ShearModulusNotPositive { value });
             }
@@ -86,7 +87,7 @@ impl Ogden {
         }
         if alpha.is_finite() && !(MIN_ALPHA..=MAX_ALPHA).contains(&alpha.abs()) {
             problems.push(MaterialError::AlphaOutOfRange { term, value: alpha, min: MIN_ALPHA, max: MAX_ALPHA });
-        } else if self.terms.len() <= 2 && mu * alpha <= 0.0 {
+        } else if !has_stable_product(&self.terms[term], self.terms.len()) {
             problems.push(MaterialError::HillViolated { term, mu, alpha });
         }
     }

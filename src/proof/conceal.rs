@@ -76,7 +76,7 @@ pub fn conceal(specimen: &Specimen, hidden: &Hidden) -> Result<Concealed, Concea
     // What the nominal model would show, for the size of the effect.
     let mut nominal = Hidden { cause: HiddenCause::None, ..hidden.clone() };
     if hidden.cause == HiddenCause::Compressibility {
-        let shear_modulus: f64 = nominal.material.terms.iter().map(|t| 0.5 * t.mu_kpa * t.alpha).sum();
+        let shear_modulus = nominal.material.initial_shear_modulus_kpa();
         nominal.material.bulk_kpa = RUBBER * shear_modulus;
     }
     let mut reference = model_of(specimen, &nominal)?;
@@ -204,7 +204,7 @@ fn departures(made: &Specimen, hidden: &Hidden) -> Departures {
     let half = [0.5 * b.length_mm, 0.5 * b.thickness_mm, 0.5 * b.width_mm];
     let (strength, which) = (hidden.strength, hidden.which);
     let largest = made.drive_mm.iter().fold(1e-9f64, |s, x| s.max(x.abs()));
-    let shear_modulus: f64 = hidden.material.terms.iter().map(|t| 0.5 * t.mu_kpa * t.alpha).sum();
+    let shear_modulus = hidden.material.initial_shear_modulus_kpa();
     match hidden.cause {
         HiddenCause::Gradient => {
             d.stiffness_factor = Some(Field::new(move |x| 1.0 + strength * x[which] / half[which]));

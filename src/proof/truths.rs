@@ -46,10 +46,7 @@ pub(super) fn truths(specimen: &Specimen, h: &Hidden) -> Vec<(String, f64)> {
             .map(|(name, d)| (name.to_string(), h.strength * d))
             .collect(),
         HiddenCause::Fibre => {
-            vec![(
-                "modulus_kpa".into(),
-                h.strength * h.material.terms.iter().map(|t| 0.5 * t.mu_kpa * t.alpha).sum::<f64>(),
-            )]
+            vec![("modulus_kpa".into(), h.strength * h.material.initial_shear_modulus_kpa())]
         }
         HiddenCause::Wrap => strength_of("jump_mm"),
         HiddenCause::Registration => {

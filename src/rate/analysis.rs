@@ -1,85 +1,14 @@
-//! What explains a load curve: an elastic baseline, hypotheses added one at a time while BIC and an F-test both call for
-//! them, taken out again where they no longer pay, and the proof on what was kept back.
+//! What explains a load curve: an elastic baseline, hypotheses added one at a time while BIC and an F-test both call
+//! for them, taken out again where they no longer pay, and the proof on what was kept back.
 
-use super::load_curve::{LoadCurve, LoadCurveError};
-use super::load_fit::{Fitted, Problem};
+use super::analysis_options::{EXPLAINED_PART, LoadCurveAnalysisError, LoadCurveOptions};
+use super::load_curve::LoadCurve;
+use super::load_fit::{LoadCurveFit, LoadCurveProblem};
 use super::model::{Layout, Physics, Prepared};
-use super::search::{Found, Search};
+use super::search::{CauseSearch, FoundCauses};
 use super::summary::{material_of_fit, sentence};
-use super::verdict::{BeforeAfter, CurveTrace, Hypothesis, LoadCurveVerdict, MatchBeforeAfter, Verdict};
+use super::verdict::{BeforeAfter, CurveTrace, LoadCurveVerdict, MatchBeforeAfter, Verdict};
 use crate::homogeneous::{Curve, CurveFitError, CurveFitOptions, CurveMatch, fit_curves, neighbour_correlation};
-
-/// BIC must fall by at least this (odds of about 150 to 1).
-pub const MIN_DELTA_BIC: f64 = 10.0;
-/// Two causes whose BIC differ by less cannot be told apart.
-pub const AMBIGUOUS_BIC: f64 = 6.0;
-/// Level of the F-test, shared among the hypotheses of a stage.
-pub const F_TEST_LEVEL: f64 = 0.01;
-/// The causes explain the mismatch where they take away at least this part of its structured variance.
-pub const EXPLAINED_PART: f64 = 0.9;
-
-/// Settings of [`analyse_load_curve`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct LoadCurveOptions {
-    /// Most Ogden terms.
-    pub max_terms: usize,
-    /// Most relaxations, at most 4.
-    pub max_relaxations: usize,
-    /// Standard deviation of a stress reading, kPa; estimated where not known.
-    pub noise_sd_kpa: Option<f64>,
-    /// Structured misfit below this part of the curves' root mean square is no mismatch: digitisation, thinning.
-    pub floor: f64,
-    /// Which hypotheses are tried.
-    pub hypotheses: Vec<Hypothesis>,
-}
-
-impl Default for LoadCurveOptions {
-    fn default() -> Self {
-        LoadCurveOptions {
-            max_terms: 3,
-            max_relaxations: 3,
-            noise_sd_kpa: None,
-            floor: 0.01,
-            hypotheses: Hypothesis::ALL.to_vec(),
-        }
-    }
-}
-
-/// Why load curves could not be analysed.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum LoadCurveAnalysisError {
-    /// A curve is not usable.
-    #[error(transparent)]
-    Curve(#[from] LoadCurveError),
-    /// No elastic material comes near the curves.
-    #[error(transparent)]
-    Elastic(#[from] CurveFitError),
-    /// Nothing to fit.
-    #[error("{num_fitted} samples are fitted; at least {needed} are needed (the others are kept back)")]
-    TooFewData {
-        /// Samples to fit.
-        num_fitted: usize,
-        /// Least number.
-        needed: usize,
-    },
-    /// A setting is out of its range.
-    #[error("{name} is {value}; {requirement}")]
-    Setting {
-        /// Which one.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// What is needed.
-        requirement: &'static str,
-    },
-    /// The caller asked to stop.
-    #[error("cancelled after {stages} stages")]
-    Cancelled {
-        /// Stages done.
-        stages: usize,
-    },
-}
 
 /// Analyses load curves of one material: is there a mismatch to an elastic material, what explains it, and does the
 /// explanation predict what was kept back ([`LoadCurve::num_fitted`])?
@@ -88,8 +17,8 @@ pub enum LoadCurveAnalysisError {
 /// use lambdak::homogeneous::HomogeneousTest;
 /// use lambdak::rate::{LoadCurve, LoadCurveOptions, PronyTerm, Verdict, analyse_load_curve, relax};
 ///
-/// // A neo-Hookean adhesive layer of 10 kPa in shear, up and down at two rates, that relaxes: in shear of a neo-Hookean
-/// // material the stress is linear, so `relax` makes the data.
+/// // A neo-Hookean adhesive layer of 10 kPa in shear, up and down at two rates, that relaxes: in shear of a
+/// // neo-Hookean material the stress is linear, so `relax` makes the data.
 /// let curve = |name: &str, rate: f64| {
 ///     let time: Vec<f64> = (1..=80).map(|i| f64::from(i) / 40.0 / rate).collect();
 ///     let shear: Vec<f64> = time.iter().map(|t| 0.2 * (1.0 - (1.0 - rate * t).abs())).collect();
@@ -108,8 +37,9 @@ pub enum LoadCurveAnalysisError {
 /// assert!(verdict.kept_back[0].after.rms_error_kpa < 0.1 * verdict.kept_back[0].before.rms_error_kpa);
 /// ```
 ///
-/// Every curve is taken to be of a fresh specimen. Correlated residuals count for fewer data: models are compared by the
-/// residuals and by the innovations of a first-order autoregression, intervals widened by the correlation of neighbours.
+/// Every curve is taken to be of a fresh specimen. Correlated residuals count for fewer data: models are compared by
+/// the residuals and by the innovations of a first-order autoregression, intervals widened by the correlation of
+/// neighbours.
 ///
 /// # Errors
 /// [`LoadCurveAnalysisError`].
@@ -131,7 +61,7 @@ pub fn analyse_load_curve(
         .enumerate()
         .map(|(i, c)| Prepared::new(order.iter().position(|&o| o == i).unwrap_or(0), c))
         .collect();
-    let problem = Problem {
+    let problem = LoadCurveProblem {
         curves,
         prepared,
         weight_kpa: scale,
@@ -139,7 +69,7 @@ pub fn analyse_load_curve(
         min_alpha_gap: fit_options.min_alpha_gap,
     };
     let baseline = baseline(&problem, &elastic_curves, &fit_options)?;
-    let search = Search { problem: &problem, options, num_fitted_curves: elastic_curves.len() };
+    let search = CauseSearch { problem: &problem, options, num_fitted_curves: elastic_curves.len() };
     let found = search.run(&baseline, is_cancelled)?;
     Ok(report(&problem, options, &baseline, found))
 }
@@ -165,7 +95,11 @@ fn check(curves: &[LoadCurve], options: &LoadCurveOptions) -> Result<(), LoadCur
 }
 
 /// The elastic material that the fitted samples call for.
-fn baseline(problem: &Problem, curves: &[Curve], options: &CurveFitOptions) -> Result<Fitted, LoadCurveAnalysisError> {
+fn baseline(
+    problem: &LoadCurveProblem,
+    curves: &[Curve],
+    options: &CurveFitOptions,
+) -> Result<LoadCurveFit, LoadCurveAnalysisError> {
     // One weight for all curves: they share the load cell.
     let curves: Vec<Curve> =
         curves.iter().map(|c| Curve { noise_sd_kpa: Some(problem.weight_kpa), ..c.clone() }).collect();
@@ -182,16 +116,21 @@ fn baseline(problem: &Problem, curves: &[Curve], options: &CurveFitOptions) -> R
 }
 
 /// The verdict on what a search found.
-fn report(problem: &Problem, options: &LoadCurveOptions, baseline: &Fitted, found: Found) -> LoadCurveVerdict {
-    let Found { fitted: chosen, causes, evidence: mut hypotheses } = found;
+fn report(
+    problem: &LoadCurveProblem,
+    options: &LoadCurveOptions,
+    baseline: &LoadCurveFit,
+    found: FoundCauses,
+) -> LoadCurveVerdict {
+    let FoundCauses { fitted: chosen, causes, evidence: mut hypotheses } = found;
     let (chosen, causes) = (&chosen, causes.as_slice());
     let n = problem.num_data() as f64;
     let (split_before, split_after) = (problem.by_curve(&baseline.residual), problem.by_curve(&chosen.residual));
     let noise = options.noise_sd_kpa.unwrap_or_else(|| scatter(&split_after) * problem.weight_kpa);
     let noise_square = (noise / problem.weight_kpa).powi(2);
-    let chi2 = |f: &Fitted| f.sum_of_squares / (n - f.x.len() as f64).max(1.0) / noise_square.max(1e-300);
+    let chi2 = |f: &LoadCurveFit| f.sum_of_squares / (n - f.x.len() as f64).max(1.0) / noise_square.max(1e-300);
     // Weights are the curves' root mean square, so the floor is a part of 1.
-    let structured = |f: &Fitted| (f.sum_of_squares / n - noise_square).max(0.0);
+    let structured = |f: &LoadCurveFit| (f.sum_of_squares / n - noise_square).max(0.0);
     let explained_fraction = if structured(baseline) > 0.0 {
         (1.0 - structured(chosen) / structured(baseline)).clamp(0.0, 1.0)
     } else {

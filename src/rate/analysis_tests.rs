@@ -47,8 +47,9 @@ fn holds(p: Option<&super::super::CauseParameter>, truth: f64) -> bool {
     p.and_then(|p| p.interval_95).is_some_and(|[low, high]| low <= truth && truth <= high)
 }
 
-/// 100 draws: relaxation (g = 0.5, τ = 12 s) behind 1 % noise at two rates. Named first in at least 95 %, intervals of g and τ
-/// hold the truth in 90 to 99 % (binomial 95 % ± 4 %), and the third rate is predicted better by the causes than without.
+/// 100 draws: relaxation (g = 0.5, τ = 12 s) behind 1 % noise at two rates. Named first in at least 95 %, intervals of
+/// g and τ hold the truth in 90 to 99 % (binomial 95 % ± 4 %), and the third rate is predicted better by the causes
+/// than without.
 #[test]
 fn hidden_relaxation_is_named_and_measured() {
     let truth = layout(Physics { num_relaxations: 1, ..Physics::default() }, 2);

@@ -1,12 +1,13 @@
-//! Incompressible homogeneous states as channels of reference stress: what the convolution of finite linear viscoelasticity
-//! acts on.
+//! Incompressible homogeneous states as channels of reference stress: what the convolution of finite linear
+//! viscoelasticity acts on.
 //!
-//! Simo's model convolves the isochoric second Piola–Kirchhoff stress, whose components live in the reference configuration.
-//! A measured nominal stress is P = Σ_c w_c S_c with two channels S_c and weights w_c that depend on the state alone, the
-//! undetermined pressure eliminated by the free face: along principal axes S = (S₁, S₃), w = (λ₁, −λ₃²/λ₁); in simple shear
-//! S = (S_xy, S_yy), w = (1, γ), where pressure has no part. S_j = (τ_j − mean τ)/λ_j².
+//! Simo's model convolves the isochoric second Piola–Kirchhoff stress, whose components live in the reference
+//! configuration. A measured nominal stress is P = Σ_c w_c S_c with two channels S_c and weights w_c that depend on the
+//! state alone, the undetermined pressure eliminated by the free face: along principal axes S = (S₁, S₃), w = (λ₁,
+//! −λ₃²/λ₁); in simple shear S = (S_xy, S_yy), w = (1, γ), where pressure has no part. S_j = (τ_j − mean τ)/λ_j².
 
-use crate::homogeneous::{Deformation, ShearTerm, power_difference};
+use crate::homogeneous::Deformation;
+use crate::material::{ShearTerm, power_difference};
 
 /// Two channels, their weights and derivatives at one state.
 #[derive(Clone, Debug)]

@@ -2,150 +2,19 @@
 //! elements, say): F(t) = s (F∞(d(t)) + Σ gᵢ ∫ e^{−(t−s)/τᵢ} dF∞) + offset.
 
 use super::channels::channels;
-use super::prony::{HistoryError, PronyTerm, check_times, memory};
+use super::force_history_input::{ForceHistory, ForceHistoryError, ForceHistoryOptions};
+use super::force_history_result::{FittedRelaxation, ForceHistoryFit, ForceHistorySequence};
+use super::prony::{HistoryError, check_times, memory};
 use super::starts::{PronyStart, prony_starts};
-use crate::homogeneous::{
-    Deformation, Interval, LeastSquaresOptions, Limit, Selection, ShearTerm, compare, covariance, independent_count,
-    minimise, t_quantile,
-};
-use crate::homogeneous::{ForceTable, TableError};
+use crate::homogeneous::{Deformation, ForceTable, Interval, compare, independent_count, t_quantile};
+use crate::material::initial_shear_modulus_kpa;
+use crate::optimise::{LeastSquaresOptions, LinearLimit, Minimum, covariance, minimise};
 use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
 
 /// Smallest ratio of neighbouring relaxation times: nearer ones are one.
 pub(crate) const MIN_TIME_RATIO: f64 = 2.0;
 /// Largest strength of one relaxation.
 pub(crate) const MAX_STRENGTH: f64 = 100.0;
-
-/// A recorded force history.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ForceHistory {
-    /// Times, s, rising.
-    pub time_s: Vec<f64>,
-    /// Drive at these times, mm.
-    pub drive_mm: Vec<f64>,
-    /// Force, N.
-    pub force_n: Vec<f64>,
-    /// Standard deviation of one reading, N; estimated from the fit where not known.
-    pub force_sd_n: Option<f64>,
-}
-
-/// A layer sheared between plates, for what relaxes in it. Simo's model convolves the isochoric second Piola–Kirchhoff
-/// stress, not the force; from an amount of shear of one half on the two differ. The force's memory is then
-/// s (∫ dS_xy + γ ∫ dS_yy) with γ = drive / gap, S of the homogeneous layer and s = F∞ / P_xy.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ShearLayer {
-    /// Distance of the plates, mm.
-    pub gap_mm: f64,
-    /// The material's terms.
-    pub terms: Vec<ShearTerm>,
-}
-
-/// Settings of [`fit_force_history`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct ForceHistoryOptions {
-    /// Fits with 0 to this many relaxations, at most 4.
-    pub max_terms: usize,
-    /// Whether the table's scale s is free (the material's stiffness) or 1.
-    pub is_scale_free: bool,
-    /// Whether a constant offset of the load cell is free or 0.
-    pub is_offset_free: bool,
-    /// Relaxation by Simo's model of a sheared layer; without it the force itself relaxes.
-    pub layer: Option<ShearLayer>,
-    /// Samples at smaller |drive| are left out of the fit (their history counts), mm. In a specimen with holes the state near
-    /// zero drive after a large one is not homogeneous, and the force there is all memory.
-    pub min_drive_mm: f64,
-}
-
-impl Default for ForceHistoryOptions {
-    fn default() -> Self {
-        ForceHistoryOptions { max_terms: 3, is_scale_free: true, is_offset_free: true, layer: None, min_drive_mm: 0.0 }
-    }
-}
-
-/// Why a history cannot be fitted.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ForceHistoryError {
-    /// The samples are not usable.
-    #[error(transparent)]
-    History(#[from] HistoryError),
-    /// The table does not reach.
-    #[error(transparent)]
-    Table(#[from] TableError),
-    /// A setting is out of its range.
-    #[error("{name} is {value}; {requirement}")]
-    Setting {
-        /// Which one.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// What is needed.
-        requirement: &'static str,
-    },
-    /// Too few samples, or a drive that never moves.
-    #[error("{samples} samples whose elastic force ranges over {range_n:.3e} N say nothing; record a loading history")]
-    NoInformation {
-        /// Samples.
-        samples: usize,
-        /// Largest minus smallest elastic force, N.
-        range_n: f64,
-    },
-}
-
-/// One relaxation with its intervals.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FittedRelaxation {
-    /// g, relative to the equilibrium response.
-    pub strength: Interval,
-    /// τ, s. Its interval is symmetric in ln τ.
-    pub time_s: Interval,
-    /// Whether the data determine both.
-    pub identifiable: bool,
-}
-
-/// The fit with a number of relaxations.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ForceHistoryFit {
-    /// Relaxations, shortest first.
-    pub relaxations: Vec<FittedRelaxation>,
-    /// s.
-    pub scale: Interval,
-    /// Offset, N.
-    pub offset_n: Interval,
-    /// Root mean square of data − model, N.
-    pub rms_error_n: f64,
-    /// Σ (data − model)² / sd² per datum left; none where the sd is not known.
-    pub chi2_per_datum: Option<f64>,
-    /// The model's force at every sample, N.
-    pub force_n: Vec<f64>,
-}
-
-impl ForceHistoryFit {
-    /// The relaxations as Prony terms.
-    pub fn terms(&self) -> Vec<PronyTerm> {
-        self.relaxations.iter().map(|r| PronyTerm { strength: r.strength.value, time_s: r.time_s.value }).collect()
-    }
-}
-
-/// Fits with 0 to N relaxations and the choice among them.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ForceHistorySequence {
-    /// The fits, elastic first.
-    pub fits: Vec<ForceHistoryFit>,
-    /// Which one the data call for.
-    pub selection: Selection,
-}
-
-impl ForceHistorySequence {
-    /// The chosen fit.
-    pub fn chosen(&self) -> &ForceHistoryFit {
-        &self.fits[self.selection.chosen().min(self.fits.len() - 1)]
-    }
-}
 
 /// A history ready to be fitted.
 struct Elastic<'a> {
@@ -174,7 +43,7 @@ impl<'a> Elastic<'a> {
                     let c = channels(&layer.terms, &Deformation::SimpleShear { shear });
                     let stress = c.stress[0] + shear * c.stress[1];
                     // At rest both vanish; their slopes' ratio is the limit.
-                    let modulus = 0.5 * layer.terms.iter().map(|t| t.modulus_kpa).sum::<f64>();
+                    let modulus = initial_shear_modulus_kpa(&layer.terms);
                     let scale = if shear.abs() > 1e-4 { f / stress } else { table.at(0.0)?.1 * layer.gap_mm / modulus };
                     for k in 0..2 {
                         lists[k].0.push(scale * c.weight[k]);
@@ -263,7 +132,7 @@ pub fn fit_force_history(
         return Err(ForceHistoryError::Setting { name: "force_sd_n", value: sd, requirement });
     }
     if let Some(layer) = &options.layer
-        && !(layer.gap_mm > 0.0 && layer.terms.iter().map(|t| t.modulus_kpa).sum::<f64>() > 0.0)
+        && !(layer.gap_mm > 0.0 && initial_shear_modulus_kpa(&layer.terms) > 0.0)
     {
         let (value, requirement) = (layer.gap_mm, "a layer needs a positive gap and terms of positive modulus");
         return Err(ForceHistoryError::Setting { name: "layer", value, requirement });
@@ -331,7 +200,7 @@ fn fit_with(elastic: &Elastic, num_terms: usize, options: &ForceHistoryOptions) 
     } else {
         prony_starts(time_s, num_terms, &free, &column, &data, 4)
     };
-    let mut best: Option<crate::homogeneous::Minimum> = None;
+    let mut best: Option<Minimum> = None;
     for start in starts {
         let scale = if options.is_scale_free { start.free.first().copied().unwrap_or(1.0) } else { 1.0 };
         let scale = if scale.abs() > 1e-9 { scale } else { 1.0 };
@@ -373,17 +242,17 @@ fn fit_with(elastic: &Elastic, num_terms: usize, options: &ForceHistoryOptions) 
 }
 
 /// g ≥ 0, times within what the samples can show, ordered. The terms' unknowns (g, ln τ) begin at `first`.
-pub(crate) fn limits_of(num_terms: usize, first: usize, time_s: &[f64]) -> Vec<Limit> {
+pub(crate) fn limits_of(num_terms: usize, first: usize, time_s: &[f64]) -> Vec<LinearLimit> {
     let [shortest, longest] = super::starts::time_range(time_s);
     let mut limits = Vec::new();
     for k in 0..num_terms {
         let (g, tau) = (first + 2 * k, first + 2 * k + 1);
-        limits.push(Limit::at_least(g, 0.0));
-        limits.push(Limit::at_most(g, MAX_STRENGTH));
-        limits.push(Limit::at_least(tau, (0.2 * shortest).ln()));
-        limits.push(Limit::at_most(tau, (5.0 * longest).ln()));
+        limits.push(LinearLimit::at_least(g, 0.0));
+        limits.push(LinearLimit::at_most(g, MAX_STRENGTH));
+        limits.push(LinearLimit::at_least(tau, (0.2 * shortest).ln()));
+        limits.push(LinearLimit::at_most(tau, (5.0 * longest).ln()));
         if k > 0 {
-            limits.push(Limit { coefficients: vec![(tau, -1.0), (tau - 2, 1.0)], bound: -MIN_TIME_RATIO.ln() });
+            limits.push(LinearLimit { coefficients: vec![(tau, -1.0), (tau - 2, 1.0)], bound: -MIN_TIME_RATIO.ln() });
         }
     }
     limits

@@ -1,7 +1,10 @@
 //! Recovery of relaxations from force histories.
 
-use super::super::prony::relax;
+use super::super::force_history_input::ShearLayer;
+use super::super::prony::{PronyTerm, relax};
 use super::*;
+use crate::homogeneous::TableError;
+use crate::material::ShearTerm;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 
@@ -79,8 +82,8 @@ fn the_jacobian_passes_the_taylor_test() {
     }
 }
 
-/// 120 draws at 0.5 % noise: two relaxations are chosen, and the intervals of g and τ hold the truth in 90 to 99 % (binomial
-/// 95 % ± 4 %).
+/// 120 draws at 0.5 % noise: two relaxations are chosen, and the intervals of g and τ hold the truth in 90 to 99 %
+/// (binomial 95 % ± 4 %).
 #[test]
 fn two_relaxations_are_recovered_with_honest_intervals() {
     let draws = 120;

@@ -16,8 +16,8 @@ pub struct LoadCurve {
     pub drive: Vec<f64>,
     /// Nominal stress, kPa.
     pub nominal_stress_kpa: Vec<f64>,
-    /// Samples from this index on are kept back: predicted, not fitted. 0 keeps back the whole curve, the number of samples
-    /// none.
+    /// Samples from this index on are kept back: predicted, not fitted. 0 keeps back the whole curve, the number of
+    /// samples none.
     pub num_fitted: usize,
     /// Shape factor of a cylinder in compression, diameter / (4 height), where known.
     pub shape_factor: Option<f64>,
@@ -82,7 +82,8 @@ impl LoadCurve {
         Curve::new(&self.name, self.test, &self.drive[..n], &self.nominal_stress_kpa[..n]).ok()
     }
 
-    /// Direction of the last motion at every sample: 1, −1, or 0 before the first motion. Motions below `resolution` are rest.
+    /// Direction of the last motion at every sample: 1, −1, or 0 before the first motion. Motions below `resolution`
+    /// are rest.
     pub(crate) fn directions(&self) -> Vec<f64> {
         let ends = self.drive.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(*v), b.max(*v)]);
         let resolution = 2e-3 * (ends[1] - ends[0]);

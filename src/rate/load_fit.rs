@@ -4,7 +4,8 @@ use super::force_history::limits_of;
 use super::load_curve::LoadCurve;
 use super::model::{Layout, Physics, Prepared, model};
 use super::starts::time_range;
-use crate::homogeneous::{Evaluation, LeastSquaresOptions, Limit, incompressible_stress, minimise};
+use crate::homogeneous::incompressible_stress;
+use crate::optimise::{Evaluation, LeastSquaresOptions, LinearLimit, minimise};
 use nalgebra::{DMatrix, DVector};
 
 /// Relaxation times that are tried for a new relaxation.
@@ -18,7 +19,7 @@ const NEW_PART: f64 = 0.02;
 
 /// A fitted model.
 #[derive(Clone, Debug)]
-pub(crate) struct Fitted {
+pub(crate) struct LoadCurveFit {
     pub(crate) layout: Layout,
     pub(crate) x: Vec<f64>,
     /// (model − data) / weight over the fitted samples, curve after curve.
@@ -28,7 +29,7 @@ pub(crate) struct Fitted {
 }
 
 /// The curves with what the fits share.
-pub(crate) struct Problem<'a> {
+pub(crate) struct LoadCurveProblem<'a> {
     pub(crate) curves: &'a [LoadCurve],
     pub(crate) prepared: Vec<Prepared>,
     /// What residuals are divided by, kPa.
@@ -37,8 +38,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) min_alpha_gap: f64,
 }
 
-impl Problem<'_> {
-    /// Fitted samples of all curves.
+impl LoadCurveProblem<'_> {
+    /// LoadCurveFit samples of all curves.
     pub(crate) fn num_data(&self) -> usize {
         self.curves.iter().map(LoadCurve::fitted).sum()
     }
@@ -57,7 +58,7 @@ impl Problem<'_> {
     }
 
     /// Modelled stress of every sample of every curve, kPa.
-    pub(crate) fn stresses(&self, fitted: &Fitted) -> Vec<Vec<f64>> {
+    pub(crate) fn stresses(&self, fitted: &LoadCurveFit) -> Vec<Vec<f64>> {
         self.prepared.iter().map(|p| model(&fitted.layout, &fitted.x, p).stress_kpa).collect()
     }
 
@@ -87,7 +88,8 @@ impl Problem<'_> {
         timed.map(|(p, _)| p.time_s.as_slice()).max_by(|a, b| span(a).total_cmp(&span(b)))
     }
 
-    /// Shortest sampling interval and longest duration over the fitted curves, as a list that [`limits_of`] understands.
+    /// Shortest sampling interval and longest duration over the fitted curves, as a list that [`limits_of`]
+    /// understands.
     fn clock(&self) -> Vec<f64> {
         let ranges: Vec<[f64; 2]> = self
             .prepared
@@ -112,17 +114,17 @@ impl Problem<'_> {
     }
 
     /// Levenberg–Marquardt from the best of several starts.
-    pub(crate) fn fit(&self, layout: &Layout, starts: &[Vec<f64>]) -> Option<Fitted> {
+    pub(crate) fn fit(&self, layout: &Layout, starts: &[Vec<f64>]) -> Option<LoadCurveFit> {
         let p = layout.physics;
-        let mut best: Option<Fitted> = None;
+        let mut best: Option<LoadCurveFit> = None;
         for start in starts {
             let mut limits = Vec::new();
             for i in 0..layout.signs.len() {
-                limits.push(Limit::at_least(2 * i + 1, self.alpha_range[0]));
-                limits.push(Limit::at_most(2 * i + 1, self.alpha_range[1]));
+                limits.push(LinearLimit::at_least(2 * i + 1, self.alpha_range[0]));
+                limits.push(LinearLimit::at_most(2 * i + 1, self.alpha_range[1]));
                 if i > 0 {
                     let coefficients = vec![(2 * i + 1, 1.0), (2 * i - 1, -1.0)];
-                    limits.push(Limit { coefficients, bound: -self.min_alpha_gap });
+                    limits.push(LinearLimit { coefficients, bound: -self.min_alpha_gap });
                 }
             }
             limits.extend(limits_of(p.num_relaxations, layout.relaxations(), &self.clock()));
@@ -130,30 +132,36 @@ impl Problem<'_> {
             if p.has_softening {
                 let s = layout.softening();
                 let scale = self.energy_scale(layout, start);
-                limits.extend([Limit::at_least(s, 0.0), Limit::at_most(s, 0.999)]);
-                limits.extend([Limit::at_least(s + 1, (1e-4 * scale).ln()), Limit::at_most(s + 1, (1e2 * scale).ln())]);
-                limits.extend([Limit::at_least(s + 2, 0.0), Limit::at_most(s + 2, 5.0)]);
+                limits.extend([LinearLimit::at_least(s, 0.0), LinearLimit::at_most(s, 0.999)]);
+                limits.extend([
+                    LinearLimit::at_least(s + 1, (1e-4 * scale).ln()),
+                    LinearLimit::at_most(s + 1, (1e2 * scale).ln()),
+                ]);
+                limits.extend([LinearLimit::at_least(s + 2, 0.0), LinearLimit::at_most(s + 2, 5.0)]);
                 steps[s] = 0.3;
             }
             if p.has_barrelling {
-                limits.extend([Limit::at_least(layout.barrelling(), 0.0), Limit::at_most(layout.barrelling(), 10.0)]);
+                limits.extend([
+                    LinearLimit::at_least(layout.barrelling(), 0.0),
+                    LinearLimit::at_most(layout.barrelling(), 10.0),
+                ]);
             }
             if p.has_friction {
-                limits.push(Limit::at_least(layout.friction(), 0.0));
+                limits.push(LinearLimit::at_least(layout.friction(), 0.0));
                 steps[layout.friction()] = 10.0 * self.weight_kpa.max(1.0);
             }
             if p.has_offset {
                 steps[layout.offset()] = f64::MAX.sqrt();
             }
             for g in layout.gains()..layout.num_unknowns() {
-                limits.extend([Limit::at_least(g, GAIN_RANGE[0]), Limit::at_most(g, GAIN_RANGE[1])]);
+                limits.extend([LinearLimit::at_least(g, GAIN_RANGE[0]), LinearLimit::at_most(g, GAIN_RANGE[1])]);
             }
             let settings = LeastSquaresOptions { max_evaluations: 120, tolerance: 1e-8 };
             let found = minimise(start, &limits, &steps, &settings, &mut |x| self.evaluate(layout, x));
             if let Some(m) = found
                 && best.as_ref().is_none_or(|b| m.sum_of_squares < b.sum_of_squares)
             {
-                best = Some(Fitted {
+                best = Some(LoadCurveFit {
                     layout: layout.clone(),
                     x: m.parameters,
                     residual: m.residual,
@@ -166,7 +174,7 @@ impl Problem<'_> {
     }
 
     /// The fit with one more relaxation, from the times where a linear step gains most.
-    pub(crate) fn with_relaxation(&self, from: &Fitted) -> Option<Fitted> {
+    pub(crate) fn with_relaxation(&self, from: &LoadCurveFit) -> Option<LoadCurveFit> {
         if from.layout.physics.num_relaxations > 0 {
             return self.with_relaxation_as(from, from.layout.physics.is_nominal);
         }
@@ -175,7 +183,7 @@ impl Problem<'_> {
         found.into_iter().flatten().min_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares))
     }
 
-    fn with_relaxation_as(&self, from: &Fitted, is_nominal: bool) -> Option<Fitted> {
+    fn with_relaxation_as(&self, from: &LoadCurveFit, is_nominal: bool) -> Option<LoadCurveFit> {
         self.times()?;
         let [low, high] = time_range(&self.clock());
         let physics =
@@ -207,8 +215,8 @@ impl Problem<'_> {
         self.fit(&layout, &starts)
     }
 
-    /// What a linear step in all unknowns with unknown `at` free from zero takes off the sum of squares, and where it takes
-    /// that unknown.
+    /// What a linear step in all unknowns with unknown `at` free from zero takes off the sum of squares, and where it
+    /// takes that unknown.
     fn linear_gain(&self, layout: &Layout, x: &[f64], at: usize) -> Option<(f64, f64)> {
         let (r, j) = self.evaluate(layout, x)?;
         // Columns without effect (a time of zero strength) are left out.
@@ -224,7 +232,7 @@ impl Problem<'_> {
     }
 
     /// The fit with softening.
-    pub(crate) fn with_softening(&self, from: &Fitted) -> Option<Fitted> {
+    pub(crate) fn with_softening(&self, from: &LoadCurveFit) -> Option<LoadCurveFit> {
         let physics = Physics { has_softening: true, ..from.layout.physics };
         let layout = Layout { physics, ..from.layout.clone() };
         let scale = self.energy_scale(&from.layout, &from.x);
@@ -241,7 +249,7 @@ impl Problem<'_> {
     }
 
     /// The fit with one more term.
-    pub(crate) fn with_term(&self, from: &Fitted) -> Option<Fitted> {
+    pub(crate) fn with_term(&self, from: &LoadCurveFit) -> Option<LoadCurveFit> {
         let num = from.layout.signs.len();
         let mut signs = from.layout.signs.clone();
         signs.push(1.0);
@@ -277,15 +285,15 @@ impl Problem<'_> {
         self.fit(&layout, &starts)
     }
 
-    /// The fit with one more linear part: `switch` turns it on, `place` is where its unknowns go, `values` their nominal
-    /// values.
+    /// The fit with one more linear part: `switch` turns it on, `place` is where its unknowns go, `values` their
+    /// nominal values.
     pub(crate) fn with_part(
         &self,
-        from: &Fitted,
+        from: &LoadCurveFit,
         switch: impl Fn(&mut Physics),
         place: impl Fn(&Layout) -> usize,
         values: &[f64],
-    ) -> Option<Fitted> {
+    ) -> Option<LoadCurveFit> {
         let mut layout = from.layout.clone();
         switch(&mut layout.physics);
         let mut x = from.x.clone();

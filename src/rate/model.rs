@@ -3,9 +3,10 @@
 //!
 //! * Softening (Ogden and Roxburgh 1999, doi 10.1098/rspa.1999.0431): the elastic stress is multiplied by
 //!   η = 1 − ρ erf((W_max − W)/(m + β W_max)), ρ = 1/r in [0, 1); ρ = 0 is no softening.
-//! * Relaxation acts on the softened isochoric stress: P = Σ_c w_c (S_c + Σ gᵢ ∫ e^{−(t−s)/τᵢ} dS_c). Simo's model takes for S
-//!   the second Piola–Kirchhoff stress; in large shear its components nearly cancel, and so do not when they lag. Fung's
-//!   quasi-linear model takes the nominal stress itself. The two agree for small strains; the data choose.
+//! * Relaxation acts on the softened isochoric stress: P = Σ_c w_c (S_c + Σ gᵢ ∫ e^{−(t−s)/τᵢ} dS_c). Simo's model
+//!   takes for S the second Piola–Kirchhoff stress; in large shear its components nearly cancel, and so do not when
+//!   they lag. Fung's quasi-linear model takes the nominal stress itself. The two agree for small strains; the data
+//!   choose.
 //! * Barrelling: below λ = 1 the stress is multiplied by 1 + b λ⁻³, b = 2 S² times the degree of bonding, S the shape
 //!   factor (Gent and Lindley 1959: 1 + 2 S² for bonded discs; S grows as λ^(−3/2) at constant volume).
 //! * Load cell: measured = gain · (P + friction · direction) + offset; gains are relative to the first curve's.
@@ -28,8 +29,8 @@ pub(crate) struct Physics {
     pub(crate) has_gain: bool,
 }
 
-/// Where the unknowns of a model lie: (ln|c|, α) per term, (g, ln τ) per relaxation, (ρ, ln m, β), b, friction, offset, gains
-/// of the second and later curves.
+/// Where the unknowns of a model lie: (ln|c|, α) per term, (g, ln τ) per relaxation, (ρ, ln m, β), b, friction, offset,
+/// gains of the second and later curves.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Layout {
     /// Signs of the terms' c.
@@ -96,7 +97,8 @@ impl Prepared {
         states.extend(curve.drive.iter().map(|&d| curve.test.at(d)));
         let mut time_s = Vec::new();
         if let Some(&first) = curve.time_s.first() {
-            // A recording that begins later than at 0 was driven there from rest at time 0; one that begins before is at rest.
+            // A recording that begins later than at 0 was driven there from rest at time 0; one that begins before is
+            // at rest.
             time_s.push(if first > 0.0 { 0.0 } else { first });
             time_s.extend(&curve.time_s);
         }

@@ -86,8 +86,8 @@ fn derivatives_pass_the_taylor_test() {
     }
 }
 
-/// A jump to λ and a hold: all of (1 + Σ g) at once, equilibrium in the end. Exact in Simo's model, because the reference
-/// stress is constant after the jump.
+/// A jump to λ and a hold: all of (1 + Σ g) at once, equilibrium in the end. Exact in Simo's model, because the
+/// reference stress is constant after the jump.
 #[test]
 fn relaxation_goes_from_instantaneous_to_equilibrium() {
     let layout =

@@ -1,10 +1,10 @@
 //! Linear relaxation of an elastic history: the Prony convolution and its derivatives.
 //!
-//! F(t) = F∞(t) + Σᵢ gᵢ ∫₀ᵗ e^{−(t−s)/τᵢ} dF∞(s). F∞ is the equilibrium response, so that an instantaneous change answers
-//! with (1 + Σ gᵢ) times the equilibrium one (Simo 1987, doi 10.1016/0045-7825(87)90107-1, in equilibrium normalisation).
-//! Between samples F∞ is taken as linear in time; then the recursion
-//! hᵢ ← e^{−Δt/τᵢ} hᵢ + gᵢ φ(Δt/τᵢ) ΔF∞, φ(x) = (1 − e^{−x})/x, is exact. Before the first sample the state is at rest: all
-//! hᵢ start at zero, whatever the first value is.
+//! F(t) = F∞(t) + Σᵢ gᵢ ∫₀ᵗ e^{−(t−s)/τᵢ} dF∞(s). F∞ is the equilibrium response, so that an instantaneous change
+//! answers with (1 + Σ gᵢ) times the equilibrium one (Simo 1987, doi 10.1016/0045-7825(87)90107-1, in equilibrium
+//! normalisation). Between samples F∞ is taken as linear in time; then the recursion hᵢ ← e^{−Δt/τᵢ} hᵢ + gᵢ φ(Δt/τᵢ)
+//! ΔF∞, φ(x) = (1 − e^{−x})/x, is exact. Before the first sample the state is at rest: all hᵢ start at zero, whatever
+//! the first value is.
 
 use serde::{Deserialize, Serialize};
 
@@ -112,8 +112,9 @@ pub struct RelaxedHistory {
     pub by_time: Vec<Vec<f64>>,
 }
 
-/// F(t) at the samples from the equilibrium response `elastic` there. The operation is linear in `elastic`: the derivative
-/// with respect to a parameter of the elastic response is this function applied to that response's derivative.
+/// F(t) at the samples from the equilibrium response `elastic` there. The operation is linear in `elastic`: the
+/// derivative with respect to a parameter of the elastic response is this function applied to that response's
+/// derivative.
 ///
 /// # Errors
 /// [`HistoryError`].
@@ -180,8 +181,8 @@ mod tests {
         }
     }
 
-    /// A sine in its steady state: storage and loss factors 1 + Σ g ω²τ²/(1+ω²τ²) and Σ g ωτ/(1+ω²τ²). Sampling at 1/400 of
-    /// a period leaves (2π/400)²/12 = 2e-5 relative.
+    /// A sine in its steady state: storage and loss factors 1 + Σ g ω²τ²/(1+ω²τ²) and Σ g ωτ/(1+ω²τ²). Sampling at
+    /// 1/400 of a period leaves (2π/400)²/12 = 2e-5 relative.
     #[test]
     fn steady_sine() {
         let omega: f64 = 0.2;

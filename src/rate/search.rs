@@ -1,29 +1,29 @@
-//! The search for causes: hypotheses added one at a time, taken out again where they no longer pay, and compared with what
-//! would take their place.
+//! The search for causes: hypotheses added one at a time, taken out again where they no longer pay, and compared with
+//! what would take their place.
 
-use super::analysis::{AMBIGUOUS_BIC, F_TEST_LEVEL, LoadCurveAnalysisError, LoadCurveOptions, MIN_DELTA_BIC};
+use super::analysis_options::{AMBIGUOUS_BIC, F_TEST_LEVEL, LoadCurveAnalysisError, LoadCurveOptions, MIN_DELTA_BIC};
 use super::load_curve::LoadCurve;
-use super::load_fit::{Fitted, Problem};
+use super::load_fit::{LoadCurveFit, LoadCurveProblem};
 use super::model::Layout;
 use super::summary::{describe_cause, model_name};
 use super::verdict::{CurveCause, Hypothesis, HypothesisEvidence};
 use crate::homogeneous::{f_exceedance, independent_count, neighbour_correlation};
 
 /// What a search found.
-pub(super) struct Found {
-    pub(super) fitted: Fitted,
+pub(super) struct FoundCauses {
+    pub(super) fitted: LoadCurveFit,
     pub(super) causes: Vec<CurveCause>,
     pub(super) evidence: Vec<HypothesisEvidence>,
 }
 
 /// The search for causes.
-pub(super) struct Search<'a> {
-    pub(super) problem: &'a Problem<'a>,
+pub(super) struct CauseSearch<'a> {
+    pub(super) problem: &'a LoadCurveProblem<'a>,
     pub(super) options: &'a LoadCurveOptions,
     pub(super) num_fitted_curves: usize,
 }
 
-impl Search<'_> {
+impl CauseSearch<'_> {
     /// Whether a hypothesis can be added to a model with these data.
     fn is_open(&self, h: Hypothesis, to: &Layout) -> bool {
         let p = to.physics;
@@ -56,7 +56,7 @@ impl Search<'_> {
     }
 
     /// The fit with a hypothesis added.
-    fn with(&self, h: Hypothesis, from: &Fitted) -> Option<Fitted> {
+    fn with(&self, h: Hypothesis, from: &LoadCurveFit) -> Option<LoadCurveFit> {
         let gains = vec![1.0; self.num_fitted_curves.saturating_sub(1)];
         match h {
             Hypothesis::Relaxation => self.problem.with_relaxation(from),
@@ -72,7 +72,7 @@ impl Search<'_> {
     }
 
     /// The fit with a hypothesis taken out altogether.
-    fn without(&self, h: Hypothesis, from: &Fitted) -> Option<Fitted> {
+    fn without(&self, h: Hypothesis, from: &LoadCurveFit) -> Option<LoadCurveFit> {
         let mut layout = from.layout.clone();
         let mut x = from.x.clone();
         let l = &from.layout;
@@ -104,11 +104,11 @@ impl Search<'_> {
 
     /// BIC of the simpler model − BIC of the richer one, F and its probability.
     ///
-    /// Neighbouring residuals may be correlated. Evidence is weighed twice, each time with the number of independent data
-    /// that the richer model's values are worth: in the residuals themselves, and in their innovations (see
-    /// [`innovations`]), which show what is sharp in time and weak in size. The stronger one counts; for white residuals they
-    /// are the same.
-    fn delta_bic(&self, simple: &Fitted, rich: &Fitted) -> (f64, f64, f64) {
+    /// Neighbouring residuals may be correlated. Evidence is weighed twice, each time with the number of independent
+    /// data that the richer model's values are worth: in the residuals themselves, and in their innovations (see
+    /// [`innovations`]), which show what is sharp in time and weak in size. The stronger one counts; for white
+    /// residuals they are the same.
+    fn delta_bic(&self, simple: &LoadCurveFit, rich: &LoadCurveFit) -> (f64, f64, f64) {
         let (k0, k1) = (simple.x.len() as f64, rich.x.len() as f64);
         let weigh = |(s0, s1, n): (f64, f64, f64)| {
             let delta = n * (s0 / s1.max(1e-300)).ln() - (k1 - k0) * n.ln();
@@ -120,12 +120,12 @@ impl Search<'_> {
         if a.0 >= b.0 { a } else { b }
     }
 
-    /// Sums of squares of two models and how many independent data the second one's are worth: of the residuals, and of the
-    /// innovations.
-    fn left_over(&self, first: &Fitted, second: &Fitted) -> [(f64, f64, f64); 2] {
+    /// Sums of squares of two models and how many independent data the second one's are worth: of the residuals, and of
+    /// the innovations.
+    fn left_over(&self, first: &LoadCurveFit, second: &LoadCurveFit) -> [(f64, f64, f64); 2] {
         let least = second.x.len() as f64 + 10.0;
         let levels = independent_count(&self.problem.by_curve(&second.residual), least);
-        let split = |f: &Fitted| innovations(&self.problem.by_curve(&f.residual));
+        let split = |f: &LoadCurveFit| innovations(&self.problem.by_curve(&f.residual));
         let square = |lists: &[Vec<f64>]| lists.iter().flatten().map(|v| v * v).sum::<f64>();
         let (a, b) = (split(first), split(second));
         let views: Vec<&[f64]> = b.iter().map(Vec::as_slice).collect();
@@ -141,15 +141,15 @@ impl Search<'_> {
     /// [`LoadCurveAnalysisError::Cancelled`].
     pub(super) fn run(
         &self,
-        baseline: &Fitted,
+        baseline: &LoadCurveFit,
         is_cancelled: &dyn Fn() -> bool,
-    ) -> Result<Found, LoadCurveAnalysisError> {
+    ) -> Result<FoundCauses, LoadCurveAnalysisError> {
         let mut current = baseline.clone();
         let mut evidence: Vec<HypothesisEvidence> = Vec::new();
         for stage in 1..=10 {
             let open: Vec<Hypothesis> =
                 Hypothesis::ALL.into_iter().filter(|&h| self.is_open(h, &current.layout)).collect();
-            let mut tried: Vec<(HypothesisEvidence, Fitted)> = Vec::new();
+            let mut additions: Vec<(HypothesisEvidence, LoadCurveFit)> = Vec::new();
             for &h in &open {
                 if is_cancelled() {
                     return Err(LoadCurveAnalysisError::Cancelled { stages: stage - 1 });
@@ -167,23 +167,23 @@ impl Search<'_> {
                     sum_of_squares,
                     is_taken: false,
                 };
-                tried.push((e, fitted));
+                additions.push((e, fitted));
             }
-            tried.sort_by(|a, b| b.0.delta_bic.total_cmp(&a.0.delta_bic));
-            let pays = tried.first().is_some_and(|(e, _)| {
+            additions.sort_by(|a, b| b.0.delta_bic.total_cmp(&a.0.delta_bic));
+            let pays = additions.first().is_some_and(|(e, _)| {
                 e.delta_bic > MIN_DELTA_BIC && e.f_probability < F_TEST_LEVEL / open.len() as f64
             });
             if pays {
-                tried[0].0.is_taken = true;
-                current = tried[0].1.clone();
+                additions[0].0.is_taken = true;
+                current = additions[0].1.clone();
             }
-            evidence.extend(tried.into_iter().map(|(e, _)| e));
+            evidence.extend(additions.into_iter().map(|(e, _)| e));
             if !pays {
                 break;
             }
         }
         let (current, causes) = self.prune(current, baseline);
-        Ok(Found { fitted: current, causes, evidence })
+        Ok(FoundCauses { fitted: current, causes, evidence })
     }
 
     /// The causes of a model, its terms apart.
@@ -203,7 +203,7 @@ impl Search<'_> {
     }
 
     /// Takes out what no longer pays, then asks for each cause what would take its place.
-    fn prune(&self, mut current: Fitted, baseline: &Fitted) -> (Fitted, Vec<CurveCause>) {
+    fn prune(&self, mut current: LoadCurveFit, baseline: &LoadCurveFit) -> (LoadCurveFit, Vec<CurveCause>) {
         let mut causes = Self::causes_in(&current.layout);
         loop {
             let weakest = causes
@@ -271,8 +271,8 @@ impl Search<'_> {
     }
 }
 
-/// Residuals less what their neighbour before predicts, eᵢ = rᵢ − ρ rᵢ₋₁, per list; the first of a list is √(1 − ρ²) r₁.
-/// ρ is the correlation of neighbours where noise alone would not show it, else 0.
+/// Residuals less what their neighbour before predicts, eᵢ = rᵢ − ρ rᵢ₋₁, per list; the first of a list is √(1 − ρ²)
+/// r₁. ρ is the correlation of neighbours where noise alone would not show it, else 0.
 fn innovations(residuals: &[&[f64]]) -> Vec<Vec<f64>> {
     let n: f64 = residuals.iter().map(|r| r.len() as f64).sum();
     let found = neighbour_correlation(residuals);

@@ -1,5 +1,5 @@
-//! Where fits of relaxations start: at given times the force is linear in the strengths, so a logarithmic grid of times is
-//! searched by linear fits with strengths ≥ 0.
+//! Where fits of relaxations start: at given times the force is linear in the strengths, so a logarithmic grid of times
+//! is searched by linear fits with strengths ≥ 0.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -1,9 +1,11 @@
 //! Parameters and sentences of a verdict.
 
-use super::load_fit::{Fitted, Problem};
+use super::load_fit::{LoadCurveFit, LoadCurveProblem};
 use super::model::Physics;
 use super::verdict::{CauseParameter, CurveCause, CurveMaterial, Hypothesis, MatchBeforeAfter, Verdict};
-use crate::homogeneous::{Interval, covariance, independent_count, t_quantile};
+use crate::homogeneous::{Interval, independent_count, t_quantile};
+use crate::material::initial_shear_modulus_kpa;
+use crate::optimise::covariance;
 use nalgebra::DMatrix;
 
 /// Singular values of the scaled Jacobian below this part of the largest count as none.
@@ -17,7 +19,7 @@ struct Uncertainty {
     t95: f64,
 }
 
-fn uncertainty(fitted: &Fitted, problem: &Problem) -> Uncertainty {
+fn uncertainty(fitted: &LoadCurveFit, problem: &LoadCurveProblem) -> Uncertainty {
     let (n, k) = (fitted.residual.len() as f64, fitted.x.len() as f64);
     let independent = independent_count(&problem.by_curve(&fitted.residual), k + 2.0);
     let variance = fitted.sum_of_squares / (n - k).max(1.0) * (n / independent);
@@ -42,7 +44,11 @@ pub(super) fn model_name(hypothesis: Hypothesis, physics: Physics) -> &'static s
 }
 
 /// The parameters of a cause in a fit.
-pub(super) fn describe_cause(hypothesis: Hypothesis, fitted: &Fitted, problem: &Problem) -> Vec<CauseParameter> {
+pub(super) fn describe_cause(
+    hypothesis: Hypothesis,
+    fitted: &LoadCurveFit,
+    problem: &LoadCurveProblem,
+) -> Vec<CauseParameter> {
     let u = uncertainty(fitted, problem);
     let l = &fitted.layout;
     let linear = |name: String, i: usize| {
@@ -96,7 +102,7 @@ pub(super) fn describe_cause(hypothesis: Hypothesis, fitted: &Fitted, problem: &
 }
 
 /// The material of a fit with its intervals.
-pub(super) fn material_of_fit(fitted: &Fitted, problem: &Problem) -> CurveMaterial {
+pub(super) fn material_of_fit(fitted: &LoadCurveFit, problem: &LoadCurveProblem) -> CurveMaterial {
     let u = uncertainty(fitted, problem);
     let terms = fitted.layout.terms(&fitted.x);
     let mut parameters = Vec::new();
@@ -119,7 +125,7 @@ pub(super) fn material_of_fit(fitted: &Fitted, problem: &Problem) -> CurveMateri
             interval_95: u.is_determined[a].then_some([term.alpha - u.half[a], term.alpha + u.half[a]]),
         });
     }
-    let value = 0.5 * terms.iter().map(|t| t.modulus_kpa).sum::<f64>();
+    let value = initial_shear_modulus_kpa(&terms);
     let mut variance = 0.0;
     for (i, a) in terms.iter().enumerate() {
         for (j, b) in terms.iter().enumerate() {

@@ -6,7 +6,7 @@ use super::html_parts::{CalloutKind, Column, Table};
 use super::lines::{Line, LinePlot};
 use super::number::significant;
 use crate::diagnosis::{Agreement, BeforeAfter, DiagnosisResult, TogetherResult};
-use crate::homogeneous::{HomogeneousTest, ShearTerm, incompressible_stress};
+use crate::homogeneous::{HomogeneousTest, incompressible_stress};
 use crate::material::Ogden;
 use crate::specimen::{Specimen, TestKind};
 
@@ -132,8 +132,7 @@ fn materials(t: &TogetherResult, all: &[&DiagnosisResult], specimen: &Specimen) 
         TestKind::Uniaxial => (HomogeneousTest::Uniaxial, drive / specimen.block.length_mm, "stretch (1)"),
     };
     let curve = |material: &Ogden| -> Vec<[f64; 2]> {
-        let terms: Vec<ShearTerm> =
-            material.terms.iter().map(|t| ShearTerm { modulus_kpa: t.mu_kpa * t.alpha, alpha: t.alpha }).collect();
+        let terms = material.shear_terms();
         (0..NUM_POINTS)
             .map(|i| {
                 let at = test.rest() + strain * i as f64 / (NUM_POINTS - 1) as f64;

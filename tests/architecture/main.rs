@@ -15,24 +15,10 @@ use std::collections::{BTreeMap, BTreeSet};
 const ARGUED_CIRCLES: [(&[&str], &str); 0] = [];
 
 /// Rooms with circles that are being removed. To be emptied.
-const CIRCLES_TO_REMOVE: [&str; 7] = ["calibration", "design", "diagnosis", "fem", "homogeneous", "rate", "service"];
+const CIRCLES_TO_REMOVE: [&str; 0] = [];
 
 /// Folders and files whose comments are being wrapped. To be emptied.
-const COMMENTS_TO_WRAP: [&str; 13] = [
-    "src/calibration/",
-    "src/cli/",
-    "src/design/",
-    "src/diagnosis/",
-    "src/fem/",
-    "src/homogeneous/",
-    "src/material/",
-    "src/proof/",
-    "src/rate/",
-    "src/recording/read.rs",
-    "src/sensitivity/",
-    "src/service/",
-    "src/specimen/",
-];
+const COMMENTS_TO_WRAP: [&str; 0] = [];
 
 /// Lines of the longest function.
 const MAX_FUNCTION_LINES: usize = 200;
@@ -44,11 +30,7 @@ const LONG_FUNCTIONS: [&str; 0] = [];
 const MAX_ARGUMENTS: usize = 7;
 
 /// Functions with more arguments, as `file: function`.
-const MANY_ARGUMENTS: [&str; 3] = [
-    "src/design/tell_apart.rs: nearest",
-    "src/service/app.rs: finish",
-    "src/service/runner.rs: keep",
-];
+const MANY_ARGUMENTS: [&str; 0] = [];
 
 /// Columns at which comment lines end.
 const MAX_COMMENT_COLUMNS: usize = 120;

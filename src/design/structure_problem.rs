@@ -4,14 +4,14 @@ use super::aim::Combine;
 use super::explore::geometry_margins;
 use super::local::{LocalModel, LocalProblem};
 use super::objective::{Judged, Reference};
-use super::search::Search;
+use super::search_run::SearchRun;
 use super::space::Subspace;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A structure's local problem.
-pub(super) struct Problem<'a> {
-    pub search: &'a Search<'a>,
+pub(super) struct StructureProblem<'a> {
+    pub search: &'a SearchRun<'a>,
     pub reference: &'a Reference<'a>,
     pub subspace: &'a Subspace,
     /// Points seen and what they were judged.
@@ -25,28 +25,27 @@ pub(super) struct Problem<'a> {
 /// Points of a refinement and what they were judged.
 pub(super) type Log = Vec<(Vec<f64>, Option<Judged>)>;
 
-/// ln of the factor by which a refinement stays away from force, stretch and guard limits: the search's mesh is coarser than
-/// the confirmation's, and a limit that is just met on the one can be broken on the other.
+/// ln of the factor by which a refinement stays away from force, stretch and guard limits: the search's mesh is coarser
+/// than the confirmation's, and a limit that is just met on the one can be broken on the other.
 pub(super) const RESERVE: f64 = 2e-3;
 
-impl<'a> Problem<'a> {
-    /// A problem that nothing was tried of yet.
+impl<'a> StructureProblem<'a> {
+    /// A problem of which nothing has been evaluated yet.
     pub fn new(
-        search: &'a Search<'a>,
+        search: &'a SearchRun<'a>,
         reference: &'a Reference<'a>,
         subspace: &'a Subspace,
         on_evaluation: &'a (dyn Fn(Option<f64>) + Sync),
-    ) -> Problem<'a> {
+    ) -> StructureProblem<'a> {
         let (log, was_stopped) = (Mutex::default(), AtomicBool::new(false));
-        Problem { search, reference, subspace, log, was_stopped, on_evaluation }
+        StructureProblem { search, reference, subspace, log, was_stopped, on_evaluation }
     }
 }
 
-impl LocalProblem for Problem<'_> {
+impl LocalProblem for StructureProblem<'_> {
     fn model(&self, x: &[f64]) -> Option<LocalModel> {
         let specimen = self.subspace.specimen(x);
-        let tried = self.search.tried(&specimen, Some(self.subspace));
-        let judged = match tried {
+        let judged = match self.search.evaluated(&specimen, Some(self.subspace)) {
             None => {
                 self.was_stopped.store(true, Ordering::Relaxed);
                 None

@@ -43,7 +43,7 @@ fn every_gradient_passes_the_taylor_test() {
         let mut model = ForwardModel::new(mesh, &moved).expect("a model");
         let solved = evaluator.solve(&mut model, drive, moves, &|| false).expect("equilibria");
         let responses =
-            evaluator.responses(&model, &model.mesh().nodes, &solved.states, &solved.fitted).expect("responses");
+            evaluator.responses(&model, &model.mesh().nodes, &solved.states, &solved.imitators).expect("responses");
         (model, solved, responses.iter().map(Response::to_vector).collect::<Vec<_>>())
     };
     for &variable in &space.variables {
@@ -80,7 +80,8 @@ fn every_gradient_passes_the_taylor_test() {
                 let coarse = (sides[0][i] - sides[1][i]) / (2.0 * h);
                 let fine = (sides[2][i] - sides[3][i]) / h;
                 let limit = (4.0 * fine - coarse) / 3.0;
-                // What extrapolation leaves is O(h⁴); all responses are logarithms, whose slopes are of order 0.01 to 1 per mm.
+                // What extrapolation leaves is O(h⁴); all responses are logarithms, whose slopes are of order 0.01 to 1
+                // per mm.
                 assert!(
                     (limit - gradient[i]).abs() < 2e-4 + 2e-3 * gradient[i].abs(),
                     "{variable:?}, response {i}: difference {limit}, gradient {}",
@@ -114,7 +115,8 @@ fn materials_are_apart_by_what_no_fit_takes_up() {
     near.material.terms[0].alpha *= 0.99;
     study.materials[1] = near;
     let fitted = separation(&study);
-    // One term is fitted to another one; the gain at which the fit stops is 10⁻⁴. The published second term is not taken up.
+    // One term is fitted to another one; the gain at which the fit stops is 10⁻⁴. The published second term is not
+    // taken up.
     assert!(fitted < 0.02, "{fitted}");
     assert!(apart > 5.0 * fitted, "{apart} {fitted}");
     study.objective.kind = ObjectiveKind::DOptimal;

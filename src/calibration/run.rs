@@ -1,0 +1,214 @@
+//! The stages of a calibration: fits from several starts, the choice of the number of terms, and remarks.
+
+use super::calibrate_options::{CalibrateOptions, TermCount};
+use super::error::CalibrationError;
+use super::observed::Observed;
+use super::options::FitOptions;
+use super::outcome::MeshComparison;
+use super::prediction::SolverWork;
+use super::problem::{CalibrationProblem, RecordingFit};
+use super::starts::{first_starts, further_starts};
+use super::target::{Objective, PAPER_BETA};
+use super::terms::{TermRow, compare, degeneracies, is_kept};
+use crate::material::{MAX_TERMS, Ogden, least_relative_stiffness};
+
+/// The same material with its exponents falling.
+pub(super) fn with_falling_exponents(material: &Ogden) -> Ogden {
+    let mut sorted = material.clone();
+    sorted.terms.sort_by(|a, b| b.alpha.total_cmp(&a.alpha));
+    sorted
+}
+
+/// What the stages of a calibration share.
+pub(super) struct Run<'a> {
+    options: &'a CalibrateOptions,
+    /// Those of `options` with what is held because no force was recorded.
+    pub(super) fit_options: FitOptions,
+    on_stage: &'a dyn Fn(&str),
+    is_cancelled: &'a dyn Fn() -> bool,
+    /// What all fits have taken so far.
+    pub(super) work: SolverWork,
+    /// Remarks for the reader.
+    pub(super) notes: Vec<String>,
+}
+
+impl<'a> Run<'a> {
+    /// With nothing fitted yet.
+    pub(super) fn new(
+        options: &'a CalibrateOptions,
+        has_force: bool,
+        on_stage: &'a dyn Fn(&str),
+        is_cancelled: &'a dyn Fn() -> bool,
+    ) -> Run<'a> {
+        // Without a force all moduli share a factor: μ₁ stays where it is.
+        let held = if has_force { options.fit.held } else { options.fit.held.with(1) };
+        let fit_options = FitOptions { held, ..options.fit };
+        Run { options, fit_options, on_stage, is_cancelled, work: SolverWork::default(), notes: Vec::new() }
+    }
+
+    /// The best fit of each number of terms, up to the first that the deciding rule does not keep.
+    pub(super) fn select(
+        &mut self,
+        problem: &mut CalibrationProblem,
+    ) -> Result<(Vec<TermRow>, Vec<RecordingFit>), CalibrationError> {
+        let (mut rows, mut fits): (Vec<TermRow>, Vec<RecordingFit>) = (Vec::new(), Vec::new());
+        let (most, is_auto) = match self.options.terms {
+            TermCount::Auto { max } => (max, true),
+            TermCount::Fixed(n) => (n, false),
+        };
+        while rows.len() < most.clamp(1, MAX_TERMS - 1) {
+            (self.on_stage)(&format!("{} term{}", rows.len() + 1, if rows.is_empty() { "" } else { "s" }));
+            let starts = match fits.last() {
+                None => first_starts(problem.observed()),
+                Some(last) => {
+                    further_starts(problem, last, &self.fit_options, self.options.num_starts, self.is_cancelled)?
+                        .into_iter()
+                        .filter(|(promise, _)| *promise >= self.options.least_promise)
+                        .map(|(_, start)| start)
+                        .collect()
+                }
+            };
+            let Some((row, fit)) = self.best_of(problem, &starts)? else { break };
+            rows.push(row);
+            fits.push(fit);
+            compare(&mut rows, fits[0].num_data);
+            let is_last_kept = is_kept(&rows[rows.len() - 1], self.options.rule, self.options.decrement_threshold);
+            if is_auto && rows.len() > 1 && !is_last_kept {
+                break;
+            }
+        }
+        Ok((rows, fits))
+    }
+
+    /// One fit, counted and told.
+    pub(super) fn fit(
+        &mut self,
+        problem: &mut CalibrationProblem,
+        start: &Ogden,
+        near: Option<&RecordingFit>,
+    ) -> Result<RecordingFit, CalibrationError> {
+        let fit = problem.fit(start, near, &self.fit_options, self.is_cancelled)?;
+        self.work.add(fit.work);
+        (self.on_stage)(&format!(
+            "  {} terms from α {:?}: χ² {:.1} in {} iterations",
+            start.terms.len(),
+            start.terms.iter().map(|t| (100.0 * t.alpha).round() / 100.0).collect::<Vec<_>>(),
+            fit.chi2,
+            fit.iterations
+        ));
+        Ok(fit)
+    }
+
+    /// The best of the fits from `starts`; none where none has an equilibrium or is stable.
+    pub(super) fn best_of(
+        &mut self,
+        problem: &mut CalibrationProblem,
+        starts: &[Ogden],
+    ) -> Result<Option<(TermRow, RecordingFit)>, CalibrationError> {
+        let mut found: Vec<RecordingFit> = Vec::new();
+        let mut failure = None;
+        for start in starts.iter().take(self.options.num_starts.max(1)) {
+            match self.fit(problem, start, None) {
+                Ok(fit) => {
+                    let visited = problem.visited_stretches(&fit)?;
+                    if least_relative_stiffness(&fit.material, &visited) > 0.0 {
+                        found.push(fit);
+                    }
+                }
+                Err(e) if e.is_of_the_data() => {
+                    (self.on_stage)(&format!("  {} terms: {e}", start.terms.len()));
+                    failure = Some(e);
+                }
+                Err(e) => return Err(e),
+            }
+        }
+        let last = |f: &RecordingFit| f.history.last().copied().unwrap_or(f64::INFINITY);
+        found.sort_by(|a, b| last(a).total_cmp(&last(b)));
+        // An optimum beats a point on the way that is no better than the noise of a step.
+        let best = found.iter().position(|f| f.is_converged && last(f) < last(&found[0]) + 1.0).unwrap_or(0);
+        if found.is_empty() {
+            return match failure {
+                Some(e) if starts.first().is_some_and(|s| s.terms.len() == 1) => Err(e),
+                _ => Ok(None),
+            };
+        }
+        let fit = found[best].clone();
+        let num_agreeing = found.iter().filter(|f| last(f) < last(&fit) + 1.0).count();
+        Ok(Some((self.row(problem, &fit, starts.len(), num_agreeing)?, fit)))
+    }
+
+    /// The line of the term selection for a fit.
+    pub(super) fn row(
+        &self,
+        problem: &CalibrationProblem,
+        fit: &RecordingFit,
+        num_starts: usize,
+        num_agreeing: usize,
+    ) -> Result<TermRow, CalibrationError> {
+        let beta = match self.options.objective {
+            Objective::Paper { beta } => beta,
+            Objective::Weighted => PAPER_BETA,
+        };
+        let visited = problem.visited_stretches(fit)?;
+        Ok(TermRow {
+            num_terms: fit.material.terms.len(),
+            chi2: fit.chi2,
+            chi2_per_datum: fit.chi2_per_datum,
+            paper_loss: fit.loss_u + beta * fit.loss_f.unwrap_or(0.0),
+            initial_shear_modulus_kpa: fit.initial_shear_modulus().0,
+            values: fit.material.parameters().iter().map(|p| fit.material.value(*p)).collect(),
+            chi2_decrease: None,
+            f_value: None,
+            f_p_value: None,
+            bic_change: None,
+            decrement: None,
+            num_starts,
+            num_agreeing,
+            is_converged: fit.is_converged,
+            distance_sd: fit.distance,
+            least_relative_stiffness: least_relative_stiffness(&fit.material, &visited),
+            degeneracies: degeneracies(fit, &visited),
+        })
+    }
+
+    /// Notes what the reader should know of the estimate.
+    pub(super) fn remark(
+        &mut self,
+        observed: &[Observed],
+        fit: &RecordingFit,
+        has_force: bool,
+        meshes: Option<&MeshComparison>,
+    ) {
+        if !has_force {
+            self.notes.push(
+                "no force was recorded: displacements determine exponents and ratios of moduli only; μ₁ was assumed"
+                    .into(),
+            );
+        }
+        if let Some(MeshComparison { allowance, .. }) = meshes {
+            self.notes.push(format!(
+                "discretisation: our mesh's displacements are {:.4} mm (rms, largest drive) from the limit of fine meshes; the \
+                 intervals allow for errors of {} times that, to one standard deviation",
+                allowance.own_error_mm, allowance.factor
+            ));
+        }
+        if fit.misfit_factor > 1.0 && fit.structured_misfit > 0.0 {
+            self.notes.push(format!(
+                "the misfit is {:.3} times that of the noise: model or data leave something out. The intervals hold what an \
+                 error of the size of that misfit could shift each parameter by at most",
+                fit.misfit_factor
+            ));
+        } else if fit.misfit_factor > 1.0 {
+            self.notes.push(format!(
+                "the misfit is {:.3} times that of the noise: no more than discretisation errors explain",
+                fit.misfit_factor
+            ));
+        }
+        for recording in observed.iter().filter(|o| o.is_noise_estimated) {
+            self.notes.push(format!("the noise was estimated from the recording: {:.4?} mm", recording.noise_sd_mm));
+        }
+        for limit in &fit.reached_limits {
+            self.notes.push(format!("the estimate stands at a limit: {limit}"));
+        }
+    }
+}

@@ -1,0 +1,309 @@
+//! What one design does, at search fidelity, and its exact derivatives: the FE-backed evaluation of the search.
+//!
+//! Voxel sums are replaced by integrals over quadrature points (see [`crate::sensitivity`]), which vary smoothly with
+//! the design, so that gradients are meaningful. The derivative of every number along a design variable follows from
+//! one back-solve for the state, one for each material sensitivity, and a central difference of the integrals along the
+//! known direction (X + tV, u + tu′, s + ts′): no solution is differenced.
+
+use super::aim::ObjectiveKind;
+use super::evaluation_failure::EvaluationFailure;
+use super::material_samples::{MaterialSample, sample_materials};
+use super::response::{Response, criteria_as_relative_sd, log_or_undetermined, normalised, tearing_stretch};
+use super::space::{Subspace, Variable};
+use super::study::{MaterialPrior, Study};
+use super::tell_apart::{Imitation, log_separation, separation, state_of};
+use crate::fem::{Equilibrium, ForwardModel, ParameterSensitivity, PathSensitivity, SolveOptions, Tangent};
+use crate::kinematics::principal_stretches;
+use crate::material::Ogden;
+use crate::mesh::{MeshOptions, shape_velocity};
+use crate::sensitivity::{FisherInformation, MaterialState, information_over_quadrature, integrate_over_quadrature};
+use crate::specimen::Specimen;
+use serde::{Deserialize, Serialize};
+
+/// A design's responses to each material of [`sample_materials`], and, where asked for, their derivatives.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Evaluated {
+    /// One per material sample.
+    pub responses: Vec<Response>,
+    /// `[material sample][variable][entry of Response::to_vector]`; empty unless asked for.
+    pub gradients: Vec<Vec<Vec<f64>>>,
+}
+
+/// Evaluates designs of a study at search fidelity.
+pub struct Evaluator<'a> {
+    study: &'a Study,
+    samples: Vec<MaterialSample>,
+    /// Factor on the search mesh's element size.
+    coarseness: f64,
+    solve: SolveOptions,
+}
+
+/// How a variable moves the nodes (none: not at all) and the drive.
+type Move = (Option<Vec<[f64; 3]>>, f64);
+
+/// An earlier material fitted to a sample's scan.
+#[derive(Clone)]
+struct ImitatingMaterial {
+    /// The sample whose scan it is.
+    of: usize,
+    material: Ogden,
+    state: MaterialState,
+}
+
+/// All that a design does at one drive.
+struct Solved {
+    /// Per sample.
+    states: Vec<MaterialState>,
+    /// Earlier materials fitted to them, where the study asks for it.
+    imitators: Vec<ImitatingMaterial>,
+    /// Per state, then per fitted material: derivatives along each move.
+    paths: Vec<Vec<PathSensitivity>>,
+}
+
+impl<'a> Evaluator<'a> {
+    /// For `study`: at the priors' central values, and at their variants if its budget says so.
+    pub fn new(study: &'a Study) -> Evaluator<'a> {
+        if study.budget.variants_in_search {
+            return Self::with_variants(study);
+        }
+        let central: Vec<MaterialPrior> =
+            study.materials.iter().map(|prior| MaterialPrior { relative_sd: 0.0, ..prior.clone() }).collect();
+        Evaluator { study, samples: sample_materials(&central), coarseness: 1.0, solve: SolveOptions::default() }
+    }
+
+    /// For `study`, always at the variants too.
+    pub fn with_variants(study: &'a Study) -> Evaluator<'a> {
+        Evaluator {
+            study,
+            samples: sample_materials(&study.materials),
+            coarseness: 1.0,
+            solve: SolveOptions::default(),
+        }
+    }
+
+    /// The same with elements larger by `factor`: for tests.
+    pub fn with_coarseness(mut self, factor: f64) -> Self {
+        self.coarseness = factor;
+        self
+    }
+
+    /// The materials in the order of [`Evaluated::responses`].
+    pub fn samples(&self) -> &[MaterialSample] {
+        &self.samples
+    }
+
+    /// Mesh of a specimen at search fidelity.
+    pub fn mesh_options(&self, specimen: &Specimen) -> MeshOptions {
+        let options = MeshOptions::search(specimen);
+        MeshOptions { section_size_mm: options.section_size_mm * self.coarseness, ..options }
+    }
+
+    /// Responses at the specimen's last drive; with gradients where `subspace` is given.
+    ///
+    /// # Errors
+    /// [`EvaluationFailure`].
+    pub fn evaluate(
+        &self,
+        specimen: &Specimen,
+        subspace: Option<&Subspace>,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Evaluated, EvaluationFailure> {
+        let no_drive = || EvaluationFailure::Geometry { reason: "the specimen has no drive".into() };
+        let drive = *specimen.drive_mm.last().ok_or_else(no_drive)?;
+        specimen.validate().map_err(|e| EvaluationFailure::Geometry { reason: e.to_string() })?;
+        let mut model = ForwardModel::of_specimen(specimen, &self.mesh_options(specimen))?;
+        let moves: Vec<Move> =
+            subspace.map(|s| s.variables.iter().map(|&v| a_move(&model, specimen, s, v)).collect()).unwrap_or_default();
+        let solved = self.solve(&mut model, drive, &moves, is_cancelled)?;
+        let responses = self.responses(&model, &model.mesh().nodes, &solved.states, &solved.imitators)?;
+        let mut gradients = Vec::new();
+        if subspace.is_some() {
+            gradients = vec![Vec::with_capacity(moves.len()); solved.states.len()];
+            for (n, moved) in moves.iter().enumerate() {
+                let rows = self.gradient(&model, &solved, n, moved)?;
+                gradients.iter_mut().zip(rows).for_each(|(all, row)| all.push(row));
+            }
+        }
+        Ok(Evaluated { responses, gradients })
+    }
+
+    /// Every sample's state at `drive`, its derivatives along each of `moves`, and what earlier materials make of it.
+    fn solve(
+        &self,
+        model: &mut ForwardModel,
+        drive: f64,
+        moves: &[Move],
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Solved, EvaluationFailure> {
+        let mut solved = Solved { states: Vec::new(), imitators: Vec::new(), paths: Vec::new() };
+        let mut equilibria: Vec<Equilibrium> = Vec::new();
+        let along_moves = |tangent: &mut Tangent, state: &MaterialState| {
+            let along = |m: &Move| tangent.path_sensitivity(&state.sensitivities, m.0.as_deref(), m.1);
+            moves.iter().map(along).collect::<Result<Vec<_>, _>>()
+        };
+        for sample in &self.samples {
+            let material = &sample.material;
+            let found = match equilibria.last() {
+                // A neighbouring material's state is closer than rest; where it is not, start over.
+                Some(previous) => model
+                    .solve(material, drive, Some(previous), &self.solve, is_cancelled)
+                    .or_else(|_| model.solve(material, drive, None, &self.solve, is_cancelled))?,
+                None => model.solve(material, drive, None, &self.solve, is_cancelled)?,
+            };
+            let mut tangent = model.tangent(material, &found)?;
+            let state = state_of(&found, &mut tangent)?;
+            solved.paths.push(along_moves(&mut tangent, &state)?);
+            solved.states.push(state);
+            equilibria.push(found);
+        }
+        if self.study.objective.kind == ObjectiveKind::TellApart {
+            for of in 0..self.samples.len() {
+                let earlier = (0..of).filter(|&o| self.is_central(o) && self.samples[o].prior < self.samples[of].prior);
+                for other in earlier.collect::<Vec<_>>() {
+                    let (start, material) = (&equilibria[other], &self.samples[other].material);
+                    let theirs = &solved.states[of];
+                    let imitation = Imitation {
+                        study: self.study,
+                        model: &mut *model,
+                        theirs,
+                        drive_mm: drive,
+                        solve: &self.solve,
+                        is_cancelled,
+                    };
+                    let fit = imitation.nearest(material, start)?;
+                    let mut tangent = model.tangent(&fit.material, &fit.equilibrium)?;
+                    solved.paths.push(along_moves(&mut tangent, &fit.state)?);
+                    solved.imitators.push(ImitatingMaterial { of, material: fit.material, state: fit.state });
+                }
+            }
+        }
+        Ok(solved)
+    }
+
+    /// Derivative of every sample's response entries along the move with this index, per mm. Fitted materials keep
+    /// their values: at the nearest point the distance does not change with them.
+    fn gradient(
+        &self,
+        model: &ForwardModel,
+        solved: &Solved,
+        index: usize,
+        (velocity, _): &Move,
+    ) -> Result<Vec<Vec<f64>>, EvaluationFailure> {
+        // A central difference along a known direction: 10⁻⁴ mm balances its truncation and rounding.
+        let t = 1e-4;
+        let mut sides = Vec::with_capacity(2);
+        for sign in [1.0, -1.0] {
+            let step = sign * t;
+            let shift = |x: &[[f64; 3]], v: &[[f64; 3]]| -> Vec<[f64; 3]> {
+                x.iter().zip(v).map(|(a, b)| [0, 1, 2].map(|i| a[i] + step * b[i])).collect()
+            };
+            let positions = match velocity {
+                Some(v) => shift(&model.mesh().nodes, v),
+                None => model.mesh().nodes.clone(),
+            };
+            let follow = |state: &MaterialState, path: &PathSensitivity| MaterialState {
+                displacement: shift(&state.displacement, &path.displacement),
+                force_n: state.force_n + step * path.force_n,
+                sensitivities: state
+                    .sensitivities
+                    .iter()
+                    .zip(&path.parameters)
+                    .map(|(s, d)| ParameterSensitivity {
+                        parameter: s.parameter,
+                        displacement: shift(&s.displacement, &d.displacement),
+                        force_n: s.force_n + step * d.force_n,
+                    })
+                    .collect(),
+            };
+            let (of_states, of_imitators) = solved.paths.split_at(solved.states.len());
+            let moved: Vec<MaterialState> =
+                solved.states.iter().zip(of_states).map(|(state, paths)| follow(state, &paths[index])).collect();
+            let imitators: Vec<ImitatingMaterial> = solved
+                .imitators
+                .iter()
+                .zip(of_imitators)
+                .map(|(i, paths)| ImitatingMaterial { state: follow(&i.state, &paths[index]), ..i.clone() })
+                .collect();
+            sides.push(self.responses(model, &positions, &moved, &imitators)?);
+        }
+        let slope = |(a, b): (&Response, &Response)| -> Vec<f64> {
+            a.to_vector().iter().zip(b.to_vector()).map(|(a, b)| (a - b) / (2.0 * t)).collect()
+        };
+        Ok(sides[0].iter().zip(&sides[1]).map(slope).collect())
+    }
+
+    /// Responses of all samples from their states, the mesh's nodes at `positions`.
+    fn responses(
+        &self,
+        model: &ForwardModel,
+        positions: &[[f64; 3]],
+        states: &[MaterialState],
+        imitators: &[ImitatingMaterial],
+    ) -> Result<Vec<Response>, EvaluationFailure> {
+        let mut all = Vec::with_capacity(states.len());
+        for (index, (sample, state)) in self.samples.iter().zip(states).enumerate() {
+            let mut response = self.response(model, &sample.material, positions, state)?;
+            let mut distances = Vec::new();
+            for i in imitators.iter().filter(|i| i.of == index) {
+                distances.push(separation(self.study, model, positions, &i.material, &i.state, state)?.distance_sd);
+            }
+            response.log_separation = log_separation(distances);
+            all.push(response);
+        }
+        Ok(all)
+    }
+
+    /// Whether a sample is its prior's central value, which comes first.
+    fn is_central(&self, index: usize) -> bool {
+        index == 0 || self.samples[index - 1].prior != self.samples[index].prior
+    }
+
+    fn response(
+        &self,
+        model: &ForwardModel,
+        material: &Ogden,
+        positions: &[[f64; 3]],
+        state: &MaterialState,
+    ) -> Result<Response, EvaluationFailure> {
+        let scan = &self.study.scan;
+        let voxel_volume = scan.voxel_mm.iter().product();
+        let fields = model.quadrature_fields_at(material, positions, &state.displacement);
+        let integrated = integrate_over_quadrature(material, &fields, model.mesh().mirror, voxel_volume);
+        let (mesh, noise) = (model.mesh(), scan.noise());
+        let information: FisherInformation =
+            information_over_quadrature(material, mesh, &fields, &state.sensitivities, &noise, voxel_volume)?;
+        let covariance = information.covariance();
+        let shear = information.shear_indices();
+        let normalisation = self.study.objective.normalisation;
+        Ok(Response {
+            log_integrated: integrated.iter().map(|s| normalised(s, normalisation).max(1e-300).ln()).collect(),
+            log_relative_sd: shear.iter().map(|&i| log_or_undetermined(covariance.relative_sd(i))).collect(),
+            log_criteria: criteria_as_relative_sd(&covariance, &shear).map(log_or_undetermined),
+            log_separation: 0.0,
+            log_force: state.force_n.abs().max(1e-12).ln(),
+            log_stretch: tearing_stretch(
+                fields.iter().map(|q| (principal_stretches(&q.deformation_gradient)[0], q.volume_mm3)),
+            )
+            .ln(),
+        })
+    }
+}
+
+/// How `variable` moves the nodes and the drive.
+fn a_move(model: &ForwardModel, specimen: &Specimen, subspace: &Subspace, variable: Variable) -> Move {
+    let mut velocity: Option<Vec<[f64; 3]>> = None;
+    for (design_variable, sign) in subspace.moves(variable) {
+        let one = shape_velocity(model.mesh(), specimen, design_variable);
+        let sum = velocity.get_or_insert_with(|| vec![[0.0; 3]; one.len()]);
+        for (s, v) in sum.iter_mut().zip(&one) {
+            for i in 0..3 {
+                s[i] += sign * v[i];
+            }
+        }
+    }
+    (velocity, if variable == Variable::Drive { 1.0 } else { 0.0 })
+}
+
+#[cfg(test)]
+#[path = "evaluator_tests.rs"]
+mod tests;

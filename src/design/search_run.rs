@@ -1,0 +1,50 @@
+//! What all stages of a search share: the study, its evaluations kept in the checkpoint, and where progress is told.
+
+use super::checkpoint::Checkpoint;
+use super::evaluation_failure::EvaluationFailure;
+use super::evaluator::{Evaluated, Evaluator};
+use super::space::Subspace;
+use super::study::Study;
+use crate::provenance::input_hash;
+use crate::specimen::Specimen;
+
+/// How far a search is.
+#[derive(Clone, Debug)]
+pub struct Progress {
+    /// `base`, `explore`, `refine`, `confirm`, `repair`, `verify`.
+    pub stage: &'static str,
+    /// Finished in this stage.
+    pub done: usize,
+    /// Of.
+    pub total: usize,
+    /// Largest objective so far (gain over the base), of designs within the limits.
+    pub best: Option<f64>,
+}
+
+/// Receives progress; called from several threads.
+pub type ProgressSink<'a> = &'a (dyn Fn(&Progress) + Sync);
+
+/// An evaluation, or why there is none.
+pub(super) type Attempt = Result<Evaluated, EvaluationFailure>;
+
+/// A search at work.
+pub(super) struct SearchRun<'a> {
+    pub study: &'a Study,
+    pub evaluator: Evaluator<'a>,
+    pub checkpoint: &'a Checkpoint,
+    pub is_cancelled: &'a (dyn Fn() -> bool + Sync),
+    pub progress: ProgressSink<'a>,
+}
+
+impl SearchRun<'_> {
+    /// The evaluation of a design at search fidelity, with gradients where `subspace` is given: from the checkpoint
+    /// where it is known. `None` where it was cancelled.
+    pub fn evaluated(&self, specimen: &Specimen, subspace: Option<&Subspace>) -> Option<Attempt> {
+        let kind = if subspace.is_some() { "gradient" } else { "value" };
+        let key = input_hash(&serde_json::json!({ "specimen": specimen, "kind": kind }));
+        self.checkpoint.get_or(&key, || match self.evaluator.evaluate(specimen, subspace, &|| (self.is_cancelled)()) {
+            Err(EvaluationFailure::Cancelled) => None,
+            other => Some(other),
+        })
+    }
+}
