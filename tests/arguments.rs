@@ -106,7 +106,10 @@ fn results_of_commands_do_not_replace_each_other() {
             .args(&arguments[1..])
             .output()
             .unwrap();
-        (output.status.code(), String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr))
+        (
+            output.status.code(),
+            String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr),
+        )
     };
     for command in ["solve", "evaluate"] {
         let (code, text) = run(&[command]);

@@ -50,7 +50,8 @@ fn upload(service: &Service, folder: &Path) -> String {
 
 /// A curve of a neo-Hookean strip with a little waviness, as CSV.
 fn curve(time: bool) -> String {
-    let mut text = String::from(if time { "time_s,stretch,nominal_stress_kpa\n" } else { "stretch,nominal_stress_kpa\n" });
+    let mut text =
+        String::from(if time { "time_s,stretch,nominal_stress_kpa\n" } else { "stretch,nominal_stress_kpa\n" });
     for n in 0..30 {
         let stretch = 1.0 + 0.03 * f64::from(n);
         let stress = 10.0 * (stretch - stretch.powi(-2)) + 0.01 * f64::from(n % 3);
@@ -103,8 +104,14 @@ fn requests(evaluation: &Value, scans: [(&Path, &str); 2]) -> Vec<Asked> {
         both("import", json!({}), "recording", path(raw_folder).into(), raw_id.into()),
         both("calibrate", calibration, "recordings", json!([path(folder)]), json!([id])),
         both("diagnose", diagnosis, "recording", path(folder).into(), id.into()),
-        Asked::alike("diagnose-curves", json!({ "curves": [{ "test": "uniaxial", "name": "pull", "csv": curve(true) }] })),
-        Asked::alike("curves", json!({ "curves": [{ "test": "uniaxial", "csv": curve(false) }], "fit": { "max_terms": 1 } })),
+        Asked::alike(
+            "diagnose-curves",
+            json!({ "curves": [{ "test": "uniaxial", "name": "pull", "csv": curve(true) }] }),
+        ),
+        Asked::alike(
+            "curves",
+            json!({ "curves": [{ "test": "uniaxial", "csv": curve(false) }], "fit": { "max_terms": 1 } }),
+        ),
         Asked::alike("uniaxial", json!({ "csv": curve(false), "fit": { "max_terms": 1 } })),
         Asked::alike("design", small_study()),
         Asked::alike("sweep", small_sweep_study()),
@@ -122,8 +129,7 @@ fn every_kind_of_job_gives_the_same_bytes_through_both_doors() {
     let folder = tempfile::tempdir().unwrap();
     let place = |name: &str| folder.path().join(name);
     let service = Service::start(&place("data"), &[]);
-    let evaluation: Value =
-        serde_json::from_slice(&run("evaluate", &small_evaluation(1.0), &place("base"))).unwrap();
+    let evaluation: Value = serde_json::from_slice(&run("evaluate", &small_evaluation(1.0), &place("base"))).unwrap();
     run("scan", &small_scan(false), &place("scan"));
     run("scan", &small_scan(true), &place("raw"));
     let (id, raw_id) = (upload(&service, &place("scan")), upload(&service, &place("raw")));
@@ -140,7 +146,13 @@ fn every_kind_of_job_gives_the_same_bytes_through_both_doors() {
         let view = service.wait(&job, LONG);
         assert_eq!(view["state"], "succeeded", "{}: {view}", a.command);
         let there = service.get(&format!("{job}/result")).body;
-        assert!(here == there, "{}: {} against {}", a.command, String::from_utf8_lossy(&here), String::from_utf8_lossy(&there));
+        assert!(
+            here == there,
+            "{}: {} against {}",
+            a.command,
+            String::from_utf8_lossy(&here),
+            String::from_utf8_lossy(&there)
+        );
         // The files have the same names, and but for pages that name the time nothing differs in them.
         let list = service.get(&format!("{job}/artefacts")).json();
         for artefact in list["artefacts"].as_array().unwrap() {

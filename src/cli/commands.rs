@@ -226,8 +226,10 @@ fn of_recordings_or_curves(command: Command) -> Command {
     let curve = Arg::new("curve").long("curve").value_name("TEST=FILE").help(help).conflicts_with("RECORDING");
     let help = "Curves that are predicted, not fitted: names of files without folder and ending, comma-separated";
     let kept = Arg::new("keep-back").long("keep-back").value_name("NAME").help(help).requires("curve");
-    let command =
-        command.arg(recordings).arg(curve.action(ArgAction::Append)).arg(kept.value_delimiter(',').action(ArgAction::Append));
+    let command = command
+        .arg(recordings)
+        .arg(curve.action(ArgAction::Append))
+        .arg(kept.value_delimiter(',').action(ArgAction::Append));
     // The options of load curves alone.
     LOAD_CURVES.iter().fold(command, |command, flag| {
         let fields = kind_of_command(LOAD_CURVES_KIND).map(|kind| kind.fields()).unwrap_or_default();
@@ -263,7 +265,8 @@ fn diagnosed(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliErro
         is_kept
     })?;
     if let Some(missing) = kept.iter().find(|k| !found.contains(k)) {
-        let message = format!("no curve is named '{missing}' (names are those of the files, without folder and ending)");
+        let message =
+            format!("no curve is named '{missing}' (names are those of the files, without folder and ending)");
         return Err(CliError::Option { option: "keep-back", message });
     }
     let fields = kind_of_command(LOAD_CURVES_KIND).map(|kind| kind.fields()).unwrap_or_default();

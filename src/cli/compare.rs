@@ -25,7 +25,9 @@ pub(super) fn clap() -> Command {
     let base = "Result file (evaluation/1, sweep/1, design/1), or folder of result files, that is compared with";
     let mut command = Command::new(COMMAND)
         .about(kind.about)
-        .after_help("Exit codes: 0 same or better, 1 worse, 2 not comparable or unreadable, 4 a report cannot be written.")
+        .after_help(
+            "Exit codes: 0 same or better, 1 worse, 2 not comparable or unreadable, 4 a report cannot be written.",
+        )
         .arg(Arg::new("BASE").help(base).required(true))
         .arg(Arg::new("CURRENT").help("The result file or folder that is judged").required(true))
         .arg(Arg::new("json").long("json").help("Print the comparison as JSON on stdout").action(ArgAction::SetTrue))

@@ -39,7 +39,8 @@ pub(super) fn run(a: &DesignArguments) -> Result<(), CliError> {
     super::start_threads(&a.common)?;
     let limit = time_limit(a.time_limit)?;
     let source = a.study.display().to_string();
-    let mut asked = Asked { kind: COMMAND, request: input::read_study(&a.study)?, sources: vec![(String::new(), source)] };
+    let mut asked =
+        Asked { kind: COMMAND, request: input::read_study(&a.study)?, sources: vec![(String::new(), source)] };
     if let Some(seed) = a.seed {
         asked.set("seed", seed, "--seed");
     }

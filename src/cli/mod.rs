@@ -43,7 +43,9 @@ fn program() -> Command {
         design::DesignArguments::augment_args(of_kind("design")),
         sweep::SweepArguments::augment_args(of_kind("sweep")),
         compare::clap(),
-        run::RunArguments::augment_args(Command::new("run").about("Any kind of job from a request as the service takes it")),
+        run::RunArguments::augment_args(
+            Command::new("run").about("Any kind of job from a request as the service takes it"),
+        ),
         serve::ServeArguments::augment_args(
             Command::new("serve").about("The service: REST, jobs, and a page for planners"),
         ),

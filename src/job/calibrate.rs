@@ -168,8 +168,7 @@ impl Run for CalibrationRequest {
         let mesh = |s: &Specimen, factor: f64| MeshOptions::scaled(s, factor);
         let found = calibrate(&observed, &mesh, &options, &on_stage, &|| context.is_cancelled())
             .map_err(|e| context.failed(&e))?;
-        let result =
-            CalibrationResult::new(&found, &observed, &names, options.objective, context.input_hash.clone());
+        let result = CalibrationResult::new(&found, &observed, &names, options.objective, context.input_hash.clone());
         let mut outcome = Outcome::new("calibration.json", &result, summary::calibration(&result))?;
         add_fields(&mut outcome, &found, &observed)?;
         let (pictures, report) = calibration_report(&found, &result, &observed);

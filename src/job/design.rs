@@ -58,8 +58,7 @@ impl Run for CheckedStudy {
 
     fn check_size(&self, _: &[Specimen], max_elements: usize) -> Result<(), FieldError> {
         let base = &self.0.base;
-        let fine = mesh_specimen(base, &MeshOptions::fine(base))
-            .map_err(|e| unmeshable("/base", &e))?;
+        let fine = mesh_specimen(base, &MeshOptions::fine(base)).map_err(|e| unmeshable("/base", &e))?;
         check_count(fine.num_elements(), "/base", max_elements)
     }
 

@@ -91,7 +91,8 @@ impl Request for DiagnosisRequest {
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let mut errors = Vec::new();
         if self.recording.is_some() == !self.recordings.is_empty() {
-            let error = FieldError::new("/recording", "neither alone nor left out", "given, or recordings in its place");
+            let error =
+                FieldError::new("/recording", "neither alone nor left out", "given, or recordings in its place");
             errors.push(error.remedy("give one of the two"));
         }
         for error in self.material.iter().flat_map(Ogden::field_errors) {
@@ -169,12 +170,7 @@ impl Run for DiagnosisRequest {
 }
 
 /// Report, pictures, and residual maps on the compared grid (measured minus predicted), by the nominal model and with the causes.
-fn add_files(
-    outcome: &mut Outcome,
-    prefix: &str,
-    found: &Diagnosis,
-    result: &DiagnosisResult,
-) -> Result<(), JobError> {
+fn add_files(outcome: &mut Outcome, prefix: &str, found: &Diagnosis, result: &DiagnosisResult) -> Result<(), JobError> {
     for (when, fitted) in [("before", &found.nominal), ("after", &found.corrected)] {
         let mask = &found.observed.mask;
         for (step, field) in fitted.residual.displacement.iter().enumerate() {

@@ -85,8 +85,9 @@ impl EvaluationRequest {
 
 /// Whether the scan's grid can be held in memory.
 fn check_grid(specimen: &Specimen, scan: &ScanSettings) -> Result<(), FieldError> {
-    let grid = VoxelGrid::covering(specimen, scan.voxel_mm)
-        .map_err(|e| FieldError::new("/scan/voxel_mm", format!("{:?}", scan.voxel_mm), "usable").remedy(e.to_string()))?;
+    let grid = VoxelGrid::covering(specimen, scan.voxel_mm).map_err(|e| {
+        FieldError::new("/scan/voxel_mm", format!("{:?}", scan.voxel_mm), "usable").remedy(e.to_string())
+    })?;
     if grid.num_voxels() <= MAX_VOXELS {
         return Ok(());
     }
@@ -139,13 +140,14 @@ impl Run for CheckedEvaluation {
         let mut model = model_of(specimen, &options.mesh, context)?;
         let cancelled = || context.is_cancelled();
         let (evaluation, maps) =
-            evaluate_model(&mut model, specimen, material, scan, &self.drives, &options, &cancelled)
-                .map_err(|e| match e {
+            evaluate_model(&mut model, specimen, material, scan, &self.drives, &options, &cancelled).map_err(|e| {
+                match e {
                     EvaluationError::Solve(_) | EvaluationError::MedianStretchNotReached { .. } => context.failed(&e),
                     other => FieldError::new("", "an evaluation that cannot be made", "one that can")
                         .remedy(other.to_string())
                         .into(),
-                })?;
+                }
+            })?;
         let text = summary::evaluation(&specimen.name, &evaluation);
         let mut outcome = Outcome::new("evaluation.json", &evaluation, text)?;
         if !self.request.has_files {

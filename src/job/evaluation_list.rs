@@ -126,9 +126,8 @@ fn sampled(fields: &[VariedField], sample: RangeSample) -> Result<Vec<Point>, Fi
         }
     }
     let drawn = latin_hypercube_points(&ranges, sample.count, sample.seed);
-    let named = |point: Vec<f64>| {
-        point.into_iter().enumerate().map(|(a, v)| (v.into(), format!("/vary/{a}/range"))).collect()
-    };
+    let named =
+        |point: Vec<f64>| point.into_iter().enumerate().map(|(a, v)| (v.into(), format!("/vary/{a}/range"))).collect();
     Ok(drawn.into_iter().map(named).collect())
 }
 

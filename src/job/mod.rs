@@ -38,12 +38,12 @@ mod sweep;
 mod uniaxial;
 
 pub use error::{Failure, JobError};
-pub use kind::{Job, KINDS, Kind, Part, kind_of_collection, kind_of_command, kind_of_task};
 pub use evaluate::EvaluationRequest;
+pub use kind::{Job, KINDS, Kind, Part, kind_of_collection, kind_of_command, kind_of_task};
 pub use outcome::{File, MediaType, Outcome, recording_identifier};
 pub use reference::reference;
 pub use request::{Context, InputForm, InputUse, Request, Run};
+pub use schema::{FieldForm, RequestField, check_against, fields_of};
 pub use scratch::ScratchFolder;
 pub use subject::unmeshable;
-pub use schema::{FieldForm, RequestField, check_against, fields_of};
 pub use surroundings::{InputFile, Progress, Surroundings};

@@ -186,9 +186,7 @@ pub fn to_json<T: Serialize>(value: &T) -> Result<String, JobError> {
 }
 
 /// What `write` leaves in a fresh folder, by name.
-fn written(
-    write: impl FnOnce(&Path) -> Result<(), RecordingError>,
-) -> Result<BTreeMap<String, Vec<u8>>, JobError> {
+fn written(write: impl FnOnce(&Path) -> Result<(), RecordingError>) -> Result<BTreeMap<String, Vec<u8>>, JobError> {
     let failed = |e: &dyn std::fmt::Display| JobError::Internal(format!("a temporary folder: {e}"));
     let scratch = super::scratch::ScratchFolder::new().map_err(|e| failed(&e))?;
     write(scratch.path()).map_err(|e| failed(&e))?;

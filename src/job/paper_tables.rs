@@ -117,9 +117,9 @@ impl Run for PaperTablesRequest {
         };
         let uniaxial =
             uniaxial_stand_in(&defaults::dumbbell(), &uniaxial, &cancelled).map_err(|e| context.failed(&e))?;
-        let rows = all.iter().map(|s| {
-            json!({ "drive_mm": s.drive_mm, "filter": s.filter, "term_selection": s.calibration.selection })
-        });
+        let rows = all
+            .iter()
+            .map(|s| json!({ "drive_mm": s.drive_mm, "filter": s.filter, "term_selection": s.calibration.selection }));
         let result = PaperTablesResult {
             schema: "paper-tables/1",
             input_hash: &context.input_hash,

@@ -132,7 +132,8 @@ impl ScanRequest {
             let error = FieldError::new("/snr", format!("{snr:?}"), "left out where noise_sd_mm is given");
             errors.push(error.remedy("give one of the two"));
         }
-        let triples = [("mm_per_radian", Some(self.mm_per_radian)), ("noise_sd_mm", self.noise_sd_mm), ("snr", self.snr)];
+        let triples =
+            [("mm_per_radian", Some(self.mm_per_radian)), ("noise_sd_mm", self.noise_sd_mm), ("snr", self.snr)];
         for (name, values) in triples {
             for (axis, value) in values.into_iter().flatten().enumerate() {
                 if !(value > 1e-100 && value <= 1e100) {

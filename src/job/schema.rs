@@ -101,7 +101,9 @@ impl RequestSchema {
         }
         match value {
             Value::Number(number) => check_number(schema, number.as_f64().unwrap_or(f64::NAN), pointer, errors),
-            Value::String(text) => check_count(schema, ["minLength", "maxLength"], text.chars().count(), pointer, errors),
+            Value::String(text) => {
+                check_count(schema, ["minLength", "maxLength"], text.chars().count(), pointer, errors)
+            }
             Value::Array(items) => {
                 check_count(schema, ["minItems", "maxItems"], items.len(), pointer, errors);
                 if let Some(each) = schema.get("items") {
@@ -363,7 +365,8 @@ mod tests {
     fn all_errors_are_named_at_once() {
         assert!(pointers(&json!({ "side": "left" })).is_empty());
         assert!(pointers(&json!({ "side": "left", "weight": null, "inner": { "voxel_mm": [1, 2, 3] } })).is_empty());
-        let wrong = json!({ "side": "up", "count": 0, "weight": 0.0, "inner": { "voxel_mm": [1, 2], "a/b": 1 }, "x": 1 });
+        let wrong =
+            json!({ "side": "up", "count": 0, "weight": 0.0, "inner": { "voxel_mm": [1, 2], "a/b": 1 }, "x": 1 });
         let mut found = pointers(&wrong);
         found.sort();
         assert_eq!(found, ["/count", "/inner/a~1b", "/inner/voxel_mm", "/side", "/weight", "/x"]);
@@ -379,7 +382,10 @@ mod tests {
         let field = |name: &str| fields.iter().find(|f| f.name == name).unwrap().clone();
         assert_eq!(field("side").form, FieldForm::Choice(vec!["left".into(), "right".into()]));
         let count = field("count");
-        assert_eq!((count.form, count.range.as_str(), count.default), (FieldForm::Integer, "from 1 to 20", Some(json!(3))));
+        assert_eq!(
+            (count.form, count.range.as_str(), count.default),
+            (FieldForm::Integer, "from 1 to 20", Some(json!(3)))
+        );
         assert_eq!(field("weight").range, "above 0");
         assert_eq!(field("inner/voxel_mm").form, FieldForm::Tuple(3));
         assert!(field("side").is_required && !field("count").is_required);

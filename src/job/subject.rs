@@ -27,8 +27,7 @@ pub fn driven(specimen: &Specimen, drive_mm: Option<&Vec<f64>>, errors: &mut Vec
 /// # Errors
 /// The field that decides.
 pub fn check_mesh(specimen: &Specimen, mesh: MeshSize, pointer: &str, max_elements: usize) -> Result<(), FieldError> {
-    let built = mesh_specimen(specimen, &mesh.options(specimen))
-        .map_err(|e| unmeshable("/specimen", &e))?;
+    let built = mesh_specimen(specimen, &mesh.options(specimen)).map_err(|e| unmeshable("/specimen", &e))?;
     check_count(built.num_elements(), pointer, max_elements)
 }
 

@@ -7,7 +7,9 @@ use crate::mesh::MeshSize;
 use crate::report::sweep_report;
 use crate::sensitivity::ScanSettings;
 use crate::specimen::Specimen;
-use crate::sweep::{Collected, Outcome as TaskOutcome, SweepResult, SweepStudy, SweepTable, TaskInputs, tasks, to_parquet};
+use crate::sweep::{
+    Collected, Outcome as TaskOutcome, SweepResult, SweepStudy, SweepTable, TaskInputs, tasks, to_parquet,
+};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use utoipa::ToSchema;

@@ -82,7 +82,8 @@ impl Request for UniaxialRequest {
         "The traditional route: one uniaxial curve, of a strip or a dumb-bell, fitted with Ogden terms.";
 
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
-        let mut errors: Vec<FieldError> = self.specimen.field_errors().into_iter().map(|e| e.below("/specimen")).collect();
+        let mut errors: Vec<FieldError> =
+            self.specimen.field_errors().into_iter().map(|e| e.below("/specimen")).collect();
         match self.columns.read(&self.csv, HomogeneousTest::Uniaxial, "/csv") {
             Ok(csv) if csv.is_displacement && !csv.is_force => {
                 let message = "displacements of a dumb-bell come with forces in N; give length_mm for plain strips";

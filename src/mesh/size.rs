@@ -4,8 +4,8 @@ use super::MeshOptions;
 use crate::field::FieldError;
 use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
-use utoipa::openapi::schema::{ObjectBuilder, OneOfBuilder, Schema, Type};
 use utoipa::openapi::RefOr;
+use utoipa::openapi::schema::{ObjectBuilder, OneOfBuilder, Schema, Type};
 use utoipa::{PartialSchema, ToSchema};
 
 /// Smallest and largest factor on the standard element size.
@@ -114,7 +114,8 @@ impl PartialSchema for MeshSize {
         let names = ObjectBuilder::new().schema_type(Type::String).max_length(Some(24));
         let [low, high] = [*SIZE_FACTORS.start(), *SIZE_FACTORS.end()];
         let factor = ObjectBuilder::new().schema_type(Type::Number).minimum(Some(low)).maximum(Some(high));
-        let text = format!("Element size: search, standard, fine, or a factor from {low} to {high} on the standard size.");
+        let text =
+            format!("Element size: search, standard, fine, or a factor from {low} to {high} on the standard size.");
         OneOfBuilder::new().item(factor).item(names).description(Some(text)).into()
     }
 }

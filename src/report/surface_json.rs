@@ -1,10 +1,10 @@
 //! The deformed surface for the page's 3D view.
 
+use super::ReportError;
+use super::surface::{nodal_values, surface_quads};
 use crate::fem::{Equilibrium, ForwardModel};
 use crate::kinematics::decompose;
 use crate::material::Ogden;
-use super::ReportError;
-use super::surface::{nodal_values, surface_quads};
 
 /// Facets of the surface as JSON: `reference_mm` and `displacement_mm` (twelve numbers per facet), `stretch_amplitude` and
 /// `deformation_mode` (one per facet; null where undefined), five digits.

@@ -118,8 +118,9 @@ fn read(files: &BTreeMap<String, Vec<u8>>) -> Result<Uploaded, Problem> {
     }
     let found = match Recording::read_with_digest(scratch.path(), &LIMITS) {
         Ok(read) => Ok(Uploaded::Displacements(Box::new(read))),
-        Err(RecordingError::Raw { .. }) => RawRecording::read_with_digest(scratch.path(), &LIMITS)
-            .map(|read| Uploaded::RawPhases(Box::new(read))),
+        Err(RecordingError::Raw { .. }) => {
+            RawRecording::read_with_digest(scratch.path(), &LIMITS).map(|read| Uploaded::RawPhases(Box::new(read)))
+        }
         Err(error) => Err(error),
     };
     found.map_err(|e| {

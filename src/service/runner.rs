@@ -195,8 +195,8 @@ fn run_job(store: &Store, task: &Claimed, surroundings: StoredSurroundings) -> R
         };
     }
     let body: serde_json::Value = serde_json::from_str(&task.body).map_err(unreadable)?;
-    let kind = kind_of_collection(&task.kind)
-        .ok_or_else(|| JobError::Internal(format!("no kind of job {}", task.kind)))?;
+    let kind =
+        kind_of_collection(&task.kind).ok_or_else(|| JobError::Internal(format!("no kind of job {}", task.kind)))?;
     let stored = store.task_results(&task.job_id).map_err(|e| JobError::Internal(e.to_string()))?;
     let result = |(result, problem): (Vec<u8>, String)| -> Result<Result<_, Failure>, serde_json::Error> {
         if problem.is_empty() {
@@ -216,10 +216,7 @@ fn stored(store: &Store, task: &Claimed, outcome: Outcome) -> Result<TaskResult,
         super::recordings::keep(store, &task.job_id, recording).map_err(|p| JobError::NoSolution(p.detail))?;
     }
     let artefact = |f: crate::job::File| (f.name, f.media_type.name().to_string(), f.bytes);
-    Ok(TaskResult {
-        result: outcome.result.into_bytes(),
-        artefacts: outcome.files.into_iter().map(artefact).collect(),
-    })
+    Ok(TaskResult { result: outcome.result.into_bytes(), artefacts: outcome.files.into_iter().map(artefact).collect() })
 }
 
 /// A result is worth waiting for a storage that does not answer; the lease decides whether it is still wanted.

@@ -22,7 +22,8 @@ impl TaskInput {
     /// # Errors
     /// [`JobError`]: another version of the program stored it.
     pub fn job(&self) -> Result<Job, JobError> {
-        let kind = kind_of_task(&self.kind).ok_or_else(|| JobError::Internal(format!("no kind of job {}", self.kind)))?;
+        let kind =
+            kind_of_task(&self.kind).ok_or_else(|| JobError::Internal(format!("no kind of job {}", self.kind)))?;
         kind.job(&self.request).map_err(JobError::Invalid)
     }
 }

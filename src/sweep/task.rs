@@ -114,8 +114,7 @@ impl TaskInputs {
         if let Err(e) = material.validate() {
             return Some(failed("material", &e));
         }
-        let options =
-            EvaluationOptions { mesh: mesh.options(specimen), ..EvaluationOptions::standard(specimen) };
+        let options = EvaluationOptions { mesh: mesh.options(specimen), ..EvaluationOptions::standard(specimen) };
         let drives = DriveSelection::DriveMm(specimen.drive_mm.clone());
         let evaluation = match evaluate(specimen, material, scan, &drives, &options, is_cancelled) {
             Ok((evaluation, _)) => evaluation,

@@ -1,9 +1,9 @@
 //! Jobs: list, look, cancel, resume, follow.
 
+use crate::job::kind_of_collection;
 use crate::service::access::{Caller, Role};
 use crate::service::app::App;
 use crate::service::hub::Watched;
-use crate::job::kind_of_collection;
 use crate::service::problem::Problem;
 use crate::service::store::JobFilter;
 use crate::service::view::{JobEvent, JobList, JobState, JobView};
