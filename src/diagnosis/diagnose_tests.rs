@@ -1,7 +1,7 @@
 use super::*;
 use crate::diagnosis::cause::CauseName;
 use crate::diagnosis::scene::Scene;
-use crate::diagnosis::test_recordings::{NOISE_MM, material, options, recorded};
+use crate::diagnosis::test_recordings::{FINER_FACTOR, MESH_FACTOR, NOISE_MM, material, options, recorded};
 use crate::recording::LoadCurve;
 use crate::voxel::VoxelMask;
 
@@ -20,7 +20,7 @@ fn observed(recording: &Recording) -> Observed {
 /// A load cell that reads 0.4 N too much: the stage names it and takes it off the steps' forces.
 #[test]
 fn the_load_curve_is_read_and_taken_off() {
-    let mut recording = recorded(&material(), &Scene::default());
+    let mut recording = recorded(&material(), &Scene::default(), MESH_FACTOR);
     let true_forces: Vec<f64> = recording.steps.iter().map(|s| s.force_n.unwrap()).collect();
     let offset = 0.4;
     let mut curve = LoadCurve::default();
@@ -48,35 +48,35 @@ fn the_load_curve_is_read_and_taken_off() {
     }
 }
 
-/// What the finer mesh predicts beyond ours is taken off, and the nominal model is fitted anew.
+/// A recording that comes from the finer mesh: what that mesh predicts beyond ours is taken off, and the nominal model,
+/// fitted anew, leaves less.
 #[test]
 fn the_mesh_is_corrected_before_a_misfit_is_looked_for() {
-    let recording = recorded(&material(), &Scene::default());
+    let recording = recorded(&material(), &Scene::default(), FINER_FACTOR);
     let (observed, registry, options) = (observed(&recording), Registry::standard(), options());
     let mut run = begun(&observed, &registry, &options);
     assert!(run.mesh_defect.is_none() && run.measured().force == run.recorded.force);
-    let before = run.findings.nominal.material.clone();
+    let before = run.findings.nominal.deviance;
     run.correct_mesh().unwrap();
     let defect = run.mesh_defect.as_ref().unwrap();
     // A coarse mesh of a block with singular edges errs by more than nothing and by less than a tenth of the drive.
     assert!(defect.trace.rms_mm() > 1e-4 && defect.trace.rms_mm() < 0.4, "{}", defect.trace.rms_mm());
-    let change = run.recorded.plus(-1.0, &run.measured());
-    assert_eq!(change.force.len(), defect.trace.force.len());
-    // The recording comes from our own mesh: taken for a true one, its coarse mesh's stiffness becomes the material's.
-    assert_ne!(before, run.findings.nominal.material);
+    assert_eq!(run.measured().force, defect.taken_off(&run.recorded).force);
+    assert!(run.findings.nominal.deviance < before, "{} {before}", run.findings.nominal.deviance);
+    // The search for causes starts from the corrected fit.
     assert_eq!(run.findings.current.material, run.findings.nominal.material);
 }
 
 /// A block of voxels off by 0.3 mm at the second step: found, fitted, named, and no cause that counts.
 #[test]
 fn artefacts_are_taken_out_and_named() {
-    let mut recording = recorded(&material(), &Scene::default());
+    let mut recording = recorded(&material(), &Scene::default(), MESH_FACTOR);
     let mask = VoxelMask::covering(&recording.specimen, [2.5, 0.8, 2.5]).unwrap();
     let mut num_moved = 0;
     for &voxel in &mask.voxels {
         let x = mask.grid.center_mm(voxel as usize);
         if x[0].abs() < 5.0 && x[2].abs() < 5.0 {
-            recording.steps[1].displacement[voxel as usize][1] += 0.3;
+            recording.steps[1].displacement[voxel as usize][2] += 0.3;
             num_moved += 1;
         }
     }
@@ -86,7 +86,7 @@ fn artefacts_are_taken_out_and_named() {
     let causes = &run.findings.current.causes;
     assert_eq!(causes.len(), 1);
     assert!(causes[0].cause.is_artefact());
-    assert_eq!(causes[0].cause.variant(), [1, 1, num_moved]);
+    assert_eq!(causes[0].cause.variant(), [1, 2, num_moved]);
     // The mean of a hundred voxels and more.
     assert!((causes[0].values[0] - 0.3).abs() < NOISE_MM, "{}", causes[0].values[0]);
     run.name_artefacts();
@@ -99,22 +99,23 @@ fn artefacts_are_taken_out_and_named() {
 fn the_material_is_questioned() {
     let mut soft = material();
     soft.bulk_kpa = 10.0 * shear_modulus(&soft);
-    let recording = recorded(&soft, &Scene::default());
+    let recording = recorded(&soft, &Scene::default(), MESH_FACTOR);
     let (observed, registry, options) = (observed(&recording), Registry::standard(), options());
     let mut run = begun(&observed, &registry, &options);
     run.question_material().unwrap();
     run.question_material_again().unwrap();
     let causes = &run.findings.causes;
     assert_eq!(causes.iter().map(|c| c.name.as_str()).collect::<Vec<_>>(), ["compressibility"]);
-    // The recording is of the mesh that is fitted: the noise alone is left.
-    assert!((causes[0].parameters[0].1 / 10.0 - 1.0).abs() < 0.05, "{:?}", causes[0].parameters);
+    // Volume changes move some hundred voxels at the free ends by some hundredths of a millimetre, with 0.01 mm of
+    // noise.
+    assert!((causes[0].parameters[0].1 / 10.0 - 1.0).abs() < 0.3, "{:?}", causes[0].parameters);
     assert!(run.findings.nominal.deviance > run.findings.current.deviance + causes[0].evidence);
 }
 
 /// Stages after a cancelled one do not run.
 #[test]
 fn a_cancelled_diagnosis_is_an_error() {
-    let recording = recorded(&material(), &Scene::default());
+    let recording = recorded(&material(), &Scene::default(), MESH_FACTOR);
     assert!(diagnose(&recording, &options(), &|_| {}, &|| true).is_err());
     let coarse = DiagnosisOptions { mesh_factor: 9.0, ..options() };
     assert!(matches!(diagnose(&recording, &coarse, &|_| {}, &never), Err(DiagnosisError::Setting { .. })));

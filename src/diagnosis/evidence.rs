@@ -4,19 +4,19 @@ use super::metric::Metric;
 use super::trace::Trace;
 use crate::calibration::Observed;
 
-/// A cause must lower the deviance by this much beyond ln n per parameter: very strong evidence, many times over,
-/// because many causes are tried.
+/// A cause must lower the deviance by this much beyond ln n per parameter. For a single cause this would be many times
+/// what counts as very strong evidence; it takes that much because many causes are tried.
 pub(super) const EVIDENCE: f64 = 30.0;
 /// A cause is fitted where it explains more than this part of what the leading one does, to first order.
 pub(super) const WORTH_A_FIT: f64 = 0.1;
-/// A further cause must explain this part of what the ones before it did: a model of a large effect errs by some
-/// percent, which is no effect of its own.
+/// A further cause must explain this part of what the ones before it did. The model of a large effect errs by some
+/// percent of it, and such an error is no cause of its own.
 pub(super) const SMALLEST_SHARE: f64 = 0.02;
-/// An effect is physics where its displacement exceeds this part of the allowance (rms), or its force its own
-/// allowance.
+/// An effect counts as physics where its displacement (rms) exceeds this multiple of the allowance, or its force the
+/// allowance of forces.
 const SMALLEST_EFFECT: f64 = 1.0;
 
-/// What parameters cost: ln n for each.
+/// What parameters cost in deviance: ln n for each, n being the number of data.
 pub(super) fn penalty(metric: &Metric, num_parameters: usize) -> f64 {
     num_parameters as f64 * (metric.num_data() as f64).ln()
 }

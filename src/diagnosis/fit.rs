@@ -15,13 +15,15 @@ use nalgebra::{DMatrix, DVector};
 /// Standard deviation of the prior of a cause's parameter around its start, in scales of the parameter. It is wide: it
 /// only keeps a fit in bounds where the data say nothing.
 const PRIOR_SCALES: f64 = 100.0;
-/// Differences for derivatives, in scales.
+/// Half width of the differences from which derivatives are taken, in scales of a parameter.
 pub const STEP: f64 = 0.02;
-/// Largest relative change of a material parameter in one step, and of a cause's in scales.
+/// Largest relative change of a material parameter in one step.
 const LARGEST_STEP: f64 = 0.4;
+/// Largest change of a cause's parameter in one step, in scales of the parameter.
 const LARGEST_CAUSE_STEP: f64 = 6.0;
 
-/// Traces of ∂prediction/∂parameter in scaled parameters (ln κ, relative, scales).
+/// Changes of the prediction with each scaled parameter: with ln κ, with the relative change of each other material
+/// parameter, and with each parameter of the causes in its scales.
 pub fn derivatives(
     laboratory: &mut Laboratory,
     material: &Ogden,
@@ -67,18 +69,18 @@ pub fn fit(
 
 /// A recording in a fit of several with one material.
 pub struct Member<'a, 'b> {
-    /// What predicts it.
+    /// Predicts it.
     pub laboratory: &'a mut Laboratory<'b>,
-    /// What its misfit weighs.
+    /// The weights of its misfit.
     pub metric: &'a Metric,
     /// What was recorded.
     pub measured: &'a Trace,
     /// Its causes.
     pub causes: Vec<Supposed>,
-    /// Priors; iterations and tolerance are those of the first member.
+    /// Priors. How many iterations are made, and when they end, the first member's settings say for all.
     pub settings: FitSettings,
-    /// Of each of its parameters (the material's, then the causes'): the parameter of the whole fit. Members that share
-    /// one have it at the same place; together the places are 0, 1, … without a gap.
+    /// For each of its parameters (the material's, then the causes') its place among the parameters of the whole fit. A
+    /// parameter that members share has the same place in each. All places together are 0, 1, … without a gap.
     pub places: Vec<usize>,
 }
 
@@ -96,8 +98,8 @@ impl Point {
     }
 }
 
-/// Fits one material to all members, each with its own causes but for parameters that they share; one result per
-/// member.
+/// Fits one material to all members. Each member has its own causes, whose parameters may be shared. Gives one result
+/// per member.
 ///
 /// # Errors
 /// As [`fit`].
@@ -313,7 +315,8 @@ fn normal_system(
     (matrix, gradient)
 }
 
-/// Half the Hessian of the deviance to first order in the residual, priors included; scaled parameters.
+/// Half the Hessian of the deviance in scaled parameters (Gauss–Newton: without second derivatives of the prediction),
+/// priors included.
 pub fn normal_matrix(
     metric: &Metric,
     weighed: &[Weighed],
@@ -391,7 +394,7 @@ fn moved(members: &[Member], at: &Point, step: &DVector<f64>) -> (Ogden, Vec<Vec
         let value = at.material.value(parameter);
         let s = part * step[place];
         let moved = if parameter == Parameter::Kappa { value * s.exp() } else { value * (1.0 + s) };
-        // Below κ/μ of about five the elements and the theory of a soft solid both end.
+        // With κ/μ below about five neither the elements nor the theory of a soft solid hold.
         let floor = if parameter == Parameter::Kappa { 5.0 * shear_modulus(&at.material) } else { f64::NEG_INFINITY };
         next.set(parameter, moved.max(floor));
     }
@@ -415,7 +418,7 @@ fn moved(members: &[Member], at: &Point, step: &DVector<f64>) -> (Ogden, Vec<Vec
     (next, causes)
 }
 
-/// What one unit of each scaled parameter is in its own units (of ln κ: κ).
+/// The size of one unit of each scaled parameter, in the parameter's own units; for ln κ that is κ.
 pub fn scales(material: &Ogden, causes: &[Supposed]) -> Vec<f64> {
     let of_material = material.parameters().into_iter().map(|p| material.value(p).abs());
     of_material.chain(causes.iter().flat_map(|c| c.cause.parameters()).map(|p| p.scale)).collect()

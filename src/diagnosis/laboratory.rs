@@ -147,8 +147,8 @@ impl<'a> Laboratory<'a> {
         }
     }
 
-    /// An elastic load curve of the scene: at each of `drives_mm` the force (N), its derivatives with respect to the material, and
-    /// what its memory needs.
+    /// An elastic load curve of the scene: at each of `drives_mm` the force (N), its derivatives with respect to the
+    /// material, and what its memory needs.
     ///
     /// # Errors
     /// As [`Self::predict`].
@@ -176,10 +176,11 @@ impl<'a> Laboratory<'a> {
         Ok(table)
     }
 
-    /// Derivatives of `prediction`, that of `material` and `scene`: with respect to every material parameter (in the order of
-    /// [`Ogden::parameters`]), then along each t ↦ path(t) at t = 0, where path(0) must be `scene` and the flag says whether the
-    /// path changes the sample. Paths are differenced over ±`step` in what is cheap, the residual, the image and the load;
-    /// holes by the derivative of the mesh's nodes.
+    /// Derivatives of `prediction`, which is that of `material` and `scene`: first with respect to every material
+    /// parameter (in the order of [`Ogden::parameters`]), then along each path t ↦ path(t) at t = 0. path(0) must be
+    /// `scene`, and the flag of a path says whether it changes the sample. What is cheap is differenced over ±`step`:
+    /// the residual of the equilibrium, the image and the load cell. Changes of holes use the exact derivative of the
+    /// mesh's nodes instead.
     ///
     /// # Errors
     /// [`DiagnosisError::Solve`].
@@ -295,8 +296,8 @@ impl<'a> Laboratory<'a> {
         Ok(recorded[0].plus(-1.0, &recorded[1]).scaled(0.5 / step))
     }
 
-    /// Changes of `prediction` (the nominal scene's) as unit compliances (mm/kPa) of parts of a bonded face move the sample
-    /// against the plate: `part_of`(position) says to which of `num_parts` a node belongs.
+    /// Changes of `prediction` (the nominal scene's) as unit compliances (mm/kPa) of parts of a bonded face move the
+    /// sample against the plate: `part_of`(position) says to which of `num_parts` a node belongs.
     ///
     /// # Errors
     /// [`DiagnosisError::Solve`].
@@ -351,8 +352,8 @@ impl<'a> Laboratory<'a> {
         seen: &[Vec<[f64; 3]>],
     ) -> Result<Trace, DiagnosisError> {
         let image = &scene.image;
-        // The view holds the scene's own shift in full: walls cut other parts of the voxels then. What is left of it, as a
-        // derivative is taken, and rotations are to first order.
+        // The view is made for the scene's shift, so that the walls cut the shifted voxels. A further shift, as of a
+        // scene beside it from which a derivative is taken, and rotations are applied to first order.
         let viewed = self.stations[at].shift_mm;
         let shift_mm = [0, 1, 2].map(|i| image.shift_mm[i] - viewed[i]);
         let turns = shift_mm.iter().chain(&image.rotation_rad).any(|x| x.abs() > 0.0);

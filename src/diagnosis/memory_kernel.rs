@@ -1,13 +1,13 @@
 //! What a sample's load remembers: the force at one drive by the stress of another.
 //!
-//! In Simo's finite viscoelasticity (1987) each relaxation adds H = ∫ g e^{−(t−s)/τ} dS_iso to the second Piola–Kirchhoff stress S,
-//! and the work of the load gives the force, F = ∫ (S + Σ H) : dE/dd dV. With the deformation at a drive that of the elastic
-//! sample, whatever its history, all of this is in the numbers
+//! In Simo's finite viscoelasticity (1987) each relaxation adds H = ∫ g e^{−(t−s)/τ} dS_iso to the second
+//! Piola–Kirchhoff stress S, and the work of the load gives the force, F = ∫ (S + Σ H) : dE/dd dV. With the deformation
+//! at a drive that of the elastic sample, whatever its history, all of this is in the numbers
 //!
 //! K(a; b) = ∫ S_iso(X; drive a) : dE/dd(X; drive b) dV,
 //!
-//! since F_H(t) = Σ g ∫ e^{−(t−s)/τ} ∂K(d(s); d(t))/∂s ds. K comes from finite elements, holes and all. K(b; b) is the elastic force but
-//! for what pressure adds.
+//! since F_H(t) = Σ g ∫ e^{−(t−s)/τ} ∂K(d(s); d(t))/∂s ds. K comes from finite elements, holes and all. K(b; b) is the
+//! elastic force but for what pressure adds.
 
 use crate::fem::{Equilibrium, ForwardModel, SolveError, Tangent};
 use crate::material::{Ogden, first_piola_kirchhoff_stress};
@@ -25,7 +25,8 @@ pub struct MemoryKernel {
 /// Stress and strain rate of one equilibrium at every quadrature point.
 pub struct KernelState {
     drive_mm: f64,
-    /// N per unit of ∫ S : dE/dd dV of the part that is meshed (kPa mm² = mN; mirrored parts and further samples counted).
+    /// N per unit of ∫ S : dE/dd dV of the part that is meshed (kPa mm² = mN; mirrored parts and further samples
+    /// counted).
     scale: f64,
     volume_mm3: Vec<f64>,
     /// S_iso, kPa.

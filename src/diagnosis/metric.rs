@@ -2,11 +2,12 @@
 //!
 //! The covariance of a trace is C = N + B S Bᵀ. N is the scan's noise, independent per voxel and component (inflated by
 //! the filter's correlation). B S Bᵀ is the discretisation allowance: smooth displacement errors in proportion to the
-//! drive, as means over boxes of several sizes, larger at the ends where bonded edges are singular. A misfit thus
+//! drive, one per box for boxes of several sizes, larger at the ends where bonded edges are singular. A misfit thus
 //! counts by its pattern and size: patterns below the allowance are not evidence, however many voxels show them. C⁻¹ is
 //! applied by the Sherman–Morrison–Woodbury formula. (A discrepancy term in the sense of Kennedy and O'Hagan 2001.)
 //!
-//! Forces: the load cell's drift, and an allowance that is common to all drives and a smaller one of each.
+//! The covariance of the forces holds the load cell's drift, an allowance that is common to all drives, and a smaller
+//! one of each drive.
 
 use super::trace::Trace;
 use crate::calibration::Observed;
@@ -16,10 +17,12 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 const LEVELS: [[usize; 3]; 3] = [[1, 1, 1], [4, 1, 3], [8, 2, 6]];
 /// The ends within this distance (mm) have a larger allowance.
 const END_MM: f64 = 2.0;
-/// How much larger.
+/// Factor on the allowance there.
 const END_FACTOR: f64 = 3.0;
-/// Allowance of the force, relative: common to all drives (coarse meshes are too stiff) and of each drive.
+/// Allowance of the force that is common to all drives, as a part of the force: coarse meshes are too stiff at every
+/// drive.
 const FORCE_COMMON: f64 = 0.004;
+/// Allowance of the force at each drive alone, as a part of the force.
 const FORCE_EACH: f64 = 0.001;
 
 /// The inner product ⟨a, b⟩ = aᵀ C⁻¹ b of traces.

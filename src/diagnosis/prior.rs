@@ -22,7 +22,9 @@ pub struct ShearPrior {
 }
 
 impl ShearPrior {
-    /// Squared distance, its gradient's negative half and the curvature's half, in scaled parameters (κ first).
+    /// The prior's part of a fit in scaled parameters (κ first): its squares (the distance from the centre in standard
+    /// deviations, squared), the derivatives of the modulus' logarithm, and the factor on these that gives half of the
+    /// squares' negative gradient.
     pub(super) fn terms(&self, material: &Ogden) -> (f64, Vec<f64>, f64) {
         let modulus = shear_modulus(material);
         let away = (self.center_kpa / modulus).ln();
@@ -42,11 +44,11 @@ impl ShearPrior {
 pub struct FitSettings {
     /// Most iterations, rejected ones included.
     pub max_iterations: usize,
-    /// κ.
+    /// What is known of κ.
     pub bulk: BulkPrior,
-    /// The shear modulus, where no force was recorded.
+    /// What is known of the shear modulus, where no force was recorded.
     pub shear: Option<ShearPrior>,
-    /// Converged when the linear model promises to lower the deviance by less than this.
+    /// A fit ends when a step promises, by the linear model, to lower the deviance by less than this.
     pub tolerance: f64,
 }
 

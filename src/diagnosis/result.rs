@@ -48,15 +48,15 @@ pub struct CauseResult {
 }
 
 /// A sample stiffer or softer than believed. A load cell that reads too much or too little would look the same:
-/// displacements know ratios of moduli, not their size.
+/// displacements tell ratios of moduli, not their size.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModulusAgainstBelief {
     /// Initial shear modulus of the material as believed, kPa.
     pub believed_kpa: f64,
-    /// That found, with the causes, kPa.
+    /// Initial shear modulus of the material found, with the causes, kPa.
     pub found_kpa: f64,
-    /// The relative gain error of the load cell that would make the one of the other.
+    /// The relative gain error of the load cell that would make the believed modulus look like the one found.
     pub as_relative_cell_gain_error: f64,
 }
 
@@ -122,7 +122,8 @@ pub struct DiagnosisResult {
     pub material_parameters: Vec<ParameterResult>,
     /// The material that the nominal model gives.
     pub nominal_material: Ogden,
-    /// Where a material was believed, a force was recorded and the moduli differ.
+    /// How the modulus differs from the believed one; left out where it does not, where no material was believed, or
+    /// where no force was recorded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub modulus_against_belief: Option<ModulusAgainstBelief>,
     /// Causes, most telling first.

@@ -11,7 +11,7 @@ use super::found::FoundCause;
 use super::inference::Inference;
 use super::ranked::Ranked;
 use super::registry::Registry;
-use super::score_round::{RoundScope, leading, score_suspects};
+use super::score_round::{RoundScope, RoundScores, leading, score_suspects};
 use super::supposed::Supposed;
 use super::trace::Trace;
 
@@ -44,7 +44,7 @@ pub(super) fn add_causes(
         round += 1;
         (inference.progress)(&format!("round {round}: testing causes"));
         let scope = RoundScope { has_load_curve, has_maps: round == 1 };
-        let (candidates, maps) = score_suspects(inference, registry, &findings.current, scope)?;
+        let RoundScores { candidates, maps } = score_suspects(inference, registry, &findings.current, scope)?;
         findings.maps.extend(maps);
         findings.ranked.extend(candidates.iter().map(|c| Ranked {
             identity: c.cause.identity(),

@@ -60,8 +60,9 @@ pub struct Jump {
 }
 
 impl Scene {
-    /// The departures at a step where `force_n` was measured; `bond_scale_kpa_per_mm` is the stiffness of the sample
-    /// under its bond, against which a bond is loose or firm; the bonded faces lie across `face_axis`.
+    /// The departures from the nominal model at a step where `force_n` was measured. A bond is loose or firm compared
+    /// with `bond_scale_kpa_per_mm`, the stiffness of the sample under its bond. The bonded faces lie across
+    /// `face_axis`.
     pub fn departures(&self, force_n: f64, bond_scale_kpa_per_mm: f64, face_axis: usize) -> Departures {
         let product = self.stiffness.clone();
         let stiffness_factor = (!product.is_empty())
@@ -76,7 +77,7 @@ impl Scene {
                 let (list, compliance) = if x[face_axis] > 0.0 { (&moved, soft[1]) } else { (&fixed, soft[0]) };
                 let loose = list.iter().map(|f| f.at(x)).fold(0.0, f64::max);
                 let held = bond_of(loose, bond_scale_kpa_per_mm);
-                // One after the other: compliances add.
+                // The patch's bond and the soft layer act one after the other: their compliances add.
                 held / (1.0 + compliance.max(0.0) * held)
             })
         });
@@ -90,7 +91,7 @@ impl Scene {
         }
     }
 
-    /// Whether nodes of the bonded faces must be free: fixed, moved.
+    /// Whether the nodes of the fixed and of the moved face must be free to leave their plate.
     pub fn releases(&self) -> [bool; 2] {
         [0, 1].map(|face| !self.looseness[face].is_empty() || self.bond_mm_per_kpa[face].abs() > 0.0)
     }
@@ -107,7 +108,7 @@ impl Scene {
     }
 }
 
-/// Stiffness (kPa/mm) of a bond that is loose to the part `loose`.
+/// Stiffness (kPa/mm) of a bond whose looseness is `loose`, from 0 (firm) to 1 (gone).
 fn bond_of(loose: f64, scale: f64) -> f64 {
     let loose = loose.clamp(0.0, 1.0);
     (scale * (1.0 - loose) / loose.max(1e-9)).min(FIRM_BOND_KPA_PER_MM)

@@ -34,7 +34,15 @@ pub(super) struct RoundScope {
     pub(super) has_maps: bool,
 }
 
-/// All candidates, most explaining first, and the maps that were made.
+/// What the tests of a round say.
+pub(super) struct RoundScores {
+    /// All candidates, most explaining first.
+    pub(super) candidates: Vec<Candidate>,
+    /// The maps that were made, with their names.
+    pub(super) maps: Vec<(String, ScoreMap)>,
+}
+
+/// Tests every suspect to first order.
 ///
 /// # Errors
 /// [`DiagnosisError`].
@@ -43,7 +51,7 @@ pub(super) fn score_suspects(
     registry: &Registry,
     current: &CauseFit,
     scope: RoundScope,
-) -> Result<(Vec<Candidate>, Vec<(String, ScoreMap)>), DiagnosisError> {
+) -> Result<RoundScores, DiagnosisError> {
     let observed = inference.laboratory.observed();
     let suspects = suspects_of(registry, observed, current, scope.has_load_curve);
     let (nuisance, directions) = directions_of(inference, current, &suspects)?;
@@ -58,7 +66,7 @@ pub(super) fn score_suspects(
     registry.search(&mut search, &mut candidates)?;
     let maps = search.into_maps()?;
     candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
-    Ok((candidates, maps))
+    Ok(RoundScores { candidates, maps })
 }
 
 /// The candidates worth a full fit: of each name as many as the cause asks for, most explaining first.

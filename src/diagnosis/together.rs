@@ -21,7 +21,7 @@ use crate::mesh::MeshOptions;
 use crate::rate::BeforeAfter;
 use serde::{Deserialize, Serialize};
 
-/// A supposition that saves parameters, against every recording for itself.
+/// Whether recordings agree: a supposition that saves parameters is compared with fits of every recording for itself.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Agreement {
@@ -29,7 +29,7 @@ pub struct Agreement {
     pub deviance_rise: f64,
     /// Parameters saved.
     pub parameters_saved: usize,
-    /// The rise that it would take to refuse it: ln n per parameter, and 30 (as for a cause).
+    /// The rise from which the supposition is refused: ln n per parameter saved, and 30 (as for a cause).
     pub deviance_limit: f64,
     /// Whether the recordings agree.
     pub agrees: bool,
@@ -45,7 +45,7 @@ pub struct CommonCause {
     pub description: String,
     /// Its parameters where it is the same in all.
     pub parameters: Vec<ParameterResult>,
-    /// Whether one size serves all, beyond one material.
+    /// Whether one size serves all, compared with a size for each in one material.
     pub agreement: Agreement,
 }
 
@@ -114,7 +114,7 @@ pub fn together(
     progress: &dyn Fn(&str),
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<TogetherResult, DiagnosisError> {
-    // The richest material serves all, or none does.
+    // A material that serves all needs as many terms as the richest of them.
     let start = diagnoses.iter().map(|(_, d)| &d.corrected.material).max_by_key(|m| m.terms.len());
     let Some(start) = start.filter(|_| diagnoses.len() >= 2) else {
         return Err(DiagnosisError::Setting {
@@ -234,7 +234,8 @@ impl CommonFit<'_> {
         })
     }
 
-    /// Fits one material to all cases with `causes`; those at the places of `common` (one per case) are one.
+    /// Fits one material to all cases with `causes`; the causes at the places of `common` (one per case) share their
+    /// parameters.
     fn fit(
         &mut self,
         start: &Ogden,
@@ -278,8 +279,8 @@ fn shared_prior(settings: FitSettings, num_cases: f64) -> FitSettings {
     }
 }
 
-/// Adds to the material's standard deviations what the mesh does in each recording: like meshes err alike, so that more
-/// recordings do not lessen it. The mean square counts.
+/// Adds to the material's standard deviations what the mesh does in each recording. Meshes of one kind err in the same
+/// way, so that this part does not become smaller with more recordings; its mean square over the recordings is added.
 fn widen_all(
     cases: &mut [Case],
     mesh_factor: f64,
@@ -295,7 +296,7 @@ fn widen_all(
         let defect = case.found.mesh_defect.as_ref();
         match widen(&mut case.laboratory, mesh_factor, &case.metric, &settings, fitted, defect, is_cancelled) {
             Err(error) if is_cancelled() => return Err(error),
-            // A coarser model without an equilibrium: the noise alone, as in the diagnosis.
+            // Where a coarser model has no equilibrium the noise alone counts, as in the diagnosis.
             Err(_) | Ok(()) => {}
         }
         for ((sum, sd), noise) in squares.iter_mut().zip(&fitted.sd).zip(&noise) {
@@ -320,7 +321,8 @@ fn cross_prediction(
         let [a, b] = [from, to].map(|n| &cases[n].found.observed.specimen);
         a.block == b.block && a.holes == b.holes
     };
-    // Another sample shares no places, no plates and no jumps; another recording of one sample no jumps.
+    // Artefacts belong to one recording alone. A recording of another sample shares neither places nor plates with this
+    // one.
     let causes: Vec<Supposed> = teacher
         .corrected
         .causes

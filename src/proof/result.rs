@@ -40,7 +40,7 @@ pub struct Scored {
 }
 
 impl Scored {
-    /// As long as nothing is known of the diagnosis.
+    /// Before there is a diagnosis.
     pub(super) fn undiagnosed(hidden: &Hidden, is_known: bool) -> Scored {
         Scored {
             hidden: hidden.clone(),
@@ -125,11 +125,11 @@ impl From<String> for FirstNamed {
 pub struct CauseSummary {
     /// The cause.
     pub cause: HiddenCause,
-    /// Recordings, and those in which it is detectable.
+    /// Recordings.
     pub num_recordings: usize,
     /// Of these, detectable.
     pub num_detectable: usize,
-    /// Right among all and among the detectable.
+    /// Right among all.
     pub num_right: usize,
     /// Right among the detectable.
     pub num_right_detectable: usize,

@@ -9,10 +9,10 @@ use super::truths::truths;
 use crate::diagnosis::{CauseName, DiagnosisError, DiagnosisOptions, DiagnosisResult, Verdict, diagnose};
 use crate::specimen::Specimen;
 
-/// A cause counts as detectable from a displacement of this many allowances (rms at the largest drive, the material
-/// unchanged)…
+/// A cause counts as detectable where it changes the displacement by this many allowances (rms at the largest drive,
+/// the material unchanged).
 const DETECTABLE_ALLOWANCES: f64 = 3.0;
-/// … or, where it acts on the force, from this relative change of it.
+/// A cause that acts on the force counts as detectable, too, where it changes the force by this part of it.
 const DETECTABLE_FORCE: f64 = 0.02;
 
 /// What to conceal: cause, seed and whether the diagnosis knows of it.
@@ -42,7 +42,7 @@ fn tasks(options: &ProofOptions) -> Vec<(HiddenCause, u64, bool)> {
 
 /// Conceals and diagnoses all of `options`; `done` are results of an earlier, stopped run with the same options;
 /// `report` is told of each result as it comes. A recording that cannot be made counts as one in which nothing was
-/// found, and not as detectable: how large its effect is, is not known.
+/// found. It does not count as detectable, because the size of its effect is not known.
 pub fn prove(
     specimen: &Specimen,
     options: &ProofOptions,

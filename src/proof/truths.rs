@@ -3,7 +3,7 @@
 use super::draw::{Hidden, HiddenCause};
 use crate::specimen::Specimen;
 
-/// True values of the diagnosis' parameters, where both mean the same.
+/// True values of those parameters of the diagnosis that mean the same as the hidden cause's own.
 pub(super) fn truths(specimen: &Specimen, h: &Hidden) -> Vec<(String, f64)> {
     let axis = |n: usize| ["x", "y", "z"][n];
     // The drawn axis has the strength, the others have none.
@@ -58,7 +58,7 @@ pub(super) fn truths(specimen: &Specimen, h: &Hidden) -> Vec<(String, f64)> {
             .enumerate()
             .map(|(n, name)| (name.to_string(), if n == h.which { h.strength } else { 0.0 }))
             .collect(),
-        // A firm bond is the end of the range.
+        // A firm bond has no true value: it is the end of the parameter's range.
         HiddenCause::Bond => [(0, "fixed"), (1, "moved")]
             .into_iter()
             .filter(|(face, _)| h.which == *face || h.which == 2)

@@ -63,7 +63,7 @@ impl Cause for SoftBond {
     }
 
     fn parameters(&self) -> Vec<CauseParameter> {
-        // Differences for derivatives are a fifth of the firmest bond.
+        // With this scale the differences for derivatives are a fifth of the firmest bond.
         ["fixed", "moved"]
             .map(|face| CauseParameter::new(format!("{face}_plate_mm_per_kpa"), 2e-3, [FIRMEST, 20.0]))
             .to_vec()

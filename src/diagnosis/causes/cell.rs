@@ -79,7 +79,7 @@ impl LoadEffect for Offset {
     }
 }
 
-/// A force of constant size against the motion.
+/// A force of constant size that resists the motion, so that the load cell reads more while the drive rises.
 #[derive(Debug)]
 pub struct Friction;
 

@@ -16,8 +16,8 @@ const NAME: CauseName = CauseName::new("debond");
 /// Its line in the registry.
 pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Searched(suspects) };
 
-/// Width of the edge of a debonded patch, mm: a third of the spacing of nodes on the face, so that the bond changes
-/// smoothly as the edge passes from node to node.
+/// Width of the edge of a debonded patch, mm. It is a third of the spacing of nodes on the face, so that the bond
+/// changes smoothly as the edge passes from node to node.
 const EDGE_MM: f64 = 0.35;
 /// Strips of bond beside a patch that are tried, mm.
 const STRIPS_MM: [f64; 3] = [0.6, 1.3, 2.6];
@@ -79,7 +79,7 @@ impl Debond {
                 }
             }
             let s = 1.0 / (1.0 + (-(inside / edge_mm)).clamp(-60.0, 60.0).exp());
-            // Loose to one half at the edge; below a thousandth it is firm.
+            // At the edge itself the bond is half loose. A looseness below a thousandth is taken as none.
             if s < 1e-3 { 0.0 } else { LOOSE * s }
         })
     }
@@ -107,7 +107,7 @@ impl Cause for Debond {
         let mut all = Vec::new();
         for (axis, half) in self.axes.iter().zip(self.half_mm) {
             let name = Self::axis_name(*axis);
-            // An edge past the face's is the face's.
+            // An edge past the face's own edge means that the patch ends with the face.
             let range = [-half - 0.5, half + 0.5];
             all.push(CauseParameter::new(format!("low_{name}_mm"), 0.5, range));
             all.push(CauseParameter::new(format!("high_{name}_mm"), 0.5, range));

@@ -89,7 +89,7 @@ impl Cause for Fibres {
         ]
     }
 
-    /// The direction in hundredths.
+    /// The components of the direction in hundredths.
     fn variant(&self) -> [i64; 3] {
         self.direction.map(|x| (100.0 * x).round() as i64)
     }

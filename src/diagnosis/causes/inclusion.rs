@@ -18,9 +18,9 @@ const NAME: CauseName = CauseName::new("inclusion");
 /// Its line in the registry.
 pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Searched(suspects) };
 
-/// Width of the inclusion's edge, mm. Wider ones take the stiffness factor of stiff balls too large and their radius
-/// too small, at twice the width by a tenth of ln f; the field's points in an element are some three times as far
-/// apart.
+/// Width of the inclusion's edge, mm. With a wider edge a fit makes the stiffness factor f of stiff balls too large and
+/// their radius too small: with twice the width, ln f is off by a tenth. The points in an element at which the field is
+/// taken are some three times this width apart.
 const EDGE_MM: f64 = 0.25;
 
 /// A ball whose stiffness is the surroundings' times a factor.
@@ -74,7 +74,7 @@ fn with_full_stiffness(search: &mut Search, ball: &Ball) -> Result<Option<(f64, 
         Ok(found) => {
             let change = found.trace.plus(-1.0, &search.current.prediction.trace);
             let shape = search.test.test(std::slice::from_ref(&change));
-            // A multiple of the same shape. With the other sign it is another ball's.
+            // The stiffness may become a multiple of the ball's, but not change its sign: that would be another ball.
             let part = shape.coefficients[0];
             let explained = if part > 0.0 { shape.explained } else { 0.0 };
             candidate.values[0] = log_factor_of_ball(part.max(0.1) * change_of_ball(ball.log_factor));
