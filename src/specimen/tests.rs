@@ -198,14 +198,6 @@ fn refuses_bad_limits() {
     assert!(matches!(read(r#", "punches_mm": [1.0], "max_forces_n": 1"#), Err(E::Json(_))));
 }
 
-fn numbers(specimen: &Specimen) -> Vec<f64> {
-    let block = specimen.block;
-    let mut all = vec![block.length_mm, block.thickness_mm, block.width_mm];
-    all.extend(specimen.holes.iter().flat_map(|hole| [hole.center_mm[0], hole.center_mm[1], hole.diameter_mm]));
-    all.extend(&specimen.drive_mm);
-    all
-}
-
 /// Least distance between points on a hole's wall and points on another wall or side.
 fn brute_force(specimen: &Specimen, kind: LigamentKind) -> f64 {
     const POINTS: usize = 600;
@@ -265,14 +257,7 @@ proptest! {
     #[test]
     fn reading_back_gives_the_same_specimen(specimen in valid_specimen()) {
         let back = Specimen::from_json(&specimen.to_json()).unwrap();
-        prop_assert_eq!(numbers(&back).len(), numbers(&specimen).len());
-        for (a, b) in numbers(&back).into_iter().zip(numbers(&specimen)) {
-            // One unit in the last place, twice over.
-            prop_assert!((a - b).abs() <= 2.0 * f64::EPSILON * b.abs());
-        }
-        // Everything that is not a measured number is the same.
-        let strip = |s: Specimen| (s.name, s.test, s.outline, s.samples_in_parallel, s.holes.first().map(|h| h.axis));
-        prop_assert_eq!(strip(back), strip(specimen));
+        prop_assert_eq!(back, specimen);
     }
 }
 
