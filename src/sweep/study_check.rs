@@ -42,7 +42,8 @@ impl SweepStudy {
         if let MeshSize::Factor(value) = self.mesh
             && !SIZE_FACTORS.contains(&value)
         {
-            let allowed = "search, standard, fine or a size factor from 0.2 to 5";
+            let [low, high] = [SIZE_FACTORS.start(), SIZE_FACTORS.end()];
+            let allowed = format!("search, standard, fine or a size factor from {low} to {high}");
             problems.push((root("mesh"), SweepStudyError::OutOfRange { field: root("mesh"), value, allowed }));
         }
         for index in 0..self.variables.len() {
@@ -132,7 +133,7 @@ impl SweepStudy {
             for (path, value) in self.values_of(index) {
                 let set = target.signed(value);
                 if set.is_finite() && set <= 0.0 {
-                    let allowed = if target.signed(1.0) > 0.0 { "above 0" } else { "below 0, as it is negated" };
+                    let allowed = if target.signed(1.0) > 0.0 { "above 0" } else { "below 0, as it is negated" }.into();
                     problems.push((path.clone(), SweepStudyError::OutOfRange { field: path, value, allowed }));
                 }
             }
@@ -158,7 +159,7 @@ impl SweepStudy {
         let path = || FieldPath::of("variables").index(index);
         let is_infinite = |(_, value): &(FieldPath, f64)| !value.is_finite();
         for (path, value) in self.values_of(index).into_iter().filter(is_infinite) {
-            problems.push((path.clone(), SweepStudyError::OutOfRange { field: path, value, allowed: "finite" }));
+            problems.push((path.clone(), SweepStudyError::OutOfRange { field: path, value, allowed: "finite".into() }));
         }
         if let Some(r) = v.range
             && r.min > r.max
@@ -193,8 +194,10 @@ impl SweepStudy {
         match &self.sampling {
             Sampling::LatinHypercube { count: 0 } => {
                 let field = path().name("count");
-                problems
-                    .push((field.clone(), SweepStudyError::OutOfRange { field, value: 0.0, allowed: "at least 1" }));
+                problems.push((
+                    field.clone(),
+                    SweepStudyError::OutOfRange { field, value: 0.0, allowed: "at least 1".into() },
+                ));
             }
             Sampling::List { rows } => {
                 let expected = self.variables.len();

@@ -17,7 +17,7 @@ pub enum SweepStudyError {
     /// The text is not a sweep study.
     #[error("not a sweep-study/1: {message}")]
     Json {
-        /// Line, column and field.
+        /// Line and column of what is no JSON, or the pointer of what does not fit.
         message: String,
     },
     /// A file that the study names cannot be used.
@@ -54,7 +54,7 @@ pub enum SweepStudyError {
         /// Its value.
         value: f64,
         /// What is allowed.
-        allowed: &'static str,
+        allowed: String,
     },
     /// The study has no tasks, or too many.
     #[error("number of tasks is {count}; it must be from 1 to {limit} (designs × materials)")]
@@ -164,7 +164,7 @@ impl SweepStudyError {
             E::Material { error, .. } => error.field_error().below(&pointer),
             E::SameName { name } => FieldError::new(pointer, quoted(name), "a name of its own")
                 .remedy("the table tells materials apart by their names"),
-            E::OutOfRange { value, allowed, .. } => FieldError::new(pointer, value, *allowed),
+            E::OutOfRange { value, allowed, .. } => FieldError::new(pointer, value, allowed.clone()),
             E::NumTasks { count, limit } => FieldError::new(
                 pointer,
                 format!("a sampling with {count} tasks"),

@@ -107,7 +107,7 @@ impl SweepStudy {
             Some(other) => return Err(not_a_study(format!("schema is '{other}', expected '{SCHEMA}'"))),
             None => return Err(not_a_study(format!("there is no schema '{SCHEMA}'"))),
         }
-        let file: StudyFile = serde_json::from_str(text).map_err(|e| not_a_study(e.to_string()))?;
+        let file: StudyFile = read(&value).map_err(|e| not_a_study(e.to_string()))?;
         let study = file.study(
             |base| base.resolve(folder, Specimen::from_json),
             |_, material| material.resolve(folder, Ogden::from_json),
