@@ -190,9 +190,7 @@ pub fn to_json<T: Serialize>(value: &T) -> Result<String, OutcomeError> {
 }
 
 /// What `write` leaves in a fresh folder, by name.
-fn written(
-    write: impl FnOnce(&Path) -> Result<(), RecordingError>,
-) -> Result<BTreeMap<String, Vec<u8>>, OutcomeError> {
+fn written(write: impl FnOnce(&Path) -> Result<(), RecordingError>) -> Result<BTreeMap<String, Vec<u8>>, OutcomeError> {
     let failed = |e: &dyn std::fmt::Display| OutcomeError(format!("a temporary folder: {e}"));
     let scratch = super::scratch::ScratchFolder::new().map_err(|e| failed(&e))?;
     write(scratch.path()).map_err(|e| failed(&e))?;

@@ -49,4 +49,3 @@ pub fn kind_of_part(kind: PartKind) -> &'static Kind {
 pub fn kind_of_task(command: &str) -> Option<&'static Kind> {
     kind_of_command(command).or_else(|| Some(&SWEEP_TASK).filter(|kind| kind.command == command))
 }
-

@@ -3,7 +3,9 @@
 use super::{Context, Failure, JobError, Outcome, Part, PartKind, Request, Run, summary};
 use crate::field::FieldError;
 use crate::report::sweep_report;
-use crate::sweep::{Collected, Outcome as TaskOutcome, SweepResult, SweepStudy, SweepTable, TaskInputs, tasks, to_parquet};
+use crate::sweep::{
+    Collected, Outcome as TaskOutcome, SweepResult, SweepStudy, SweepTable, TaskInputs, tasks, to_parquet,
+};
 use serde::Deserialize;
 use serde_json::{Value, json};
 

@@ -44,7 +44,8 @@ pub fn tasks_of(job: &Job, max_elements: usize) -> Result<(Vec<NewTask>, bool), 
         Ok(job) => task(&job),
         // A part that cannot be run is a result: it fails when its turn comes.
         Err(_) => {
-            let input = TaskInput { kind: kind_of_part(part.kind).command.into(), request: part.request.clone(), max_elements };
+            let input =
+                TaskInput { kind: kind_of_part(part.kind).command.into(), request: part.request.clone(), max_elements };
             Ok(NewTask { input: serde_json::to_string(&input)?, cache_key: String::new() })
         }
     });
