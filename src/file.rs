@@ -1,7 +1,8 @@
 //! Reading files that a user names: regular files only, and never more than a limit.
 //!
-//! A pipe would block, a device such as `/dev/zero` never ends, and the size that the system tells for some files (those
-//! of `/proc`) is not what they hold. So the kind is checked before and after opening, and the limit while reading.
+//! A pipe would block, a device such as `/dev/zero` never ends, and the size that the system tells for some files
+//! (those of `/proc`) is not what they hold. So the kind is checked before and after opening, and the limit while
+//! reading.
 
 use sha2::{Digest, Sha256};
 use std::fs::{self, File};

@@ -277,7 +277,8 @@ fn diagnosed(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliErro
     Ok(first)
 }
 
-/// Reads TEST=FILE arguments into the field `curves`; `is_kept_back` is asked with a curve's name and test. Gives the first path.
+/// Reads TEST=FILE arguments into the field `curves`; `is_kept_back` is asked with a curve's name and test. Gives the
+/// first path.
 fn read_curves(
     arguments: &[String],
     option: &'static str,

@@ -1,7 +1,8 @@
 //! `lambdak design --slurm`: searches from several seeds as a job array, of which the best is taken.
 //!
-//! A search decides each round from the one before, so that it does not split into independent tasks; whole searches do. Each
-//! seed's search is the one that `lambdak design --seed` runs, to the bit, and the winner does not depend on which ends first.
+//! A search decides each round from the one before, so that it does not split into independent tasks; whole searches
+//! do. Each seed's search is the one that `lambdak design --seed` runs, to the bit, and the winner does not depend on
+//! which ends first.
 
 use super::error::CliError;
 use super::slurm::{SlurmArguments, own_program, path_text, run_array};
@@ -11,8 +12,8 @@ use crate::design::{DesignResult, Study, study_hash};
 use crate::slurm::TaskProgress;
 use std::path::{Path, PathBuf};
 
-/// Runs a search for each of the seeds `study.seed`, `study.seed` + 1, … as array tasks. Returns the folder and the seed of the
-/// one with the largest objective, of equal ones the smallest seed.
+/// Runs a search for each of the seeds `study.seed`, `study.seed` + 1, … as array tasks. Returns the folder and the
+/// seed of the one with the largest objective, of equal ones the smallest seed.
 pub(super) fn search_on_cluster(
     a: &SlurmArguments,
     study: &Study,

@@ -73,7 +73,8 @@ pub enum CliError {
 }
 
 impl CliError {
-    /// 1 for a compared result that is worse, 2 for bad input, 3 for a computation that did not succeed, 4 for a file that cannot be written, 130 after Ctrl-C.
+    /// 1 for a compared result that is worse, 2 for bad input, 3 for a computation that did not succeed, 4 for a file
+    /// that cannot be written, 130 after Ctrl-C.
     pub fn exit_code(&self) -> u8 {
         match self {
             CliError::Read { .. } | CliError::Input { .. } | CliError::Option { .. } => 2,

@@ -1,4 +1,5 @@
-//! Options of the command as fields of a request: names are translated here, everything else comes from the request's type.
+//! Options of the command as fields of a request: names are translated here, everything else comes from the request's
+//! type.
 
 use super::error::CliError;
 use super::input;
@@ -56,7 +57,7 @@ impl Flag {
     pub(super) fn arg(self, field: &RequestField) -> Arg {
         let mut help = field.about.trim_end_matches('.').replace('`', "");
         if self.written == Written::Off {
-            help = format!("Turns off: {help}");
+            help = format!("Turns off: {}", help.trim_start_matches("Whether "));
         }
         if !field.range.is_empty() {
             help += &format!(" ({})", field.range);

@@ -5,7 +5,8 @@ use crate::file::read_limited;
 use serde_json::Value;
 use std::path::Path;
 
-/// Largest file that is read as a part of a request: specimens, materials and studies are a few kilobytes, results of sweeps more.
+/// Largest file that is read as a part of a request: specimens, materials and studies are a few kilobytes, results of
+/// sweeps more.
 const MAX_FILE_BYTES: u64 = 256 << 20;
 
 /// Text of a file.

@@ -1,4 +1,5 @@
-//! A command that runs a job: options become a request, the request a job, the job an outcome, the outcome files and text.
+//! A command that runs a job: options become a request, the request a job, the job an outcome, the outcome files and
+//! text.
 
 use super::error::CliError;
 use super::flag::Flag;
@@ -12,7 +13,8 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// What a command adds to the request beyond its flags: its plain arguments. Gives the path after which results are named.
+/// What a command adds to the request beyond its flags: its plain arguments. Gives the path after which results are
+/// named.
 pub(super) type Fill = fn(&ArgMatches, &mut Asked) -> Result<PathBuf, CliError>;
 
 /// A command and the kind of job that it runs.
@@ -110,13 +112,14 @@ impl JobCommand {
     pub(super) fn clap(&self) -> Command {
         let kind = kind_of(self.name);
         let fields = kind.fields();
-        let mut command = (self.arguments)(Command::new(self.name).about(kind.about));
+        let mut command = (self.arguments)(Command::new(self.name));
         for flag in self.flags {
             if let Some(field) = fields.iter().find(|f| f.name == flag.field) {
                 command = command.arg(flag.arg(field));
             }
         }
-        Common::augment_args(command)
+        // The description of the options that all commands share is not that of the command.
+        Common::augment_args(command).about(kind.about)
     }
 
     /// The request that the command line asks for, and the path after which results are named.

@@ -1,4 +1,5 @@
-//! The command. Nothing is computed here: arguments become one validated request, the library works, results are printed.
+//! The command. Nothing is computed here: arguments become one validated request, the library works, results are
+//! printed.
 //!
 //! Results on stdout (`--json` for machines), progress on stderr, files in a folder. Exit codes: 0 done, 1 worse
 //! (`compare`), 2 bad input, 3 no solution found, 4 a file cannot be written, 130 stopped by Ctrl-C.
@@ -40,23 +41,24 @@ fn program() -> Command {
         .arg_required_else_help(true);
     let job = commands::COMMANDS.iter().map(job_command::JobCommand::clap);
     let own = [
-        design::DesignArguments::augment_args(of_kind("design")),
-        sweep::SweepArguments::augment_args(of_kind("sweep")),
+        of_kind(design::DesignArguments::augment_args(Command::new("design"))),
+        of_kind(sweep::SweepArguments::augment_args(Command::new("sweep"))),
         compare::clap(),
-        run::RunArguments::augment_args(
-            Command::new("run").about("Any kind of job from a request as the service takes it"),
-        ),
-        serve::ServeArguments::augment_args(
-            Command::new("serve").about("The service: REST, jobs, and a page for planners"),
-        ),
-        worker::WorkerArguments::augment_args(Command::new("worker").about("A worker of a service on PostgreSQL")),
+        run::RunArguments::augment_args(Command::new("run"))
+            .about("Any kind of job from a request as the service takes it"),
+        serve::ServeArguments::augment_args(Command::new("serve"))
+            .about("The service: REST, jobs, and a page for planners"),
+        worker::WorkerArguments::augment_args(Command::new("worker")).about("A worker of a service on PostgreSQL"),
     ];
     program.subcommands(job).subcommands(own)
 }
 
 /// A command that says of itself what its kind of job does.
-fn of_kind(name: &'static str) -> Command {
-    Command::new(name).about(job_command::kind_of(name).about)
+fn of_kind(command: Command) -> Command {
+    match crate::job::kind_of_command(command.get_name()) {
+        Some(kind) => command.about(kind.about),
+        None => command,
+    }
 }
 
 /// What every command takes.

@@ -1,7 +1,7 @@
 //! Where results go: each command has a folder of its own under the name of its input, `results/NAME/COMMAND`.
 //!
-//! Beside the files lies a list of them (`COMMAND-job.json`). Files of another command are never replaced; files of an earlier
-//! run of the same command are, and where its inputs were others, that is said.
+//! Beside the files lies a list of them (`COMMAND-job.json`). Files of another command are never replaced; files of an
+//! earlier run of the same command are, and where its inputs were others, that is said.
 
 use super::error::CliError;
 use super::output::{to_json, write_file};

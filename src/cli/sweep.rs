@@ -210,7 +210,7 @@ fn finish(study: &SweepStudy, folders: &[&Path], out: &Path, is_json: bool) -> R
     let results = collected(study, folders)?;
     results.check_complete(study.num_tasks())?;
     let asked = Asked { kind: COMMAND, request: json(study)?, sources: Vec::new() };
-    let outcomes = results.outcomes.values().map(|o| Ok(json(o)?)).collect::<Result<Vec<_>, CliError>>()?;
+    let outcomes = results.outcomes.values().map(json).collect::<Result<Vec<_>, CliError>>()?;
     let gathered = asked.job()?.gather(outcomes.into_iter().map(Ok).collect());
     let outcome = gathered.map_err(|e| asked.failure(e, None))?;
     leave(&outcome, Some(&ResultsFolder::open(out.to_path_buf(), COMMAND)?), is_json)

@@ -1,4 +1,5 @@
-//! What a job is given by the command: recordings from folders, progress on stderr, Ctrl-C, checkpoints beside the results.
+//! What a job is given by the command: recordings from folders, progress on stderr, Ctrl-C, checkpoints beside the
+//! results.
 
 use super::interrupt;
 use crate::job::{InputFile, JobError, Progress, Surroundings};
@@ -71,7 +72,7 @@ impl Surroundings for Terminal {
 
     fn progress(&self, p: &Progress) {
         let best = p.best.map_or(String::new(), |b| format!(" best gain {b:.3}"));
-        let tenth = if p.total == 0 { 0 } else { 10 * p.done / p.total };
+        let tenth = (10 * p.done).checked_div(p.total).unwrap_or(0);
         let is_new = {
             let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
             let is_new = last.0 != p.stage || last.1 < tenth;

@@ -9,8 +9,8 @@ use clap::Args;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Where the database's address is taken from without `--database`: it may hold a password, which other users of a machine
-/// would see in a command line.
+/// Where the database's address is taken from without `--database`: it may hold a password, which other users of a
+/// machine would see in a command line.
 const ADDRESS: &str = "LAMBDAK_DATABASE";
 /// How long a cluster's worker waits for work unless told otherwise, s.
 const IDLE_ON_A_CLUSTER: u64 = 60;

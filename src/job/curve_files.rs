@@ -106,7 +106,8 @@ pub struct CurveFitSettings {
     #[serde(default = "max_terms")]
     #[schema(minimum = 1, maximum = 4, default = max_terms)]
     pub max_terms: usize,
-    /// Bulk modulus in kPa, held; the incompressible limit where it is left out, since homogeneous tests do not determine it.
+    /// Bulk modulus in kPa, held; the incompressible limit where it is left out, since homogeneous tests do not
+    /// determine it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-6, maximum = 1e12)]
     pub bulk_kpa: Option<f64>,

@@ -123,8 +123,8 @@ impl CheckedStudy {
         })
     }
 
-    /// Best and base with every material, `None` where it was stopped. What is done is kept in the checkpoint. A specimen that
-    /// cannot be verified is a finding, not a failed job.
+    /// Best and base with every material, `None` where it was stopped. What is done is kept in the checkpoint. A
+    /// specimen that cannot be verified is a finding, not a failed job.
     fn verified(
         &self,
         result: &DesignResult,

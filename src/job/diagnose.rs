@@ -15,8 +15,8 @@ use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// Body of a diagnosis: one `recording`, or several `recordings`, which are diagnosed one after the other and then looked at
-/// together.
+/// Body of a diagnosis: one `recording`, or several `recordings`, which are diagnosed one after the other and then
+/// looked at together.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DiagnosisRequest {
@@ -34,7 +34,8 @@ pub struct DiagnosisRequest {
     #[serde(default = "mesh_factor")]
     #[schema(minimum = 0.3, maximum = 5.0, default = mesh_factor)]
     pub mesh_factor: f64,
-    /// Displacement error that meshes may leave, mm rms at the largest drive; a thousandth of that drive where it is left out.
+    /// Displacement error that meshes may leave, mm rms at the largest drive; a thousandth of that drive where it is
+    /// left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-9, maximum = 1000.0)]
     pub allowance_mm: Option<f64>,
@@ -90,7 +91,7 @@ impl Request for DiagnosisRequest {
 
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let mut errors = Vec::new();
-        if self.recording.is_some() == !self.recordings.is_empty() {
+        if self.recording.is_some() != self.recordings.is_empty() {
             let error =
                 FieldError::new("/recording", "neither alone nor left out", "given, or recordings in its place");
             errors.push(error.remedy("give one of the two"));
@@ -169,7 +170,8 @@ impl Run for DiagnosisRequest {
     }
 }
 
-/// Report, pictures, and residual maps on the compared grid (measured minus predicted), by the nominal model and with the causes.
+/// Report, pictures, and residual maps on the compared grid (measured minus predicted), by the nominal model and with
+/// the causes.
 fn add_files(outcome: &mut Outcome, prefix: &str, found: &Diagnosis, result: &DiagnosisResult) -> Result<(), JobError> {
     for (when, fitted) in [("before", &found.nominal), ("after", &found.corrected)] {
         let mask = &found.observed.mask;

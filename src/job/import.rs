@@ -222,7 +222,7 @@ fn unfit(pointer: &str, path: &Path, error: &dyn std::fmt::Display) -> JobError 
 }
 
 impl CheckedImport {
-    fn from_phases(&self, context: &Context) -> Result<Imported, JobError> {
+    fn unwrapped(&self, context: &Context) -> Result<Imported, JobError> {
         let mut raw = context
             .raw_recordings
             .first()
@@ -241,7 +241,7 @@ impl CheckedImport {
         Ok((found.recording, found.sd_mm, found.steps))
     }
 
-    fn from_files(&self, files: &[PathBuf]) -> Result<Recording, JobError> {
+    fn read_files(&self, files: &[PathBuf]) -> Result<Recording, JobError> {
         let missing = || JobError::Internal("a checked import has a specimen and a form".into());
         let specimen = self.request.specimen.as_ref().ok_or_else(missing)?;
         let options = self.request.import_options().ok_or_else(missing)?;
@@ -292,8 +292,8 @@ impl Run for CheckedImport {
     fn run(&self, context: &Context) -> Result<Outcome, JobError> {
         context.step("import", 0, 1);
         let (mut recording, sd, reports) = match self.request.recording {
-            Some(_) => self.from_phases(context)?,
-            None => (self.from_files(&context.files)?, Vec::new(), Vec::new()),
+            Some(_) => self.unwrapped(context)?,
+            None => (self.read_files(&context.files)?, Vec::new(), Vec::new()),
         };
         if let Some(load) = &self.load {
             recording.load = Some(load.clone());

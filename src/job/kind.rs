@@ -13,6 +13,9 @@ use std::sync::OnceLock;
 use utoipa::openapi::RefOr;
 use utoipa::openapi::schema::Schema;
 
+/// A request in its canonical form, and ready to run.
+type Checked = (Value, Box<dyn Run>);
+
 /// A kind of job.
 pub struct Kind {
     /// Name of the command.
@@ -24,12 +27,13 @@ pub struct Kind {
     schema: fn() -> RequestSchema,
     components: fn() -> Vec<(String, RefOr<Schema>)>,
     schema_name: fn() -> Cow<'static, str>,
-    checked: fn(&Value) -> Result<(Value, Box<dyn Run>), Vec<FieldError>>,
+    checked: fn(&Value) -> Result<Checked, Vec<FieldError>>,
     cell: OnceLock<RequestSchema>,
 }
 
-/// Reads a request of type `R` whose fields fit its schema: its canonical form, with defaults written out, and itself ready to run.
-fn checked<R: Request>(value: &Value) -> Result<(Value, Box<dyn Run>), Vec<FieldError>> {
+/// Reads a request of type `R` whose fields fit its schema: its canonical form, with defaults written out, and itself
+/// ready to run.
+fn checked<R: Request>(value: &Value) -> Result<Checked, Vec<FieldError>> {
     let request = R::read(value)?;
     let whole = |e: serde_json::Error| vec![FieldError::new("", e, "a request that JSON can hold")];
     let canonical = serde_json::to_value(&request).map_err(whole)?;
@@ -122,8 +126,8 @@ impl Job {
         self.run.inputs()
     }
 
-    /// A key that equal work of this version of the program shares, and whether the result is numbers alone, which the files of
-    /// an equal job with files answer too.
+    /// A key that equal work of this version of the program shares, and whether the result is numbers alone, which the
+    /// files of an equal job with files answer too.
     pub fn work_key(&self) -> (String, bool) {
         let (content, is_numbers_only) = self.run.equal_work().unwrap_or_else(|| (self.request.clone(), false));
         let key = input_hash(&json!({ "kind": self.kind.command, "version": VERSION, "content": content }));
@@ -159,8 +163,8 @@ impl Job {
         Ok(self.context(surroundings)?.input_hash)
     }
 
-    /// Reads what the request names. It is known by its content, not by where it lies: in the hash its name gives way to its
-    /// digest.
+    /// Reads what the request names. It is known by its content, not by where it lies: in the hash its name gives way
+    /// to its digest.
     fn context<'a>(&self, surroundings: &'a dyn Surroundings) -> Result<Context<'a>, JobError> {
         let mut canonical = self.request.clone();
         let (mut recordings, mut raw_recordings, mut files) = (Vec::new(), Vec::new(), Vec::new());
@@ -195,7 +199,8 @@ impl Job {
         input_hash(&json!({ "kind": self.kind.command, "request": canonical }))
     }
 
-    /// Reads what the request names, hashes what goes in, and does work that does not divide ([`super::run`] does any work).
+    /// Reads what the request names, hashes what goes in, and does work that does not divide ([`super::run`] does any
+    /// work).
     ///
     /// # Errors
     /// [`JobError`].

@@ -1,9 +1,11 @@
-//! What the program can be asked to do: one file per kind of job, the same for the command, the service and every other door.
+//! What the program can be asked to do: one file per kind of job, the same for the command, the service and every other
+//! door.
 //!
-//! A *request* says what is wanted (its fields, units, defaults and limits stand once, in its type; the command's options, the
-//! OpenAPI document and the reference in the docs come from there). It is *checked*, which names everything that is wrong
-//! with it at once, and then *run* in *surroundings* that hand it recordings, take its progress, keep its checkpoint and may
-//! cancel it. The *outcome* is a result and files: the command writes them into a folder, the service stores them.
+//! A *request* says what is wanted (its fields, units, defaults and limits stand once, in its type; the command's
+//! options, the OpenAPI document and the reference in the docs come from there). It is *checked*, which names
+//! everything that is wrong with it at once, and then *run* in *surroundings* that hand it recordings, take its
+//! progress, keep its checkpoint and may cancel it. The *outcome* is a result and files: the command writes them into a
+//! folder, the service stores them.
 //!
 //! A new kind of job is one file here, with a type that implements [`Request`], and one line in [`KINDS`].
 
@@ -50,7 +52,7 @@ pub use reference::reference;
 pub use registry::{KINDS, kind_of_collection, kind_of_command, kind_of_part, kind_of_task};
 pub use request::{Context, InputForm, InputUse, Request, Run};
 pub use run::{job_of_part, run};
-pub use schema::{FieldForm, RequestField, check_against, fields_of};
+pub use schema::{FieldForm, RequestField};
 pub use scratch::ScratchFolder;
 pub use subject::unmeshable;
 pub use surroundings::{InputFile, Progress, Surroundings};

@@ -12,8 +12,8 @@ use utoipa::ToSchema;
 
 /// A request of one kind: the one definition of its fields, their units, defaults and limits.
 ///
-/// Limits of single fields stand in the attributes of the type's schema and are checked from there; [`check`](Self::check)
-/// adds what concerns several fields or their content.
+/// Limits of single fields stand in the attributes of the type's schema and are checked from there;
+/// [`check`](Self::check) adds what concerns several fields or their content.
 pub trait Request: Serialize + DeserializeOwned + ToSchema + Send + Sync + 'static {
     /// Name of the command, such as `calibrate`; also the name of the job's folder of results.
     const COMMAND: &'static str;
@@ -89,8 +89,8 @@ pub trait Run: Send + Sync {
         Ok(())
     }
 
-    /// What decides the result, where other requests may have the same: its content, and whether the result is numbers alone
-    /// (which those of a request with files answer too). `None` where the request itself is that content.
+    /// What decides the result, where other requests may have the same: its content, and whether the result is numbers
+    /// alone (which those of a request with files answer too). `None` where the request itself is that content.
     fn equal_work(&self) -> Option<(Value, bool)> {
         None
     }

@@ -1,7 +1,7 @@
 //! A request's type as JSON Schema: what its fields may hold, and which of them do not.
 //!
-//! The schema comes from the request's own type ([`utoipa::ToSchema`]), so that the OpenAPI document, the options of the
-//! command, the reference in the docs and the check before a job starts cannot differ.
+//! The schema comes from the request's own type ([`utoipa::ToSchema`]), so that the OpenAPI document, the options of
+//! the command, the reference in the docs and the check before a job starts cannot differ.
 
 use crate::field::{FieldError, escaped};
 use serde_json::{Map, Value};
@@ -199,16 +199,6 @@ impl RequestSchema {
     }
 }
 
-/// Every field of `value` that does not hold what `T` may hold.
-pub fn check_against<T: ToSchema>(value: &Value) -> Vec<FieldError> {
-    RequestSchema::of::<T>().errors(value)
-}
-
-/// The fields of a request's type.
-pub fn fields_of<T: ToSchema>() -> Vec<RequestField> {
-    RequestSchema::of::<T>().fields()
-}
-
 /// JSON of a value, cut where it is long.
 fn shown(value: &Value) -> String {
     let text = value.to_string();
@@ -285,11 +275,17 @@ fn range_in_words(schema: &Value) -> String {
     let high = limit(schema, "maximum").map(|h| (h, "at most"));
     let high = high.or_else(|| limit(schema, "exclusiveMaximum").map(|h| (h, "below")));
     match (low, high) {
-        (Some((l, "at least")), Some((h, "at most"))) => format!("from {l} to {h}"),
-        (Some((l, from)), Some((h, to))) => format!("{from} {l} and {to} {h}"),
-        (Some((l, word)), None) | (None, Some((l, word))) => format!("{word} {l}"),
+        (Some((l, "at least")), Some((h, "at most"))) => format!("from {} to {}", short(l), short(h)),
+        (Some((l, from)), Some((h, to))) => format!("{from} {} and {to} {}", short(l), short(h)),
+        (Some((l, word)), None) | (None, Some((l, word))) => format!("{word} {}", short(l)),
         (None, None) => String::new(),
     }
+}
+
+/// A limit without a row of zeros.
+fn short(limit: f64) -> String {
+    let is_plain = limit == 0.0 || (1e-4..1e6).contains(&limit.abs());
+    if is_plain { limit.to_string() } else { format!("{limit:e}") }
 }
 
 fn form_of(schema: &Value) -> FieldForm {
@@ -358,7 +354,7 @@ mod tests {
     }
 
     fn pointers(value: &Value) -> Vec<String> {
-        check_against::<Outer>(value).into_iter().map(|e| e.pointer).collect()
+        RequestSchema::of::<Outer>().errors(value).into_iter().map(|e| e.pointer).collect()
     }
 
     #[test]
@@ -372,13 +368,13 @@ mod tests {
         assert_eq!(found, ["/count", "/inner/a~1b", "/inner/voxel_mm", "/side", "/weight", "/x"]);
         assert_eq!(pointers(&json!({ "count": 1.5 })), ["/side", "/count"]);
         assert_eq!(pointers(&json!([])), [""]);
-        let text = check_against::<Outer>(&json!({ "side": "left", "count": 21 }))[0].to_string();
+        let text = RequestSchema::of::<Outer>().errors(&json!({ "side": "left", "count": 21 }))[0].to_string();
         assert_eq!(text, "/count is 21; it must be from 1 to 20");
     }
 
     #[test]
     fn fields_carry_form_default_and_range() {
-        let fields = fields_of::<Outer>();
+        let fields = RequestSchema::of::<Outer>().fields();
         let field = |name: &str| fields.iter().find(|f| f.name == name).unwrap().clone();
         assert_eq!(field("side").form, FieldForm::Choice(vec!["left".into(), "right".into()]));
         let count = field("count");

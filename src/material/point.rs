@@ -1,4 +1,5 @@
-//! The material at one point: energy, stress, tangent and parameter derivatives with the exact volumetric term κ/2 (ln J)².
+//! The material at one point: energy, stress, tangent and parameter derivatives with the exact volumetric term κ/2 (ln
+//! J)².
 
 use super::{Lanes, Ogden, Parameter, SpectralState, Tensor};
 
@@ -106,7 +107,8 @@ mod tests {
         energy_density(m, [s[0], s[1], s[2]])
     }
 
-    /// Central differences with step 1e-5: truncation 1e-10 × third derivatives (≤ 1e3 of the scale), rounding 1e-11/1e-5.
+    /// Central differences with step 1e-5: truncation 1e-10 × third derivatives (≤ 1e3 of the scale), rounding
+    /// 1e-11/1e-5.
     #[test]
     fn stress_is_the_derivative_of_the_energy() {
         for m in materials() {

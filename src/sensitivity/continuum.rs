@@ -1,8 +1,8 @@
 //! Smooth counterparts of the voxel sums, over the quadrature points of the mesh.
 //!
-//! A sum over voxels jumps when a wall crosses a voxel's middle; a search needs values that vary smoothly with the design.
-//! With ∫ dV / V_voxel in place of Σ_voxels the sums become integrals over the specimen: the limit of small voxels at a fixed
-//! number of voxels per volume. Mirrored parts count as often as they are reflected.
+//! A sum over voxels jumps when a wall crosses a voxel's middle; a search needs values that vary smoothly with the
+//! design. With ∫ dV / V_voxel in place of Σ_voxels the sums become integrals over the specimen: the limit of small
+//! voxels at a fixed number of voxels per volume. Mirrored parts count as often as they are reflected.
 
 use super::information::{FisherInformation, InformationError, MeasurementNoise};
 use super::integrated::{IntegratedSensitivity, parameter_sensitivity, shear_parameters};
@@ -50,8 +50,8 @@ pub fn integrate_over_quadrature(
 /// Fisher information of one drive with ∫ dV / V_voxel in place of the sum over voxels.
 ///
 /// `points` come from [`crate::fem::ForwardModel::quadrature_fields`] (element after element, in the order of
-/// [`crate::mesh::ElementKind::quadrature`]); `sensitivities` stand in the order of [`Ogden::parameters`]. Products of two sensitivities are
-/// even under the mirrors, so each reflected copy adds the same.
+/// [`crate::mesh::ElementKind::quadrature`]); `sensitivities` stand in the order of [`Ogden::parameters`]. Products of
+/// two sensitivities are even under the mirrors, so each reflected copy adds the same.
 ///
 /// # Errors
 /// [`InformationError::InvalidSd`], [`InformationError::LengthMismatch`], [`InformationError::NotFinite`].
@@ -77,8 +77,8 @@ pub fn information_over_quadrature(
     Ok(information)
 }
 
-/// Products of pairs (nodal displacements in mm, force in N) in the metric of the scan's noise: ∫ aᵀ N⁻¹ b dV / V_voxel and the
-/// load cell's part.
+/// Products of pairs (nodal displacements in mm, force in N) in the metric of the scan's noise: ∫ aᵀ N⁻¹ b dV / V_voxel
+/// and the load cell's part.
 pub(super) fn gram_over_quadrature(
     mesh: &Mesh,
     points: &[QuadraturePoint],

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 /// Largest relative standard deviation of an identifiable parameter: at ½ the 95 % interval just reaches zero.
 pub const IDENTIFIABILITY_LIMIT: f64 = 0.5;
 
-/// A direction counts as undetermined where its eigenvalue, in the information matrix scaled to a unit diagonal, is below
-/// this times the largest: sums over some 10⁴ data carry about that much rounding.
+/// A direction counts as undetermined where its eigenvalue, in the information matrix scaled to a unit diagonal, is
+/// below this times the largest: sums over some 10⁴ data carry about that much rounding.
 const NULL_EIGENVALUE: f64 = 1e-13;
 
 /// A parameter shares an undetermined direction where its component in it exceeds this.
@@ -96,8 +96,8 @@ impl Covariance {
         Covariance { parameters: information.parameters().to_vec(), scales, relative, is_determined }
     }
 
-    /// The sandwich M⁻¹ B M⁻¹ of an estimate whose weights are not the inverse of the noise's covariance: this covariance is
-    /// M⁻¹, `score` is B, the covariance of the weighted misfit's gradient, in the parameters' units.
+    /// The sandwich M⁻¹ B M⁻¹ of an estimate whose weights are not the inverse of the noise's covariance: this
+    /// covariance is M⁻¹, `score` is B, the covariance of the weighted misfit's gradient, in the parameters' units.
     pub fn with_score(&self, score: &DMatrix<f64>) -> Covariance {
         let n = self.parameters.len();
         let relative_score = DMatrix::from_fn(n, n, |i, j| self.scales[i] * score[(i, j)] * self.scales[j]);
@@ -202,8 +202,8 @@ impl Covariance {
     }
 
     /// Derivative of the criterion with respect to the information matrix in parameter units: ∂Φ/∂I_ij with the entries
-    /// (i, j) and (j, i) taken apart, so that dΦ = Σ_ij gradient_ij dI_ij. From dC = −C dI C. At a repeated largest value
-    /// one of the subgradients.
+    /// (i, j) and (j, i) taken apart, so that dΦ = Σ_ij gradient_ij dI_ij. From dC = −C dI C. At a repeated largest
+    /// value one of the subgradients.
     pub fn criterion_gradient(&self, criterion: Criterion, subset: &[usize]) -> Option<DMatrix<f64>> {
         let block = self.block(subset)?;
         let by_block = match criterion {

@@ -50,8 +50,8 @@ pub(super) fn check_drives(drives: &DriveSelection) -> Result<(), EvaluationErro
     }
 }
 
-/// The drive at which a homogeneous specimen has stretch amplitude λ: shear γ = λ − 1/λ over the thickness, or λ − 1 over
-/// the length.
+/// The drive at which a homogeneous specimen has stretch amplitude λ: shear γ = λ − 1/λ over the thickness, or λ − 1
+/// over the length.
 fn homogeneous_drive_mm(specimen: &Specimen, stretch: f64) -> f64 {
     match specimen.test {
         TestKind::DoubleLapShear => (stretch - 1.0 / stretch) * specimen.block.thickness_mm,

@@ -1,7 +1,7 @@
 //! Fisher information of a scan about the material's parameters.
 //!
-//! Data: the displacement of every voxel (independent Gaussian noise per component) and the load cell's force at every drive.
-//! With s_i = ∂ū/∂ξ_i per voxel and f_i = ∂F/∂ξ_i,
+//! Data: the displacement of every voxel (independent Gaussian noise per component) and the load cell's force at every
+//! drive. With s_i = ∂ū/∂ξ_i per voxel and f_i = ∂F/∂ξ_i,
 //!
 //! I_ij = Σ_drives [ Σ_voxels w Σ_c s_ic s_jc / σ_c² + f_i f_j / σ_F² ].
 //!
@@ -122,8 +122,8 @@ impl FisherInformation {
 
     /// Information of one drive.
     ///
-    /// `voxel_sensitivities[i][v]` is ∂ū/∂ξ_i of voxel v (mm per unit of ξ_i) and `force_sensitivities[i]` is ∂F/∂ξ_i (N per
-    /// unit), both in the order of [`Ogden::parameters`]; `weights[v]` comes from [`PartialVoxels::weights`].
+    /// `voxel_sensitivities[i][v]` is ∂ū/∂ξ_i of voxel v (mm per unit of ξ_i) and `force_sensitivities[i]` is ∂F/∂ξ_i
+    /// (N per unit), both in the order of [`Ogden::parameters`]; `weights[v]` comes from [`PartialVoxels::weights`].
     ///
     /// # Errors
     /// [`InformationError::InvalidSd`], [`InformationError::LengthMismatch`], [`InformationError::NotFinite`].

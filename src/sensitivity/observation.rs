@@ -35,7 +35,8 @@ pub struct EvaluationStep {
     pub median_mode: Option<f64>,
     /// Largest λ of a voxel.
     pub largest_voxel_stretch: f64,
-    /// Largest principal stretch in the specimen (quadrature points). Bonded edges are singular: it grows with the mesh.
+    /// Largest principal stretch in the specimen (quadrature points). Bonded edges are singular: it grows with the
+    /// mesh.
     pub largest_principal_stretch: f64,
     /// Voxels without a mode (λ = 1); they count as zero in the sensitivities.
     pub num_voxels_without_mode: usize,

@@ -1,9 +1,9 @@
 //! How far apart two materials are for a scan: the objective of experiments that are to tell models apart.
 //!
-//! T-optimality (Atkinson and Fedorov 1975): the least squares distance, in standard deviations of the noise, between what one
-//! material does and the nearest that the other can do with its parameters free. Its square is the non-centrality of the
-//! likelihood ratio by which data of the one reject the other. What is here is the last, linear step to the nearest point;
-//! repeated from where it leads it is a Gauss–Newton fit.
+//! T-optimality (Atkinson and Fedorov 1975): the least squares distance, in standard deviations of the noise, between
+//! what one material does and the nearest that the other can do with its parameters free. Its square is the
+//! non-centrality of the likelihood ratio by which data of the one reject the other. What is here is the last, linear
+//! step to the nearest point; repeated from where it leads it is a Gauss–Newton fit.
 
 use super::continuum::gram_over_quadrature;
 use super::information::{InformationError, MeasurementNoise};
@@ -22,14 +22,15 @@ pub struct MaterialState {
     pub sensitivities: Vec<ParameterSensitivity>,
 }
 
-/// A direction of `ours` counts as its own above this share of the largest, in the Gram matrix scaled to a unit diagonal.
+/// A direction of `ours` counts as its own above this share of the largest, in the Gram matrix scaled to a unit
+/// diagonal.
 const NULL_EIGENVALUE: f64 = 1e-12;
 
 /// How far apart two materials are, and where the nearest point is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Separation {
-    /// Standard deviations of the noise between the scan of one material and the nearest scan that the other can give, to first
-    /// order in its parameters.
+    /// Standard deviations of the noise between the scan of one material and the nearest scan that the other can give,
+    /// to first order in its parameters.
     pub distance_sd: f64,
     /// Changes of the other's parameters (in their units) that lead there.
     pub steps: Vec<f64>,

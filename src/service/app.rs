@@ -157,7 +157,7 @@ async fn guard(State(app): State<App>, mut request: Request, next: Next) -> Resp
             run(&app, request, next, &path).await
         }
     };
-    finish(&app, answer, &id, &method, &route, &path, &name, started)
+    finish(&app, answer, &Served { id, method, route, path, caller: name, started })
 }
 
 /// What needs no token: the page's own files, its document, and whether the service lives. They hold no data.
@@ -221,16 +221,20 @@ fn request_id(headers: &HeaderMap) -> String {
     if is_plain { given.into() } else { random_hex::<8>().unwrap_or_else(|_| "0".into()) }
 }
 
-fn finish(
-    app: &App,
-    mut answer: Response,
-    id: &str,
-    method: &Method,
-    route: &str,
-    path: &str,
-    caller: &str,
+/// A request that was served.
+struct Served {
+    id: String,
+    method: Method,
+    /// The route's pattern.
+    route: String,
+    path: String,
+    /// Name of the token; empty where there was none.
+    caller: String,
     started: Instant,
-) -> Response {
+}
+
+fn finish(app: &App, mut answer: Response, served: &Served) -> Response {
+    let Served { id, method, route, path, caller, started } = served;
     // axum's own refusals (a body that is too long, say) become problems too.
     let is_plain_error = answer.status().as_u16() >= 400
         && answer.headers().get(header::CONTENT_TYPE).is_none_or(|t| t != "application/problem+json");

@@ -128,20 +128,18 @@ fn run_task(store: &Store, settings: &WorkerSettings, signal: &Signal, worker: &
     if let Ok(Some(bytes)) = store.checkpoint(task) {
         let _ = std::fs::write(&path, bytes);
     }
-    let is_lost = AtomicBool::new(false);
-    let is_done = AtomicBool::new(false);
-    let progress = Mutex::new(String::new());
+    let watch = Watch::default();
     let outcome = std::thread::scope(|scope| {
-        let keeper = scope.spawn(|| keep(store, settings, worker, task, &path, &is_lost, &is_done, &progress));
+        let keeper = scope.spawn(|| keep(store, settings, worker, task, &path, &watch));
         let surroundings = StoredSurroundings {
             store,
-            is_cancelled: &|| is_lost.load(Ordering::Relaxed) || signal.is_stopping(),
-            progress: &progress,
+            is_cancelled: &|| watch.is_lost.load(Ordering::Relaxed) || signal.is_stopping(),
+            progress: &watch.progress,
             checkpoint: &path,
             max_elements: usize::MAX,
         };
         let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| run_job(store, task, surroundings)));
-        is_done.store(true, Ordering::SeqCst);
+        watch.is_done.store(true, Ordering::SeqCst);
         keeper.thread().unpark();
         outcome
     });
@@ -233,16 +231,20 @@ fn until_stored(store: impl Fn() -> Result<Finished, StoreError>) -> Result<Fini
     store()
 }
 
-fn keep(
-    store: &Store,
-    settings: &WorkerSettings,
-    worker: &str,
-    task: &Claimed,
-    path: &Path,
-    is_lost: &AtomicBool,
-    is_done: &AtomicBool,
-    progress: &Mutex<String>,
-) {
+/// What a task's two threads share: the one that runs it and the one that keeps its lease alive.
+#[derive(Default)]
+struct Watch {
+    /// The task is another's now.
+    is_lost: AtomicBool,
+    /// The work has ended.
+    is_done: AtomicBool,
+    /// Progress as JSON.
+    progress: Mutex<String>,
+}
+
+/// Keeps the lease of a task alive, stores its progress and its checkpoint.
+fn keep(store: &Store, settings: &WorkerSettings, worker: &str, task: &Claimed, path: &Path, watch: &Watch) {
+    let Watch { is_lost, is_done, progress } = watch;
     let lease_ms = settings.lease.as_millis() as i64;
     let mut prolonged = Instant::now();
     let mut last_progress = String::new();

@@ -58,7 +58,8 @@ pub(in crate::job) fn diagnosis(r: &DiagnosisResult, d: &Diagnosis) -> String {
     text
 }
 
-/// Whether the recordings agree: causes of each, materials side by side, the one material, and what each says of the others.
+/// Whether the recordings agree: causes of each, materials side by side, the one material, and what each says of the
+/// others.
 pub(in crate::job) fn together(results: &[&DiagnosisResult], found: Option<&TogetherResult>) -> String {
     let mut text = String::from("all recordings        verdict, causes; material with the causes\n");
     for r in results {

@@ -24,8 +24,8 @@ fn sensitivities(num_voxels: usize) -> (Vec<Vec<[f64; 3]>>, Vec<f64>) {
     (fields, vec![1e-5, 0.3, 2.0])
 }
 
-/// Draws data from a linear Gaussian model, fits by weighted least squares and compares the spread of the estimates with
-/// the promise.
+/// Draws data from a linear Gaussian model, fits by weighted least squares and compares the spread of the estimates
+/// with the promise.
 #[test]
 fn promised_covariance_is_the_spread_of_estimates() {
     let (num_voxels, draws) = (40, 20_000);

@@ -95,10 +95,11 @@ pub(super) struct Checked {
     cost: Option<Cost>,
 }
 
-/// Processor seconds of one drive of an evaluation with a material of one term. From the release build on one thread of the
-/// development machine: eight evaluations of the shipped specimens (1,393 to 11,687 nodes, 2,000 to 21,000 voxels; 0.15 s to
-/// 2.5 s a drive) give 2.28 s at 10,000 nodes with the power 1.4, each within a factor of 2.3; voxels eight times as many
-/// cost 2 µs each. Material terms and other machines change it: an estimate to decide by, not a promise.
+/// Processor seconds of one drive of an evaluation with a material of one term. From the release build on one thread of
+/// the development machine: eight evaluations of the shipped specimens (1,393 to 11,687 nodes, 2,000 to 21,000
+/// voxels; 0.15 s to 2.5 s a drive) give 2.28 s at 10,000 nodes with the power 1.4, each within a factor of 2.3; voxels
+/// eight times as many cost 2 µs each. Material terms and other machines change it: an estimate to decide by, not a
+/// promise.
 fn seconds(num_nodes: usize, num_voxels: usize) -> f64 {
     2.28 * (num_nodes as f64 / 1e4).powf(1.4) + 2e-6 * num_voxels as f64
 }
