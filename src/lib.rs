@@ -1,7 +1,7 @@
 //! lambdak designs the specimen from which one full-field (MR-u) scan tells the most about a soft material.
 //!
 //! The rooms stand on one another in this order; a room uses only those before it:
-//! [`field`], [`file`], [`provenance`], [`optimise`] → [`specimen`] → [`mesh`], [`material`] → [`fem`] →
+//! [`field`], [`file`](mod@file), [`provenance`], [`optimise`] → [`specimen`] → [`mesh`], [`material`] → [`fem`] →
 //! [`kinematics`], [`homogeneous`], [`rate`], [`voxel`] → [`sensitivity`] → [`recording`], [`acquisition`] →
 //! [`calibration`] → [`diagnosis`], [`design`] → [`proof`] → [`sweep`] → [`slurm`], [`report`] → [`compare`] → [`job`]
 //! → [`service`] → [`cli`].

@@ -199,7 +199,7 @@ impl Job {
         input_hash(&json!({ "kind": self.kind.command, "request": canonical }))
     }
 
-    /// Reads what the request names, hashes what goes in, and does work that does not divide ([`super::run`] does any
+    /// Reads what the request names, hashes what goes in, and does work that does not divide ([`super::run()`] does any
     /// work).
     ///
     /// # Errors

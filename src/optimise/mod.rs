@@ -1,11 +1,11 @@
 //! Least squares and quadratic programmes with linear limits. The room knows nothing of materials, meshes or data.
 //!
-//! * [`descend`]: the loop of every nonlinear fit. What is fitted is a [`LeastSquares`] problem; how steps are
+//! * [`descend()`]: the loop of every nonlinear fit. What is fitted is a [`LeastSquares`] problem; how steps are
 //!   shortened and when the loop ends are its [`Rules`].
 //! * [`minimise`]: a fit whose residuals and Jacobian are at hand, with linear limits on its parameters.
-//! * [`limited_step`]: the least of a quadratic model within linear limits, to rounding.
+//! * [`limited_step()`]: the least of a quadratic model within linear limits, to rounding.
 //! * [`QuadraticProgramme`]: any convex quadratic programme with linear limits, by an interior-point method (Clarabel).
-//! * [`covariance`]: what a Jacobian says of the parameters.
+//! * [`covariance()`]: what a Jacobian says of the parameters.
 //!
 //! Quadratic programmes are solved in two ways. A fit to curves takes thousands of steps in a dozen unknowns from a
 //! feasible rest: an active set is exact there and costs next to nothing. The steps of calibrations and searches have
