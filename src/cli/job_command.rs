@@ -55,7 +55,8 @@ impl Asked {
                 None => e.to_string(),
                 Some((pointer, source)) => {
                     let rest = FieldError { pointer: e.pointer[pointer.len()..].into(), ..e.clone() };
-                    format!("{source}: {rest}")
+                    let colon = if rest.pointer.is_empty() { "" } else { ":" };
+                    format!("{source}{colon} {rest}")
                 }
             }
         };

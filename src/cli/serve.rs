@@ -2,7 +2,7 @@
 
 use super::error::CliError;
 use crate::service::access::{Role, add_token};
-use crate::service::app::Limits;
+use crate::service::limits::Limits;
 use crate::service::{ServeError, ServeOptions, serve};
 use clap::Args;
 use std::net::SocketAddr;

@@ -13,7 +13,8 @@ pub struct CauseFit {
     pub material: Ogden,
     /// The causes.
     pub causes: Vec<Supposed>,
-    /// Weighted squares of the misfit (see [`Metric`](super::metric::Metric)), priors included: −2 ln of the likelihood up to a constant.
+    /// Weighted squares of the misfit (see [`Metric`](super::metric::Metric)), priors included: −2 ln of the likelihood
+    /// up to a constant.
     pub deviance: f64,
     /// Measured minus predicted.
     pub residual: Trace,

@@ -9,7 +9,7 @@
 //! | shear | `shear_strain`, `shear`, `gamma` (simple shear; else as strain), `stretch` |
 //! | strain (stretch − 1) | `engineering_strain`, `nominal_strain`, `strain` |
 //! | displacement, mm (needs a length) | `displacement_mm`, `extension_mm`, `drive_mm`, `compression_mm` (turned) |
-//! | nominal stress | `nominal_stress`, `engineering_stress`, `shear_nominal_stress`, `p11` (`p12` in shear), `stress` |
+//! | nominal stress | `nominal_stress`, `engineering_stress`, `shear_nominal_stress`, `p11` (shear: `p12`), `stress` |
 //! | | each with or without `_pa`, `_kpa`, `_mpa` |
 //! | force, N (needs an area) | `force_n`, `load_n` (turned where the drive is a compression) |
 

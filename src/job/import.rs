@@ -1,5 +1,6 @@
 //! Import: raw phases, MATLAB files and point clouds become a recording of displacements.
 
+use super::import_result::{ImportResult, ImportStep};
 use super::outcome::{WithRecording, recording_identifier, to_json};
 use super::request::{InputForm, InputUse};
 use super::{Context, JobError, Outcome, Request, Run, summary};
@@ -119,26 +120,6 @@ pub struct ImportRequest {
 
 fn axes() -> String {
     "y,z,x".into()
-}
-
-/// The result of an import (`import/1`).
-#[derive(Serialize)]
-pub(super) struct ImportResult {
-    schema: &'static str,
-    version: &'static str,
-    input_hash: String,
-    pub id: String,
-    pub num_voxels: usize,
-    pub noise_sd_mm: Option<[f64; 3]>,
-    pub steps: Vec<ImportStep>,
-}
-
-/// One drive of an import.
-#[derive(Serialize)]
-pub(super) struct ImportStep {
-    pub drive_mm: f64,
-    pub num_complete: usize,
-    pub reconstruction: Option<StepReport>,
 }
 
 /// A recording, the standard deviations of its voxels, and how its phases were unwrapped.

@@ -22,6 +22,7 @@ mod evaluate;
 mod evaluation_list;
 mod evaluation_table;
 mod import;
+mod import_result;
 mod kind;
 mod load_curves;
 mod outcome;

@@ -123,7 +123,8 @@ impl FisherInformation {
     /// Information of one drive.
     ///
     /// `voxel_sensitivities[i][v]` is ∂ū/∂ξ_i of voxel v (mm per unit of ξ_i) and `force_sensitivities[i]` is ∂F/∂ξ_i
-    /// (N per unit), both in the order of [`Ogden::parameters`]; `weights[v]` comes from [`PartialVoxels::weights`](super::PartialVoxels::weights).
+    /// (N per unit), both in the order of [`Ogden::parameters`]; `weights[v]` comes from
+    /// [`PartialVoxels::weights`](super::PartialVoxels::weights).
     ///
     /// # Errors
     /// [`InformationError::InvalidSd`], [`InformationError::LengthMismatch`], [`InformationError::NotFinite`].

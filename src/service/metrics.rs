@@ -1,6 +1,6 @@
 //! `/metrics` in Prometheus' text format.
 
-use super::runner::Signal;
+use super::signal::Signal;
 use super::store::Store;
 use std::collections::BTreeMap;
 use std::fmt::Write;

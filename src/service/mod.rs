@@ -14,13 +14,16 @@
 pub mod access;
 pub mod app;
 mod hub;
+pub mod limits;
 mod log;
 mod metrics;
 pub mod problem;
 mod recordings;
+mod router;
 mod routes;
 pub mod runner;
 mod server;
+mod signal;
 pub mod store;
 mod task;
 mod view;

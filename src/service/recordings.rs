@@ -171,7 +171,7 @@ pub fn upload_of(files: BTreeMap<String, Vec<u8>>, owner: String) -> Result<NewU
 pub fn keep(store: &Store, job: &str, files: BTreeMap<String, Vec<u8>>) -> Result<String, Problem> {
     let length: usize = files.values().map(Vec::len).sum();
     let kept = usize::try_from(store.uploaded_bytes()?).unwrap_or(0);
-    if kept + length > super::app::Limits::default().max_uploads_bytes {
+    if kept + length > super::limits::Limits::default().max_uploads_bytes {
         return Err(Problem::new("quota", "the recordings fill the service's space"));
     }
     let owner = store.job(job)?.map(|row| row.owner).unwrap_or_default();

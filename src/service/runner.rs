@@ -3,12 +3,13 @@
 use super::log;
 use super::problem::Problem;
 use super::recordings::StoredSurroundings;
+use super::signal::Signal;
 use super::store::{Claimed, Finished, Store, StoreError, TaskResult};
 use super::task::TaskInput;
 use crate::job::{Failure, JobError, Outcome, kind_of_collection, run};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// How a worker works.
@@ -32,46 +33,6 @@ const IDLE: Duration = Duration::from_millis(250);
 const CHECKPOINT: Duration = Duration::from_secs(3);
 /// How long to wait when the storage does not answer.
 const STORAGE_PAUSE: Duration = Duration::from_secs(1);
-
-/// Wakes idle slots and stops all.
-#[derive(Default)]
-pub struct Signal {
-    is_stopping: AtomicBool,
-    generation: Mutex<u64>,
-    changed: Condvar,
-    /// Tasks finished, for metrics.
-    pub finished: AtomicU64,
-    /// Tasks failed, for metrics.
-    pub failed: AtomicU64,
-    /// Milliseconds of tasks run, for metrics.
-    pub busy_ms: AtomicU64,
-    /// Tasks running now.
-    pub running: AtomicU64,
-}
-
-impl Signal {
-    /// There may be new work.
-    pub fn wake(&self) {
-        let mut generation = self.generation.lock().unwrap_or_else(PoisonError::into_inner);
-        *generation += 1;
-        self.changed.notify_all();
-    }
-
-    /// Running tasks keep their checkpoints and go back into the queue.
-    pub fn stop(&self) {
-        self.is_stopping.store(true, Ordering::SeqCst);
-        self.wake();
-    }
-
-    fn is_stopping(&self) -> bool {
-        self.is_stopping.load(Ordering::SeqCst)
-    }
-
-    fn wait(&self, time: Duration) {
-        let generation = self.generation.lock().unwrap_or_else(PoisonError::into_inner);
-        let _unused = self.changed.wait_timeout(generation, time);
-    }
-}
 
 /// Starts a worker's slots; join them after [`Signal::stop`].
 pub fn start(store: &Arc<Store>, settings: &WorkerSettings, signal: &Arc<Signal>) -> Vec<std::thread::JoinHandle<()>> {

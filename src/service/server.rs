@@ -1,12 +1,15 @@
 //! Listening, serving, shutting down; and the worker on another machine.
 
 use super::access::{Access, TokenError, random_hex};
-use super::app::{Limits, Shared, router};
+use super::app::Shared;
 use super::hub::{self, Hub};
+use super::limits::Limits;
 use super::log;
 use super::metrics::Metrics;
 use super::problem::Problem;
-use super::runner::{self, Signal, WorkerSettings};
+use super::router::router;
+use super::runner::{self, WorkerSettings};
+use super::signal::Signal;
 use super::store::{Store, StoreError};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;

@@ -1,7 +1,7 @@
 //! Scans and imports as text.
 
 use crate::acquisition::ScanResult;
-use crate::job::import::ImportResult;
+use crate::job::import_result::ImportResult;
 
 pub(in crate::job) fn scan(name: &str, result: &ScanResult) -> String {
     let mut text = format!("{name}: {} voxels, seed {}\n", result.num_voxels, result.seed);

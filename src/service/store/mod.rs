@@ -4,7 +4,7 @@
 //! | Invariant | Kept by |
 //! |---|---|
 //! | a task is run by one worker at a time | a claim is a transaction that takes a lease (SKIP LOCKED in PostgreSQL) |
-//! | a task has exactly one result | a result is taken only from the attempt that holds it (`attempt` fences late ones) |
+//! | a task has exactly one result | a result is taken only from the attempt that holds it (`attempt` fences late) |
 //! | equal evaluations are computed once | results are kept under their content's key; equal tasks never run together |
 //! | a task that ends its worker cannot do so for ever | [`MAX_LOSSES`], then it is put aside with a problem |
 

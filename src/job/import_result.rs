@@ -1,0 +1,24 @@
+//! The result of an import (`import/1`).
+
+use crate::acquisition::StepReport;
+use serde::Serialize;
+
+/// The result of an import (`import/1`).
+#[derive(Serialize)]
+pub(super) struct ImportResult {
+    pub schema: &'static str,
+    pub version: &'static str,
+    pub input_hash: String,
+    pub id: String,
+    pub num_voxels: usize,
+    pub noise_sd_mm: Option<[f64; 3]>,
+    pub steps: Vec<ImportStep>,
+}
+
+/// One drive of an import.
+#[derive(Serialize)]
+pub(super) struct ImportStep {
+    pub drive_mm: f64,
+    pub num_complete: usize,
+    pub reconstruction: Option<StepReport>,
+}

@@ -1,0 +1,183 @@
+//! The service as an axum router, and what every request passes through.
+
+use super::access::{Caller, random_hex};
+use super::app::App;
+use super::problem::Problem;
+use super::{log, routes};
+use axum::Router;
+use axum::extract::{DefaultBodyLimit, MatchedPath, Request, State};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// The whole service.
+pub fn router(app: App) -> Router {
+    let (api, document) = routes::open_api();
+    let document: Arc<str> = document.into();
+    let max_body = app.limits.max_body_bytes;
+    api.route("/openapi.json", axum::routing::get(move || routes::document(document.clone())))
+        .merge(routes::page())
+        .fallback(not_found)
+        .method_not_allowed_fallback(not_allowed)
+        .layer(DefaultBodyLimit::max(max_body))
+        .layer(axum::middleware::from_fn_with_state(app.clone(), guard))
+        .with_state(app)
+}
+
+async fn not_found() -> Problem {
+    Problem::new("not-found", "no such address; /openapi.json lists them")
+}
+
+async fn not_allowed() -> Problem {
+    Problem::new("method-not-allowed", "the header Allow lists what is allowed here")
+}
+
+static REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
+
+/// Every request passes here: identity, origin, limits, time, log, metrics, headers of the answer.
+async fn guard(State(app): State<App>, mut request: Request, next: Next) -> Response {
+    let started = Instant::now();
+    let id = request_id(request.headers());
+    let method = request.method().clone();
+    let path = request.uri().path().to_string();
+    let route = request.extensions().get::<MatchedPath>().map_or("(none)", MatchedPath::as_str).to_string();
+    let is_page = is_public(&path);
+    let caller = check(&app, request.headers(), &method, is_page);
+    let mut name = String::new();
+    let answer = match caller {
+        Err(problem) => problem.into_response(),
+        Ok(caller) => {
+            name.clone_from(&caller.name);
+            request.extensions_mut().insert(caller);
+            run(&app, request, next, &path).await
+        }
+    };
+    finish(&app, answer, &Served { id, method, route, path, caller: name, started })
+}
+
+/// What needs no token: the page's own files, its document, and whether the service lives. They hold no data.
+fn is_public(path: &str) -> bool {
+    !path.starts_with("/v1/") && path != "/metrics"
+}
+
+async fn run(app: &App, request: Request, next: Next, path: &str) -> Response {
+    if *app.stopping.borrow() && !is_public(path) {
+        return Problem::new("shutting-down", "the service is shutting down; try again").after(5).into_response();
+    }
+    let Ok(_permit) = app.requests.try_acquire() else {
+        app.metrics.turned_away.fetch_add(1, Ordering::Relaxed);
+        return Problem::new("too-many-requests", "too many requests at a time; try again").after(1).into_response();
+    };
+    app.metrics.in_flight.fetch_add(1, Ordering::Relaxed);
+    let is_upload = path == "/v1/recordings";
+    let time = if is_upload { Duration::from_secs(600) } else { app.limits.request_time };
+    let answer = tokio::time::timeout(time, next.run(request)).await;
+    app.metrics.in_flight.fetch_sub(1, Ordering::Relaxed);
+    answer.unwrap_or_else(|_| Problem::new("timeout", "the request took too long").into_response())
+}
+
+fn check(app: &App, headers: &HeaderMap, method: &Method, is_page: bool) -> Result<Caller, Problem> {
+    let mut hosts = headers.get_all(header::HOST).iter();
+    let host = hosts.next().and_then(|h| h.to_str().ok());
+    if hosts.next().is_some() {
+        return Err(Problem::new("bad-host", "there are several Host headers"));
+    }
+    if !app.hosts.is_empty() {
+        // A page of another site that resolves to this machine still carries its own name.
+        let name = host.map(|h| h.rsplit_once(':').map_or(h, |(n, p)| if p.ends_with(']') { h } else { n }));
+        if !name.is_some_and(|n| app.hosts.iter().any(|known| known.eq_ignore_ascii_case(n))) {
+            return Err(Problem::new("bad-host", "call the service by the address it listens on"));
+        }
+    }
+    if headers.contains_key(header::TRANSFER_ENCODING) && headers.contains_key(header::CONTENT_LENGTH) {
+        return Err(Problem::new("invalid-parameter", "Content-Length and Transfer-Encoding exclude each other"));
+    }
+    let text = |name: &str| headers.get(name).and_then(|v| v.to_str().ok());
+    let is_reading = matches!(*method, Method::GET | Method::HEAD | Method::OPTIONS);
+    if !is_reading && text("sec-fetch-site").is_some_and(|site| !matches!(site, "same-origin" | "none")) {
+        return Err(Problem::new("forbidden", "pages of other origins may not change anything here"));
+    }
+    if is_page {
+        return Ok(Caller {
+            name: String::new(),
+            role: super::access::Role::Read,
+            max_queued_tasks: None,
+            max_elements: None,
+        });
+    }
+    app.access.caller(text("authorization"))
+}
+
+/// The client's id where it is short and plain, else a random one.
+fn request_id(headers: &HeaderMap) -> String {
+    let given = headers.get(&REQUEST_ID).and_then(|v| v.to_str().ok()).unwrap_or_default();
+    let is_plain = (1..=64).contains(&given.len())
+        && given.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_' || b == b'.');
+    if is_plain { given.into() } else { random_hex::<8>().unwrap_or_else(|_| "0".into()) }
+}
+
+/// A request that was served.
+struct Served {
+    id: String,
+    method: Method,
+    /// The route's pattern.
+    route: String,
+    path: String,
+    /// Name of the token; empty where there was none.
+    caller: String,
+    started: Instant,
+}
+
+fn finish(app: &App, mut answer: Response, served: &Served) -> Response {
+    let Served { id, method, route, path, caller, started } = served;
+    // axum's own refusals (a body that is too long, say) become problems too.
+    let is_plain_error = answer.status().as_u16() >= 400
+        && answer.headers().get(header::CONTENT_TYPE).is_none_or(|t| t != "application/problem+json");
+    if is_plain_error {
+        let name = match answer.status().as_u16() {
+            404 => "not-found",
+            405 => "method-not-allowed",
+            413 => "too-large",
+            415 => "unsupported-media-type",
+            500.. => "internal",
+            _ => "invalid-parameter",
+        };
+        let allow = answer.headers().get(header::ALLOW).cloned();
+        answer = Problem::new(name, "see the document at /openapi.json").into_response();
+        if let Some(allow) = allow {
+            answer.headers_mut().insert(header::ALLOW, allow);
+        }
+    }
+    let status = answer.status().as_u16();
+    let seconds = started.elapsed().as_secs_f64();
+    app.metrics.count(method.as_str(), route, status, seconds);
+    if !path.starts_with("/healthz") && !path.starts_with("/readyz") {
+        log::info(
+            "request",
+            &serde_json::json!({
+                "id": id, "method": method.as_str(), "route": route, "path": path, "status": status,
+                "seconds": seconds, "caller": caller,
+            }),
+        );
+    }
+    let headers = answer.headers_mut();
+    if let Ok(value) = HeaderValue::from_str(id) {
+        headers.insert(REQUEST_ID.clone(), value);
+    }
+    for (name, value) in [
+        ("x-content-type-options", "nosniff"),
+        ("x-frame-options", "DENY"),
+        ("referrer-policy", "no-referrer"),
+        ("cross-origin-resource-policy", "same-origin"),
+    ] {
+        headers.insert(HeaderName::from_static(name), HeaderValue::from_static(value));
+    }
+    headers
+        .entry("content-security-policy")
+        .or_insert(HeaderValue::from_static("default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox"));
+    headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
+    answer
+}
