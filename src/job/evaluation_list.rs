@@ -29,7 +29,7 @@ pub struct VariedField {
     pub pointer: String,
     /// Values to try.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    #[schema(value_type = Vec<Object>, max_items = 10000)]
+    #[schema(value_type = Vec<serde_json::Value>, max_items = 10000)]
     pub values: Vec<Value>,
     /// Least and greatest value.
     #[serde(default, skip_serializing_if = "Option::is_none")]
