@@ -29,7 +29,7 @@ fn uniaxial_fits_print_and_write() {
     let shown = String::from_utf8_lossy(&text.stdout);
     assert!(shown.contains("free terms") && shown.contains("neo-Hookean") && shown.contains("chosen"), "{shown}");
     for file in ["uniaxial.json", "fits.svg", "fits-neo-hookean.svg"] {
-        assert!(folder.path().join("results/ut").join(file).is_file(), "{file}");
+        assert!(folder.path().join("results/ut/uniaxial").join(file).is_file(), "{file}");
     }
     let json = run(folder.path(), &["uniaxial", "ut.csv", "--json"]);
     let value: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
@@ -50,7 +50,7 @@ fn curves_predict_what_is_kept_back() {
     let text = run(folder.path(), &arguments);
     assert!(text.status.success(), "{}", String::from_utf8_lossy(&text.stderr));
     assert!(String::from_utf8_lossy(&text.stdout).contains("predicted, kept back: equibiaxial"));
-    assert!(folder.path().join("results/ut/curves.svg").is_file());
+    assert!(folder.path().join("results/ut/curves/curves.svg").is_file());
     let json = run(folder.path(), &[&arguments[..], &["--json"]].concat());
     let value: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
     assert_eq!((value["schema"].as_str(), value["num_terms"].as_u64()), (Some("curves/1"), Some(2)));

@@ -20,7 +20,7 @@ fn python_example_runs() -> Result<(), Missing> {
         .unwrap();
     let (text, errors) = (String::from_utf8_lossy(&out.stdout), String::from_utf8_lossy(&out.stderr));
     assert!(out.status.success(), "{text}\n{errors}");
-    for part in ["gain of the best over the base", "verdict:", "residual-after_1.nii.gz", "misfit_1_2.nii.gz"] {
+    for part in ["gain of the best over the base", "verdict:", "residual_after_1.nii.gz", "misfit_1_2.nii.gz"] {
         assert!(text.contains(part), "{part}: {text}");
     }
     eprintln!("{text}");

@@ -151,12 +151,17 @@ fn a_scan_becomes_a_recording_that_is_calibrated() {
         assert_eq!((image.status, image.header("content-type")), (200, Some("application/gzip")), "{name}");
         assert!(image.body.starts_with(&[0x1f, 0x8b]), "{name}");
     }
-    // Raw phases are files and no recording.
+    // Raw phases are a recording too, which an import makes displacements of.
     let mut raw = body;
     raw["is_raw"] = json!(true);
     let job = service.submit("scans", &raw);
     assert_eq!(service.wait(&job, LONG)["state"], "succeeded");
-    assert_eq!(service.get(&format!("{job}/result")).json()["recording"], Value::Null);
+    let phases = service.get(&format!("{job}/result")).json()["recording"].clone();
+    let import = service.submit("imports", &json!({ "recording": phases }));
+    assert_eq!(service.wait(&import, LONG)["state"], "succeeded");
+    let imported = service.get(&format!("{import}/result")).json();
+    let id = imported["recording"].as_str().unwrap();
+    assert_eq!(service.get(&format!("/v1/recordings/{id}")).json()["summary"]["num_voxels"], imported["num_voxels"]);
     assert_eq!(service.get(&format!("{job}/artefacts/px_1.nii.gz")).status, 200);
 
     let calibration = json!({ "recordings": [recording], "num_terms": 1, "mesh_factor": 2.5, "has_mesh_allowance": false, "num_starts": 1 });

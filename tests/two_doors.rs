@@ -142,10 +142,12 @@ fn every_kind_of_job_gives_the_same_bytes_through_both_doors() {
     assert_eq!(covered, kinds, "every kind of job is asked through both doors");
     for a in &asked {
         let kind = KINDS.iter().find(|k| k.command == a.command).unwrap();
+        let started = std::time::Instant::now();
         let job = service.submit(kind.collection, &a.there);
         let here = run(a.command, &a.here, &place(a.command));
         let view = service.wait(&job, LONG);
         assert_eq!(view["state"], "succeeded", "{}: {view}", a.command);
+        eprintln!("{}: {:.1} s", a.command, started.elapsed().as_secs_f64());
         let there = service.get(&format!("{job}/result")).body;
         assert!(
             here == there,

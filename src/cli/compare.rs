@@ -2,11 +2,11 @@
 
 use super::error::CliError;
 use super::flag::Flag;
-use super::input::read_json;
+use super::input::read_text;
 use super::job_command::{Asked, kind_of, leave, value};
 use super::output::write_named;
 use super::terminal::Terminal;
-use crate::compare::pairs;
+use crate::compare::{CompareError, pairs};
 use clap::{Arg, ArgAction, ArgMatches, Command};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -48,7 +48,7 @@ pub(super) fn run(matches: &ArgMatches) -> Result<(), CliError> {
     let mut compared: Vec<Value> = Vec::new();
     for (index, pair) in pairs(Path::new(&base), Path::new(&current))?.into_iter().enumerate() {
         asked.sources.push((format!("/pairs/{index}"), pair.name.clone()));
-        let (base, current) = (read_json(&pair.base)?, read_json(&pair.current)?);
+        let (base, current) = (result_in(&pair.base)?, result_in(&pair.current)?);
         compared.push(json!({ "name": pair.name, "base": base, "current": current }));
     }
     asked.set("pairs", compared, base);
@@ -66,4 +66,10 @@ pub(super) fn run(matches: &ArgMatches) -> Result<(), CliError> {
         }
     }
     leave(&outcome, None, matches.get_flag("json"))
+}
+
+/// A result from a file.
+fn result_in(path: &Path) -> Result<Value, CliError> {
+    let not_a_result = |e: serde_json::Error| CompareError::NotAResult { path: path.into(), message: e.to_string() };
+    Ok(serde_json::from_str(&read_text(path)?).map_err(not_a_result)?)
 }

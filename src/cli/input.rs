@@ -1,7 +1,7 @@
 //! Reading what the commands are given.
 
 use super::error::CliError;
-use crate::file::read_limited;
+use crate::file::{ReadError, read_limited};
 use serde_json::Value;
 use std::path::Path;
 
@@ -12,10 +12,13 @@ const MAX_FILE_BYTES: u64 = 256 << 20;
 /// Text of a file.
 ///
 /// # Errors
-/// [`CliError::Input`] for a file that is no regular one, too large, or not text.
+/// [`CliError::Read`]; [`CliError::Input`] for a file that is no regular one, too large, or not text.
 pub fn read_text(path: &Path) -> Result<String, CliError> {
     let bad = |message: String| CliError::Input { path: path.into(), message };
-    let bytes = read_limited(path, MAX_FILE_BYTES).map_err(|e| bad(e.to_string()))?;
+    let bytes = read_limited(path, MAX_FILE_BYTES).map_err(|e| match e {
+        ReadError::Io(source) => CliError::Read { path: path.into(), source },
+        other => bad(other.to_string()),
+    })?;
     String::from_utf8(bytes).map_err(|_| bad("it is not text in UTF-8".into()))
 }
 

@@ -6,7 +6,9 @@ use super::study_limits::{MAX_WEIGHT, ParameterWeight};
 use crate::field::FieldPath;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
-use utoipa::ToSchema;
+use utoipa::openapi::RefOr;
+use utoipa::openapi::schema::{ObjectBuilder, OneOfBuilder, Schema, Type};
+use utoipa::{PartialSchema, ToSchema};
 
 /// What is maximised: a gain over the base specimen, 1 for the base itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -105,7 +107,7 @@ impl Normalisation {
 }
 
 /// Whose promised standard deviations may not get worse than with the base specimen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Guard {
     /// Nobody's.
@@ -127,6 +129,20 @@ impl Guard {
         }
     }
 }
+
+/// A name, or true or false.
+impl PartialSchema for Guard {
+    fn schema() -> RefOr<Schema> {
+        let names = ["none", "first_material", "every_material"];
+        let name = ObjectBuilder::new().schema_type(Type::String).enum_values(Some(names));
+        let switch = ObjectBuilder::new().schema_type(Type::Boolean);
+        let text = "Whose promised standard deviations may not get worse than with the base specimen: nobody's, the first \
+                    material's (or true), or every material's.";
+        OneOfBuilder::new().item(name).item(switch).description(Some(text)).into()
+    }
+}
+
+impl ToSchema for Guard {}
 
 /// `true` is short for the first material, `false` for none.
 impl<'de> Deserialize<'de> for Guard {

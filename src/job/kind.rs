@@ -89,8 +89,8 @@ impl Kind {
         if !errors.is_empty() {
             return Err(errors);
         }
-        let (request, run) = (self.checked)(request)?;
-        Ok(Job { kind: self, request, run })
+        let (canonical, run) = (self.checked)(request)?;
+        Ok(Job { kind: self, request: request.clone(), canonical, run })
     }
 }
 
@@ -110,8 +110,10 @@ impl std::fmt::Debug for Kind {
 pub struct Job {
     /// Its kind.
     pub kind: &'static Kind,
-    /// The request with defaults written out.
+    /// The request as it was made.
     pub request: Value,
+    /// The request with defaults written out: equal ones are written alike.
+    canonical: Value,
     run: Box<dyn Run>,
 }
 
@@ -129,7 +131,7 @@ impl Job {
     /// A key that equal work of this version of the program shares, and whether the result is numbers alone, which the
     /// files of an equal job with files answer too.
     pub fn work_key(&self) -> (String, bool) {
-        let (content, is_numbers_only) = self.run.equal_work().unwrap_or_else(|| (self.request.clone(), false));
+        let (content, is_numbers_only) = self.run.equal_work().unwrap_or_else(|| (self.canonical.clone(), false));
         let key = input_hash(&json!({ "kind": self.kind.command, "version": VERSION, "content": content }));
         (key, is_numbers_only)
     }
@@ -152,7 +154,7 @@ impl Job {
     /// # Errors
     /// [`JobError`].
     pub fn gather(&self, results: Vec<Result<Value, Failure>>) -> Result<Outcome, JobError> {
-        Ok(Outcome { input_hash: self.hash_of(&self.request), ..self.run.gather(results)? })
+        Ok(Outcome { input_hash: self.hash_of(&self.canonical), ..self.run.gather(results)? })
     }
 
     /// SHA-256 of the kind, the canonical request and the content of every file that the job reads, hexadecimal.
@@ -166,7 +168,7 @@ impl Job {
     /// Reads what the request names. It is known by its content, not by where it lies: in the hash its name gives way
     /// to its digest.
     fn context<'a>(&self, surroundings: &'a dyn Surroundings) -> Result<Context<'a>, JobError> {
-        let mut canonical = self.request.clone();
+        let mut canonical = self.canonical.clone();
         let (mut recordings, mut raw_recordings, mut files) = (Vec::new(), Vec::new(), Vec::new());
         for wanted in self.run.inputs() {
             let digest = match wanted.form {

@@ -143,10 +143,16 @@ impl RequestSchema {
                 errors.push(FieldError::new(format!("{pointer}/{}", escaped(name)), "", "given"));
             }
         }
+        let is_required = |name: &str| {
+            let required = schema.get("required").and_then(Value::as_array);
+            required.is_some_and(|r| r.iter().any(|n| n.as_str() == Some(name)))
+        };
         let is_closed = schema.get("additionalProperties") == Some(&Value::Bool(false));
         for (name, value) in fields {
             let place = format!("{pointer}/{}", escaped(name));
             match properties.and_then(|p| p.get(name)) {
+                // A field that may be left out may be null as well.
+                Some(_) if value.is_null() && !is_required(name) => {}
                 Some(field) => self.check(field, value, &place, errors),
                 None if is_closed => {
                     let known: Vec<&str> = properties.into_iter().flatten().map(|(n, _)| n.as_str()).collect();
