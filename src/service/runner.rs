@@ -34,7 +34,7 @@ const CHECKPOINT: Duration = Duration::from_secs(3);
 /// How long to wait when the storage does not answer.
 const STORAGE_PAUSE: Duration = Duration::from_secs(1);
 
-/// Starts a worker's slots; join them after [`Signal::stop`].
+/// Starts a worker's slots; join them after its signal says stop.
 pub fn start(store: &Arc<Store>, settings: &WorkerSettings, signal: &Arc<Signal>) -> Vec<std::thread::JoinHandle<()>> {
     (0..settings.slots.max(1))
         .filter_map(|slot| {
