@@ -38,6 +38,12 @@ pub enum CalibrationError {
         /// [`super::FitOptions::min_alpha_gap`].
         min_gap: f64,
     },
+    /// What was measured at the boundary cannot be imposed.
+    #[error("the measured boundary cannot be imposed: {reason}; take the plates as commanded")]
+    NoMeasuredBoundary {
+        /// Why.
+        reason: &'static str,
+    },
     /// Lists of the measurement do not belong together.
     #[error("the measurement's {what} has {found} entries, {expected} are needed")]
     DataLength {

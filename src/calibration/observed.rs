@@ -3,10 +3,12 @@
 
 use super::error::CalibrationError;
 use super::noise::estimate_noise_sd_mm;
-use crate::mesh::Mesh;
+use super::outliers::outlying_voxels;
+use crate::fem::{VectorField, turned_by};
+use crate::mesh::{BlockShape, Mesh, half_extents_mm};
 use crate::recording::{Filter, Recording};
 use crate::specimen::Specimen;
-use crate::voxel::{HammingFilter, Sampling, VoxelMask, VoxelOperator};
+use crate::voxel::{HammingFilter, Sampling, VoxelGrid, VoxelMask, VoxelOperator};
 
 /// Least filled part of a voxel that is compared: the average over a sliver is that of a place on the wall, where the
 /// made sample may differ from the drawing.
@@ -30,6 +32,9 @@ pub struct ObservedStep {
     pub force: Option<ObservedForce>,
     /// u of the compared voxels, mm, in the mask's order; NaN where missing.
     pub displacement: Vec<[f64; 3]>,
+    /// What was measured of the fixed and the moved face and is imposed there, beyond the nominal motion of their
+    /// plates, per mm of drive. None where plates are taken to move as they were told.
+    pub faces_per_mm: [Option<VectorField>; 2],
 }
 
 /// A recording made ready for comparison.
@@ -49,6 +54,9 @@ pub struct Observed {
     pub filter: Filter,
     /// Voxels that the recording marks but that the specimen as drawn (nearly) does not fill: not compared.
     pub num_outside: usize,
+    /// Most voxels of a step that agree with hardly any of their neighbours: they hold no displacement and are taken as
+    /// missing.
+    pub num_outliers: usize,
     /// Marks of the compared voxels on the grid.
     flags: Vec<bool>,
 }
@@ -68,26 +76,35 @@ impl Observed {
             }
         };
         let flags = mask.spread(&vec![true; mask.num_voxels()], false);
+        let cleaned: Vec<Cleaned> = recording
+            .steps
+            .iter()
+            .map(|s| Cleaned::of(&recording.grid, &flags, &s.displacement, recording.noise_sd_mm))
+            .collect();
+        let num_outliers = cleaned.iter().map(|c| c.num_outliers).max().unwrap_or(0);
         let steps: Vec<ObservedStep> = recording
             .steps
             .iter()
-            .map(|step| ObservedStep {
+            .zip(&cleaned)
+            .map(|(step, cleaned)| ObservedStep {
                 drive_mm: step.drive_mm,
                 force: step
                     .force_n
                     .map(|value_n| ObservedForce { value_n, sd_n: step.force_sd_n.unwrap_or(force_sd_n) }),
-                displacement: mask.voxels.iter().map(|&v| step.displacement[v as usize]).collect(),
+                displacement: mask.voxels.iter().map(|&v| cleaned.field[v as usize]).collect(),
+                faces_per_mm: [None, None],
             })
             .collect();
         let noise_sd_mm = match recording.noise_sd_mm {
             Some(sd) => sd,
             None => {
-                let fields: Vec<&[[f64; 3]]> = recording.steps.iter().map(|s| &s.displacement[..]).collect();
+                let fields: Vec<&[[f64; 3]]> = cleaned.iter().map(|c| &c.field[..]).collect();
                 estimate_noise_sd_mm(&recording.grid, &flags, &fields, recording.filter)?
             }
         };
         Ok(Observed {
             num_outside: recording.num_voxels() - mask.num_voxels(),
+            num_outliers,
             is_noise_estimated: recording.noise_sd_mm.is_none(),
             filter: recording.filter,
             specimen,
@@ -96,6 +113,21 @@ impl Observed {
             noise_sd_mm,
             flags,
         })
+    }
+
+    /// The same recording with other steps.
+    pub(super) fn with_steps(&self, steps: Vec<ObservedStep>) -> Observed {
+        Observed { steps, ..self.clone() }
+    }
+
+    /// The same recording of another specimen with the voxels that `flags` (in the grid's order) mark; without steps.
+    ///
+    /// # Errors
+    /// [`CalibrationError::Voxel`] where the specimen fills none of them.
+    pub(super) fn with_mask(&self, specimen: Specimen, flags: &[bool]) -> Result<Observed, CalibrationError> {
+        let mask = VoxelMask::from_flags(&specimen, self.mask.grid.clone(), flags, LEAST_FRACTION)?;
+        let flags = mask.spread(&vec![true; mask.num_voxels()], false);
+        Ok(Observed { specimen, mask, flags, steps: Vec::new(), ..self.clone() })
     }
 
     /// Takes as missing what lies within `margin_mm` of the ends x = ±length/2 of a sheared block. The bonded edges end
@@ -127,17 +159,17 @@ impl Observed {
     /// # Errors
     /// [`CalibrationError::Voxel`].
     pub fn view(&self, specimen: &Specimen, mesh: &Mesh) -> Result<View, CalibrationError> {
-        self.shifted_view(specimen, mesh, [0.0; 3])
+        self.placed_view(specimen, mesh, &Placing::default())
     }
 
-    /// As [`Self::view`] with the voxels where they would be if the image lay `shift_mm` further along than its header
-    /// says.
+    /// As [`Self::view`] of a sample that is not where, or not the block, that the image's header and the drawing say.
+    /// `mesh` is that of the drawing (with its holes as made).
     ///
     /// # Errors
     /// As [`Self::view`].
-    pub fn shifted_view(&self, specimen: &Specimen, mesh: &Mesh, shift_mm: [f64; 3]) -> Result<View, CalibrationError> {
+    pub fn placed_view(&self, specimen: &Specimen, mesh: &Mesh, placing: &Placing) -> Result<View, CalibrationError> {
         let mut grid = self.mask.grid.clone();
-        for (origin, shift) in grid.origin_mm.iter_mut().zip(shift_mm) {
+        for (origin, shift) in grid.origin_mm.iter_mut().zip(placing.shift_mm) {
             *origin += shift;
         }
         // Whatever part of a compared voxel the specimen still fills is what the scan averages over.
@@ -153,8 +185,56 @@ impl Observed {
         let places: Vec<u32> = (0..seen.num_voxels() as u32).collect();
         let place_of = seen.spread(&places, u32::MAX);
         let places = self.mask.voxels.iter().map(|&v| place_of[v as usize]).collect();
-        let operator = VoxelOperator::new(specimen, mesh, &acquired, Sampling::default())?;
+        let operator = if placing.turns_or_reshapes() {
+            let half_mm = half_extents_mm(specimen);
+            let place = |x| placing.point_of(half_mm, x);
+            VoxelOperator::placed(specimen, mesh, &acquired, Sampling::default(), &place)?
+        } else {
+            VoxelOperator::new(specimen, mesh, &acquired, Sampling::default())?
+        };
         Ok(View { operator, filter, places })
+    }
+}
+
+/// A displacement field without the voxels that hold none.
+struct Cleaned {
+    field: Vec<[f64; 3]>,
+    num_outliers: usize,
+}
+
+impl Cleaned {
+    fn of(grid: &VoxelGrid, flags: &[bool], field: &[[f64; 3]], noise_sd_mm: Option<[f64; 3]>) -> Cleaned {
+        let outliers = outlying_voxels(grid, flags, field, noise_sd_mm);
+        let mut field = field.to_vec();
+        for &v in &outliers {
+            field[v] = [f64::NAN; 3];
+        }
+        Cleaned { field, num_outliers: outliers.len() }
+    }
+}
+
+/// Where a sample lies in the image, and which block it is: the image shows at x what the sample, as drawn and unmoved,
+/// has at R x + s, with a rotation R about the origin and a shift s.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Placing {
+    /// s, mm.
+    pub shift_mm: [f64; 3],
+    /// The vector of the rotation R, rad.
+    pub rotation_rad: [f64; 3],
+    /// How far the block's faces lie off the drawing.
+    pub shape: BlockShape,
+}
+
+impl Placing {
+    fn turns_or_reshapes(&self) -> bool {
+        self.rotation_rad.iter().any(|w| w.abs() > 0.0) || !self.shape.is_nominal()
+    }
+
+    /// The point of the drawn block that is seen at `x` of the shifted image, and its derivatives with respect to the
+    /// point R x + s of the made block.
+    fn point_of(&self, half_mm: [f64; 3], x: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
+        let turned = turned_by(self.rotation_rad, [0, 1, 2].map(|i| x[i] - self.shift_mm[i]));
+        self.shape.pulled_back(half_mm, [0, 1, 2].map(|i| turned[i] + self.shift_mm[i]))
     }
 }
 
@@ -265,7 +345,11 @@ mod tests {
             mesh.nodes.iter().map(|x| [0.3 * x[0] + 0.1 * x[1], 0.2 * x[1], -0.4 * x[2]]).collect();
         let shift = [0.21, -0.13, 0.17];
         let plain = observed.view(&specimen, &mesh).unwrap().average(&field).unwrap();
-        let moved = observed.shifted_view(&specimen, &mesh, shift).unwrap().average(&field).unwrap();
+        let moved = observed
+            .placed_view(&specimen, &mesh, &Placing { shift_mm: shift, ..Placing::default() })
+            .unwrap()
+            .average(&field)
+            .unwrap();
         let expected = [0.3 * shift[0] + 0.1 * shift[1], 0.2 * shift[1], -0.4 * shift[2]];
         let half = [0.5 * specimen.block.length_mm, 0.5 * specimen.block.thickness_mm, 0.5 * specimen.block.width_mm];
         let mut num_inside = 0;

@@ -9,7 +9,7 @@ use super::step::Constraints;
 use super::stress_path::StressPath;
 use super::system::NormalSystem;
 use super::target::{Objective, Target};
-use crate::fem::{Equilibrium, ForwardModel, SolveOptions};
+use crate::fem::{Departures, Equilibrium, ForwardModel, SolveOptions};
 use crate::kinematics::IDENTITY;
 use crate::material::{Ogden, Parameter};
 use crate::mesh::MeshOptions;
@@ -117,7 +117,8 @@ impl<'a> CalibrationProblem<'a> {
     /// Meshes every recording's specimen with `mesh` and prepares what the fits share.
     ///
     /// # Errors
-    /// [`CalibrationError`].
+    /// [`CalibrationError`]; [`CalibrationError::NoMeasuredBoundary`] where several steps of one recording have measured
+    /// boundaries ([`Observed::steps_apart`]).
     pub fn new(
         observed: &'a [Observed],
         mesh: &dyn Fn(&Specimen) -> MeshOptions,
@@ -128,7 +129,7 @@ impl<'a> CalibrationProblem<'a> {
             let specimen = &recording.specimen;
             let model = ForwardModel::of_specimen(specimen, &mesh(specimen))?;
             problem.views.push(recording.view(specimen, model.mesh())?);
-            problem.models.push(model);
+            problem.models.push(with_boundary(model, recording)?);
         }
         Ok(problem)
     }
@@ -287,6 +288,18 @@ impl<'a> CalibrationProblem<'a> {
             }
         }
         Ok(all)
+    }
+}
+
+/// A model with what was measured at the boundary of a recording.
+fn with_boundary(model: ForwardModel, recording: &Observed) -> Result<ForwardModel, CalibrationError> {
+    match &recording.steps[..] {
+        _ if !recording.has_measured_faces() => Ok(model),
+        [step] => Ok(model.departed(&Departures { faces_per_mm: step.faces_per_mm.clone(), ..Departures::default() })),
+        _ => {
+            let reason = "several steps share a model; take the steps apart";
+            Err(CalibrationError::NoMeasuredBoundary { reason })
+        }
     }
 }
 

@@ -77,6 +77,7 @@ const CALIBRATE: &[Flag] = &[
     Flag::of("rule", "rule"),
     Flag::of("decrement", "decrement"),
     Flag::of("objective", "objective"),
+    Flag::of("boundary", "boundary"),
     Flag::of("beta", "beta"),
     Flag::read("mesh", "mesh_factor", MeshFactor),
     Flag::read("one-mesh", "has_mesh_allowance", Off),
@@ -90,6 +91,7 @@ const DIAGNOSE: &[Flag] = &[
     Flag::of("mesh", "mesh_factor"),
     Flag::of("allowance", "allowance_mm"),
     Flag::of("max-causes", "max_causes"),
+    Flag::of("boundary", "boundary"),
 ];
 /// Options of commands that read curves.
 const COLUMNS: [Flag; 5] = [

@@ -55,12 +55,27 @@ pub struct CauseParameter {
     pub scale: f64,
     /// Smallest and largest value.
     pub range: [f64; 2],
+    /// Standard deviation of what a laboratory believes of it before it looks, around the cause's start; `None` where
+    /// nothing is believed.
+    pub believed_sd: Option<f64>,
+    /// The only step of the recording that it changes, where it is one.
+    pub only_step: Option<usize>,
 }
 
 impl CauseParameter {
     /// A parameter with its scale and range.
     pub fn new(name: impl Into<String>, scale: f64, range: [f64; 2]) -> CauseParameter {
-        CauseParameter { name: name.into(), scale, range }
+        CauseParameter { name: name.into(), scale, range, believed_sd: None, only_step: None }
+    }
+
+    /// The same, believed to be within about `sd` of the start.
+    pub fn believed(self, sd: f64) -> CauseParameter {
+        CauseParameter { believed_sd: Some(sd), ..self }
+    }
+
+    /// The same, of one step alone.
+    pub fn of_step(self, step: usize) -> CauseParameter {
+        CauseParameter { only_step: Some(step), ..self }
     }
 }
 
@@ -141,6 +156,28 @@ pub trait Cause: Send + Sync {
     }
     /// Whether a recording of a single drive cannot tell it from another cause that grows with the drive.
     fn needs_several_drives(&self) -> bool {
+        false
+    }
+    /// Whether it changes nothing but how the plates move, and nothing of the image.
+    fn moves_only_plates(&self) -> bool {
+        self.frees_plates() || self.is_plain_motion()
+    }
+    /// Whether it is a part of the set-up, held by what a laboratory believes.
+    fn is_of_set_up(&self) -> bool {
+        false
+    }
+    /// Whether it gives the plates motions of their own at every drive. Motions that are alike at all drives or in
+    /// proportion to them ([`Self::is_plain_motion`]) say nothing beyond it.
+    fn frees_plates(&self) -> bool {
+        false
+    }
+    /// Whether it is a motion of a plate of one simple course over the drives: a simpler explanation of what a cause
+    /// that [frees the plates](Self::frees_plates) takes.
+    fn is_plain_motion(&self) -> bool {
+        false
+    }
+    /// Whether it is a smooth field without a mechanism, which takes up whatever is smooth.
+    fn is_sponge(&self) -> bool {
         false
     }
     /// Leaps: values that a fit which ended at `values` could not reach by small steps, and that may explain more.

@@ -5,7 +5,6 @@ use super::error::DiagnosisError;
 use super::fit::fit;
 use super::found::FoundCause;
 use super::inference::Inference;
-use super::metric::Metric;
 use super::prior::FitSettings;
 use super::trace::Trace;
 use crate::calibration::Observed;
@@ -65,7 +64,7 @@ pub(super) fn kept_back_rms_mm(
     let mut squares = [0.0; 2];
     let mut count = 0.0;
     for colour in [false, true] {
-        let metric = Metric::new(observed, inference.allowance_mm, &|v| colours[v] != colour);
+        let metric = inference.metric_of(&|v| colours[v] != colour);
         for (n, fitted) in fits.into_iter().enumerate() {
             let settings = FitSettings { max_iterations: ITERATIONS_OF_PART, bulk: bulks[n], ..inference.settings };
             let Inference { laboratory, is_cancelled, .. } = &mut *inference;

@@ -1,11 +1,13 @@
 //! The diagnosis: fit the nominal model, look at what is left, suppose causes, fit them, and prove them on data kept
 //! back.
 
+use super::cause_fit::CauseFit;
 use super::conclusion::{explain_too_little, kept_back_rms_mm, verdict_on};
 use super::error::DiagnosisError;
 use super::findings::Findings;
 use super::found::FoundCause;
 use super::inference::{Inference, KNOWN_LOG_SD};
+use super::interior::{InteriorTest, test_interior};
 use super::laboratory::Laboratory;
 use super::leftover::leftover;
 use super::load_curve::{largest_drive_mm, read_load_curve, take_off_effects};
@@ -18,9 +20,12 @@ use super::options::DiagnosisOptions;
 use super::outcome::Diagnosis;
 use super::prior::{BulkPrior, FitSettings, ShearPrior, shear_modulus};
 use super::registry::Registry;
-use super::rounds::add_causes;
+use super::rounds::{RoundLimits, add_causes, fit_round, score_round};
+use super::set_up::{fit_set_up, promises_more, simplest_set_up};
+use super::supposed::Supposed;
+use super::thinning::named_causes;
 use super::trace::Trace;
-use crate::calibration::Observed;
+use crate::calibration::{Boundary, Observed};
 use crate::material::Ogden;
 use crate::mesh::MeshOptions;
 use crate::recording::Recording;
@@ -34,6 +39,19 @@ const TOLERANCE: f64 = 0.3;
 /// The allowance where none is stated, as a part of the largest drive.
 const ALLOWANCE_OF_DRIVE: f64 = 1e-3;
 
+/// The set-up as a whole is looked at where the first cause leaves more than this part of the misfit (rms).
+const SET_UP_LEAVES: f64 = 0.25;
+/// It is gone on from where it leaves less than this part of what that cause leaves (rms).
+const SET_UP_GAINS: f64 = 0.7;
+
+/// The interior is tested where the misfit beyond noise exceeds this multiple of the allowance (rms).
+const INTERIOR_ABOVE: f64 = 2.0;
+
+/// The artefacts among the causes of a fit.
+fn artefacts_of(fitted: &CauseFit) -> Vec<Supposed> {
+    fitted.causes.iter().filter(|c| c.cause.is_artefact()).cloned().collect()
+}
+
 /// Diagnoses `recording`; `progress` is told what is being done.
 ///
 /// # Errors
@@ -45,6 +63,10 @@ pub fn diagnose(
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Diagnosis, DiagnosisError> {
     let registry = Registry::standard().without(&options.left_out)?;
+    let registry = match options.boundary {
+        Boundary::Commanded => registry,
+        Boundary::Measured => registry.without_boundary(),
+    };
     diagnose_among(&registry, recording, options, progress, is_cancelled)
 }
 
@@ -60,10 +82,11 @@ pub(super) fn diagnose_among(
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Diagnosis, DiagnosisError> {
     options.check()?;
-    let observed = Observed::new(recording, options.force_sd_n)?;
+    let observed = Observed::new(recording, options.force_sd_n)?.with_boundary(options.boundary)?;
     let mut run = Run::begin(&observed, registry, options, progress, is_cancelled)?;
     run.read_load_curve(recording)?;
     run.correct_mesh()?;
+    run.test_interior()?;
     run.question_material()?;
     run.take_out_artefacts()?;
     run.add_causes()?;
@@ -91,6 +114,8 @@ struct Run<'a> {
     load: Option<LoadHistoryFit>,
     /// What the finer mesh predicts beyond ours.
     mesh_defect: Option<MeshDefect>,
+    /// What the interior test found, where it was made.
+    interior: Option<InteriorTest>,
     findings: Findings,
 }
 
@@ -123,6 +148,7 @@ impl<'a> Run<'a> {
             nominal_bulk: believed_bulk,
             believed_bulk,
             allowance_mm,
+            discrepancy_mm2: [0.0; 3],
             mesh_factor,
             is_cancelled,
             progress,
@@ -139,6 +165,7 @@ impl<'a> Run<'a> {
             recorded,
             load: None,
             mesh_defect: None,
+            interior: None,
             findings: Findings::of_nominal(nominal),
         })
     }
@@ -197,6 +224,17 @@ impl<'a> Run<'a> {
         }
     }
 
+    /// Asks of a misfit that is more than a mesh's whether it was made at the boundary or inside.
+    fn test_interior(&mut self) -> Result<(), DiagnosisError> {
+        let nominal = &self.findings.nominal;
+        let left = leftover(self.observed, &nominal.residual, &self.inference.metric);
+        let is_inside = self.observed.has_measured_faces();
+        if !is_inside && left.structured_rms_mm > INTERIOR_ABOVE * self.inference.allowance_mm {
+            self.interior = test_interior(&self.inference, self.observed, &nominal.residual, &nominal.material)?;
+        }
+        Ok(())
+    }
+
     /// Looks for causes in the material's own law.
     fn question_material(&mut self) -> Result<(), DiagnosisError> {
         let measured = self.measured();
@@ -226,11 +264,77 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Tests, fits and names causes, round by round.
+    /// Tests, fits and names causes, round by round. Where no single cause explains much of the misfit, the set-up as a
+    /// whole is fitted in its place, and rounds go on from that.
     fn add_causes(&mut self) -> Result<(), DiagnosisError> {
-        let (measured, max_causes) = (self.measured(), self.options.max_causes);
-        let Run { inference, registry, findings, load, .. } = self;
-        add_causes(inference, registry, findings, &measured, max_causes, load.is_some())
+        let measured = self.measured();
+        let limits = RoundLimits { max_causes: self.options.max_causes, has_load_curve: self.load.is_some() };
+        let Run { inference, registry, findings, .. } = self;
+        if findings.causes.len() >= limits.max_causes {
+            return Ok(());
+        }
+        let candidates = score_round(inference, registry, findings, limits)?;
+        let comes_first = promises_more(inference, registry, &findings.current, &candidates)?;
+        let mut is_set_up = comes_first && self.consider_set_up(&measured)?;
+        let mut goes_on = is_set_up;
+        if !is_set_up {
+            goes_on = fit_round(&mut self.inference, &mut self.findings, &measured, &candidates)?;
+            is_set_up = self.consider_set_up(&measured)?;
+        }
+        if goes_on || is_set_up {
+            let Run { inference, registry, findings, .. } = self;
+            add_causes(inference, registry, findings, &measured, limits)?;
+        }
+        if is_set_up {
+            let Run { inference, registry, findings, .. } = self;
+            findings.current = simplest_set_up(inference, registry, &measured, findings.current.clone())?;
+            self.name_causes_of_fit()?;
+        }
+        Ok(())
+    }
+
+    /// Fits the set-up as a whole where what was named so far leaves much of the misfit, and goes on from it where it
+    /// explains much more; whether it does.
+    fn consider_set_up(&mut self, measured: &Trace) -> Result<bool, DiagnosisError> {
+        let left = |run: &Self, fitted: &CauseFit| {
+            leftover(run.observed, &fitted.residual, &run.inference.metric).structured_rms_mm
+        };
+        let (before, single) = (left(self, &self.findings.nominal), left(self, &self.findings.current));
+        let is_explained = single < (SET_UP_LEAVES * before).max(self.inference.allowance_mm);
+        if is_explained || self.registry.set_up(self.observed).is_empty() {
+            return Ok(false);
+        }
+        self.tell("fitting the set-up as a whole: plates, rig, layers, block");
+        let start = CauseFit { causes: artefacts_of(&self.findings.current), ..self.findings.nominal.clone() };
+        let Run { inference, registry, .. } = self;
+        let fitted = match fit_set_up(inference, registry, measured, &start) {
+            Ok(fitted) => simplest_set_up(inference, registry, measured, fitted),
+            Err(error) => Err(error),
+        };
+        match fitted {
+            Ok(fitted) if left(self, &fitted) < SET_UP_GAINS * single => {
+                let Findings { nominal, current, causes, alternatives, .. } = &mut self.findings;
+                *current = fitted;
+                nominal.deviance = self.inference.misfit_of(&nominal.residual);
+                causes.retain(|c| !c.is_of_fit());
+                alternatives.clear();
+                self.name_causes_of_fit()?;
+                Ok(true)
+            }
+            Err(error) if self.is_cancelled() => Err(error),
+            _ => {
+                self.inference.forget_discrepancy();
+                Ok(false)
+            }
+        }
+    }
+
+    /// Names the causes that are in the fit, with the evidence for each among all others.
+    fn name_causes_of_fit(&mut self) -> Result<(), DiagnosisError> {
+        let named = named_causes(&mut self.inference, &self.findings.current)?;
+        self.findings.causes.retain(|c| !c.is_of_fit());
+        self.findings.causes.extend(named);
+        Ok(())
     }
 
     /// Looks again at the causes in the material's law, now that other causes are in the fit.
@@ -309,7 +413,7 @@ impl<'a> Run<'a> {
 
     /// Looks at what is left, predicts data that were kept back, and says how the diagnosis ended.
     fn conclude(mut self, seen: &[Trace; 2]) -> Result<Diagnosis, DiagnosisError> {
-        let Findings { nominal, current, mut causes, mut alternatives, ranked, maps } = self.findings;
+        let Findings { nominal, current, mut causes, mut alternatives, ranked, maps, .. } = self.findings;
         // Parameters as in the last fit, all causes together.
         for cause in &mut causes {
             cause.refresh(&current, self.observed);
@@ -341,6 +445,7 @@ impl<'a> Run<'a> {
             num_solves: self.inference.laboratory.num_solves,
             allowance_mm: self.inference.allowance_mm,
             mesh_defect: self.mesh_defect,
+            interior: self.interior,
         })
     }
 }

@@ -26,6 +26,9 @@ pub(super) struct Entry {
 pub(super) enum Origin {
     /// It needs no suspicion: every recording is tested for these suspects.
     Tested(fn(&Specimen) -> Vec<Arc<dyn Cause>>),
+    /// It is a part of the experiment's set-up, all of which are fitted together where no single cause explains a
+    /// misfit.
+    SetUp(fn(&Observed) -> Vec<Arc<dyn Cause>>),
     /// It has a place or a direction, which is searched for first (in a map, for instance).
     Searched(fn(&mut Search) -> Result<Vec<Candidate>, DiagnosisError>),
     /// It is an artefact of the image, found in the residual of the nominal model.

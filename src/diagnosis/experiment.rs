@@ -47,7 +47,12 @@ pub(super) fn experiments(
         let drive_mm = part * last.drive_mm;
         // What the load train takes follows the force, here that of the recorded step in proportion.
         let force = last.force.map(|f| ObservedForce { value_n: part * f.value_n, sd_n: f.sd_n });
-        let step = ObservedStep { drive_mm, force, displacement: vec![[0.0; 3]; observed.mask.num_voxels()] };
+        let step = ObservedStep {
+            drive_mm,
+            force,
+            displacement: vec![[0.0; 3]; observed.mask.num_voxels()],
+            faces_per_mm: last.faces_per_mm.clone(),
+        };
         let mut planned: Observed = observed.clone();
         planned.steps = vec![step];
         let metric = Metric::new(&planned, *allowance_mm * part.abs(), &|_| true);

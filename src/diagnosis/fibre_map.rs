@@ -11,6 +11,7 @@ use super::laboratory::{Laboratory, Prediction};
 use super::prior::shear_modulus;
 use super::scene::Scene;
 use super::score::{Prepared, ScoreTest};
+use super::supposed::Path;
 use crate::fem::Fibre;
 use crate::material::Ogden;
 use nalgebra::{DMatrix, DVector};
@@ -67,17 +68,17 @@ pub fn fibre_directions(
     test: &ScoreTest,
 ) -> Result<Vec<FibreDirection>, DiagnosisError> {
     let modulus = shear_modulus(material);
-    let paths: Vec<Box<dyn Fn(f64) -> Scene + '_>> = SPANNING
+    let paths: Vec<Path> = SPANNING
         .iter()
         .map(|a| {
             let direction = unit(*a);
-            Box::new(move |t: f64| Scene {
+            Path::of_sample(move |t: f64| Scene {
                 fibre: Some(Fibre { direction, modulus_kpa: t * modulus }),
                 ..scene.clone()
-            }) as _
+            })
         })
         .collect();
-    let paths: Vec<(&dyn Fn(f64) -> Scene, bool)> = paths.iter().map(|p| (&**p as _, true)).collect();
+    let paths: Vec<&Path> = paths.iter().collect();
     let prepared = test.prepare(&laboratory.derivatives(material, scene, prediction, false, &paths, STEP)?);
     let combine = Combination::new();
     let grid = hemisphere();

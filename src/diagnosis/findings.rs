@@ -19,13 +19,15 @@ pub(super) struct Findings {
     pub(super) ranked: Vec<Ranked>,
     /// Maps of the nominal misfit, with their names.
     pub(super) maps: Vec<(String, ScoreMap)>,
+    /// Rounds of tests so far.
+    pub(super) num_rounds: usize,
 }
 
 impl Findings {
     /// Nothing but a nominal model yet.
     pub(super) fn of_nominal(nominal: CauseFit) -> Findings {
         let current = nominal.clone();
-        Findings { nominal, current, causes: vec![], alternatives: vec![], ranked: vec![], maps: vec![] }
+        Findings { nominal, current, causes: vec![], alternatives: vec![], ranked: vec![], maps: vec![], num_rounds: 0 }
     }
 
     /// Takes another nominal model as the fit so far.

@@ -1,12 +1,12 @@
 //! Full, nonlinear fits of a material and causes to a recording.
 
+use super::cause::CauseParameter;
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
 use super::laboratory::{Laboratory, Prediction};
 use super::metric::{Metric, Weighed};
 use super::prior::{FitSettings, shear_modulus};
-use super::scene::Scene;
-use super::supposed::{Supposed, paths_of, scene_of};
+use super::supposed::{Path, Supposed, paths_of, scene_of};
 use super::trace::Trace;
 use crate::material::{Ogden, Parameter};
 use crate::optimise::{Damping, End, LeastSquares, Raise, Rules, Shortening, Step, Stop, descend};
@@ -15,6 +15,11 @@ use nalgebra::{DMatrix, DVector};
 /// Standard deviation of the prior of a cause's parameter around its start, in scales of the parameter. It is wide: it
 /// only keeps a fit in bounds where the data say nothing.
 const PRIOR_SCALES: f64 = 100.0;
+/// Standard deviation of what is known of a parameter before a fit, in its scales.
+pub(super) fn prior_scales(parameter: &CauseParameter) -> f64 {
+    parameter.believed_sd.map_or(PRIOR_SCALES, |sd| sd / parameter.scale)
+}
+
 /// Half width of the differences from which derivatives are taken, in scales of a parameter.
 pub const STEP: f64 = 0.02;
 /// Largest relative change of a material parameter in one step.
@@ -32,7 +37,7 @@ pub fn derivatives(
 ) -> Result<Vec<Trace>, DiagnosisError> {
     let scene = scene_of(causes);
     let paths = paths_of(causes);
-    let paths: Vec<(&dyn Fn(f64) -> Scene, bool)> = paths.iter().map(|(p, b)| (&**p as _, *b)).collect();
+    let paths: Vec<&Path> = paths.iter().collect();
     let mut columns = laboratory.derivatives(material, &scene, prediction, true, &paths, STEP)?;
     for (trace, parameter) in columns.iter_mut().zip(material.parameters()) {
         *trace = trace.scaled(material.value(parameter));
@@ -308,7 +313,8 @@ fn normal_system(
     for supposed in causes {
         let (parameters, start) = (supposed.cause.parameters(), supposed.cause.start());
         for n in 0..parameters.len() {
-            gradient[i] -= PRIOR_SCALES.powi(-2) * (supposed.values[n] - start[n]) / parameters[n].scale;
+            let away = (supposed.values[n] - start[n]) / parameters[n].scale;
+            gradient[i] -= prior_scales(&parameters[n]).powi(-2) * away;
             i += 1;
         }
     }
@@ -343,9 +349,8 @@ pub fn normal_matrix(
         }
     }
     let first = material.parameters().len();
-    let count: usize = causes.iter().map(|c| c.values.len()).sum();
-    for i in first..first + count {
-        matrix[(i, i)] += PRIOR_SCALES.powi(-2);
+    for (i, parameter) in causes.iter().flat_map(|c| c.cause.parameters()).enumerate() {
+        matrix[(first + i, first + i)] += prior_scales(&parameter).powi(-2);
     }
     matrix
 }
@@ -365,7 +370,8 @@ fn deviance_of(
     for supposed in causes {
         let (parameters, start) = (supposed.cause.parameters(), supposed.cause.start());
         for n in 0..parameters.len() {
-            sum += ((supposed.values[n] - start[n]) / (PRIOR_SCALES * parameters[n].scale)).powi(2);
+            let sd = prior_scales(&parameters[n]) * parameters[n].scale;
+            sum += ((supposed.values[n] - start[n]) / sd).powi(2);
         }
     }
     sum

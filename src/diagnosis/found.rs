@@ -112,6 +112,11 @@ impl FoundCause {
         self
     }
 
+    /// Whether a later fit may change it.
+    pub(super) fn is_of_fit(&self) -> bool {
+        matches!(self.source, Source::Fit(_))
+    }
+
     /// Takes parameters and place from the last fit, all causes together. What the load curve told stays.
     pub(super) fn refresh(&mut self, fitted: &CauseFit, observed: &Observed) {
         match self.source {

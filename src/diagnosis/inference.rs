@@ -5,6 +5,7 @@ use super::error::DiagnosisError;
 use super::evidence::EVIDENCE;
 use super::fit::{deviance_at, fit};
 use super::laboratory::Laboratory;
+use super::leftover::leftover;
 use super::metric::Metric;
 use super::prior::{BulkPrior, FitSettings};
 use super::supposed::Supposed;
@@ -33,6 +34,8 @@ pub(super) struct Inference<'a> {
     pub(super) believed_bulk: BulkPrior,
     /// Displacement error that meshes may leave, mm rms at the largest drive.
     pub(super) allowance_mm: f64,
+    /// Variance (mm²) of each component at every voxel for what the model is known to leave.
+    pub(super) discrepancy_mm2: [f64; 3],
     /// Element size as a factor on the standard one.
     pub(super) mesh_factor: f64,
     /// Whether the work is to stop.
@@ -42,6 +45,34 @@ pub(super) struct Inference<'a> {
 }
 
 impl Inference<'_> {
+    /// What a misfit weighs at the voxels for which `is_kept`.
+    pub(super) fn metric_of(&self, is_kept: &dyn Fn(usize) -> bool) -> Metric {
+        let metric = Metric::new(self.laboratory.observed(), self.allowance_mm, is_kept);
+        if self.discrepancy_mm2.iter().any(|v| *v > 0.0) { metric.with_variance(self.discrepancy_mm2) } else { metric }
+    }
+
+    /// Weighs misfits from now on by what `residual` leaves beyond noise and allowance: the mean of a box of voxels then
+    /// has the standard deviation that such means are seen to have. Without it a model that cannot be exact is fitted
+    /// to its own errors, and whatever is believed of its parameters counts for nothing.
+    pub(super) fn accept_discrepancy(&mut self, residual: &Trace) {
+        let left = leftover(self.laboratory.observed(), residual, &self.metric);
+        let beyond = |mm: f64| (mm * mm - self.allowance_mm * self.allowance_mm).max(0.0);
+        self.discrepancy_mm2 = left.structured_by_component_mm.map(|mm| beyond(mm) * left.voxels_per_box);
+        self.metric = self.metric_of(&|_| true);
+    }
+
+    /// Weighs misfits by noise and allowance alone again.
+    pub(super) fn forget_discrepancy(&mut self) {
+        self.discrepancy_mm2 = [0.0; 3];
+        self.metric = self.metric_of(&|_| true);
+    }
+
+    /// The deviance of a fit by the present weights, what is known beforehand left out.
+    pub(super) fn misfit_of(&self, residual: &Trace) -> f64 {
+        let weighed = self.metric.weigh(residual);
+        self.metric.inner(&weighed, &weighed)
+    }
+
     /// Fits a material and causes from where they are.
     ///
     /// # Errors

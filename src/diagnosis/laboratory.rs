@@ -3,29 +3,18 @@
 use super::error::DiagnosisError;
 use super::memory_kernel::KernelState;
 use super::scene::Scene;
+use super::station::Stations;
+use super::supposed::Path;
 use super::trace::Trace;
-use crate::calibration::{Observed, View};
-use crate::fem::{Equilibrium, ForwardModel, SolveError, SolveOptions};
-use crate::material::{Ogden, Parameter};
-use crate::mesh::{DesignVariable, Mesh, MeshOptions, mesh_specimen, morphed, shape_velocity};
+use crate::calibration::Observed;
+use crate::fem::{Departures, Equilibrium, ForwardModel, SolveError, SolveOptions, Tangent};
+use crate::material::Ogden;
+use crate::mesh::{MeshOptions, half_extents_mm, mesh_specimen};
 use crate::specimen::TestKind;
+use rayon::prelude::*;
 
-/// Most prepared models kept: one nominal, some with released faces or other holes.
-const MAX_STATIONS: usize = 4;
 /// Spacing of nodes on a bonded face against which a bond is loose, mm.
 const BOND_LENGTH_MM: f64 = 0.5;
-
-/// A prepared model: one mesh, one set of released faces.
-struct Station {
-    holes: Vec<[f64; 3]>,
-    releases: [bool; 2],
-    model: ForwardModel,
-    /// Of the voxels moved by `shift_mm`.
-    view: View,
-    shift_mm: [f64; 3],
-    /// The last equilibria, from which the next start.
-    states: Vec<Equilibrium>,
-}
 
 /// What would be recorded of a scene.
 #[derive(Clone)]
@@ -35,14 +24,13 @@ pub struct Prediction {
     /// One equilibrium per step.
     pub states: Vec<Equilibrium>,
     /// Voxel averages before the image's changes.
-    seen: Vec<Vec<[f64; 3]>>,
+    pub(super) seen: Vec<Vec<[f64; 3]>>,
 }
 
 /// Predicts recordings of scenes.
 pub struct Laboratory<'a> {
     observed: &'a Observed,
-    nominal: Mesh,
-    stations: Vec<Station>,
+    stations: Stations<'a>,
     solve: SolveOptions,
     face_axis: usize,
     half_extents: [f64; 3],
@@ -58,17 +46,15 @@ impl<'a> Laboratory<'a> {
     pub fn new(observed: &'a Observed, mesh: &MeshOptions) -> Result<Laboratory<'a>, DiagnosisError> {
         let options = MeshOptions { use_mirror: false, ..*mesh };
         let nominal = mesh_specimen(&observed.specimen, &options).map_err(crate::fem::PrepareError::from)?;
-        let b = observed.specimen.block;
         Ok(Laboratory {
             observed,
-            nominal,
-            stations: Vec::new(),
+            stations: Stations::new(observed, nominal),
             solve: SolveOptions::default(),
             face_axis: match observed.specimen.test {
                 TestKind::DoubleLapShear => 1,
                 TestKind::Uniaxial => 0,
             },
-            half_extents: [0.5 * b.length_mm, 0.5 * b.thickness_mm, 0.5 * b.width_mm],
+            half_extents: half_extents_mm(&observed.specimen),
             num_solves: 0,
         })
     }
@@ -88,7 +74,7 @@ impl<'a> Laboratory<'a> {
 
     /// Displacement unknowns of the nominal model.
     pub fn num_unknowns(&mut self) -> Result<usize, DiagnosisError> {
-        let station = self.station(&Scene::default())?;
+        let station = self.stations.at(&Scene::default())?;
         Ok(self.stations[station].model.num_unknowns())
     }
 
@@ -102,49 +88,68 @@ impl<'a> Laboratory<'a> {
         scene: &Scene,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Prediction, DiagnosisError> {
-        let at = self.station(scene)?;
+        let at = self.stations.at(scene)?;
+        // A cancellation is seen between the steps' equilibria, of which each takes a second at most.
+        let warm = if is_cancelled() { Vec::new() } else { self.warm_states(at, material, scene) };
         let mut states: Vec<Equilibrium> = Vec::with_capacity(self.observed.steps.len());
-        let mut seen = Vec::with_capacity(states.capacity());
+        let mut warm = warm.into_iter();
         for (n, step) in self.observed.steps.iter().enumerate() {
-            let departures = self.departures(material, scene, n);
-            let station = &self.stations[at];
-            let mut model = station.model.departed(&departures);
             self.num_solves += 1;
-            let near = station.states.get(n);
-            let warm = near.map(|s| model.solve(material, step.drive_mm, Some(s), &self.solve, is_cancelled));
-            let state = match warm {
-                Some(Ok(state)) => state,
-                Some(Err(cause @ SolveError::Cancelled { .. })) => return Err(cause.into()),
-                _ => {
-                    let last = states.last();
-                    let cold = model.solve(material, step.drive_mm, last, &self.solve, is_cancelled);
-                    match cold {
-                        Ok(state) => state,
-                        Err(cause @ SolveError::Cancelled { .. }) => return Err(cause.into()),
-                        // From rest; plates far out of place are brought there by parts.
-                        Err(_) => match model.solve(material, step.drive_mm, None, &self.solve, is_cancelled) {
-                            Err(_) if departures.moves_plates() && !is_cancelled() => {
-                                model.solve_by_parts(material, step.drive_mm, &self.solve, is_cancelled)?
-                            }
-                            found => found?,
-                        },
-                    }
+            let state = match warm.next().flatten().filter(|_| !is_cancelled()) {
+                Some(state) => state,
+                None => {
+                    let departures = self.departures(material, scene, n);
+                    let mut model = self.stations[at].model.departed(&departures);
+                    self.cold_state(&mut model, material, step.drive_mm, states.last(), is_cancelled)?
                 }
             };
-            seen.push(station.view.average(&state.displacement)?);
             states.push(state);
         }
+        let view = &self.stations[at].view;
+        let seen = states.par_iter().map(|s| view.average(&s.displacement)).collect::<Result<Vec<_>, _>>()?;
         self.stations[at].states = states.clone();
         let forces: Vec<f64> = states.iter().map(|s| s.force_n).collect();
         let trace = self.recorded(scene, at, &states, &forces, &seen)?;
         Ok(Prediction { trace, states, seen })
     }
 
+    /// Equilibria from those that the station last found, steps side by side; `None` for a step that has none to start
+    /// from or finds none from there.
+    fn warm_states(&self, at: usize, material: &Ogden, scene: &Scene) -> Vec<Option<Equilibrium>> {
+        let station = &self.stations[at];
+        let solved = |n: usize| {
+            let near = station.states.get(n)?;
+            let mut model = station.model.departed(&self.departures(material, scene, n));
+            model.solve(material, self.observed.steps[n].drive_mm, Some(near), &self.solve, &|| false).ok()
+        };
+        (0..self.observed.steps.len()).into_par_iter().map(solved).collect()
+    }
+
+    /// An equilibrium from the last step's, or from rest; plates far out of place are brought there by parts.
+    fn cold_state(
+        &self,
+        model: &mut ForwardModel,
+        material: &Ogden,
+        drive_mm: f64,
+        last: Option<&Equilibrium>,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Equilibrium, DiagnosisError> {
+        let moves_plates = model.departures().moves_plates();
+        match model.solve(material, drive_mm, last, &self.solve, is_cancelled) {
+            Ok(state) => Ok(state),
+            Err(cause @ SolveError::Cancelled { .. }) => Err(cause.into()),
+            Err(_) => match model.solve(material, drive_mm, None, &self.solve, is_cancelled) {
+                Err(_) if moves_plates && !is_cancelled() => {
+                    Ok(model.solve_by_parts(material, drive_mm, &self.solve, is_cancelled)?)
+                }
+                found => Ok(found?),
+            },
+        }
+    }
+
     /// Forgets the equilibria found so far: the next prediction starts from rest.
     pub fn forget(&mut self) {
-        for station in &mut self.stations {
-            station.states.clear();
-        }
+        self.stations.forget();
     }
 
     /// An elastic load curve of the scene: at each of `drives_mm` the force (N), its derivatives with respect to the
@@ -159,7 +164,7 @@ impl<'a> Laboratory<'a> {
         drives_mm: &[f64],
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Vec<(f64, Vec<f64>, KernelState)>, DiagnosisError> {
-        let at = self.station(scene)?;
+        let at = self.stations.at(scene)?;
         let departures = self.departures(material, scene, 0);
         let mut model = self.stations[at].model.departed(&departures);
         let mut last: Option<Equilibrium> = None;
@@ -178,9 +183,8 @@ impl<'a> Laboratory<'a> {
 
     /// Derivatives of `prediction`, which is that of `material` and `scene`: first with respect to every material
     /// parameter (in the order of [`Ogden::parameters`]), then along each path t ↦ path(t) at t = 0. path(0) must be
-    /// `scene`, and the flag of a path says whether it changes the sample. What is cheap is differenced over ±`step`:
-    /// the residual of the equilibrium, the image and the load cell. Changes of holes use the exact derivative of the
-    /// mesh's nodes instead.
+    /// `scene`. What is cheap is differenced over ±`step`: the residual of the equilibrium, the image and the load cell.
+    /// Changes of holes and faces use the exact derivative of the mesh's nodes instead.
     ///
     /// # Errors
     /// [`DiagnosisError::Solve`].
@@ -190,86 +194,125 @@ impl<'a> Laboratory<'a> {
         scene: &Scene,
         prediction: &Prediction,
         with_material: bool,
-        paths: &[(&dyn Fn(f64) -> Scene, bool)],
+        paths: &[&Path],
         step: f64,
     ) -> Result<Vec<Trace>, DiagnosisError> {
-        let at = self.station(scene)?;
-        let parameters: Vec<Parameter> = if with_material { material.parameters() } else { Vec::new() };
-        let mut of_material = vec![Trace::default(); parameters.len()];
-        let ends: Vec<[Scene; 2]> = paths.iter().map(|(path, _)| [path(step), path(-step)]).collect();
-        let velocities: Vec<Option<Vec<[f64; 3]>>> = ends.iter().map(|e| self.hole_velocity(e, step)).collect();
+        let at = self.stations.at(scene)?;
+        let num_parameters = if with_material { material.parameters().len() } else { 0 };
+        let mut of_material = vec![Trace::default(); num_parameters];
+        let ends: Vec<[Scene; 2]> = paths.iter().map(|path| [(path.to)(step), (path.to)(-step)]).collect();
+        let velocities: Vec<Option<Vec<[f64; 3]>>> =
+            ends.iter().map(|e| self.stations.node_velocity(at, e, step)).collect();
         // Per path: change of the voxel averages and of the force, before the image and the load cell.
         let mut changes = vec![Trace::default(); paths.len()];
-        for (n, state) in prediction.states.iter().enumerate() {
-            let now = self.departures(material, scene, n);
-            let (face_axis, scale) = (self.face_axis, bond_scale(material));
-            let measured = self.observed.steps[n].force.map_or(0.0, |f| f.value_n);
-            let has_force = self.observed.steps[n].force.is_some();
-            let station = &self.stations[at];
-            let mut tangent = station.model.departed(&now).tangent(material, state)?;
-            if with_material {
-                for (s, trace) in tangent.material_sensitivities()?.iter().zip(&mut of_material) {
-                    let mut field = station.view.average(&s.displacement)?;
-                    for u in &mut field {
-                        for c in 0..3 {
-                            u[c] *= 1.0 + scene.image.gain[c];
-                        }
+        let numbers: Vec<usize> = (0..prediction.states.len()).collect();
+        // As many factors as threads are held at once.
+        for group in numbers.chunks(rayon::current_num_threads().max(1)) {
+            let tangents = self.tangents(at, material, scene, prediction, with_material, group)?;
+            let tasks: Vec<(usize, usize)> =
+                (0..group.len()).flat_map(|k| (0..paths.len()).map(move |index| (k, index))).collect();
+            let found = tasks
+                .par_iter()
+                .map(|&(k, index)| {
+                    let n = group[k];
+                    let (path, velocity) = (paths[index], velocities[index].as_deref());
+                    let is_still = !path.changes_sample || path.only_step.is_some_and(|only| only != n);
+                    if is_still && velocity.is_none() {
+                        return Ok((vec![[0.0; 3]; prediction.seen[n].len()], 0.0));
                     }
-                    trace.displacement.push(field);
-                    trace.force.push(if has_force { s.force_n * (1.0 + scene.force_gain) } else { 0.0 });
-                }
-            }
-            for (index, (path, changes_sample)) in paths.iter().enumerate() {
-                let (field, force) = match &velocities[index] {
-                    Some(velocity) => {
-                        let s = tangent.path_sensitivity(&[], Some(velocity), 0.0)?;
-                        // The derivative follows the nodes; the scan's voxels stay: u′ − ∇u V.
-                        let mut field = station.view.average(&s.displacement)?;
-                        let (moved, gradients) =
-                            (station.view.average(velocity)?, station.view.gradients(&state.displacement)?);
-                        for ((u, v), g) in field.iter_mut().zip(&moved).zip(&gradients) {
-                            for i in 0..3 {
-                                u[i] -= (0..3).map(|j| g[i][j] * v[j]).sum::<f64>();
-                            }
-                        }
-                        (field, s.force_n)
+                    let mut tangent = tangents[k].0.shared();
+                    match velocity {
+                        Some(velocity) => self.change_by_nodes(at, &mut tangent, &prediction.states[n], velocity),
+                        None => self.change_by_departures(at, &mut tangent, material, path, n, step),
                     }
-                    None if *changes_sample => {
-                        let at_t = |t: f64| path(t).departures(measured, scale, face_axis);
-                        let s = tangent.departure_sensitivity(&at_t, step)?;
-                        (station.view.average(&s.displacement)?, s.force_n)
-                    }
-                    None => (vec![[0.0; 3]; prediction.seen[n].len()], 0.0),
-                };
+                })
+                .collect::<Result<Vec<_>, DiagnosisError>>()?;
+            for (&(_, index), (field, force)) in tasks.iter().zip(found) {
                 changes[index].displacement.push(field);
                 changes[index].force.push(force);
             }
-        }
-        let mut all = of_material;
-        for (change, ends) in changes.iter().zip(&ends) {
-            all.push(self.recorded_change(at, prediction, change, ends, step)?);
-        }
-        Ok(all)
-    }
-
-    /// Velocity of the nodes as holes change, if they do.
-    fn hole_velocity(&self, [ahead, behind]: &[Scene; 2], step: f64) -> Option<Vec<[f64; 3]>> {
-        let mut velocity: Option<Vec<[f64; 3]>> = None;
-        for (hole, (a, b)) in ahead.holes.iter().zip(&behind.holes).enumerate() {
-            let rate = [0, 1, 2].map(|i| (a[i] - b[i]) / (2.0 * step));
-            for (r, variable) in rate.into_iter().zip(hole_variables(hole)) {
-                if r.abs() > 0.0 {
-                    let v = shape_velocity(&self.nominal, &self.observed.specimen, variable);
-                    let sum = velocity.get_or_insert_with(|| vec![[0.0; 3]; v.len()]);
-                    for (s, v) in sum.iter_mut().zip(&v) {
-                        for i in 0..3 {
-                            s[i] += r * v[i];
-                        }
-                    }
+            for ((_, sensitivities), &n) in tangents.into_iter().zip(group) {
+                let has_force = self.observed.steps[n].force.is_some();
+                for ((field, force), trace) in sensitivities.into_iter().zip(&mut of_material) {
+                    trace.displacement.push(self.shown(scene, field));
+                    trace.force.push(if has_force { force * (1.0 + scene.force_gain) } else { 0.0 });
                 }
             }
         }
-        velocity
+        let recorded: Vec<Trace> = changes
+            .par_iter()
+            .zip(&ends)
+            .map(|(change, ends)| self.recorded_change(at, prediction, change, ends, step))
+            .collect::<Result<_, _>>()?;
+        of_material.extend(recorded);
+        Ok(of_material)
+    }
+
+    /// The tangents of some steps, with the voxel averages and forces of the material's sensitivities.
+    #[allow(clippy::type_complexity)]
+    fn tangents<'t>(
+        &self,
+        at: usize,
+        material: &'t Ogden,
+        scene: &Scene,
+        prediction: &'t Prediction,
+        with_material: bool,
+        steps: &[usize],
+    ) -> Result<Vec<(Tangent<'t>, Vec<(Vec<[f64; 3]>, f64)>)>, DiagnosisError> {
+        let station = &self.stations[at];
+        steps
+            .par_iter()
+            .map(|&n| {
+                let departures = self.departures(material, scene, n);
+                let mut tangent = station.model.departed(&departures).tangent(material, &prediction.states[n])?;
+                let mut seen = Vec::new();
+                if with_material {
+                    for s in tangent.material_sensitivities()? {
+                        seen.push((station.view.average(&s.displacement)?, s.force_n));
+                    }
+                }
+                Ok((tangent, seen))
+            })
+            .collect()
+    }
+
+    /// Changes of the voxel averages and of the force as the nodes move.
+    fn change_by_nodes(
+        &self,
+        at: usize,
+        tangent: &mut Tangent,
+        state: &Equilibrium,
+        velocity: &[[f64; 3]],
+    ) -> Result<(Vec<[f64; 3]>, f64), DiagnosisError> {
+        let view = &self.stations[at].view;
+        let s = tangent.path_sensitivity(&[], Some(velocity), 0.0)?;
+        // The derivative follows the nodes; the scan's voxels stay: u′ − ∇u V.
+        let mut field = view.average(&s.displacement)?;
+        let (moved, gradients) = (view.average(velocity)?, view.gradients(&state.displacement)?);
+        for ((u, v), g) in field.iter_mut().zip(&moved).zip(&gradients) {
+            for i in 0..3 {
+                u[i] -= (0..3).map(|j| g[i][j] * v[j]).sum::<f64>();
+            }
+        }
+        Ok((field, s.force_n))
+    }
+
+    /// Changes of the voxel averages and of the force along a path of departures, at a step.
+    fn change_by_departures(
+        &self,
+        at: usize,
+        tangent: &mut Tangent,
+        material: &Ogden,
+        path: &Path,
+        n: usize,
+        step: f64,
+    ) -> Result<(Vec<[f64; 3]>, f64), DiagnosisError> {
+        let departures = |t: f64| self.departures(material, &(path.to)(t), n);
+        let s = match path.moves_only_plates {
+            true => tangent.plates_sensitivity(&departures, step)?,
+            false => tangent.departure_sensitivity(&departures, step)?,
+        };
+        Ok((self.stations[at].view.average(&s.displacement)?, s.force_n))
     }
 
     /// What the image and the load cell make of a change of the sample, and their own change: a difference of both.
@@ -281,6 +324,19 @@ impl<'a> Laboratory<'a> {
         ends: &[Scene; 2],
         step: f64,
     ) -> Result<Trace, DiagnosisError> {
+        let [ahead, behind] = ends;
+        if ahead.image.is_as(&behind.image) && self.stations[at].pose() == &ahead.image.pose {
+            // Only the sample changes: the image turns and scales that.
+            let displacement = change.displacement.iter().map(|field| self.shown(ahead, field.clone())).collect();
+            let (gain, offset) =
+                (1.0 + 0.5 * (ahead.force_gain + behind.force_gain), ahead.force_offset_n - behind.force_offset_n);
+            let (d_gain, d_offset) = ((ahead.force_gain - behind.force_gain) / (2.0 * step), offset / (2.0 * step));
+            let force = |(n, f): (usize, &f64)| match self.observed.steps[n].force {
+                Some(_) => f * gain + prediction.states[n].force_n * d_gain + d_offset,
+                None => 0.0,
+            };
+            return Ok(Trace { displacement, force: change.force.iter().enumerate().map(force).collect() });
+        }
         let mut recorded = Vec::with_capacity(2);
         for (scene, sign) in ends.iter().zip([1.0, -1.0]) {
             let seen: Vec<Vec<[f64; 3]>> = prediction
@@ -296,50 +352,56 @@ impl<'a> Laboratory<'a> {
         Ok(recorded[0].plus(-1.0, &recorded[1]).scaled(0.5 / step))
     }
 
-    /// Changes of `prediction` (the nominal scene's) as unit compliances (mm/kPa) of parts of a bonded face move the
-    /// sample against the plate: `part_of`(position) says to which of `num_parts` a node belongs.
+    /// Changes of `prediction`, which is that of `material` and `scene`, as unit compliances (mm/kPa) of parts of a
+    /// bonded face move the sample against the plate: `part_of`(position) says to which of `num_parts` a node belongs.
     ///
     /// # Errors
     /// [`DiagnosisError::Solve`].
     pub fn bond_derivatives(
         &mut self,
         material: &Ogden,
+        scene: &Scene,
         prediction: &Prediction,
         is_moved_face: bool,
         num_parts: usize,
-        part_of: &dyn Fn([f64; 3]) -> usize,
+        part_of: &(dyn Fn([f64; 3]) -> usize + Sync),
     ) -> Result<Vec<Trace>, DiagnosisError> {
-        let scene = Scene::default();
-        let at = self.station(&scene)?;
+        let at = self.stations.at(scene)?;
         let mut all = vec![Trace::default(); num_parts];
         for (n, state) in prediction.states.iter().enumerate() {
-            let departures = self.departures(material, &scene, n);
+            let departures = self.departures(material, scene, n);
             let station = &self.stations[at];
             let mut model = station.model.departed(&departures);
             let tractions = model.plate_tractions(material, state)?;
-            let mut tangent = model.tangent(material, state)?;
+            let tangent = model.tangent(material, state)?;
             let mesh = model.mesh();
             let face = if is_moved_face { &mesh.moved_nodes } else { &mesh.fixed_nodes };
             let parts: Vec<(u32, usize)> = face.iter().map(|&v| (v, part_of(mesh.nodes[v as usize]))).collect();
-            for (part, trace) in all.iter_mut().enumerate() {
+            let has_force = self.observed.steps[n].force.is_some();
+            all.par_iter_mut().enumerate().try_for_each(|(part, trace)| -> Result<(), DiagnosisError> {
                 let mut rate = vec![[0.0; 3]; tractions.len()];
                 for (v, _) in parts.iter().filter(|(_, p)| *p == part) {
                     // The sample lags behind what pulls it.
                     rate[*v as usize] = tractions[*v as usize].map(|t| -t);
                 }
-                let s = tangent.imposed_sensitivity(&rate)?;
-                trace.displacement.push(station.view.average(&s.displacement)?);
-                let has_force = self.observed.steps[n].force.is_some();
-                trace.force.push(if has_force { s.force_n } else { 0.0 });
-            }
+                let s = tangent.shared().imposed_sensitivity(&rate)?;
+                trace.displacement.push(self.shown(scene, station.view.average(&s.displacement)?));
+                trace.force.push(if has_force { s.force_n * (1.0 + scene.force_gain) } else { 0.0 });
+                Ok(())
+            })?;
         }
         Ok(all)
     }
 
     /// The departures of a scene at a step.
-    fn departures(&self, material: &Ogden, scene: &Scene, step: usize) -> crate::fem::Departures {
-        let measured = self.observed.steps[step].force.map_or(0.0, |f| f.value_n);
-        scene.departures(measured, bond_scale(material), self.face_axis)
+    fn departures(&self, material: &Ogden, scene: &Scene, step: usize) -> Departures {
+        scene.departures(step, &self.observed.steps[step], bond_scale(material), self.face_axis)
+    }
+
+    /// What the image makes of a change of the sample's displacement, voxel by voxel.
+    fn shown(&self, scene: &Scene, mut change: Vec<[f64; 3]>) -> Vec<[f64; 3]> {
+        scene.image.turn_and_scale(&mut change);
+        change
     }
 
     /// What the scan and the load cell make of equilibria.
@@ -351,53 +413,17 @@ impl<'a> Laboratory<'a> {
         forces: &[f64],
         seen: &[Vec<[f64; 3]>],
     ) -> Result<Trace, DiagnosisError> {
-        let image = &scene.image;
-        // The view is made for the scene's shift, so that the walls cut the shifted voxels. A further shift, as of a
-        // scene beside it from which a derivative is taken, and rotations are applied to first order.
-        let viewed = self.stations[at].shift_mm;
-        let shift_mm = [0, 1, 2].map(|i| image.shift_mm[i] - viewed[i]);
-        let turns = shift_mm.iter().chain(&image.rotation_rad).any(|x| x.abs() > 0.0);
-        let has_background = image.background_mm.iter().flatten().any(|x| x.abs() > 0.0);
-        let mask = &self.observed.mask;
+        let station = &self.stations[at];
         let mut trace = Trace::default();
         for (n, (state, seen)) in states.iter().zip(seen).enumerate() {
-            let mut field = seen.clone();
-            if turns {
-                let gradients = self.stations[at].view.gradients(&state.displacement)?;
-                let w = image.rotation_rad;
-                let cross = |a: [f64; 3], b: [f64; 3]| {
-                    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-                };
-                for ((u, g), &voxel) in field.iter_mut().zip(&gradients).zip(&mask.voxels) {
-                    let x = mask.grid.center_mm(voxel as usize);
-                    let turned = cross(w, x);
-                    let shift = [0, 1, 2].map(|i| shift_mm[i] + turned[i]);
-                    let back = cross(w, *u);
-                    for i in 0..3 {
-                        u[i] += (0..3).map(|j| g[i][j] * shift[j]).sum::<f64>() - back[i];
-                    }
-                }
-            }
-            for u in &mut field {
-                for c in 0..3 {
-                    u[c] *= 1.0 + image.gain[c];
-                }
-            }
-            if has_background {
-                for (u, &voxel) in field.iter_mut().zip(&mask.voxels) {
-                    let x = mask.grid.center_mm(voxel as usize);
-                    let t = [0, 1, 2].map(|a| x[a] / self.half_extents[a]);
-                    let terms = background_terms(t);
-                    for c in 0..3 {
-                        u[c] += image.background_mm[c].iter().zip(terms).map(|(a, b)| a * b).sum::<f64>();
-                    }
-                }
-            }
-            for jump in image.jumps.iter().filter(|j| j.step == n) {
-                for &v in jump.voxels.iter() {
-                    field[v as usize][jump.component] += jump.size_mm;
-                }
-            }
+            // The view is made where the scene's image lies. A scene beside it, from which a derivative is taken, is
+            // looked at to first order.
+            let gradients = match scene.image.lies_off(station.pose()) {
+                true => Some(station.view.gradients(&state.displacement)?),
+                false => None,
+            };
+            let mask = &self.observed.mask;
+            let field = scene.image.shown(n, seen, gradients.as_deref(), station.pose(), mask, self.half_extents);
             trace.displacement.push(field);
             let has_force = self.observed.steps[n].force.is_some();
             let force = forces[n] * (1.0 + scene.force_gain) + scene.force_offset_n;
@@ -405,66 +431,10 @@ impl<'a> Laboratory<'a> {
         }
         Ok(trace)
     }
-
-    /// The station of a scene, made where there is none.
-    fn station(&mut self, scene: &Scene) -> Result<usize, DiagnosisError> {
-        let holes: Vec<[f64; 3]> = self
-            .observed
-            .specimen
-            .holes
-            .iter()
-            .enumerate()
-            .map(|(n, _)| scene.holes.get(n).copied().unwrap_or([0.0; 3]))
-            .collect();
-        let releases = scene.releases();
-        let found = self.stations.iter().position(|s| {
-            let same = |a: &[f64; 3], b: &[f64; 3]| a.iter().zip(b).all(|(x, y)| x.to_bits() == y.to_bits());
-            s.releases == releases && s.holes.iter().zip(&holes).all(|(a, b)| same(a, b))
-        });
-        let made = scene.specimen(&self.observed.specimen);
-        let shift_mm = scene.image.shift_mm;
-        if let Some(at) = found {
-            let station = &mut self.stations[at];
-            if station.shift_mm != shift_mm {
-                station.view = self.observed.shifted_view(&made, station.model.mesh(), shift_mm)?;
-                station.shift_mm = shift_mm;
-            }
-            return Ok(at);
-        }
-        made.validate().map_err(DiagnosisError::Specimen)?;
-        let mut mesh = self.nominal.clone();
-        for (hole, change) in holes.iter().enumerate() {
-            for (variable, &by) in hole_variables(hole).into_iter().zip(change) {
-                if by.abs() > 0.0 {
-                    let velocity = shape_velocity(&self.nominal, &self.observed.specimen, variable);
-                    mesh = morphed(&mesh, &velocity, by);
-                }
-            }
-        }
-        let view = self.observed.shifted_view(&made, &mesh, shift_mm)?;
-        let model = ForwardModel::with_released(mesh, &made, &|_, is_moved| releases[usize::from(is_moved)])?;
-        // The nodes of two morphed meshes correspond: equilibria of one start the other.
-        let states = self.stations.iter().rev().find(|s| s.releases == releases).map(|s| s.states.clone());
-        if self.stations.len() >= MAX_STATIONS {
-            // The nominal one stays.
-            self.stations.remove(1);
-        }
-        self.stations.push(Station { holes, releases, model, view, shift_mm, states: states.unwrap_or_default() });
-        Ok(self.stations.len() - 1)
-    }
-}
-
-fn hole_variables(hole: usize) -> [DesignVariable; 3] {
-    [DesignVariable::HoleDiameter(hole), DesignVariable::HoleX(hole), DesignVariable::HoleOther(hole)]
 }
 
 /// Stiffness (kPa/mm) of the sample under a node of its bond: shear modulus / node spacing.
 fn bond_scale(material: &Ogden) -> f64 {
     let mu = material.initial_shear_modulus_kpa();
     mu.abs() / BOND_LENGTH_MM
-}
-
-/// 1, x, y, z, x², y², z², xy, yz, zx.
-pub(super) fn background_terms([x, y, z]: [f64; 3]) -> [f64; 10] {
-    [1.0, x, y, z, x * x, y * y, z * z, x * y, y * z, z * x]
 }

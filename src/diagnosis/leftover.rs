@@ -12,6 +12,10 @@ pub struct Leftover {
     pub chi2_per_datum: f64,
     /// Misfit beyond noise, mm rms, from means over boxes.
     pub structured_rms_mm: f64,
+    /// The same per component, mm rms.
+    pub structured_by_component_mm: [f64; 3],
+    /// Voxels per box of those means.
+    pub voxels_per_box: f64,
     /// Where it is largest.
     pub location: Option<Location>,
 }
@@ -23,7 +27,8 @@ pub(super) fn leftover(observed: &Observed, residual: &Trace, metric: &Metric) -
     let half = [0.5 * b.length_mm, 0.5 * b.thickness_mm, 0.5 * b.width_mm];
     let num = BOXES.iter().product::<usize>();
     let (mut chi2, mut count) = (0.0, 0.0);
-    let (mut structured, mut weight) = (0.0, 0.0);
+    let (mut structured, mut weight) = ([0.0; 3], 0.0);
+    let mut num_means = 0.0;
     let mut worst: Option<(f64, usize, usize)> = None;
     for (step, field) in residual.displacement.iter().enumerate() {
         let mut sums = vec![[0.0; 3]; num];
@@ -46,11 +51,12 @@ pub(super) fn leftover(observed: &Observed, residual: &Trace, metric: &Metric) -
             }
         }
         for (at, (sum, n)) in sums.iter().zip(&counts).enumerate().filter(|(_, (_, n))| **n > 0.0) {
+            weight += n;
+            num_means += 1.0;
             for c in 0..3 {
                 let noise = observed.noise_sd_mm[c].powi(2) * observed.noise_correlation() / n;
                 let excess = (sum[c] / n).powi(2) - noise;
-                structured += n * excess;
-                weight += n;
+                structured[c] += n * excess;
                 let significance = (sum[c] / n).powi(2) / noise;
                 if worst.is_none_or(|w| significance > w.0) {
                     worst = Some((significance, at, c));
@@ -69,7 +75,9 @@ pub(super) fn leftover(observed: &Observed, residual: &Trace, metric: &Metric) -
     });
     Leftover {
         chi2_per_datum: chi2 / f64::max(count, 1.0),
-        structured_rms_mm: f64::max(structured / f64::max(weight, 1.0), 0.0).sqrt(),
+        structured_rms_mm: f64::max(structured.iter().sum::<f64>() / f64::max(3.0 * weight, 1.0), 0.0).sqrt(),
+        structured_by_component_mm: structured.map(|s| f64::max(s / f64::max(weight, 1.0), 0.0).sqrt()),
+        voxels_per_box: weight / f64::max(num_means, 1.0),
         location,
     }
 }

@@ -1,5 +1,6 @@
 //! Where something is in the sample.
 
+use crate::mesh::half_extents_mm;
 use crate::specimen::{Specimen, TestKind};
 use serde::{Deserialize, Serialize};
 
@@ -31,5 +32,15 @@ impl Location {
                 extent_mm: [0.0, b.thickness_mm, b.width_mm],
             },
         }
+    }
+
+    /// The face of the block across `axis`, at its low (0) or high (1) side.
+    pub(super) fn of_face(specimen: &Specimen, axis: usize, side: usize, what: &str) -> Location {
+        let half_mm = half_extents_mm(specimen);
+        let (mut center_mm, mut extent_mm) = ([0.0; 3], half_mm.map(|h| 2.0 * h));
+        center_mm[axis] = [-1.0, 1.0][side] * half_mm[axis];
+        extent_mm[axis] = 0.0;
+        let (sign, name) = (["-", "+"][side], ["x", "y", "z"][axis]);
+        Location { region: format!("{what} {sign}{name}"), center_mm, extent_mm }
     }
 }

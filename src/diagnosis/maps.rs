@@ -10,6 +10,7 @@ use super::error::DiagnosisError;
 use super::laboratory::{Laboratory, Prediction};
 use super::scene::Scene;
 use super::score::{Prepared, ScoreTest};
+use super::supposed::Path;
 use super::trace::Trace;
 use crate::fem::Field;
 use crate::material::Ogden;
@@ -113,6 +114,7 @@ impl BondMap {
     pub fn new(
         laboratory: &mut Laboratory,
         material: &Ogden,
+        scene: &Scene,
         prediction: &Prediction,
         test: &ScoreTest,
         is_moved_face: bool,
@@ -124,7 +126,7 @@ impl BondMap {
         };
         let division = Division::of(&specimen, counts);
         let directions =
-            laboratory.bond_derivatives(material, prediction, is_moved_face, division.num_parts(), &|x| {
+            laboratory.bond_derivatives(material, scene, prediction, is_moved_face, division.num_parts(), &|x| {
                 division.part_of(x)
             })?;
         let whole = directions[1..].iter().fold(directions[0].clone(), |sum, part| sum.plus(1.0, part));
@@ -167,20 +169,23 @@ impl StiffnessMap {
     pub fn new(
         laboratory: &mut Laboratory,
         material: &Ogden,
+        scene: &Scene,
         prediction: &Prediction,
         test: &ScoreTest,
     ) -> Result<StiffnessMap, DiagnosisError> {
         let division = Division::of(&laboratory.observed().specimen, BOXES);
-        let paths: Vec<Box<dyn Fn(f64) -> Scene>> = (0..division.num_parts())
+        let paths: Vec<Path> = (0..division.num_parts())
             .map(|part| {
-                Box::new(move |t: f64| Scene {
-                    stiffness: vec![Field::new(move |x| if division.part_of(x) == part { 1.0 + t } else { 1.0 })],
-                    ..Scene::default()
-                }) as _
+                Path::of_sample(move |t: f64| {
+                    let mut changed = scene.clone();
+                    let factor = move |x| if division.part_of(x) == part { 1.0 + t } else { 1.0 };
+                    changed.stiffness.push(Field::new(factor));
+                    changed
+                })
             })
             .collect();
-        let paths: Vec<(&dyn Fn(f64) -> Scene, bool)> = paths.iter().map(|p| (&**p, true)).collect();
-        let directions = laboratory.derivatives(material, &Scene::default(), prediction, false, &paths, 0.02)?;
+        let paths: Vec<&Path> = paths.iter().collect();
+        let directions = laboratory.derivatives(material, scene, prediction, false, &paths, 0.02)?;
         let map = ScoreMap::new(division, test, &directions);
         let balls = best_balls(&division, &map.prepared);
         Ok(StiffnessMap { map, balls })

@@ -2,6 +2,7 @@
 
 use super::cause::CauseName;
 use super::error::DiagnosisError;
+use crate::calibration::Boundary;
 use crate::material::Ogden;
 
 /// Settings of [`super::diagnose()`].
@@ -14,11 +15,13 @@ pub struct DiagnosisOptions {
     pub allowance_mm: Option<f64>,
     /// The material as believed; its number of terms is then the nominal one.
     pub prior: Option<Ogden>,
-    /// Most causes. A cause that a round of tests adds counts twice, one that the load curve or the material tells of
-    /// counts once, an artefact of the image not at all; no round begins once the count is reached.
+    /// Most causes that are named, however they were found; artefacts of the image do not count. No round begins once
+    /// the count is reached.
     pub max_causes: usize,
     /// Drift of the load cell where the recording does not state it, N.
     pub force_sd_n: f64,
+    /// What moves the boundary of the model. Where it is what was measured, no cause at the boundary is looked for.
+    pub boundary: Boundary,
     /// Causes that are not to be supposed.
     pub left_out: Vec<CauseName>,
 }
@@ -29,8 +32,9 @@ impl Default for DiagnosisOptions {
             mesh_factor: 1.35,
             allowance_mm: None,
             prior: None,
-            max_causes: 3,
+            max_causes: 6,
             force_sd_n: 0.02,
+            boundary: Boundary::Commanded,
             left_out: Vec::new(),
         }
     }

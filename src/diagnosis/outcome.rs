@@ -2,6 +2,7 @@
 
 use super::cause_fit::CauseFit;
 use super::found::FoundCause;
+use super::interior::InteriorTest;
 use super::leftover::Leftover;
 use super::load_history::LoadHistoryFit;
 use super::maps::ScoreMap;
@@ -49,4 +50,6 @@ pub struct Diagnosis {
     pub allowance_mm: f64,
     /// What a finer mesh predicts beyond the mesh of the diagnosis, the causes included.
     pub mesh_defect: Option<MeshDefect>,
+    /// Whether the misfit was made at the boundary or inside; `None` where there is none or the test cannot be made.
+    pub interior: Option<InteriorTest>,
 }

@@ -2,7 +2,7 @@
 
 use super::candidate::Candidate;
 use super::cause::{Cause, CauseName};
-use super::causes::REGISTRY;
+use super::causes::{AT_BOUNDARY, REGISTRY};
 use super::entry::{Entry, Origin};
 use super::error::DiagnosisError;
 use super::load_effect::LoadEffect;
@@ -45,6 +45,12 @@ impl Registry {
         Ok(self)
     }
 
+    /// Without the causes that act where the sample is held: plates, bonds, layers, the outline.
+    pub(super) fn without_boundary(mut self) -> Registry {
+        self.entries.retain(|e| !AT_BOUNDARY.contains(&e.name));
+        self
+    }
+
     /// The names, each once, in order.
     pub(super) fn names(&self) -> Vec<CauseName> {
         let mut names: Vec<CauseName> = Vec::new();
@@ -60,6 +66,15 @@ impl Registry {
     pub(super) fn tested(&self, specimen: &Specimen) -> Vec<Arc<dyn Cause>> {
         let of_entry = |entry: &Entry| match entry.origin {
             Origin::Tested(suspects) => suspects(specimen),
+            _ => Vec::new(),
+        };
+        self.entries.iter().flat_map(of_entry).collect()
+    }
+
+    /// The parts of the set-up of a recording.
+    pub(super) fn set_up(&self, observed: &Observed) -> Vec<Arc<dyn Cause>> {
+        let of_entry = |entry: &Entry| match entry.origin {
+            Origin::SetUp(parts) => parts(observed),
             _ => Vec::new(),
         };
         self.entries.iter().flat_map(of_entry).collect()

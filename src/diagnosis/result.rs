@@ -4,6 +4,7 @@ use super::cause::Category;
 use super::cause_fit::CauseFit;
 use super::experiment::Experiment;
 use super::found::FoundCause;
+use super::interior::InteriorTest;
 use super::interval::{interval, log_interval};
 use super::location::Location;
 use super::outcome::Diagnosis;
@@ -126,6 +127,9 @@ pub struct DiagnosisResult {
     /// where no force was recorded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub modulus_against_belief: Option<ModulusAgainstBelief>,
+    /// Whether the misfit was made at the boundary or inside; left out where there is none, or where it cannot be told.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interior: Option<InteriorTest>,
     /// Causes, most telling first.
     pub causes: Vec<CauseResult>,
     /// What the data cannot tell apart from the last cause; where the verdict is unexplained, what was tried and
@@ -137,6 +141,9 @@ pub struct DiagnosisResult {
     pub structured_rms_mm: BeforeAfter,
     /// Misfit on data kept back, mm rms, noise included.
     pub kept_back_rms_mm: BeforeAfter,
+    /// Voxels of a step at most that agree with hardly any of their neighbours and were left out.
+    #[serde(default)]
+    pub num_outlying_voxels: usize,
     /// Where most is left.
     pub left_at: Option<Location>,
     /// All causes tested.
@@ -178,6 +185,8 @@ impl DiagnosisResult {
             chi2_per_datum: BeforeAfter { before: d.left[0].chi2_per_datum, after: d.left[1].chi2_per_datum },
             structured_rms_mm: BeforeAfter { before: d.left[0].structured_rms_mm, after: d.left[1].structured_rms_mm },
             kept_back_rms_mm: BeforeAfter { before: d.kept_back_rms_mm[0], after: d.kept_back_rms_mm[1] },
+            interior: d.interior,
+            num_outlying_voxels: d.observed.num_outliers,
             left_at: d.left[1].location.clone(),
             ranked: d
                 .ranked

@@ -20,6 +20,10 @@ const SAME_EFFECT: f64 = 0.2;
 /// Causes whose fits differ by less than this in deviance cannot be told apart.
 const AMBIGUITY: f64 = 15.0;
 
+/// A candidate is fitted where it explains, to first order, more than this part of the smallest share that is called
+/// for: a full fit may explain several times what first order promises.
+const LEAST_PROMISE: f64 = 0.25;
+
 /// A fit with one more cause.
 struct Trial {
     /// Fall of the deviance, less ln n per parameter of the cause.
@@ -27,44 +31,75 @@ struct Trial {
     fit: CauseFit,
 }
 
-/// Adds causes round by round, until no further one is called for or `max_causes` are named.
+/// How far rounds go.
+#[derive(Clone, Copy)]
+pub(super) struct RoundLimits {
+    /// Most causes that are named in all.
+    pub(super) max_causes: usize,
+    /// Whether a load curve was read.
+    pub(super) has_load_curve: bool,
+}
+
+/// The first half of a round: tests all suspects to first order.
 ///
 /// # Errors
 /// [`DiagnosisError`]: the work was cancelled, or the fit so far has no derivatives.
+pub(super) fn score_round(
+    inference: &mut Inference,
+    registry: &Registry,
+    findings: &mut Findings,
+    limits: RoundLimits,
+) -> Result<Vec<Candidate>, DiagnosisError> {
+    findings.num_rounds += 1;
+    let round = findings.num_rounds;
+    (inference.progress)(&format!("round {round}: testing causes"));
+    let scope = RoundScope { has_load_curve: limits.has_load_curve };
+    let RoundScores { candidates, maps } = score_suspects(inference, registry, &findings.current, scope)?;
+    if round == 1 {
+        findings.maps.extend(maps);
+    }
+    findings.ranked.extend(candidates.iter().map(|c| Ranked {
+        identity: c.cause.identity(),
+        description: c.cause.description(),
+        score: c.score,
+        fitted: None,
+        round,
+    }));
+    Ok(candidates)
+}
+
+/// The second half of a round: fits the leading candidates and names the best; whether there was one.
+///
+/// # Errors
+/// As [`score_round`].
+pub(super) fn fit_round(
+    inference: &mut Inference,
+    findings: &mut Findings,
+    measured: &Trace,
+    candidates: &[Candidate],
+) -> Result<bool, DiagnosisError> {
+    let trials = fit_leading(inference, candidates, findings, measured, findings.num_rounds);
+    take_best(inference, findings, trials)
+}
+
+/// Adds causes round by round, until no further one is called for or the limits are reached.
+///
+/// # Errors
+/// As [`score_round`].
 pub(super) fn add_causes(
     inference: &mut Inference,
     registry: &Registry,
     findings: &mut Findings,
     measured: &Trace,
-    max_causes: usize,
-    has_load_curve: bool,
+    limits: RoundLimits,
 ) -> Result<(), DiagnosisError> {
-    let mut round = 0;
-    while num_named(findings) < max_causes {
-        round += 1;
-        (inference.progress)(&format!("round {round}: testing causes"));
-        let scope = RoundScope { has_load_curve, has_maps: round == 1 };
-        let RoundScores { candidates, maps } = score_suspects(inference, registry, &findings.current, scope)?;
-        findings.maps.extend(maps);
-        findings.ranked.extend(candidates.iter().map(|c| Ranked {
-            identity: c.cause.identity(),
-            description: c.cause.description(),
-            score: c.score,
-            fitted: None,
-            round,
-        }));
-        let trials = fit_leading(inference, &candidates, findings, measured, round);
-        if !take_best(inference, findings, trials)? {
+    while findings.causes.len() < limits.max_causes {
+        let candidates = score_round(inference, registry, findings, limits)?;
+        if !fit_round(inference, findings, measured, &candidates)? {
             break;
         }
     }
     Ok(())
-}
-
-/// What counts towards the most causes: all that are named, and once more those of them that are in the fit. Artefacts
-/// do not count.
-fn num_named(findings: &Findings) -> usize {
-    findings.current.causes.iter().filter(|c| !c.cause.is_artefact()).count() + findings.causes.len()
 }
 
 /// Fits the leading candidates in full, the best first; those without a fit are left out.
@@ -76,7 +111,8 @@ fn fit_leading(
     round: usize,
 ) -> Vec<Trial> {
     let mut trials: Vec<Trial> = Vec::new();
-    for c in leading(candidates) {
+    let least = LEAST_PROMISE * SMALLEST_SHARE * findings.explained();
+    for c in leading(candidates, &findings.current).into_iter().filter(|c| c.score > least) {
         if (inference.is_cancelled)() {
             break;
         }

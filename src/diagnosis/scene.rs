@@ -1,6 +1,9 @@
 //! A scene: the experiment as it may really have been. The default scene is the nominal experiment.
 
+pub use super::image::{ImageChange, Jump, Pose};
+use crate::calibration::ObservedStep;
 use crate::fem::{Departures, FIRM_BOND_KPA_PER_MM, Fibre, Field, PlateMotion};
+use crate::mesh::BlockShape;
 use crate::specimen::Specimen;
 
 /// What differs from the nominal experiment. Causes change it; the laboratory predicts what would be recorded of it.
@@ -16,6 +19,10 @@ pub struct Scene {
     pub fibre: Option<Fibre>,
     /// The plates: fixed, moved.
     pub plates: [PlateMotion; 2],
+    /// Motions of the plates at each step alone, added to the others. Steps without an entry have none.
+    pub plates_at: Vec<[PlateMotion; 2]>,
+    /// How far the block's faces lie off the drawing.
+    pub shape: BlockShape,
     /// Real minus commanded drive per newton of the measured force, mm/N.
     pub compliance_mm_per_n: f64,
     /// How loose the bond is on the fixed and the moved face, from 0 (firm) to 1 (gone). Where several fields overlap,
@@ -31,45 +38,25 @@ pub struct Scene {
     pub force_gain: f64,
 }
 
-/// How recorded displacements differ from the sample's.
-#[derive(Clone, Debug, Default)]
-pub struct ImageChange {
-    /// Relative error of the encoding along x, y, z.
-    pub gain: [f64; 3],
-    /// Shift of the image, mm.
-    pub shift_mm: [f64; 3],
-    /// Rotation of the image about the origin, rad.
-    pub rotation_rad: [f64; 3],
-    /// Background per component: coefficients (mm) of 1, x, y, z, x², y², z², xy, yz, zx in units of the half extents.
-    pub background_mm: [[f64; 10]; 3],
-    /// Jumps: step, component, voxels (places in the compared mask) and size, mm.
-    pub jumps: Vec<Jump>,
-}
-
-/// Voxels whose phase is off by a multiple of 2π.
-#[derive(Clone, Debug)]
-pub struct Jump {
-    /// Which step.
-    pub step: usize,
-    /// Which component.
-    pub component: usize,
-    /// Places in the compared mask.
-    pub voxels: std::sync::Arc<Vec<u32>>,
-    /// Size, mm.
-    pub size_mm: f64,
-}
-
 impl Scene {
-    /// The departures from the nominal model at a step where `force_n` was measured. A bond is loose or firm compared
-    /// with `bond_scale_kpa_per_mm`, the stiffness of the sample under its bond. The bonded faces lie across
+    /// The departures from the nominal model at the step of this number, which is `observed`. A bond is loose or firm
+    /// compared with `bond_scale_kpa_per_mm`, the stiffness of the sample under its bond. The bonded faces lie across
     /// `face_axis`.
-    pub fn departures(&self, force_n: f64, bond_scale_kpa_per_mm: f64, face_axis: usize) -> Departures {
+    pub fn departures(
+        &self,
+        step: usize,
+        observed: &ObservedStep,
+        bond_scale_kpa_per_mm: f64,
+        face_axis: usize,
+    ) -> Departures {
         let product = self.stiffness.clone();
         let stiffness_factor = (!product.is_empty())
             .then(|| Field::new(move |x| product.iter().map(|f| f.at(x)).product::<f64>().max(1e-2)));
         let growth = self.log_growth;
-        let mut moved_plate = self.plates[1];
-        moved_plate.translation_mm[0] += self.compliance_mm_per_n * force_n;
+        let own = self.plates_at.get(step).copied().unwrap_or_default();
+        let fixed_plate = self.plates[0].plus(&own[0]);
+        let mut moved_plate = self.plates[1].plus(&own[1]);
+        moved_plate.translation_mm[0] += self.compliance_mm_per_n * observed.force.map_or(0.0, |f| f.value_n);
         let [fixed, moved] = self.looseness.clone();
         let soft = self.bond_mm_per_kpa;
         let bond = self.releases().contains(&true).then(|| {
@@ -85,9 +72,10 @@ impl Scene {
             stiffness_factor,
             log_growth: (growth.abs() > 0.0).then(|| Field::new(move |_| growth)),
             fibre: self.fibre,
-            fixed_plate: self.plates[0],
+            fixed_plate,
             moved_plate,
             bond_kpa_per_mm: bond,
+            faces_per_mm: observed.faces_per_mm.clone(),
         }
     }
 
@@ -96,7 +84,15 @@ impl Scene {
         [0, 1].map(|face| !self.looseness[face].is_empty() || self.bond_mm_per_kpa[face].abs() > 0.0)
     }
 
-    /// The specimen as made.
+    /// The motions of the plates at a step alone, to change.
+    pub fn plates_at_mut(&mut self, step: usize) -> &mut [PlateMotion; 2] {
+        if self.plates_at.len() <= step {
+            self.plates_at.resize(step + 1, Default::default());
+        }
+        &mut self.plates_at[step]
+    }
+
+    /// The specimen as drawn, with its holes as made.
     pub fn specimen(&self, nominal: &Specimen) -> Specimen {
         let mut made = nominal.clone();
         for (hole, change) in made.holes.iter_mut().zip(&self.holes) {

@@ -67,6 +67,18 @@ impl<'a> ScoreTest<'a> {
     }
 }
 
+impl ScoreTest<'_> {
+    /// What all of `directions` together explain where something is believed of each: `precision` per direction, in
+    /// its units.
+    pub fn explained_believed(&self, directions: &[Trace], precision: &[f64]) -> f64 {
+        let Prepared { mut gram, gradient } = self.prepare(directions);
+        for (i, p) in precision.iter().enumerate() {
+            gram[(i, i)] += p;
+        }
+        gram.cholesky().map_or(0.0, |factor| gradient.dot(&factor.solve(&gradient)))
+    }
+}
+
 /// Products of directions with a residual and with each other.
 pub struct Prepared {
     /// ⟨dᵢ, dⱼ⟩ without the nuisance.

@@ -2,15 +2,15 @@
 //! free.
 
 use super::candidate::Candidate;
-use super::cause::{Cause, Course};
+use super::cause::{Cause, CauseParameter, Course};
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
 use super::evidence::{EVIDENCE, WORTH_A_FIT};
-use super::fit::STEP;
+use super::fit::{STEP, prior_scales};
 use super::inference::Inference;
 use super::maps::ScoreMap;
+use super::prior::FitSettings;
 use super::registry::Registry;
-use super::scene::Scene;
 use super::score::ScoreTest;
 use super::search::Search;
 use super::supposed::{Path, Supposed, paths_of};
@@ -20,6 +20,8 @@ use std::sync::Arc;
 
 /// Most full fits per round.
 const MAX_FITS: usize = 5;
+/// Most full fits per round where the set-up is in the fit: its many parameters make them long.
+const MAX_FITS_WITH_SET_UP: usize = 2;
 /// First order may overshoot: a fit starts at most so many scales of a parameter away.
 const LARGEST_START: f64 = 5.0;
 /// A step within this part of the largest drive is near rest and tells no course from another.
@@ -30,15 +32,13 @@ const NEAR_REST: f64 = 1e-3;
 pub(super) struct RoundScope {
     /// Whether a load curve was read, which tells of some causes better than the steps' forces do.
     pub(super) has_load_curve: bool,
-    /// Whether maps are made: they are those of the nominal misfit.
-    pub(super) has_maps: bool,
 }
 
 /// What the tests of a round say.
 pub(super) struct RoundScores {
     /// All candidates, most explaining first.
     pub(super) candidates: Vec<Candidate>,
-    /// The maps that were made, with their names.
+    /// The maps of what the fit so far leaves, with their names.
     pub(super) maps: Vec<(String, ScoreMap)>,
 }
 
@@ -56,27 +56,56 @@ pub(super) fn score_suspects(
     let suspects = suspects_of(registry, observed, current, scope.has_load_curve);
     let (nuisance, directions) = directions_of(inference, current, &suspects)?;
     let Inference { laboratory, metric, settings, is_cancelled, .. } = inference;
-    let test = ScoreTest::new(metric, &current.residual, &nuisance, &[settings.bulk.log_sd.powi(-2)]);
+    let test = ScoreTest::new(metric, &current.residual, &nuisance, &nuisance_priors(current, settings));
     let mut candidates: Vec<Candidate> = suspects
         .into_iter()
         .zip(&directions)
         .filter_map(|(cause, directions)| scored(cause, directions, &test, observed))
         .collect();
-    let mut search = Search::new(laboratory, current, &test, *is_cancelled, scope.has_maps);
+    let mut search = Search::new(laboratory, current, &test, *is_cancelled);
     registry.search(&mut search, &mut candidates)?;
     let maps = search.into_maps()?;
     candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
     Ok(RoundScores { candidates, maps })
 }
 
+/// What the set-up as a whole explains of what `current` leaves, to first order and as far as its beliefs allow.
+///
+/// # Errors
+/// [`DiagnosisError`].
+pub(super) fn score_of_set_up(
+    inference: &mut Inference,
+    registry: &Registry,
+    current: &CauseFit,
+) -> Result<f64, DiagnosisError> {
+    let parts = registry.set_up(inference.laboratory.observed());
+    let (nuisance, directions) = directions_of(inference, current, &parts)?;
+    let test =
+        ScoreTest::new(&inference.metric, &current.residual, &nuisance, &nuisance_priors(current, &inference.settings));
+    let precision: Vec<f64> = parts.iter().flat_map(|c| c.parameters()).map(|p| prior_scales(&p).powi(-2)).collect();
+    Ok(test.explained_believed(&directions.concat(), &precision))
+}
+
+/// What is known of the parameters of the fit so far, as precisions in their scales: of ln κ, and of the causes'
+/// parameters of which something is believed.
+fn nuisance_priors(current: &CauseFit, settings: &FitSettings) -> Vec<f64> {
+    let mut priors = vec![0.0; current.material.parameters().len()];
+    priors[0] = settings.bulk.log_sd.powi(-2);
+    let believed = |p: CauseParameter| p.believed_sd.map_or(0.0, |_| prior_scales(&p).powi(-2));
+    priors.extend(current.causes.iter().flat_map(|c| c.cause.parameters()).map(believed));
+    priors
+}
+
 /// The candidates worth a full fit: of each name as many as the cause asks for, most explaining first.
-pub(super) fn leading(candidates: &[Candidate]) -> Vec<&Candidate> {
+pub(super) fn leading<'c>(candidates: &'c [Candidate], current: &CauseFit) -> Vec<&'c Candidate> {
+    let has_set_up = current.causes.iter().any(|s| s.cause.is_of_set_up());
+    let max_fits = if has_set_up { MAX_FITS_WITH_SET_UP } else { MAX_FITS };
     let mut chosen: Vec<&Candidate> = Vec::new();
     let top = candidates.first().map_or(0.0, |c| c.score);
     for c in candidates {
         let is_worth = c.score > EVIDENCE && c.score > WORTH_A_FIT * top;
         let num_alike = chosen.iter().filter(|o| o.cause.name() == c.cause.name()).count();
-        if is_worth && num_alike < c.cause.max_suspects() && chosen.len() < MAX_FITS {
+        if is_worth && num_alike < c.cause.max_suspects() && chosen.len() < max_fits {
             chosen.push(c);
         }
     }
@@ -89,7 +118,8 @@ fn has_several_drives(observed: &Observed) -> bool {
 }
 
 /// The suspects for which every recording is tested, as far as this recording can tell of them. What is in the fit
-/// already is free there and is not tested again.
+/// already is free there and is not tested again: nor are plain motions where the plates are free, nor what takes up
+/// whatever is smooth where the set-up is in the fit.
 fn suspects_of(
     registry: &Registry,
     observed: &Observed,
@@ -97,11 +127,14 @@ fn suspects_of(
     has_load_curve: bool,
 ) -> Vec<Arc<dyn Cause>> {
     let has_several_drives = has_several_drives(observed);
+    let has = |is: fn(&dyn Cause) -> bool| current.causes.iter().any(|s| is(&*s.cause));
+    let (are_plates_free, has_set_up) = (has(|c| c.frees_plates()), has(|c| c.is_of_set_up()));
     registry
         .tested(&observed.specimen)
         .into_iter()
         .filter(|c| !(has_load_curve && c.is_read_from_load_curve()))
         .filter(|c| has_several_drives || !c.needs_several_drives())
+        .filter(|c| !(are_plates_free && c.is_plain_motion()) && !(has_set_up && c.is_sponge()))
         .filter(|c| !current.causes.iter().any(|s| s.cause.identity() == c.identity()))
         .collect()
 }
@@ -130,11 +163,7 @@ fn directions_of(
         })
         .collect();
     let known = paths_of(&current.causes);
-    let paths: Vec<(&dyn Fn(f64) -> Scene, bool)> = known
-        .iter()
-        .chain(own.iter().flatten())
-        .map(|(path, changes_sample)| (&**path as _, *changes_sample))
-        .collect();
+    let paths: Vec<&Path> = known.iter().chain(own.iter().flatten()).collect();
     let (material, scene) = (&current.material, current.scene());
     let mut columns = inference.laboratory.derivatives(material, &scene, &current.prediction, true, &paths, STEP)?;
     let parameters = material.parameters();

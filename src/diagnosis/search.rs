@@ -19,46 +19,45 @@ pub(super) struct Search<'s, 'a> {
     /// The most that a suspect of this round explains so far, to first order. Causes are asked in the order of the
     /// registry.
     pub(super) top: f64,
-    has_maps: bool,
     bonds: Option<[BondMap; 2]>,
     stiffness: Option<StiffnessMap>,
 }
 
 impl<'s, 'a> Search<'s, 'a> {
-    /// `has_maps` says whether there are maps in this round: they hold for the nominal scene, hence for the first
-    /// round.
+    /// Nothing looked at yet.
     pub(super) fn new(
         laboratory: &'s mut Laboratory<'a>,
         current: &'s CauseFit,
         test: &'s ScoreTest<'s>,
         is_cancelled: &'s dyn Fn() -> bool,
-        has_maps: bool,
     ) -> Search<'s, 'a> {
-        Search { laboratory, current, test, is_cancelled, top: 0.0, has_maps, bonds: None, stiffness: None }
+        Search { laboratory, current, test, is_cancelled, top: 0.0, bonds: None, stiffness: None }
     }
 
-    /// Maps of the compliance of the fixed and the moved face; `None` in a round without maps.
+    /// Maps of the compliance of the fixed and the moved face.
     ///
     /// # Errors
     /// [`DiagnosisError`].
     pub(super) fn bond_maps(&mut self) -> Result<&Option<[BondMap; 2]>, DiagnosisError> {
-        if self.bonds.is_none() && self.has_maps {
-            let (material, prediction) = (&self.current.material, &self.current.prediction);
-            let fixed = BondMap::new(self.laboratory, material, prediction, self.test, false)?;
-            let moved = BondMap::new(self.laboratory, material, prediction, self.test, true)?;
+        if self.bonds.is_none() {
+            let (material, scene, prediction) =
+                (&self.current.material, &self.current.scene(), &self.current.prediction);
+            let fixed = BondMap::new(self.laboratory, material, scene, prediction, self.test, false)?;
+            let moved = BondMap::new(self.laboratory, material, scene, prediction, self.test, true)?;
             self.bonds = Some([fixed, moved]);
         }
         Ok(&self.bonds)
     }
 
-    /// The map of modulus changes; `None` in a round without maps.
+    /// The map of modulus changes.
     ///
     /// # Errors
     /// [`DiagnosisError`].
     pub(super) fn stiffness_map(&mut self) -> Result<&Option<StiffnessMap>, DiagnosisError> {
-        if self.stiffness.is_none() && self.has_maps {
-            let (material, prediction) = (&self.current.material, &self.current.prediction);
-            self.stiffness = Some(StiffnessMap::new(self.laboratory, material, prediction, self.test)?);
+        if self.stiffness.is_none() {
+            let (material, scene, prediction) =
+                (&self.current.material, &self.current.scene(), &self.current.prediction);
+            self.stiffness = Some(StiffnessMap::new(self.laboratory, material, scene, prediction, self.test)?);
         }
         Ok(&self.stiffness)
     }

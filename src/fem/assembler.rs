@@ -21,9 +21,9 @@ use std::sync::{Arc, OnceLock};
 /// What does not change with the departures: the mesh with its boundary conditions and unknowns.
 struct Discretisation {
     mesh: Mesh,
-    tables: ElementTables,
+    tables: Arc<ElementTables>,
     topology: Arc<Topology>,
-    plates: Plates,
+    plates: Arc<Plates>,
     /// Multiplicity of the meshed part (2 per mirror plane) × samples in parallel.
     multiplicity: f64,
     /// Reference positions of the quadrature points of every element; made when a field first needs them.
@@ -71,9 +71,9 @@ impl Assembler {
         let departures = DeparturesOnMesh::new(&Departures::default(), &mesh, &plates, &|| &[]);
         let assembler = Assembler {
             discretisation: Arc::new(Discretisation {
-                tables: ElementTables::new(mesh.element_kind),
+                tables: Arc::new(ElementTables::new(mesh.element_kind)),
                 topology,
-                plates,
+                plates: Arc::new(plates),
                 multiplicity: f64::from(1u32 << planes) * f64::from(specimen.samples_in_parallel),
                 points: OnceLock::new(),
                 mesh,
@@ -90,6 +90,30 @@ impl Assembler {
         let points = || &self.discretisation.points.get_or_init(|| self.point_positions())[..];
         let on_mesh = DeparturesOnMesh::new(departures, self.mesh(), self.plates(), &points);
         Assembler { departures: Arc::new(on_mesh), ..self.clone() }
+    }
+
+    /// The same elements with the nodes elsewhere, without departures. Springs keep the areas that they stood for.
+    ///
+    /// # Errors
+    /// [`SolveError::InvalidMesh`].
+    pub(super) fn moved(&self, nodes: Vec<[f64; 3]>) -> Result<Assembler, SolveError> {
+        let old = &self.discretisation;
+        let mesh = Mesh { nodes, ..old.mesh.clone() };
+        let departures = DeparturesOnMesh::new(&Departures::default(), &mesh, &old.plates, &|| &[]);
+        let assembler = Assembler {
+            discretisation: Arc::new(Discretisation {
+                tables: old.tables.clone(),
+                topology: old.topology.clone(),
+                plates: old.plates.clone(),
+                multiplicity: old.multiplicity,
+                points: OnceLock::new(),
+                mesh,
+            }),
+            departures: Arc::new(departures),
+            kernels: self.kernels,
+        };
+        assembler.check_geometry()?;
+        Ok(assembler)
     }
 
     /// The same with the kernels that use no special instructions.
@@ -129,7 +153,7 @@ impl Assembler {
 
     /// Displacement (mm) that the plates impose on node `v`, which must be on a plate.
     pub(super) fn imposed(&self, v: usize, drive_mm: f64) -> [f64; 3] {
-        self.plates().imposed(self.mesh(), self.departures(), v, drive_mm)
+        self.plates().imposed(self.mesh().nodes[v], self.departures(), v, drive_mm)
     }
 
     fn check_geometry(&self) -> Result<(), SolveError> {

@@ -46,6 +46,48 @@ impl Tangent<'_> {
         self.sensitivity_between(&Ends { ahead: &ahead, behind: &behind, step }, imposed_rate)
     }
 
+    /// As [`Self::departure_sensitivity`] along a path that changes nothing but how plates and faces move: closed forms
+    /// in place of differences of the residual, and only in the elements beside the plates.
+    ///
+    /// # Errors
+    /// As [`Self::departure_sensitivity`].
+    pub fn plates_sensitivity(
+        &mut self,
+        path: &dyn Fn(f64) -> Departures,
+        step: f64,
+    ) -> Result<DepartureSensitivity, SolveError> {
+        let plates = self.assembler.plates();
+        if !plates.released.is_empty() {
+            // Springs pull at what moves.
+            return self.departure_sensitivity(path, step);
+        }
+        let (ahead, behind, drive) = (path(step), path(-step), self.equilibrium.drive_mm);
+        let nodes = &self.assembler.mesh().nodes;
+        let mut rate = vec![[0.0; 3]; nodes.len()];
+        for v in plates.held_nodes() {
+            let at = |departures: &Departures| plates.imposed(nodes[v], departures, v, drive);
+            let (a, b) = (at(&ahead), at(&behind));
+            rate[v] = [0, 1, 2].map(|i| (a[i] - b[i]) / (2.0 * step));
+        }
+        let mut force = vec![[0.0; 3]; nodes.len()];
+        let assembler = self.assembler.clone();
+        let beside = &assembler.plates().elements_beside;
+        assembler
+            .assemble_directional(&self.configuration(), Some(&rate), None, Some(beside), &mut force)
+            .map_err(|cause| self.diverged(cause))?;
+        let x = self.solve_all(&[assembler.collect(&force, -1.0)], ACCURACY)?;
+        for (r, d) in rate.iter_mut().zip(assembler.spread(&x[0])) {
+            for i in 0..3 {
+                r[i] += d[i];
+            }
+        }
+        let driven = Some(&assembler.plates().driven_elements[..]);
+        assembler
+            .assemble_directional(&self.configuration(), Some(&rate), None, driven, &mut force)
+            .map_err(|cause| self.diverged(cause))?;
+        Ok(DepartureSensitivity { force_n: assembler.force_n(&force), displacement: rate })
+    }
+
     /// Derivative of the equilibrium as the held nodes move by `rate` (mm per unit of t; other nodes' entries are
     /// ignored).
     ///

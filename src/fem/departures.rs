@@ -4,6 +4,7 @@
 //! along x. Each departure here is at rest in its default; the element kernels, the factorisation and the derivatives
 //! are the same with and without.
 
+use super::rotation::turning_of;
 use std::fmt;
 use std::sync::Arc;
 
@@ -26,6 +27,34 @@ impl Field {
 impl fmt::Debug for Field {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("Field")
+    }
+}
+
+/// A vector function of the reference position (mm).
+#[derive(Clone)]
+pub struct VectorField(Arc<dyn Fn([f64; 3]) -> [f64; 3] + Send + Sync>);
+
+impl VectorField {
+    /// A field from its formula.
+    pub fn new(formula: impl Fn([f64; 3]) -> [f64; 3] + Send + Sync + 'static) -> VectorField {
+        VectorField(Arc::new(formula))
+    }
+
+    /// Its value at a reference position, mm.
+    pub fn at(&self, position: [f64; 3]) -> [f64; 3] {
+        (self.0)(position)
+    }
+
+    /// The field times a factor.
+    fn scaled(&self, factor: f64) -> VectorField {
+        let whole = self.clone();
+        VectorField::new(move |x| whole.at(x).map(|u| factor * u))
+    }
+}
+
+impl fmt::Debug for VectorField {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("VectorField")
     }
 }
 
@@ -58,20 +87,19 @@ impl PlateMotion {
         let sum = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|i| a[i] + drive_mm * b[i]);
         let t = sum(self.translation_mm, self.translation_per_mm);
         let w = sum(self.rotation_rad, self.rotation_rad_per_mm);
-        let cross = |a: [f64; 3], b: [f64; 3]| {
-            [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-        };
-        // Rodrigues: R x − x = sin(θ)/θ w×x + (1 − cos θ)/θ² w×(w×x), both factors by their series near zero.
-        let square: f64 = w.iter().map(|x| x * x).sum();
-        let (a, b) = if square < 1e-8 {
-            (1.0 - square / 6.0, 0.5 - square / 24.0)
-        } else {
-            let angle = square.sqrt();
-            (angle.sin() / angle, (1.0 - angle.cos()) / square)
-        };
-        let once = cross(w, arm);
-        let twice = cross(w, once);
-        [0, 1, 2].map(|i| t[i] + a * once[i] + b * twice[i])
+        let turning = turning_of(w, arm);
+        [0, 1, 2].map(|i| t[i] + turning[i])
+    }
+
+    /// Both motions, translations and rotation vectors added.
+    pub fn plus(&self, other: &PlateMotion) -> PlateMotion {
+        let sum = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|i| a[i] + b[i]);
+        PlateMotion {
+            translation_mm: sum(self.translation_mm, other.translation_mm),
+            translation_per_mm: sum(self.translation_per_mm, other.translation_per_mm),
+            rotation_rad: sum(self.rotation_rad, other.rotation_rad),
+            rotation_rad_per_mm: sum(self.rotation_rad_per_mm, other.rotation_rad_per_mm),
+        }
     }
 
     /// The motion times a factor.
@@ -103,6 +131,9 @@ pub struct Departures {
     /// Stiffness of the bond, kPa/mm, on faces that were released (see
     /// [`ForwardModel::with_released`](super::ForwardModel::with_released)).
     pub bond_kpa_per_mm: Option<Field>,
+    /// Displacement per mm of drive that is imposed on the fixed and on the moved face beside the plates' motions, at
+    /// the reference position (mm).
+    pub faces_per_mm: [Option<VectorField>; 2],
 }
 
 impl Departures {
@@ -120,6 +151,7 @@ impl Departures {
         Departures {
             fixed_plate: self.fixed_plate.scaled(factor),
             moved_plate: self.moved_plate.scaled(factor),
+            faces_per_mm: self.faces_per_mm.clone().map(|face| face.map(|f| f.scaled(factor))),
             ..self.clone()
         }
     }
@@ -127,6 +159,7 @@ impl Departures {
     /// Whether a plate departs from its nominal motion.
     pub fn moves_plates(&self) -> bool {
         [self.fixed_plate, self.moved_plate] != [PlateMotion::default(); 2]
+            || self.faces_per_mm.iter().any(Option::is_some)
     }
 }
 

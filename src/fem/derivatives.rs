@@ -99,6 +99,7 @@ impl Tangent<'_> {
         for &v in &mesh.moved_nodes {
             drive[v as usize][0] = drive_rate;
         }
+        self.add_turning_of_plates(velocity, &mut drive);
         let driven = Some(&assembler.plates().driven_elements[..]);
         let along = Path { velocity, rate: &drive, step: difference_step(mesh, velocity, &drive) };
         let derivative = self.residual_along(along, None)?;
@@ -133,6 +134,27 @@ impl Tangent<'_> {
             });
         }
         Ok(PathSensitivity { displacement, force_n, parameters })
+    }
+
+    /// Adds to `rate` (mm per unit of t) how the displacement that plates and faces impose changes as their nodes move:
+    /// a turned plate moves a node by its arm.
+    fn add_turning_of_plates(&self, velocity: &[[f64; 3]], rate: &mut [[f64; 3]]) {
+        let (plates, departures) = (self.assembler.plates(), self.assembler.departures());
+        if !departures.moves_plates() {
+            return;
+        }
+        let (nodes, drive_mm) = (&self.assembler.mesh().nodes, self.equilibrium.drive_mm);
+        for v in plates.held_nodes() {
+            let at =
+                |t: f64| plates.imposed([0, 1, 2].map(|i| nodes[v][i] + t * velocity[v][i]), departures, v, drive_mm);
+            // Rigid motions are linear in the position, measured faces of low degree: differences over a micrometre
+            // are exact to rounding.
+            let step = 1e-3 / velocity[v].iter().fold(1e-12, |s: f64, x| s.max(x.abs()));
+            let (ahead, behind) = (at(step), at(-step));
+            for i in 0..3 {
+                rate[v][i] += (ahead[i] - behind[i]) / (2.0 * step);
+            }
+        }
     }
 
     /// d/dt r along a path; `elements` restricts the sum.

@@ -90,6 +90,15 @@ impl ForwardModel {
         }
     }
 
+    /// A model of the same elements and released nodes with the nodes at other positions (mm), which departs in
+    /// nothing. Elimination order and symbolic factorisation are shared.
+    ///
+    /// # Errors
+    /// [`SolveError::InvalidMesh`] where an element is inverted.
+    pub fn moved(&self, nodes: Vec<[f64; 3]>) -> Result<ForwardModel, SolveError> {
+        Ok(ForwardModel { fine: self.fine.moved(nodes)?, guide: None, statistics: Statistics::default() })
+    }
+
     /// What the model departs from the nominal experiment in.
     pub fn departures(&self) -> &Departures {
         self.fine.assembler.departures()

@@ -42,6 +42,15 @@ impl MeshModel {
         }
     }
 
+    /// The same elements with the nodes elsewhere and no departures; the symbolic work is shared.
+    ///
+    /// # Errors
+    /// [`SolveError::InvalidMesh`].
+    pub(super) fn moved(&self, nodes: Vec<[f64; 3]>) -> Result<MeshModel, SolveError> {
+        let assembler = self.assembler.moved(nodes)?;
+        Ok(MeshModel { assembler, linearisation: Linearisation::new(self.linearisation.system.empty_like()) })
+    }
+
     /// A run of Newton's method.
     pub(super) fn newton<'a>(
         &'a mut self,

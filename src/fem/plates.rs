@@ -16,6 +16,8 @@ pub(super) struct Plates {
     pub(super) released: Vec<(u32, f64)>,
     /// Elements with a node on the moved face.
     pub(super) driven_elements: Vec<u32>,
+    /// Elements with a node on either face.
+    pub(super) elements_beside: Vec<u32>,
     /// Affine displacement along x per unit of drive at each node: the first guess of a load step.
     pub(super) lift: Vec<f64>,
     /// Largest first load step, mm.
@@ -50,6 +52,10 @@ impl Plates {
         for &(v, _) in &released {
             is_held[v as usize] = false;
         }
+        let is_on_face = |v: u32| is_held[v as usize] || flags[v as usize];
+        let elements_beside = (0..mesh.num_elements() as u32)
+            .filter(|&e| mesh.element(e as usize).iter().any(|&v| is_on_face(v)))
+            .collect();
         let driven_elements = (0..mesh.num_elements() as u32)
             .filter(|&e| mesh.element(e as usize).iter().any(|&v| is_moved[v as usize]))
             .collect();
@@ -63,6 +69,7 @@ impl Plates {
             is_released: flags,
             released,
             driven_elements,
+            elements_beside,
             lift: mesh.nodes.iter().map(|x| x[axis] / extent + 0.5).collect(),
             // One step to a shear strain of 0.8 takes five or six iterations; stretching is more nonlinear.
             first_step_mm: if axis == 1 { 0.85 } else { 0.3 } * extent,
@@ -79,16 +86,21 @@ impl Plates {
         (0..self.is_held.len()).filter(|&v| self.is_held[v])
     }
 
-    /// Displacement (mm) that the plates impose on node `v` of `mesh` at a drive; the node must be on a plate.
-    pub(super) fn imposed(&self, mesh: &Mesh, departures: &Departures, v: usize, drive_mm: f64) -> [f64; 3] {
+    /// Displacement (mm) that the plates impose on node `v` at a drive, were it at the position `x` (mm); the node must
+    /// be on a plate.
+    pub(super) fn imposed(&self, x: [f64; 3], departures: &Departures, v: usize, drive_mm: f64) -> [f64; 3] {
         let (motion, center, along) = if self.is_moved[v] {
             (&departures.moved_plate, self.face_centers[1], drive_mm)
         } else {
             (&departures.fixed_plate, self.face_centers[0], 0.0)
         };
-        let x = mesh.nodes[v];
         let mut u = motion.displacement([0, 1, 2].map(|i| x[i] - center[i]), drive_mm);
         u[0] += along;
+        if let Some(face) = &departures.faces_per_mm[usize::from(self.is_moved[v])] {
+            for (u, rate) in u.iter_mut().zip(face.at(x)) {
+                *u += drive_mm * rate;
+            }
+        }
         u
     }
 }

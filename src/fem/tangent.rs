@@ -20,6 +20,11 @@ pub struct Tangent<'a> {
 }
 
 impl<'a> Tangent<'a> {
+    /// The same tangent once more, for another thread: matrix and factor are shared.
+    pub fn shared(&self) -> Tangent<'a> {
+        Tangent { assembler: self.assembler.clone(), system: self.system.share(), ..*self }
+    }
+
     /// Where the tangent was assembled.
     pub(super) fn configuration(&self) -> Configuration<'_> {
         Configuration {

@@ -4,8 +4,8 @@ use super::request::{InputForm, InputUse};
 use super::subject::check_mesh;
 use super::{Context, JobError, Outcome, Progress, Request, Run, defaults, summary};
 use crate::calibration::{
-    CalibrateOptions, Calibration, CalibrationResult, ContourOptions, DECREMENT_THRESHOLD, Objective, Observed,
-    PAPER_BETA, Rule, TermCount, calibrate,
+    Boundary, CalibrateOptions, Calibration, CalibrationResult, ContourOptions, DECREMENT_THRESHOLD, Objective,
+    Observed, PAPER_BETA, Rule, TermCount, calibrate,
 };
 use crate::field::FieldError;
 use crate::mesh::{MeshOptions, MeshSize};
@@ -69,6 +69,11 @@ pub struct CalibrationRequest {
     #[serde(default)]
     #[schema(minimum = 0.0, maximum = 1000.0, default = 0.0)]
     pub end_margin_mm: f64,
+    /// What moves the boundary of the model: the plates as commanded, or the displacement measured on two planes inside
+    /// the sample, between which alone it is then compared. The second needs no plates that moved as they were told.
+    #[serde(default)]
+    #[schema(default = Boundary::default)]
+    pub boundary: Boundary,
     /// Profile likelihoods of all parameters.
     #[serde(default)]
     pub has_profiles: bool,
@@ -127,8 +132,14 @@ impl CalibrationRequest {
                 let allowed = "small enough to leave a voxel";
                 return Err(JobError::at("/end_margin_mm", self.end_margin_mm, allowed));
             }
-            observed.push(ready);
-            names.push(recording.id.clone());
+            let parts = ready.with_boundary(self.boundary).map_err(|e| unfit(&e))?.steps_apart();
+            for part in &parts {
+                names.push(match (&part.steps[..], parts.len()) {
+                    ([step], 2..) => format!("{} at {} mm", recording.id, step.drive_mm),
+                    _ => recording.id.clone(),
+                });
+            }
+            observed.extend(parts);
         }
         Ok((observed, names))
     }

@@ -3,6 +3,7 @@
 use super::request::{InputForm, InputUse};
 use super::subject::check_mesh;
 use super::{Context, JobError, Outcome, Progress, Request, Run, summary};
+use crate::calibration::Boundary;
 use crate::diagnosis::{
     Diagnosis, DiagnosisError, DiagnosisOptions, DiagnosisResult, TogetherResult, diagnose, together,
 };
@@ -39,6 +40,11 @@ pub struct DiagnosisRequest {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-9, maximum = 1000.0)]
     pub allowance_mm: Option<f64>,
+    /// What moves the boundary of the model: the plates as commanded, or the displacement measured on two planes inside
+    /// the sample, between which alone it is then compared. With the second no cause at the boundary is looked for.
+    #[serde(default)]
+    #[schema(default = Boundary::default)]
+    pub boundary: Boundary,
     /// Most causes.
     #[serde(default = "max_causes")]
     #[schema(minimum = 1, maximum = 20, default = max_causes)]
@@ -69,6 +75,7 @@ impl DiagnosisRequest {
             allowance_mm: self.allowance_mm,
             prior: self.material.clone(),
             max_causes: self.max_causes,
+            boundary: self.boundary,
             ..DiagnosisOptions::default()
         }
     }

@@ -5,11 +5,13 @@
 //!                    └─ triangles                   constrained Delaunay refinement, where quadrilaterals fail
 //!                         └─ section ─ build        extrusion in graded levels, node sets
 //! mesh ─ check, locator, morph                      invariants and quality; inverse map; shape derivatives
+//!      ─ block_shape                                a block whose faces lie off the drawing
 //! ```
 //!
 //! The section is (x, z) extruded along y, or (x, y) extruded along z where holes run along the width. Every mesh is
 //! conforming, its curved walls carry exact nodes at element corners and middles, and equal input gives equal bits.
 
+mod block_shape;
 mod build;
 mod cells;
 mod check;
@@ -35,6 +37,7 @@ mod layout_tests;
 #[cfg(test)]
 mod test_specimens;
 
+pub use block_shape::{BlockShape, FACE_TERMS, half_extents_mm, made_mesh};
 pub use build::{mesh_specimen, mesh_specimen_along};
 pub use check::MeshQuality;
 pub use element::ElementKind;

@@ -71,13 +71,24 @@ fn load_curve(load: &LoadHistoryFit) -> String {
     .to_svg()
 }
 
-/// The residual at the last step; colours saturate at three standard deviations of the noise.
+/// Nineteen of twenty voxels are within the colours' range, which is no less than three standard deviations of the noise.
+const SHOWN_PART: f64 = 0.95;
+
+/// The range of colours in which the pattern of some values can be seen.
+fn visible_range(values: &[f64], noise_sd_mm: f64) -> f64 {
+    let mut sizes: Vec<f64> = values.iter().map(|x| x.abs()).filter(|x| x.is_finite()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let shown = (sizes.len() as f64 * SHOWN_PART) as usize;
+    sizes.get(shown).copied().unwrap_or(0.0).max(3.0 * noise_sd_mm)
+}
+
+/// The residual at the last step, each component and each model on a scale of its own on which its pattern can be seen.
 fn residual_maps(d: &Diagnosis, residual: &Trace, when: &str) -> String {
     let (mask, step) = (&d.observed.mask, d.observed.steps.len() - 1);
     let fields = (0..3)
         .map(|c| {
             let values: Vec<f64> = residual.displacement[step].iter().map(|u| u[c]).collect();
-            let range = 3.0 * d.observed.noise_sd_mm[c];
+            let range = visible_range(&values, d.observed.noise_sd_mm[c]);
             VoxelField {
                 title: format!("measured − model, u_{} ({when})", ["x", "y", "z"][c]),
                 unit: "mm".into(),

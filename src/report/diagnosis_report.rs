@@ -12,6 +12,7 @@ pub fn diagnosis_report(d: &Diagnosis, r: &DiagnosisResult) -> Report {
     let mut page = Report::new(verdict_words(r.verdict), header(d, r));
     page.section("What was found");
     verdict(&mut page, r);
+    interior(&mut page, r);
     for cause in &r.causes {
         describe(&mut page, cause);
     }
@@ -20,8 +21,8 @@ pub fn diagnosis_report(d: &Diagnosis, r: &DiagnosisResult) -> Report {
     materials(&mut page, d, r);
     let pictures = DiagnosisPictures::new(d);
     let [before, after] = &pictures.residuals;
-    page.figure(before, "Measured minus nominal model at the largest drive; colours saturate at three standard deviations of the noise.");
-    page.figure(after, "The same with the causes modelled.");
+    page.figure(before, "Measured minus nominal model at the largest drive. Each map has a scale of its own (see its bar): 19 of 20 voxels are within it, and it is no less than three standard deviations of the noise.");
+    page.figure(after, "The same with the causes modelled, on scales of their own.");
     if let Some(svg) = &pictures.load_curve {
         page.section("Load curve");
         page.figure(svg, "Force over time; measured minus modelled below.");
@@ -51,6 +52,7 @@ fn header(d: &Diagnosis, r: &DiagnosisResult) -> ReportHeader {
         seed: None,
         facts: vec![
             ("voxels compared".into(), d.observed.mask.num_voxels().to_string()),
+            ("voxels that hold no displacement, left out".into(), r.num_outlying_voxels.to_string()),
             ("displacement unknowns".into(), r.num_unknowns.to_string()),
             ("equilibria solved".into(), r.num_solves.to_string()),
             (
@@ -101,6 +103,21 @@ fn verdict(page: &mut Report, r: &DiagnosisResult) {
     if let Some(m) = &r.modulus_against_belief {
         page.callout(CalloutKind::Caution, "Not as stiff as believed", &format!("It seems that {}.", m.in_words()));
     }
+}
+
+/// Whether the misfit was made at the boundary or inside.
+fn interior(page: &mut Report, r: &DiagnosisResult) {
+    let Some(test) = &r.interior else { return };
+    page.subsection("Where it was made, asked before any cause");
+    page.paragraph(&format!(
+        "The part of the sample between two planes {} mm from its middle was driven by the displacement that was measured on them,          whatever the plates and bonds did. There χ² per datum falls from {} to {}, and the misfit beyond noise from {} to {} mm rms: {}.",
+        significant(test.plane_mm, 3),
+        significant(test.chi2_per_datum.before, 3),
+        significant(test.chi2_per_datum.after, 3),
+        significant(test.structured_rms_mm.before, 2),
+        significant(test.structured_rms_mm.after, 2),
+        test.origin.in_words()
+    ));
 }
 
 /// A cause with its place, its parameters and its evidence.

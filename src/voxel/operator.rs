@@ -38,6 +38,22 @@ impl VoxelOperator {
     /// # Errors
     /// [`VoxelError::InvalidSampling`]; [`VoxelError::OutsideMesh`] where no point of a voxel is in the mesh.
     pub fn new(specimen: &Specimen, mesh: &Mesh, mask: &VoxelMask, sampling: Sampling) -> Result<Self, VoxelError> {
+        Self::placed(specimen, mesh, mask, sampling, &|x| (x, IDENTITY))
+    }
+
+    /// As [`Self::new`] for a sample that is not where or what its drawing says: `place` gives for each sample point x
+    /// (mm) of the drawing's voxels the point X of `mesh` whose displacement is seen there, and ∂X/∂x (row: X).
+    /// Gradients are with respect to x.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn placed(
+        specimen: &Specimen,
+        mesh: &Mesh,
+        mask: &VoxelMask,
+        sampling: Sampling,
+        place_of: &dyn Fn([f64; 3]) -> ([f64; 3], Tensor),
+    ) -> Result<Self, VoxelError> {
         sampling.check()?;
         let section = Section::new(specimen);
         let locator = Locator::new(mesh);
@@ -59,7 +75,7 @@ impl VoxelOperator {
             sampling.points(&section, &mask.grid, voxel as usize, &mut points);
             let mut total = 0.0;
             for &(point, weight) in &points {
-                if operator.add_point(mesh, &locator, &mut place, first, point, weight) {
+                if operator.add_point(mesh, &locator, &mut place, first, place_of(point), weight) {
                     total += weight;
                 }
             }
@@ -83,7 +99,7 @@ impl VoxelOperator {
         locator: &Locator,
         place: &mut [u32],
         first: usize,
-        mut point: [f64; 3],
+        (mut point, back): ([f64; 3], Tensor),
         weight: f64,
     ) -> bool {
         let mut reflection = 0;
@@ -123,9 +139,10 @@ impl VoxelOperator {
                 self.gradients.push([0.0; 3]);
             }
             self.values[at] += weight * n[a];
+            let slope = [0, 1, 2].map(|j| (0..3).map(|m| g[a][m] * inverse[m][j]).sum::<f64>());
             for j in 0..3 {
-                let slope: f64 = (0..3).map(|m| g[a][m] * inverse[m][j]).sum();
-                self.gradients[at][j] += weight * SIGNS[reflection as usize][j] * slope;
+                let seen: f64 = (0..3).map(|m| SIGNS[reflection as usize][m] * slope[m] * back[m][j]).sum();
+                self.gradients[at][j] += weight * seen;
             }
         }
         self.num_points += 1;

@@ -47,4 +47,8 @@ impl Cause for Background {
     fn course(&self) -> Course {
         Course::Alike
     }
+
+    fn is_sponge(&self) -> bool {
+        true
+    }
 }

@@ -36,4 +36,8 @@ impl Cause for Compliance {
     fn course(&self) -> Course {
         Course::InProportion
     }
+
+    fn is_plain_motion(&self) -> bool {
+        true
+    }
 }

@@ -9,6 +9,9 @@ const NAME: CauseName = CauseName::new("gain");
 /// Its line in the registry.
 pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Tested(|_| vec![Arc::new(Gain)]) };
 
+/// Gradients are calibrated to this part or better.
+const BELIEVED: f64 = 0.05;
+
 /// Recorded displacement = (1 + gain) × displacement, per axis.
 pub struct Gain;
 
@@ -26,7 +29,9 @@ impl Cause for Gain {
     }
 
     fn parameters(&self) -> Vec<CauseParameter> {
-        ["x", "y", "z"].map(|a| CauseParameter::new(format!("relative_gain_error_{a}"), 0.02, [-0.5, 0.5])).to_vec()
+        ["x", "y", "z"]
+            .map(|a| CauseParameter::new(format!("relative_gain_error_{a}"), 0.02, [-0.5, 0.5]).believed(BELIEVED))
+            .to_vec()
     }
 
     fn apply(&self, values: &[f64], scene: &mut Scene) {

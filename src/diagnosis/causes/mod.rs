@@ -5,6 +5,7 @@
 //! or [`super::material_cause::MaterialCause`].
 
 mod background;
+mod block;
 mod bond;
 mod cell;
 mod compliance;
@@ -15,6 +16,7 @@ mod gain;
 mod gradient;
 mod hole;
 mod inclusion;
+mod layer;
 mod mount;
 mod mullins;
 mod offaxis;
@@ -24,8 +26,10 @@ mod slack;
 mod swelling;
 mod terms;
 mod tilt;
+mod travel;
 mod wrap;
 
+use super::cause::CauseName;
 use super::entry::Entry;
 
 /// All causes. Those in the material's law and those with a place are asked in this order; for all others it only
@@ -54,4 +58,22 @@ pub(super) const REGISTRY: &[Entry] = &[
     debond::ENTRY,
     bond::ENTRY,
     inclusion::ENTRY,
+    travel::ENTRY,
+    registration::OF_SET_UP,
+    layer::ENTRY,
+    block::ENTRY,
+];
+
+/// The causes that act where the sample is held. They say nothing of a part of it whose boundary was measured.
+pub(super) const AT_BOUNDARY: &[CauseName] = &[
+    tilt::ENTRY.name,
+    offaxis::ENTRY.name,
+    mount::ENTRY.name,
+    compliance::ENTRY.name,
+    slack::ENTRY.name,
+    debond::ENTRY.name,
+    bond::ENTRY.name,
+    travel::ENTRY.name,
+    layer::ENTRY.name,
+    block::ENTRY.name,
 ];

@@ -54,4 +54,8 @@ impl Cause for Mount {
     fn course(&self) -> Course {
         Course::Alike
     }
+
+    fn is_plain_motion(&self) -> bool {
+        true
+    }
 }

@@ -54,4 +54,8 @@ impl Cause for OffAxis {
     fn course(&self) -> Course {
         Course::InProportion
     }
+
+    fn is_plain_motion(&self) -> bool {
+        true
+    }
 }

@@ -40,4 +40,8 @@ impl Cause for Slack {
     fn course(&self) -> Course {
         Course::Alike
     }
+
+    fn is_plain_motion(&self) -> bool {
+        true
+    }
 }

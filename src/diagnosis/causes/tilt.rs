@@ -56,4 +56,8 @@ impl Cause for Tilt {
     fn course(&self) -> Course {
         Course::InProportion
     }
+
+    fn is_plain_motion(&self) -> bool {
+        true
+    }
 }

@@ -11,6 +11,14 @@ pub(in crate::job) fn diagnosis(r: &DiagnosisResult, d: &Diagnosis) -> String {
         Verdict::Unexplained => "unexplained: something is left that no cause in the registry explains",
     };
     let mut text = format!("{}: {verdict}\n", r.recording);
+    if r.num_outlying_voxels > 0 {
+        text += &format!("{} voxels hold no displacement and are left out\n", r.num_outlying_voxels);
+    }
+    if let Some(test) = &r.interior {
+        let (before, after) = (test.chi2_per_datum.before, test.chi2_per_datum.after);
+        let words = test.origin.in_words();
+        text += &format!("\ninterior test: chi2 per datum {before:.4} -> {after:.4} between the planes: {words}\n");
+    }
     for c in &r.causes {
         text += &format!("\n{} ({:?}): {}\n", c.name, c.category, c.description);
         for p in &c.parameters {

@@ -1,0 +1,95 @@
+//! Layers at the bonded faces that do not deform.
+
+use crate::calibration::Observed;
+use crate::diagnosis::cause::{Category, Cause, CauseName, CauseParameter};
+use crate::diagnosis::entry::{Entry, Origin};
+use crate::diagnosis::location::Location;
+use crate::diagnosis::scene::Scene;
+use crate::mesh::FACE_TERMS;
+use crate::specimen::{Outline, Specimen, TestKind};
+use std::sync::Arc;
+
+const NAME: CauseName = CauseName::new("layer");
+/// Its line in the registry.
+pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::SetUp(suspects) };
+
+/// A dumb-bell's grips hold it along its tabs: it has no faces of which a layer could be told.
+fn suspects(observed: &Observed) -> Vec<Arc<dyn Cause>> {
+    match observed.specimen.outline {
+        Outline::Block => vec![Arc::new(Layer::of(&observed.specimen))],
+        Outline::Iso37Type4 => Vec::new(),
+    }
+}
+
+/// A layer is believed to be thinner than a millimetre.
+const BELIEVED_DEPTH_MM: f64 = 0.5;
+/// Its depth is believed to vary by about this over half the face.
+const BELIEVED_SLOPE_MM: f64 = 0.3;
+
+/// At each bonded face a layer that moves with the plate: glue, a skin, or a foot of the sample that hardly shears. The
+/// depth of each is a polynomial of second degree over the face, alike at all drives.
+pub struct Layer {
+    /// The axis across the bonded faces.
+    axis: usize,
+}
+
+impl Layer {
+    /// The layers of a specimen.
+    pub fn of(specimen: &Specimen) -> Layer {
+        Layer { axis: bonded_axis(specimen) }
+    }
+}
+
+/// The axis across the bonded faces.
+pub(super) fn bonded_axis(specimen: &Specimen) -> usize {
+    match specimen.test {
+        TestKind::DoubleLapShear => 1,
+        TestKind::Uniaxial => 0,
+    }
+}
+
+impl Cause for Layer {
+    fn name(&self) -> CauseName {
+        NAME
+    }
+
+    fn category(&self) -> Category {
+        Category::Boundary
+    }
+
+    fn description(&self) -> String {
+        "layers at the bonded faces move with the plates and do not deform".into()
+    }
+
+    fn parameters(&self) -> Vec<CauseParameter> {
+        let [a, b] = [["y", "z"], ["x", "z"], ["x", "y"]][self.axis];
+        let terms = [String::new(), a.into(), b.into(), format!("{a}{a}"), format!("{a}{b}"), format!("{b}{b}")];
+        let mut all = Vec::new();
+        for plate in ["fixed", "moved"] {
+            for (n, term) in terms.iter().enumerate() {
+                let name = if n == 0 { format!("{plate}_depth_mm") } else { format!("{plate}_depth_{term}_mm") };
+                let sd = if n == 0 { BELIEVED_DEPTH_MM } else { BELIEVED_SLOPE_MM };
+                all.push(CauseParameter::new(name, 0.1, [-2.0, 3.0]).believed(sd));
+            }
+        }
+        all
+    }
+
+    fn apply(&self, values: &[f64], scene: &mut Scene) {
+        for (side, depth) in values.chunks(FACE_TERMS).enumerate() {
+            let inwards = [1.0, -1.0][side];
+            for (offset, depth) in scene.shape.faces_mm[self.axis][side].iter_mut().zip(depth) {
+                *offset += inwards * depth;
+            }
+        }
+    }
+
+    fn location(&self, values: &[f64], specimen: &Specimen) -> Option<Location> {
+        let face = usize::from(values[FACE_TERMS].abs() > values[0].abs());
+        Some(Location::of_face(specimen, self.axis, face, "layer at the bonded face"))
+    }
+
+    fn is_of_set_up(&self) -> bool {
+        true
+    }
+}

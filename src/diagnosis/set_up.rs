@@ -1,0 +1,138 @@
+//! The experiment as it really was: the plates' own motions, the rig in the scanner, layers at the bonds and the block as
+//! made, fitted all at once.
+//!
+//! Where no single cause explains a misfit, the parts of the set-up are not asked one after the other (each alone explains
+//! little, and the first takes what is another's), but fitted together, each held by what a laboratory believes of it.
+//! What even all of them leave is then taken as known to be left, and misfits are weighed by it
+//! ([`Inference::accept_discrepancy`]): first by what the nominal model leaves, so that the beliefs lead, then by less and
+//! less. Parts that are not needed are taken out again ([`super::thinning`]), and plain motions of the moved plate take
+//! the place of free ones where they explain as much.
+
+use super::candidate::Candidate;
+use super::cause::Cause;
+use super::cause_fit::CauseFit;
+use super::error::DiagnosisError;
+use super::evidence::penalty;
+use super::inference::Inference;
+use super::registry::Registry;
+use super::score_round::score_of_set_up;
+use super::supposed::Supposed;
+use super::thinning::thinned;
+use super::trace::Trace;
+use std::sync::Arc;
+
+/// Most fits, each weighed by what the one before left.
+const MAX_FITS: usize = 5;
+/// The weights are settled where the misfit beyond noise changes by less than this part.
+const SETTLED: f64 = 0.05;
+
+/// A single cause that explains more than this part of the misfit, to first order, is fitted before the set-up is looked
+/// at.
+const SINGLE_EXPLAINS: f64 = 0.75;
+/// The set-up is looked at first where, to first order, it explains so many times what the best single cause does.
+const SET_UP_EXPLAINS: f64 = 1.5;
+
+/// Whether the set-up as a whole promises so much more than any of `candidates` that it is to be fitted before them.
+///
+/// # Errors
+/// [`DiagnosisError`]: no derivatives.
+pub(super) fn promises_more(
+    inference: &mut Inference,
+    registry: &Registry,
+    current: &CauseFit,
+    candidates: &[Candidate],
+) -> Result<bool, DiagnosisError> {
+    let (best, all) = (candidates.first().map_or(0.0, |c| c.score), inference.misfit_of(&current.residual));
+    if best > SINGLE_EXPLAINS * all || registry.set_up(inference.laboratory.observed()).is_empty() {
+        return Ok(false);
+    }
+    let set_up = score_of_set_up(inference, registry, current)?;
+    (inference.progress)(&format!(
+        "to first order the set-up explains {:.0} %, the best single cause {:.0} % of the misfit",
+        100.0 * set_up / all,
+        100.0 * best / all
+    ));
+    Ok(set_up > SET_UP_EXPLAINS * best)
+}
+
+/// The fit of `measured` with all parts of the set-up, from where `start` ended; the causes that it has stay.
+///
+/// # Errors
+/// [`DiagnosisError`]: no equilibrium, or the work was cancelled.
+pub(super) fn fit_set_up(
+    inference: &mut Inference,
+    registry: &Registry,
+    measured: &Trace,
+    start: &CauseFit,
+) -> Result<CauseFit, DiagnosisError> {
+    let mut causes = start.causes.clone();
+    let of_cause = |cause: Arc<dyn Cause>| Supposed { values: cause.start(), cause };
+    causes.extend(registry.set_up(inference.laboratory.observed()).into_iter().map(of_cause));
+    inference.accept_discrepancy(&start.residual);
+    let fitted = inference.fit(measured, &start.material, &causes)?;
+    settled(inference, measured, fitted)
+}
+
+/// Fits again with weights by what the last fit left, until both hardly change.
+///
+/// # Errors
+/// As [`fit_set_up`].
+fn settled(inference: &mut Inference, measured: &Trace, mut fitted: CauseFit) -> Result<CauseFit, DiagnosisError> {
+    for _ in 1..MAX_FITS {
+        let before = inference.discrepancy_mm2.iter().sum::<f64>();
+        inference.accept_discrepancy(&fitted.residual);
+        let after = inference.discrepancy_mm2.iter().sum::<f64>();
+        let left_mm = fitted.residual.rms_mm();
+        (inference.progress)(&format!("fitting again, weighed by what is left ({left_mm:.3} mm rms)"));
+        fitted = inference.fit(measured, &fitted.material, &fitted.causes)?;
+        if (after - before).abs() <= 2.0 * SETTLED * before {
+            break;
+        }
+    }
+    Ok(fitted)
+}
+
+/// The fit with plain motions of the moved plate (alike at all drives, in proportion to them, or to the force) in place
+/// of motions with values of their own at every drive, where they explain as much for their number; else as it is.
+///
+/// # Errors
+/// As [`fit_set_up`].
+pub(super) fn with_plain_motions(
+    inference: &mut Inference,
+    registry: &Registry,
+    measured: &Trace,
+    fitted: CauseFit,
+) -> Result<CauseFit, DiagnosisError> {
+    if !fitted.causes.iter().any(|c| c.cause.frees_plates()) {
+        return Ok(fitted);
+    }
+    let observed = inference.laboratory.observed();
+    let has_several_drives = observed.steps.iter().any(|s| (s.drive_mm - observed.steps[0].drive_mm).abs() > 0.0);
+    let plain = registry
+        .tested(&observed.specimen)
+        .into_iter()
+        .filter(|c| c.is_plain_motion() && (has_several_drives || !c.needs_several_drives()))
+        .filter(|c| !fitted.causes.iter().any(|s| s.cause.identity() == c.identity()))
+        .map(|cause| Supposed { values: cause.start(), cause });
+    let mut causes: Vec<Supposed> = fitted.causes.iter().filter(|c| !c.cause.frees_plates()).cloned().collect();
+    causes.extend(plain);
+    let Ok(other) = inference.fit(measured, &fitted.material, &causes) else { return Ok(fitted) };
+    let other = thinned(inference, measured, other)?;
+    let cost = |fit: &CauseFit| fit.deviance + penalty(&inference.metric, fit.num_parameters());
+    Ok(if cost(&other) < cost(&fitted) { other } else { fitted })
+}
+
+/// As far as the set-up is in a fit: the fit without what it does not need.
+///
+/// # Errors
+/// As [`fit_set_up`].
+pub(super) fn simplest_set_up(
+    inference: &mut Inference,
+    registry: &Registry,
+    measured: &Trace,
+    fitted: CauseFit,
+) -> Result<CauseFit, DiagnosisError> {
+    let fitted = thinned(inference, measured, fitted)?;
+    let fitted = with_plain_motions(inference, registry, measured, fitted)?;
+    settled(inference, measured, fitted)
+}

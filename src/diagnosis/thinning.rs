@@ -1,0 +1,154 @@
+//! Taking out of a fit what it does not need.
+//!
+//! Near its end a fit's deviance is a quadratic form in its parameters. Of that form it is known at once what it costs to
+//! do without a cause (Wald's statistic with all others free to follow), and where the others go. Causes are taken out
+//! one after the other, the one that is missed least first (backward elimination), as long as none of them is missed by
+//! more than it costs; then what is left is fitted again.
+
+use super::cause_fit::CauseFit;
+use super::error::DiagnosisError;
+use super::evidence::{EVIDENCE, penalty};
+use super::fit::{derivatives, normal_matrix};
+use super::found::FoundCause;
+use super::inference::Inference;
+use super::supposed::Supposed;
+use super::trace::Trace;
+use nalgebra::{DMatrix, DVector};
+
+/// The quadratic form of a fit at its end, in scaled parameters.
+struct QuadraticModel {
+    /// Half the Hessian of the deviance.
+    matrix: DMatrix<f64>,
+    /// How far each parameter is from where it would be without its cause; zero for the material's, which have no such
+    /// place.
+    away: DVector<f64>,
+    /// Per parameter: the cause that it belongs to, `None` for the material's.
+    owners: Vec<Option<usize>>,
+    /// Changes of the prediction with each parameter.
+    columns: Vec<Trace>,
+}
+
+impl QuadraticModel {
+    fn of(inference: &mut Inference, fitted: &CauseFit) -> Result<QuadraticModel, DiagnosisError> {
+        let Inference { laboratory, metric, settings, .. } = inference;
+        let columns = derivatives(laboratory, &fitted.material, &fitted.causes, &fitted.prediction)?;
+        let weighed: Vec<_> = columns.iter().map(|c| metric.weigh(c)).collect();
+        let matrix = normal_matrix(metric, &weighed, &fitted.material, &fitted.causes, settings);
+        let num_material = fitted.material.parameters().len();
+        let (mut away, mut owners) = (vec![0.0; num_material], vec![None; num_material]);
+        for (index, supposed) in fitted.causes.iter().enumerate() {
+            let parameters = supposed.cause.parameters();
+            for ((value, start), p) in supposed.values.iter().zip(supposed.cause.start()).zip(&parameters) {
+                away.push((value - start) / p.scale);
+                owners.push(Some(index));
+            }
+        }
+        Ok(QuadraticModel { matrix, away: DVector::from_vec(away), owners, columns })
+    }
+
+    fn places_of(&self, cause: usize) -> Vec<usize> {
+        (0..self.owners.len()).filter(|i| self.owners[*i] == Some(cause)).collect()
+    }
+
+    /// By how much the deviance rises without a cause, all others free to follow; infinite where it is not known.
+    fn missed(&self, cause: usize) -> f64 {
+        let places = self.places_of(cause);
+        let rest: Vec<usize> = (0..self.owners.len()).filter(|i| !places.contains(i)).collect();
+        let part = |rows: &[usize], columns: &[usize]| {
+            DMatrix::from_fn(rows.len(), columns.len(), |i, j| self.matrix[(rows[i], columns[j])])
+        };
+        let Some(factor) = part(&rest, &rest).cholesky() else { return f64::INFINITY };
+        let cross = part(&rest, &places);
+        let own = part(&places, &places) - cross.tr_mul(&factor.solve(&cross));
+        let away = DVector::from_fn(places.len(), |i, _| self.away[places[i]]);
+        away.dot(&(own * &away))
+    }
+
+    /// The model without a cause: the others have followed.
+    fn without(self, cause: usize) -> QuadraticModel {
+        let places = self.places_of(cause);
+        let rest: Vec<usize> = (0..self.owners.len()).filter(|i| !places.contains(i)).collect();
+        let matrix = DMatrix::from_fn(rest.len(), rest.len(), |i, j| self.matrix[(rest[i], rest[j])]);
+        let pull = DVector::from_fn(rest.len(), |i, _| {
+            places.iter().map(|&p| self.matrix[(rest[i], p)] * self.away[p]).sum::<f64>()
+        });
+        let followed = matrix.clone().cholesky().map_or_else(|| DVector::zeros(rest.len()), |f| f.solve(&pull));
+        let away = DVector::from_fn(rest.len(), |i, _| {
+            if self.owners[rest[i]].is_some() { self.away[rest[i]] + followed[i] } else { 0.0 }
+        });
+        let owners = rest.iter().map(|&i| self.owners[i]).collect();
+        let columns = rest.iter().map(|&i| self.columns[i].clone()).collect();
+        QuadraticModel { matrix, away, owners, columns }
+    }
+
+    /// Root mean square of what a cause adds to the displacement, mm, to first order.
+    fn effect_rms_mm(&self, cause: usize) -> f64 {
+        let places = self.places_of(cause);
+        let zero = self.columns[0].scaled(0.0);
+        places.iter().fold(zero, |sum, &p| sum.plus(self.away[p], &self.columns[p])).rms_mm()
+    }
+}
+
+/// Whether a cause may be taken out: an artefact was seen in the image.
+fn may_go(supposed: &Supposed) -> bool {
+    !supposed.cause.is_artefact()
+}
+
+/// The fit without the causes that it does not need.
+///
+/// # Errors
+/// [`DiagnosisError`]: no derivatives, no equilibrium, or the work was cancelled.
+pub(super) fn thinned(
+    inference: &mut Inference,
+    measured: &Trace,
+    fitted: CauseFit,
+) -> Result<CauseFit, DiagnosisError> {
+    let mut model = QuadraticModel::of(inference, &fitted)?;
+    let mut left: Vec<usize> = (0..fitted.causes.len()).collect();
+    loop {
+        let least = left
+            .iter()
+            .filter(|&&cause| may_go(&fitted.causes[cause]))
+            .map(|&cause| {
+                let num = fitted.causes[cause].values.len();
+                (cause, model.missed(cause) - penalty(&inference.metric, num).max(EVIDENCE))
+            })
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((cause, _)) = least.filter(|(_, beyond)| *beyond < 0.0) else { break };
+        model = model.without(cause);
+        left.retain(|c| *c != cause);
+    }
+    if left.len() == fitted.causes.len() {
+        return Ok(fitted);
+    }
+    let causes: Vec<Supposed> = left
+        .iter()
+        .map(|&index| {
+            let Supposed { cause, values } = &fitted.causes[index];
+            let away = model.places_of(index).into_iter().map(|p| model.away[p]);
+            let moved = cause.parameters().into_iter().zip(cause.start()).zip(away).zip(values);
+            let values = moved.map(|(((p, start), away), was)| {
+                let value = (start + away * p.scale).clamp(p.range[0], p.range[1]);
+                if value.is_finite() { value } else { *was }
+            });
+            Supposed { cause: cause.clone(), values: values.collect() }
+        })
+        .collect();
+    (inference.progress)(&format!("fitting without {} parts that are not needed", fitted.causes.len() - left.len()));
+    inference.fit(measured, &fitted.material, &causes)
+}
+
+/// All causes of a fit but artefacts, each with what is missed without it (less ln n per parameter) and what it adds to
+/// the displacement.
+///
+/// # Errors
+/// As [`thinned`].
+pub(super) fn named_causes(inference: &mut Inference, fitted: &CauseFit) -> Result<Vec<FoundCause>, DiagnosisError> {
+    let model = QuadraticModel::of(inference, fitted)?;
+    let observed = inference.laboratory.observed();
+    let found = |(index, supposed): (usize, &Supposed)| {
+        let evidence = model.missed(index) - penalty(&inference.metric, supposed.values.len());
+        FoundCause::of_fit(fitted, index, observed).with_evidence(evidence, model.effect_rms_mm(index))
+    };
+    Ok(fitted.causes.iter().enumerate().filter(|(_, s)| !s.cause.is_artefact()).map(found).collect())
+}

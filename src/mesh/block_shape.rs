@@ -1,0 +1,183 @@
+//! A block whose six faces are not the planes of the drawing: how far each face lies off, and the smooth map from the
+//! drawn to the made block that this makes.
+//!
+//! A point X of the drawn block comes to x = X + Σ_axes e_i [ (1 − s_i)/2 f_i⁻(X) + (1 + s_i)/2 f_i⁺(X) ], where s_i is
+//! X_i in half extents and f_i^± is how far the face across axis i lies off at the low and the high side: a polynomial
+//! of second degree in the two other coordinates. The map is linear in the coefficients of the polynomials, so that
+//! derivatives with respect to them are its terms. On quadratic elements with axes along the block's it is exact.
+
+use super::Mesh;
+use crate::specimen::Specimen;
+use nalgebra::Matrix3;
+
+/// Terms of a face's polynomial: 1, a, b, a², ab, b² in the two axes of the face (in order), in half extents.
+pub const FACE_TERMS: usize = 6;
+
+/// Iterations of the inverse map: the offsets are small against the block, each gains two digits or more.
+const INVERSIONS: usize = 12;
+/// The inverse map ends where it moves by less than this, mm.
+const INVERTED_MM: f64 = 1e-10;
+
+/// How far the faces of a block lie off the drawing, mm along the axis that they lie across.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BlockShape {
+    /// Per axis, side (low, high) and term.
+    pub faces_mm: [[[f64; FACE_TERMS]; 2]; 3],
+}
+
+impl BlockShape {
+    /// Whether the block is that of the drawing.
+    pub fn is_nominal(&self) -> bool {
+        self.faces_mm.iter().flatten().flatten().all(|c| *c == 0.0)
+    }
+
+    /// `factor` × `other` added.
+    pub fn plus(&self, factor: f64, other: &BlockShape) -> BlockShape {
+        let mut sum = *self;
+        for (a, b) in sum.faces_mm.iter_mut().flatten().flatten().zip(other.faces_mm.iter().flatten().flatten()) {
+            *a += factor * b;
+        }
+        sum
+    }
+
+    /// How far a point of the drawn block lies off, mm: the map less the identity. Also the velocity of the points as
+    /// the coefficients change by `self` per unit of time.
+    pub fn offset(&self, half_mm: [f64; 3], x: [f64; 3]) -> [f64; 3] {
+        let t = [0, 1, 2].map(|i| x[i] / half_mm[i]);
+        [0, 1, 2].map(|axis| {
+            let terms = face_terms(axis, t);
+            let [low, high] = self.faces_mm[axis].map(|c| c.iter().zip(terms).map(|(c, t)| c * t).sum::<f64>());
+            0.5 * (1.0 - t[axis]) * low + 0.5 * (1.0 + t[axis]) * high
+        })
+    }
+
+    /// ∂x/∂X of the map at a point of the drawn block.
+    fn slope(&self, half_mm: [f64; 3], x: [f64; 3]) -> Matrix3<f64> {
+        let t = [0, 1, 2].map(|i| x[i] / half_mm[i]);
+        let mut slope = Matrix3::identity();
+        for axis in 0..3 {
+            let (terms, rates) = (face_terms(axis, t), face_term_rates(axis, t));
+            let sides = [0.5 * (1.0 - t[axis]), 0.5 * (1.0 + t[axis])];
+            for (side, coefficients) in self.faces_mm[axis].iter().enumerate() {
+                let sign = [-0.5, 0.5][side];
+                for (n, c) in coefficients.iter().enumerate() {
+                    slope[(axis, axis)] += sign * c * terms[n] / half_mm[axis];
+                    for (k, other) in other_axes(axis).into_iter().enumerate() {
+                        slope[(axis, other)] += sides[side] * c * rates[k][n] / half_mm[other];
+                    }
+                }
+            }
+        }
+        slope
+    }
+
+    /// The point of the drawn block that comes to `x`, cut to the block, and ∂X/∂x there; the rows of cut coordinates
+    /// are zero, since they do not change with x. What lies beyond a face is thus taken for what the face does.
+    pub fn pulled_back(&self, half_mm: [f64; 3], x: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
+        let mut drawn = x;
+        if !self.is_nominal() {
+            for _ in 0..INVERSIONS {
+                let cut = [0, 1, 2].map(|i| drawn[i].clamp(-1.5 * half_mm[i], 1.5 * half_mm[i]));
+                let offset = self.offset(half_mm, cut);
+                let next = [0, 1, 2].map(|i| x[i] - offset[i]);
+                let moved = (0..3).map(|i| (next[i] - drawn[i]).abs()).fold(0.0, f64::max);
+                drawn = next;
+                if moved < INVERTED_MM {
+                    break;
+                }
+            }
+        }
+        let cut = [0, 1, 2].map(|i| drawn[i].clamp(-half_mm[i], half_mm[i]));
+        let back = self.slope(half_mm, cut).try_inverse().unwrap_or_else(Matrix3::identity);
+        let is_inside = |i: usize| (cut[i] - drawn[i]).abs() < f64::MIN_POSITIVE;
+        let rows = [0, 1, 2].map(|i| if is_inside(i) { [0, 1, 2].map(|j| back[(i, j)]) } else { [0.0; 3] });
+        (cut, rows)
+    }
+}
+
+/// Half extents of a specimen's block, mm.
+pub fn half_extents_mm(specimen: &Specimen) -> [f64; 3] {
+    let b = specimen.block;
+    [0.5 * b.length_mm, 0.5 * b.thickness_mm, 0.5 * b.width_mm]
+}
+
+/// `mesh`, a mesh of the drawn `specimen`, with its nodes where they are in the made block.
+pub fn made_mesh(mesh: &Mesh, specimen: &Specimen, shape: &BlockShape) -> Mesh {
+    let mut made = mesh.clone();
+    if !shape.is_nominal() {
+        let half_mm = half_extents_mm(specimen);
+        for x in &mut made.nodes {
+            let offset = shape.offset(half_mm, *x);
+            *x = [0, 1, 2].map(|i| x[i] + offset[i]);
+        }
+    }
+    made
+}
+
+/// The two axes of a face across `axis`.
+fn other_axes(axis: usize) -> [usize; 2] {
+    [[1, 2], [0, 2], [0, 1]][axis]
+}
+
+fn face_terms(axis: usize, t: [f64; 3]) -> [f64; FACE_TERMS] {
+    let [a, b] = other_axes(axis).map(|i| t[i]);
+    [1.0, a, b, a * a, a * b, b * b]
+}
+
+/// Derivatives of the terms with respect to a and b.
+fn face_term_rates(axis: usize, t: [f64; 3]) -> [[f64; FACE_TERMS]; 2] {
+    let [a, b] = other_axes(axis).map(|i| t[i]);
+    [[0.0, 1.0, 0.0, 2.0 * a, b, 0.0], [0.0, 0.0, 1.0, 0.0, a, 2.0 * b]]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HALF: [f64; 3] = [12.7, 3.2, 9.5];
+
+    fn shape() -> BlockShape {
+        let mut shape = BlockShape::default();
+        shape.faces_mm[0] = [[0.3, 0.1, -0.2, 0.0, 0.0, 0.0], [-0.2, 0.05, 0.1, 0.0, 0.0, 0.0]];
+        shape.faces_mm[1] = [[0.4, 0.1, -0.1, 0.2, 0.05, -0.1], [-0.5, 0.1, 0.2, -0.1, 0.03, 0.1]];
+        shape.faces_mm[2] = [[0.1, 0.2, 0.1, 0.0, 0.0, 0.0], [0.0, -0.1, 0.1, 0.0, 0.0, 0.0]];
+        shape
+    }
+
+    /// Faces come to lie where they are said to, and points go there and back.
+    #[test]
+    fn the_map_goes_there_and_back() {
+        let shape = shape();
+        // The middle of the moved face.
+        assert!((shape.offset(HALF, [0.0, HALF[1], 0.0])[1] + 0.5).abs() < 1e-15);
+        for x in [[3.0, 1.0, -2.0], [-12.0, -3.0, 9.0], [0.0, 3.1, 0.0]] {
+            let offset = shape.offset(HALF, x);
+            let made = [0, 1, 2].map(|i| x[i] + offset[i]);
+            let (back, slope) = shape.pulled_back(HALF, made);
+            // The tolerance of the inverse map.
+            assert!((0..3).all(|i| (back[i] - x[i]).abs() < 1e-9), "{x:?} {back:?}");
+            // The slope against differences, of second order: (1e-4)² and rounding.
+            for j in 0..3 {
+                let at = |t: f64| {
+                    let mut p = made;
+                    p[j] += t;
+                    shape.pulled_back(HALF, p).0
+                };
+                let (ahead, behind) = (at(1e-4), at(-1e-4));
+                for i in 0..3 {
+                    let rate = (ahead[i] - behind[i]) / 2e-4;
+                    assert!((rate - slope[i][j]).abs() < 1e-5, "{i} {j} {rate} {}", slope[i][j]);
+                }
+            }
+        }
+    }
+
+    /// A point beyond a face is taken for the nearest of the face, and does not depend on how far beyond it is.
+    #[test]
+    fn what_lies_beyond_a_face_is_the_face() {
+        let (back, slope) = shape().pulled_back(HALF, [1.0, 3.1, 2.0]);
+        assert!((back[1] - HALF[1]).abs() < 1e-15);
+        assert_eq!(slope[1], [0.0; 3]);
+        assert!((slope[0][0] - 1.0).abs() < 0.1);
+    }
+}
