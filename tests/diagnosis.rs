@@ -129,7 +129,7 @@ fn what_grows_with_the_drive_is_no_background() {
 #[test]
 fn a_shifted_image_is_named() {
     let mut scene = Scene::default();
-    scene.image.shift_mm = [0.0, 0.0, 0.6];
+    scene.image.pose.shift_mm = [0.0, 0.0, 0.6];
     let result = diagnosed(&recorded(&scene, 9));
     assert_eq!(result.causes[0].name, "registration", "{:?}", result.causes);
     // The meshes' difference of 0.01 mm against slopes of some tenths along z.

@@ -45,9 +45,8 @@ impl Observed {
     /// displacement measured there imposed on it. Steps at rest are left out.
     ///
     /// # Errors
-    /// [`CalibrationError::NoMeasuredBoundary`] where the sample is no block, the values are filtered, or too few voxels
-    /// lie beside the planes;
-    /// [`CalibrationError::Voxel`] where none lies between them.
+    /// [`CalibrationError::NoMeasuredBoundary`] where the sample is no block, the values are filtered, or too few
+    /// voxels lie beside the planes; [`CalibrationError::Voxel`] where none lies between them.
     pub fn between_measured_planes(&self, cut_part: f64) -> Result<Observed, CalibrationError> {
         let axis = match self.specimen.test {
             TestKind::DoubleLapShear => 1,

@@ -1,8 +1,8 @@
 //! Voxels that hold no displacement: noise where a mask is wrong (over a hole, past a wall), lost fringes.
 //!
-//! A displacement is continuous: a voxel agrees with its neighbours up to a few times what neighbours along the same axis
-//! usually differ by. A voxel of noise agrees with hardly any. A group of voxels that is off as a whole, as by a wrapped
-//! phase, agrees within itself and is no outlier: it says what it says.
+//! A displacement is continuous: a voxel agrees with its neighbours up to a few times what neighbours along the same
+//! axis usually differ by. A voxel of noise agrees with hardly any. A group of voxels that is off as a whole, as by a
+//! wrapped phase, agrees within itself and is no outlier: it says what it says.
 
 use crate::voxel::VoxelGrid;
 

@@ -117,8 +117,8 @@ impl<'a> CalibrationProblem<'a> {
     /// Meshes every recording's specimen with `mesh` and prepares what the fits share.
     ///
     /// # Errors
-    /// [`CalibrationError`]; [`CalibrationError::NoMeasuredBoundary`] where several steps of one recording have measured
-    /// boundaries ([`Observed::steps_apart`]).
+    /// [`CalibrationError`]; [`CalibrationError::NoMeasuredBoundary`] where several steps of one recording have
+    /// measured boundaries ([`Observed::steps_apart`]).
     pub fn new(
         observed: &'a [Observed],
         mesh: &dyn Fn(&Specimen) -> MeshOptions,

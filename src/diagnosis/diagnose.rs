@@ -281,11 +281,12 @@ impl<'a> Run<'a> {
             goes_on = fit_round(&mut self.inference, &mut self.findings, &measured, &candidates)?;
             is_set_up = self.consider_set_up(&measured)?;
         }
+        let num_before = self.findings.current.causes.len();
         if goes_on || is_set_up {
             let Run { inference, registry, findings, .. } = self;
             add_causes(inference, registry, findings, &measured, limits)?;
         }
-        if is_set_up {
+        if is_set_up && self.findings.current.causes.len() > num_before {
             let Run { inference, registry, findings, .. } = self;
             findings.current = simplest_set_up(inference, registry, &measured, findings.current.clone())?;
             self.name_causes_of_fit()?;
@@ -305,7 +306,12 @@ impl<'a> Run<'a> {
             return Ok(false);
         }
         self.tell("fitting the set-up as a whole: plates, rig, layers, block");
-        let start = CauseFit { causes: artefacts_of(&self.findings.current), ..self.findings.nominal.clone() };
+        // Without the further terms that the nominal fit took to make up for the set-up.
+        let start = CauseFit {
+            material: self.start.clone(),
+            causes: artefacts_of(&self.findings.current),
+            ..self.findings.nominal.clone()
+        };
         let Run { inference, registry, .. } = self;
         let fitted = match fit_set_up(inference, registry, measured, &start) {
             Ok(fitted) => simplest_set_up(inference, registry, measured, fitted),

@@ -51,9 +51,9 @@ impl Inference<'_> {
         if self.discrepancy_mm2.iter().any(|v| *v > 0.0) { metric.with_variance(self.discrepancy_mm2) } else { metric }
     }
 
-    /// Weighs misfits from now on by what `residual` leaves beyond noise and allowance: the mean of a box of voxels then
-    /// has the standard deviation that such means are seen to have. Without it a model that cannot be exact is fitted
-    /// to its own errors, and whatever is believed of its parameters counts for nothing.
+    /// Weighs misfits from now on by what `residual` leaves beyond noise and allowance: the mean of a box of voxels
+    /// then has the standard deviation that such means are seen to have. Without it a model that cannot be exact is
+    /// fitted to its own errors, and whatever is believed of its parameters counts for nothing.
     pub(super) fn accept_discrepancy(&mut self, residual: &Trace) {
         let left = leftover(self.laboratory.observed(), residual, &self.metric);
         let beyond = |mm: f64| (mm * mm - self.allowance_mm * self.allowance_mm).max(0.0);

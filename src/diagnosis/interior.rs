@@ -1,8 +1,8 @@
 //! The interior test: before any cause is named, whether a misfit was made at the boundary or inside.
 //!
-//! A part of the sample between two planes along its bonded faces is driven by the displacement that was measured on the
-//! planes ([`Observed::between_measured_planes`]). What vanishes of the misfit there was the set-up: plates, bonds, mount.
-//! What stays is the material's or the scan's.
+//! A part of the sample between two planes along its bonded faces is driven by the displacement that was measured on
+//! the planes ([`Observed::between_measured_planes`]). What vanishes of the misfit there was the set-up: plates, bonds,
+//! mount. What stays is the material's or the scan's.
 
 use super::error::DiagnosisError;
 use super::inference::Inference;
@@ -59,8 +59,8 @@ pub struct InteriorTest {
     pub plane_mm: f64,
 }
 
-/// Tests the interior of `observed`, of which the nominal model leaves `residual`; `None` where the test cannot be made,
-/// which progress says why.
+/// Tests the interior of `observed`, of which the nominal model leaves `residual`; `None` where the test cannot be
+/// made, which progress says why.
 ///
 /// # Errors
 /// [`DiagnosisError`]: the work was cancelled.

@@ -183,8 +183,8 @@ impl<'a> Laboratory<'a> {
 
     /// Derivatives of `prediction`, which is that of `material` and `scene`: first with respect to every material
     /// parameter (in the order of [`Ogden::parameters`]), then along each path t ↦ path(t) at t = 0. path(0) must be
-    /// `scene`. What is cheap is differenced over ±`step`: the residual of the equilibrium, the image and the load cell.
-    /// Changes of holes and faces use the exact derivative of the mesh's nodes instead.
+    /// `scene`. What is cheap is differenced over ±`step`: the residual of the equilibrium, the image and the load
+    /// cell. Changes of holes and faces use the exact derivative of the mesh's nodes instead.
     ///
     /// # Errors
     /// [`DiagnosisError::Solve`].

@@ -114,8 +114,8 @@ impl Metric {
         metric
     }
 
-    /// The same with `variance_mm2` added to the variance of every voxel, per component: what a model is known to leave,
-    /// in patterns that nobody knows, counts like noise.
+    /// The same with `variance_mm2` added to the variance of every voxel, per component: what a model is known to
+    /// leave, in patterns that nobody knows, counts like noise.
     pub(super) fn with_variance(mut self, variance_mm2: [f64; 3]) -> Metric {
         self.precision = [0, 1, 2].map(|c| 1.0 / (1.0 / self.precision[c] + variance_mm2[c]));
         self.capacitance = self.capacitances();

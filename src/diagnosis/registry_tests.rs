@@ -35,7 +35,7 @@ mod turned_image {
         }
 
         fn apply(&self, values: &[f64], scene: &mut Scene) {
-            scene.image.rotation_rad[1] += values[0].to_radians();
+            scene.image.pose.rotation_rad[1] += values[0].to_radians();
         }
 
         fn changes_sample(&self) -> bool {
@@ -53,7 +53,7 @@ fn with_turned_image() -> Registry {
 #[test]
 fn a_new_cause_is_an_entry() {
     let mut scene = Scene::default();
-    scene.image.rotation_rad[1] = 3f64.to_radians();
+    scene.image.pose.rotation_rad[1] = 3f64.to_radians();
     let recording = recorded(&material(), &scene, FINER_FACTOR);
     let options = DiagnosisOptions { max_causes: 1, ..options() };
     let found = diagnose_among(&with_turned_image(), &recording, &options, &|_| {}, &|| false).unwrap();
@@ -122,7 +122,7 @@ fn entries_are_named_as_what_they_hold() {
             Origin::Tested(suspects) => assert!(suspects(&specimen).iter().all(|c| c.name() == entry.name)),
             Origin::LoadCurve(effect) => assert_eq!(effect.name(), entry.name),
             Origin::Material(cause) => assert_eq!(cause.name(), entry.name),
-            Origin::Searched(_) | Origin::Artefact { .. } => {}
+            Origin::Searched(_) | Origin::Artefact { .. } | Origin::SetUp(_) => {}
         }
     }
     // Holes are suspects of one name and different identities.

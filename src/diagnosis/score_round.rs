@@ -134,7 +134,7 @@ fn suspects_of(
         .into_iter()
         .filter(|c| !(has_load_curve && c.is_read_from_load_curve()))
         .filter(|c| has_several_drives || !c.needs_several_drives())
-        .filter(|c| !(are_plates_free && c.is_plain_motion()) && !(has_set_up && c.is_sponge()))
+        .filter(|c| !(are_plates_free && c.is_plain_motion() || has_set_up && c.is_sponge()))
         .filter(|c| !current.causes.iter().any(|s| s.cause.identity() == c.identity()))
         .collect()
 }

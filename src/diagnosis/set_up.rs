@@ -1,12 +1,12 @@
-//! The experiment as it really was: the plates' own motions, the rig in the scanner, layers at the bonds and the block as
-//! made, fitted all at once.
+//! The experiment as it really was: the plates' own motions, the rig in the scanner, layers at the bonds and the block
+//! as made, fitted all at once.
 //!
-//! Where no single cause explains a misfit, the parts of the set-up are not asked one after the other (each alone explains
-//! little, and the first takes what is another's), but fitted together, each held by what a laboratory believes of it.
-//! What even all of them leave is then taken as known to be left, and misfits are weighed by it
-//! ([`Inference::accept_discrepancy`]): first by what the nominal model leaves, so that the beliefs lead, then by less and
-//! less. Parts that are not needed are taken out again ([`super::thinning`]), and plain motions of the moved plate take
-//! the place of free ones where they explain as much.
+//! Where no single cause explains a misfit, the parts of the set-up are not asked one after the other (each alone
+//! explains little, and the first takes what is another's), but fitted together, each held by what a laboratory
+//! believes of it. What even all of them leave is then taken as known to be left, and misfits are weighed by it
+//! ([`Inference::accept_discrepancy`]): first by what the nominal model leaves, so that the beliefs lead, then by less
+//! and less. Parts that are not needed are taken out again ([`super::thinning`]), and plain motions of the moved plate
+//! take the place of free ones where they explain as much.
 
 use super::candidate::Candidate;
 use super::cause::Cause;
@@ -21,13 +21,17 @@ use super::thinning::thinned;
 use super::trace::Trace;
 use std::sync::Arc;
 
+/// Most iterations of a fit whose weights are still to change.
+const ROUGH_ITERATIONS: usize = 5;
+/// Such a fit ends when a step would lower the deviance by less than this: a tenth of what decides about a cause.
+const ROUGH_TOLERANCE: f64 = 3.0;
 /// Most fits, each weighed by what the one before left.
-const MAX_FITS: usize = 5;
+const MAX_FITS: usize = 8;
 /// The weights are settled where the misfit beyond noise changes by less than this part.
 const SETTLED: f64 = 0.05;
 
-/// A single cause that explains more than this part of the misfit, to first order, is fitted before the set-up is looked
-/// at.
+/// A single cause that explains more than this part of the misfit, to first order, is fitted before the set-up is
+/// looked at.
 const SINGLE_EXPLAINS: f64 = 0.75;
 /// The set-up is looked at first where, to first order, it explains so many times what the best single cause does.
 const SET_UP_EXPLAINS: f64 = 1.5;
@@ -69,8 +73,21 @@ pub(super) fn fit_set_up(
     let of_cause = |cause: Arc<dyn Cause>| Supposed { values: cause.start(), cause };
     causes.extend(registry.set_up(inference.laboratory.observed()).into_iter().map(of_cause));
     inference.accept_discrepancy(&start.residual);
-    let fitted = inference.fit(measured, &start.material, &causes)?;
+    let fitted = roughly(inference, |inference| inference.fit(measured, &start.material, &causes))?;
     settled(inference, measured, fitted)
+}
+
+/// What `fit` gives with looser ends: the weights are about to change, and so is the place where a fit ends.
+fn roughly(
+    inference: &mut Inference,
+    fit: impl FnOnce(&mut Inference) -> Result<CauseFit, DiagnosisError>,
+) -> Result<CauseFit, DiagnosisError> {
+    let settings = inference.settings;
+    inference.settings.max_iterations = ROUGH_ITERATIONS;
+    inference.settings.tolerance = ROUGH_TOLERANCE;
+    let found = fit(inference);
+    inference.settings = settings;
+    found
 }
 
 /// Fits again with weights by what the last fit left, until both hardly change.
@@ -84,7 +101,7 @@ fn settled(inference: &mut Inference, measured: &Trace, mut fitted: CauseFit) ->
         let after = inference.discrepancy_mm2.iter().sum::<f64>();
         let left_mm = fitted.residual.rms_mm();
         (inference.progress)(&format!("fitting again, weighed by what is left ({left_mm:.3} mm rms)"));
-        fitted = inference.fit(measured, &fitted.material, &fitted.causes)?;
+        fitted = roughly(inference, |inference| inference.fit(measured, &fitted.material, &fitted.causes))?;
         if (after - before).abs() <= 2.0 * SETTLED * before {
             break;
         }
@@ -134,5 +151,6 @@ pub(super) fn simplest_set_up(
 ) -> Result<CauseFit, DiagnosisError> {
     let fitted = thinned(inference, measured, fitted)?;
     let fitted = with_plain_motions(inference, registry, measured, fitted)?;
-    settled(inference, measured, fitted)
+    let fitted = settled(inference, measured, fitted)?;
+    inference.fit(measured, &fitted.material, &fitted.causes)
 }

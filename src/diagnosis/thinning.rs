@@ -1,14 +1,14 @@
 //! Taking out of a fit what it does not need.
 //!
-//! Near its end a fit's deviance is a quadratic form in its parameters. Of that form it is known at once what it costs to
-//! do without a cause (Wald's statistic with all others free to follow), and where the others go. Causes are taken out
-//! one after the other, the one that is missed least first (backward elimination), as long as none of them is missed by
-//! more than it costs; then what is left is fitted again.
+//! Near its end a fit's deviance is a quadratic form in its parameters. Of that form it is known at once what it costs
+//! to do without a cause (Wald's statistic with all others free to follow), and where the others go. Causes are taken
+//! out one after the other, the one that is missed least first (backward elimination), as long as none of them is
+//! missed by more than it costs; then what is left is fitted again.
 
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
 use super::evidence::{EVIDENCE, penalty};
-use super::fit::{derivatives, normal_matrix};
+use super::fit::{derivatives, normal_matrix, prior_scales};
 use super::found::FoundCause;
 use super::inference::Inference;
 use super::supposed::Supposed;
@@ -64,6 +64,27 @@ impl QuadraticModel {
         away.dot(&(own * &away))
     }
 
+    /// What the parameters of a cause cost: of one that is believed in the logarithm of how far the data narrow the
+    /// belief (the Occam factor of Laplace's approximation), of any other ln n.
+    fn cost(&self, cause: usize, supposed: &Supposed, inference: &Inference) -> f64 {
+        let parameters = supposed.cause.parameters();
+        if parameters.iter().any(|p| p.believed_sd.is_none()) {
+            return penalty(&inference.metric, parameters.len()).max(EVIDENCE);
+        }
+        let places = self.places_of(cause);
+        let rest: Vec<usize> = (0..self.owners.len()).filter(|i| !places.contains(i)).collect();
+        let part = |rows: &[usize], columns: &[usize]| {
+            DMatrix::from_fn(rows.len(), columns.len(), |i, j| self.matrix[(rows[i], columns[j])])
+        };
+        let Some(factor) = part(&rest, &rest).cholesky() else { return 0.0 };
+        let cross = part(&rest, &places);
+        let own = part(&places, &places) - cross.tr_mul(&factor.solve(&cross));
+        let prior: f64 = parameters.iter().map(|p| -2.0 * prior_scales(p).ln()).sum();
+        let log_determinant =
+            own.cholesky().map_or(0.0, |c| 2.0 * c.l().diagonal().iter().map(|x| x.ln()).sum::<f64>());
+        (log_determinant - prior).max(0.0)
+    }
+
     /// The model without a cause: the others have followed.
     fn without(self, cause: usize) -> QuadraticModel {
         let places = self.places_of(cause);
@@ -110,8 +131,12 @@ pub(super) fn thinned(
             .iter()
             .filter(|&&cause| may_go(&fitted.causes[cause]))
             .map(|&cause| {
-                let num = fitted.causes[cause].values.len();
-                (cause, model.missed(cause) - penalty(&inference.metric, num).max(EVIDENCE))
+                let (missed, cost) = (model.missed(cause), model.cost(cause, &fitted.causes[cause], inference));
+                let name = fitted.causes[cause].cause.name();
+                (inference.progress)(&format!(
+                    "without '{name}' the deviance rises by {missed:.0}; it costs {cost:.0}"
+                ));
+                (cause, missed - cost)
             })
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let Some((cause, _)) = least.filter(|(_, beyond)| *beyond < 0.0) else { break };
@@ -138,8 +163,8 @@ pub(super) fn thinned(
     inference.fit(measured, &fitted.material, &causes)
 }
 
-/// All causes of a fit but artefacts, each with what is missed without it (less ln n per parameter) and what it adds to
-/// the displacement.
+/// All causes of a fit but artefacts, each with what is missed without it (less its
+/// cost) and what it adds to the displacement.
 ///
 /// # Errors
 /// As [`thinned`].
@@ -147,7 +172,7 @@ pub(super) fn named_causes(inference: &mut Inference, fitted: &CauseFit) -> Resu
     let model = QuadraticModel::of(inference, fitted)?;
     let observed = inference.laboratory.observed();
     let found = |(index, supposed): (usize, &Supposed)| {
-        let evidence = model.missed(index) - penalty(&inference.metric, supposed.values.len());
+        let evidence = model.missed(index) - model.cost(index, supposed, inference);
         FoundCause::of_fit(fitted, index, observed).with_evidence(evidence, model.effect_rms_mm(index))
     };
     Ok(fitted.causes.iter().enumerate().filter(|(_, s)| !s.cause.is_artefact()).map(found).collect())

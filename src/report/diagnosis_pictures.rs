@@ -71,7 +71,8 @@ fn load_curve(load: &LoadHistoryFit) -> String {
     .to_svg()
 }
 
-/// Nineteen of twenty voxels are within the colours' range, which is no less than three standard deviations of the noise.
+/// Nineteen of twenty voxels are within the colours' range, which is no less than three standard deviations of the
+/// noise.
 const SHOWN_PART: f64 = 0.95;
 
 /// The range of colours in which the pattern of some values can be seen.
