@@ -83,9 +83,11 @@ fn names_are_those_of_the_format() {
         "debond",
         "fibre",
         "gain",
+        "geometry",
         "gradient",
         "hole",
         "inclusion",
+        "layer",
         "mount",
         "mullins",
         "offaxis",
@@ -95,6 +97,7 @@ fn names_are_those_of_the_format() {
         "swelling",
         "terms",
         "tilt",
+        "travel",
         "wrap",
     ];
     assert_eq!(names, expected);
