@@ -4,7 +4,10 @@
 mod common;
 
 use lambdak::diagnosis::Verdict;
-use lambdak::proof::{HiddenCause, ProofOptions, conceal, draw_cause, prove, score_one};
+use lambdak::proof::{
+    Experiment, ExperimentKind, HiddenCause, ProofOptions, conceal, draw_cause, draw_harmless, draw_several,
+    draw_with_unknown, prove, score_experiment, score_one,
+};
 use lambdak::specimen::Specimen;
 
 fn specimen() -> Specimen {
@@ -16,7 +19,7 @@ fn one_seed_conceals_one_recording() {
     let hidden = draw_cause(HiddenCause::Gain, 3);
     assert_eq!(hidden, draw_cause(HiddenCause::Gain, 3));
     assert_ne!(hidden, draw_cause(HiddenCause::Gain, 4));
-    let [a, b] = [0, 1].map(|_| conceal(&specimen(), &hidden).unwrap().recording);
+    let [a, b] = [0, 1].map(|_| conceal(&specimen(), &Experiment::of_one(&hidden)).unwrap().recording);
     assert_eq!(a.steps[2].force_n, b.steps[2].force_n);
     let bits = |r: &lambdak::recording::Recording| -> Vec<u64> {
         r.steps.iter().flat_map(|s| &s.displacement).flatten().map(|x| x.to_bits()).collect()
@@ -36,8 +39,9 @@ fn a_plain_gain_error_is_found_with_its_size() {
     let hidden = lambdak::proof::Hidden { strength: 0.04, which: 0, ..draw_cause(HiddenCause::Gain, 22) };
     let found = score_one(&specimen(), &hidden, true, 2.2, &common::never).unwrap();
     assert!(found.is_right, "{found:?}");
-    // Three intervals of 95 %: one may miss.
-    assert!(found.deviations.iter().filter(|d| d.1.abs() <= 1.0).count() >= 2, "{found:?}");
+    // Intervals of 95 %: of three one may miss.
+    let num_outside = found.deviations.iter().filter(|d| d.1.abs() > 1.0).count();
+    assert!(!found.deviations.is_empty() && num_outside <= found.deviations.len() / 3, "{found:?}");
 }
 
 /// Where the diagnosis is not told of debonds it must say that something is left.
@@ -91,7 +95,7 @@ fn a_third_left_is_no_explanation() {
 #[test]
 fn an_ambiguous_cause_comes_with_the_experiment() {
     use lambdak::diagnosis::{DiagnosisOptions, diagnose};
-    let made = conceal(&specimen(), &draw_cause(HiddenCause::Gain, 1_010_016)).unwrap();
+    let made = conceal(&specimen(), &Experiment::of_one(&draw_cause(HiddenCause::Gain, 1_010_016))).unwrap();
     let options = DiagnosisOptions { mesh_factor: 2.2, ..DiagnosisOptions::default() };
     let found = diagnose(&made.recording, &options, &|_| {}, &common::never).unwrap();
     assert_eq!(found.verdict, Verdict::ExplainedAmbiguously);
@@ -104,4 +108,41 @@ fn an_ambiguous_cause_comes_with_the_experiment() {
     // Half way both do half of what they do, under the same noise: nothing new.
     let at = |drive: f64| experiments.iter().find(|e| (e.drive_mm - drive).abs() < 1e-9).map_or(0.0, |e| e.distance_sd);
     assert!(at(3.5) < at(10.5), "{experiments:?}");
+}
+
+/// One seed, one experiment. Several causes are of different kinds and begin with the mount and the material; a hidden
+/// unknown comes last, and no solid block has a wrong hole.
+#[test]
+fn experiments_with_several_causes_are_drawn_as_told() {
+    for seed in 0..200 {
+        let several = draw_several(seed);
+        assert_eq!(several, draw_several(seed));
+        assert!((2..=4).contains(&several.hidden.len()));
+        assert!(several.hidden.iter().all(|h| !(several.is_solid && h.cause == HiddenCause::Hole)), "{several:?}");
+        let mut causes: Vec<HiddenCause> = several.hidden.iter().map(|h| h.cause).collect();
+        causes.sort();
+        causes.dedup();
+        assert_eq!(causes.len(), several.hidden.len());
+        assert!((1..=3).contains(&several.material.terms.len()));
+        assert!(several.material.terms.iter().all(|t| t.mu_kpa * t.alpha > 0.0), "{several:?}");
+        assert_eq!(draw_harmless(seed).hidden.len(), 3);
+        let last = draw_with_unknown(seed).hidden.pop().unwrap().cause;
+        assert!(!matches!(last, HiddenCause::Tilt | HiddenCause::Gain), "{last:?}");
+    }
+}
+
+/// A plate that drifts off its axis and a gradient of the modulus at once, both plain: both are named.
+#[test]
+fn two_causes_at_once_are_both_named() {
+    let mut experiment =
+        Experiment::of_one(&lambdak::proof::Hidden { strength: 0.4, which: 2, ..draw_cause(HiddenCause::Offaxis, 31) });
+    experiment.hidden.push(lambdak::proof::Hidden {
+        strength: 0.3,
+        which: 0,
+        material: experiment.material.clone(),
+        ..draw_cause(HiddenCause::Gradient, 31)
+    });
+    let found = score_experiment(&specimen(), ExperimentKind::Several, &experiment, 2.2, &common::never).unwrap();
+    assert!(found.causes.iter().all(|c| c.is_detectable && c.is_named), "{found:?}");
+    assert!(found.is_right && found.false_names.is_empty(), "{found:?}");
 }

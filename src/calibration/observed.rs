@@ -3,7 +3,7 @@
 
 use super::error::CalibrationError;
 use super::noise::estimate_noise_sd_mm;
-use super::outliers::outlying_voxels;
+use super::outliers::{lost_voxels, outlying_voxels};
 use crate::fem::{VectorField, turned_by};
 use crate::mesh::{BlockShape, Mesh, half_extents_mm};
 use crate::recording::{Filter, Recording};
@@ -209,7 +209,11 @@ impl Cleaned {
         for &v in &outliers {
             field[v] = [f64::NAN; 3];
         }
-        Cleaned { field, num_outliers: outliers.len() }
+        let lost = lost_voxels(grid, flags, &field, noise_sd_mm);
+        for &v in &lost {
+            field[v] = [f64::NAN; 3];
+        }
+        Cleaned { field, num_outliers: outliers.len() + lost.len() }
     }
 }
 

@@ -3,6 +3,10 @@
 //! A displacement is continuous: a voxel agrees with its neighbours up to a few times what neighbours along the same
 //! axis usually differ by. A voxel of noise agrees with hardly any. A group of voxels that is off as a whole, as by a
 //! wrapped phase, agrees within itself and is no outlier: it says what it says.
+//!
+//! Where the signal is nearly lost the noise is many times what it is elsewhere. A displacement is smooth along at least
+//! one axis, even at a wall or a layer; noise is rough along all. So the roughness along the smoothest axis is the
+//! noise, and voxels in whose neighbourhood it is several times the usual one are left out.
 
 use crate::voxel::VoxelGrid;
 
@@ -11,6 +15,10 @@ use crate::voxel::VoxelGrid;
 const AGREES: f64 = 10.0;
 /// A voxel with fewer neighbours than this is not judged.
 const FEWEST_NEIGHBOURS: usize = 3;
+/// Noise of so many times the usual one says that the signal is lost.
+const LOST: f64 = 4.0;
+/// Fewer second differences than this around a voxel do not say how large the noise is.
+const FEWEST_DIFFERENCES: usize = 9;
 /// A voxel that agrees with no more neighbours than this is an outlier.
 const MOST_AGREEING: usize = 1;
 
@@ -44,6 +52,83 @@ pub(super) fn outlying_voxels(
         .collect()
 }
 
+/// The voxels of `field` (as for [`outlying_voxels`]) in whose neighbourhood the noise of a component is [`LOST`] times
+/// the noise that is known or the usual one, whichever is larger.
+pub(super) fn lost_voxels(
+    grid: &VoxelGrid,
+    flags: &[bool],
+    field: &[[f64; 3]],
+    noise_sd_mm: Option<[f64; 3]>,
+) -> Vec<usize> {
+    let is_there = |v: usize| flags[v] && field[v].iter().all(|u| u.is_finite());
+    let all: Vec<usize> = (0..field.len()).filter(|&v| is_there(v)).collect();
+    let mut is_lost = vec![false; field.len()];
+    for c in 0..3 {
+        let rough = [0, 1, 2].map(|axis| second_differences(grid, &is_there, field, axis, c));
+        let local: Vec<(usize, f64)> = all.iter().filter_map(|&v| Some((v, local_noise(grid, &rough, v)?))).collect();
+        let mut sizes: Vec<f64> = local.iter().map(|l| l.1).collect();
+        if sizes.is_empty() {
+            continue;
+        }
+        let usual = median(&mut sizes);
+        let limit = LOST * noise_sd_mm.map_or(usual, |sd| usual.max(sd[c]));
+        for (v, _) in local.into_iter().filter(|l| l.1 > limit) {
+            is_lost[v] = true;
+        }
+    }
+    all.into_iter().filter(|&v| is_lost[v]).collect()
+}
+
+/// Sizes of the second differences of a component along an axis, each as the standard deviation of the noise of which
+/// it would be the median size; NaN where a neighbour is missing.
+fn second_differences(
+    grid: &VoxelGrid,
+    is_there: &dyn Fn(usize) -> bool,
+    field: &[[f64; 3]],
+    axis: usize,
+    component: usize,
+) -> Vec<f64> {
+    // The variance of 1, -2, 1 times noise is 6 times the noise's; the median size of a normal number is 0.6745 σ.
+    let scale = 1.0 / (6f64.sqrt() * 0.6745);
+    let u = |v: usize| field[v][component];
+    (0..field.len())
+        .map(|v| match neighbours(grid, v, axis) {
+            [Some(before), Some(behind)] if [v, before, behind].iter().all(|&w| is_there(w)) => {
+                scale * (u(before) - 2.0 * u(v) + u(behind)).abs()
+            }
+            _ => f64::NAN,
+        })
+        .collect()
+}
+
+/// The noise in the neighbourhood of a voxel by the axis along which the field is smoothest; `None` where too few
+/// neighbours are there to say.
+fn local_noise(grid: &VoxelGrid, rough: &[Vec<f64>; 3], voxel: usize) -> Option<f64> {
+    let at = grid.indices(voxel);
+    let range = |axis: usize| at[axis].saturating_sub(1)..(at[axis] + 2).min(grid.shape[axis]);
+    let of_axis = |along: &Vec<f64>| {
+        let mut near = Vec::with_capacity(27);
+        for k in range(2) {
+            for j in range(1) {
+                for i in range(0) {
+                    near.push(along[i + grid.shape[0] * (j + grid.shape[1] * k)]);
+                }
+            }
+        }
+        near.retain(|d| d.is_finite());
+        (near.len() >= FEWEST_DIFFERENCES).then(|| median(&mut near))
+    };
+    let by_axis: Vec<f64> = rough.iter().filter_map(of_axis).collect();
+    // At an edge of the block a single axis is left, along which there may be a kink.
+    if by_axis.len() < 2 { None } else { by_axis.into_iter().min_by(f64::total_cmp) }
+}
+
+/// The median of at least one number.
+fn median(all: &mut [f64]) -> f64 {
+    let middle = all.len() / 2;
+    *all.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
 /// The voxels before and behind a voxel along an axis.
 fn neighbours(grid: &VoxelGrid, voxel: usize, axis: usize) -> [Option<usize>; 2] {
     let at = grid.indices(voxel)[axis];
@@ -72,6 +157,38 @@ fn usual_difference_mm(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Noise of 0.01 mm in a sheared block with a stiff layer, six times as much beyond x = 9: about all of it is found
+    /// there, and hardly any elsewhere.
+    #[test]
+    fn lost_signal_is_told_from_kinks() {
+        let grid = VoxelGrid { origin_mm: [0.0; 3], voxel_mm: [1.0, 0.2, 1.0], shape: [14, 20, 10] };
+        let num = grid.num_voxels();
+        let mut state = 1u64;
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let field: Vec<[f64; 3]> = (0..num)
+            .map(|v| {
+                let at = grid.indices(v);
+                let x = grid.center_mm(v);
+                let sd = if at[0] >= 10 { 0.06 } else { 0.01 };
+                // The sum of twelve uniform numbers less six is nearly normal.
+                let mut noise = || sd * ((0..12).map(|_| uniform()).sum::<f64>() - 6.0);
+                [1.1 * (x[1] - 0.5).max(0.0) + noise(), 0.1 * x[0] + noise(), noise()]
+            })
+            .collect();
+        for noise_sd_mm in [None, Some([0.01; 3])] {
+            let found = lost_voxels(&grid, &vec![true; num], &field, noise_sd_mm);
+            let is_rough = |v: usize| grid.indices(v)[0] >= 10;
+            let right = found.iter().filter(|&&v| is_rough(v)).count();
+            let rough = (0..num).filter(|&v| is_rough(v)).count();
+            // Of four layers of rough voxels the first has smooth ones beside it, and half of the last have no other.
+            assert!(right as f64 > 0.7 * rough as f64, "{right} of {rough}");
+            assert!(found.iter().all(|&v| grid.indices(v)[0] >= 9), "{} beside {right}", found.len());
+        }
+    }
 
     /// A sheared block with a column of noise and a group that is off by a constant: the noise is found, the group and
     /// the rest are not.

@@ -141,6 +141,8 @@ const PAPER_TABLES: &[Flag] = &[
 ];
 const PROOF: &[Flag] = &[
     Flag::of("per-cause", "per_cause"),
+    Flag::of("several", "has_several"),
+    Flag::of("recordings", "recordings"),
     Flag::of("controls", "controls"),
     Flag::of("unknown", "unknown"),
     Flag::of("seed", "seed"),

@@ -129,6 +129,10 @@ pub trait Cause: Send + Sync {
     fn identity(&self) -> CauseIdentity {
         CauseIdentity { name: self.name(), variant: self.variant() }
     }
+    /// Whether it holds other suspects of its name: beside one of them it says little that is new.
+    fn is_several_in_one(&self) -> bool {
+        false
+    }
     /// How many suspects of its name are fitted in full in one round. More than one where suspects differ in their
     /// place or direction and first order does not tell reliably which of them is right.
     fn max_suspects(&self) -> usize {
@@ -160,20 +164,10 @@ pub trait Cause: Send + Sync {
     }
     /// Whether it changes nothing but how the plates move, and nothing of the image.
     fn moves_only_plates(&self) -> bool {
-        self.frees_plates() || self.is_plain_motion()
+        false
     }
     /// Whether it is a part of the set-up, held by what a laboratory believes.
     fn is_of_set_up(&self) -> bool {
-        false
-    }
-    /// Whether it gives the plates motions of their own at every drive. Motions that are alike at all drives or in
-    /// proportion to them ([`Self::is_plain_motion`]) say nothing beyond it.
-    fn frees_plates(&self) -> bool {
-        false
-    }
-    /// Whether it is a motion of a plate of one simple course over the drives: a simpler explanation of what a cause
-    /// that [frees the plates](Self::frees_plates) takes.
-    fn is_plain_motion(&self) -> bool {
         false
     }
     /// Whether it is a smooth field without a mechanism, which takes up whatever is smooth.

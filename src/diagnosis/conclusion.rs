@@ -2,6 +2,7 @@
 
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
+use super::evidence::UNEXPLAINED;
 use super::fit::fit;
 use super::found::FoundCause;
 use super::inference::Inference;
@@ -10,11 +11,13 @@ use super::trace::Trace;
 use crate::calibration::Observed;
 use crate::rate::Verdict;
 
-/// Structured misfit that is left counts as unexplained above this multiple of the allowance (rms).
-const UNEXPLAINED: f64 = 2.0;
 /// Causes of a misfit above that limit explain it where they leave less than this part of it (rms), or no more than the
 /// allowance: the right cause leaves a tenth or less, but for the odd debond; another one in its place about a third.
 const EXPLAINED_LEAVES: f64 = 0.25;
+/// Causes of a smaller misfit explain it where they leave less than this part of it (rms).
+const SMALL_LEAVES: f64 = 0.5;
+/// Causes claim a misfit where one of them moves the sample by more than this part of it (rms).
+const CLAIMS: f64 = 0.5;
 /// Where causes leave more than this part of the squares unexplained, they are not named but listed as tried.
 const UNEXPLAINED_SHARE: f64 = 0.5;
 /// Iterations of a fit to a part of the voxels, from where the fit to all of them ended.
@@ -31,7 +34,10 @@ pub(super) fn verdict_on(
 ) -> Verdict {
     let [before, after] = structured_mm;
     let limit = UNEXPLAINED * allowance_mm;
-    let is_half_done = before > limit && after > allowance_mm.max(EXPLAINED_LEAVES * before);
+    // Of a misfit that is hardly more than a mesh's, causes that claim it must take the larger part.
+    let claim_it = before > allowance_mm && causes.iter().any(|c| c.effect_rms_mm > CLAIMS * before);
+    let enough = allowance_mm.min(if claim_it { SMALL_LEAVES * before } else { f64::INFINITY });
+    let is_half_done = (before > limit || claim_it) && after > enough.max(EXPLAINED_LEAVES * before);
     if after > limit || is_half_done {
         Verdict::Unexplained
     } else if causes.is_empty() {
@@ -48,21 +54,31 @@ pub(super) fn explain_too_little(verdict: Verdict, [before, after]: [f64; 2]) ->
     verdict == Verdict::Unexplained && after.powi(2) > UNEXPLAINED_SHARE * before.powi(2)
 }
 
-/// Rms misfit (mm) on blocks of voxels that the fits did not see, without and with the causes: the two colours of a
-/// chequerboard in turn. `seen` is what each of the two models is compared with.
+/// What fits to one half of the voxels say.
+pub(super) struct KeptBack {
+    /// Rms misfit (mm) on the blocks of voxels that the fits did not see, without and with the causes.
+    pub(super) rms_mm: [f64; 2],
+    /// Half the difference of each parameter between the fits to the two halves, with the causes (the standard deviation
+    /// of the whole by half samples, McCarthy 1969), in the order and units of [`CauseFit::sd`].
+    pub(super) half_differences: Vec<f64>,
+}
+
+/// Fits each of the two models to the two colours of a chequerboard of blocks in turn and predicts the other colour.
+/// `seen` is what each of the two models is compared with.
 ///
 /// # Errors
 /// [`DiagnosisError`]: no equilibrium, or the work was cancelled.
-pub(super) fn kept_back_rms_mm(
+pub(super) fn kept_back(
     inference: &mut Inference,
     seen: &[Trace; 2],
     fits: [&CauseFit; 2],
-) -> Result<[f64; 2], DiagnosisError> {
+) -> Result<KeptBack, DiagnosisError> {
     let observed = inference.laboratory.observed();
     let colours = chequerboard(observed);
     let bulks = [inference.nominal_bulk, inference.settings.bulk];
     let mut squares = [0.0; 2];
     let mut count = 0.0;
+    let mut halves: Vec<Vec<f64>> = Vec::new();
     for colour in [false, true] {
         let metric = inference.metric_of(&|v| colours[v] != colour);
         for (n, fitted) in fits.into_iter().enumerate() {
@@ -77,9 +93,19 @@ pub(super) fn kept_back_rms_mm(
                     }
                 }
             }
+            if n == 1 {
+                halves.push(values_of(&found));
+            }
         }
     }
-    Ok(squares.map(|s| (s / f64::max(count, 1.0)).sqrt()))
+    let half_differences = halves[0].iter().zip(&halves[1]).map(|(a, b)| 0.5 * (a - b).abs()).collect();
+    Ok(KeptBack { rms_mm: squares.map(|s| (s / f64::max(count, 1.0)).sqrt()), half_differences })
+}
+
+/// The parameters of a fit: the material's, then those of the causes.
+fn values_of(fitted: &CauseFit) -> Vec<f64> {
+    let material = fitted.material.parameters().into_iter().map(|p| fitted.material.value(p));
+    material.chain(fitted.causes.iter().flat_map(|c| c.values.iter().copied())).collect()
 }
 
 /// The colour of every voxel on a chequerboard of blocks in the plane of x and z.

@@ -2,7 +2,7 @@
 //! back.
 
 use super::cause_fit::CauseFit;
-use super::conclusion::{explain_too_little, kept_back_rms_mm, verdict_on};
+use super::conclusion::{explain_too_little, kept_back, verdict_on};
 use super::error::DiagnosisError;
 use super::findings::Findings;
 use super::found::FoundCause;
@@ -139,7 +139,13 @@ impl<'a> Run<'a> {
         let has_force = observed.steps.iter().any(|s| s.force.is_some());
         let shear = (!has_force).then(|| ShearPrior { center_kpa: shear_modulus(&start), log_sd: KNOWN_LOG_SD });
         let believed_bulk = BulkPrior { center_kpa: start.bulk_kpa, log_sd: BELIEVED_LOG_SD };
-        let settings = FitSettings { max_iterations: MAX_ITERATIONS, bulk: believed_bulk, shear, tolerance: TOLERANCE };
+        let settings = FitSettings {
+            max_iterations: MAX_ITERATIONS,
+            bulk: believed_bulk,
+            shear,
+            tolerance: TOLERANCE,
+            relative_tolerance: 0.0,
+        };
         progress(&format!("fitting the nominal model ({num_unknowns} unknowns)"));
         let mut inference = Inference {
             laboratory,
@@ -268,17 +274,24 @@ impl<'a> Run<'a> {
     /// whole is fitted in its place, and rounds go on from that.
     fn add_causes(&mut self) -> Result<(), DiagnosisError> {
         let measured = self.measured();
-        let limits = RoundLimits { max_causes: self.options.max_causes, has_load_curve: self.load.is_some() };
+        let limits = RoundLimits {
+            max_causes: self.options.max_causes,
+            has_load_curve: self.load.is_some(),
+            is_believed: self.options.prior.is_some(),
+        };
         let Run { inference, registry, findings, .. } = self;
         if findings.causes.len() >= limits.max_causes {
             return Ok(());
         }
-        let candidates = score_round(inference, registry, findings, limits)?;
-        let comes_first = promises_more(inference, registry, &findings.current, &candidates)?;
+        let scored = score_round(inference, registry, findings, limits)?;
+        let left = leftover(self.observed, &findings.current.residual, &inference.metric);
+        // What is no more than a mesh's needs no set-up.
+        let comes_first = left.structured_rms_mm > inference.allowance_mm
+            && promises_more(inference, registry, &findings.current, &scored.candidates)?;
         let mut is_set_up = comes_first && self.consider_set_up(&measured)?;
         let mut goes_on = is_set_up;
         if !is_set_up {
-            goes_on = fit_round(&mut self.inference, &mut self.findings, &measured, &candidates)?;
+            goes_on = fit_round(&mut self.inference, &mut self.findings, &measured, &scored, limits)?;
             is_set_up = self.consider_set_up(&measured)?;
         }
         let num_before = self.findings.current.causes.len();
@@ -419,15 +432,21 @@ impl<'a> Run<'a> {
 
     /// Looks at what is left, predicts data that were kept back, and says how the diagnosis ended.
     fn conclude(mut self, seen: &[Trace; 2]) -> Result<Diagnosis, DiagnosisError> {
-        let Findings { nominal, current, mut causes, mut alternatives, ranked, maps, .. } = self.findings;
+        let Findings { nominal, mut current, mut causes, mut alternatives, ranked, maps, .. } = self.findings;
+        (self.inference.progress)("predicting voxel blocks that were kept back");
+        let kept_back = kept_back(&mut self.inference, seen, [&nominal, &current])?;
+        if self.inference.accepts_discrepancy() {
+            // What is left is no noise: neighbours share it, and halves of the voxels tell what that does.
+            for (sd, half) in current.sd.iter_mut().zip(&kept_back.half_differences) {
+                *sd = sd.hypot(*half);
+            }
+        }
         // Parameters as in the last fit, all causes together.
         for cause in &mut causes {
             cause.refresh(&current, self.observed);
         }
         causes.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
         let left = [&nominal, &current].map(|f| leftover(self.observed, &f.residual, &self.inference.metric));
-        (self.inference.progress)("predicting voxel blocks that were kept back");
-        let kept_back_rms_mm = kept_back_rms_mm(&mut self.inference, seen, [&nominal, &current])?;
         let structured_mm = [left[0].structured_rms_mm, left[1].structured_rms_mm];
         let verdict = verdict_on(structured_mm, self.inference.allowance_mm, &causes, &alternatives);
         if explain_too_little(verdict, structured_mm) {
@@ -440,7 +459,7 @@ impl<'a> Run<'a> {
             nominal,
             corrected: current,
             left,
-            kept_back_rms_mm,
+            kept_back_rms_mm: kept_back.rms_mm,
             ranked,
             load: self.load,
             maps,

@@ -21,6 +21,16 @@ pub(super) struct Entry {
     pub(super) origin: Origin,
 }
 
+impl Entry {
+    /// The names of the causes that are special cases of it.
+    pub(super) fn special_cases(&self) -> &'static [CauseName] {
+        match self.origin {
+            Origin::SetUp { special_cases, .. } => special_cases,
+            _ => &[],
+        }
+    }
+}
+
 /// How a diagnosis comes to suspect a cause.
 #[derive(Clone, Copy)]
 pub(super) enum Origin {
@@ -28,7 +38,13 @@ pub(super) enum Origin {
     Tested(fn(&Specimen) -> Vec<Arc<dyn Cause>>),
     /// It is a part of the experiment's set-up, all of which are fitted together where no single cause explains a
     /// misfit.
-    SetUp(fn(&Observed) -> Vec<Arc<dyn Cause>>),
+    SetUp {
+        /// The parts for a recording.
+        parts: fn(&Observed) -> Vec<Arc<dyn Cause>>,
+        /// Causes that are special cases of it (a motion in proportion to the drive of one that is free at every
+        /// drive): beside it they say nothing, and in its place they are the simpler explanation.
+        special_cases: &'static [CauseName],
+    },
     /// It has a place or a direction, which is searched for first (in a map, for instance).
     Searched(fn(&mut Search) -> Result<Vec<Candidate>, DiagnosisError>),
     /// It is an artefact of the image, found in the residual of the nominal model.

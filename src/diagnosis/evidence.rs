@@ -7,11 +7,15 @@ use crate::calibration::Observed;
 /// A cause must lower the deviance by this much beyond ln n per parameter. For a single cause this would be many times
 /// what counts as very strong evidence; it takes that much because many causes are tried.
 pub(super) const EVIDENCE: f64 = 30.0;
+/// Fits that only compare end where a step would lower the deviance by less than this part of the misfit beyond noise.
+pub(super) const ROUGH_TOLERANCE: f64 = 1e-3;
 /// A cause is fitted where it explains more than this part of what the leading one does, to first order.
 pub(super) const WORTH_A_FIT: f64 = 0.1;
 /// A further cause must explain this part of what the ones before it did. The model of a large effect errs by some
 /// percent of it, and such an error is no cause of its own.
 pub(super) const SMALLEST_SHARE: f64 = 0.02;
+/// Structured misfit that is left counts as unexplained above this multiple of the allowance (rms).
+pub(super) const UNEXPLAINED: f64 = 2.0;
 /// An effect counts as physics where its displacement (rms) exceeds this multiple of the allowance, or its force the
 /// allowance of forces.
 const SMALLEST_EFFECT: f64 = 1.0;

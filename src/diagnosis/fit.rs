@@ -35,14 +35,30 @@ pub fn derivatives(
     causes: &[Supposed],
     prediction: &Prediction,
 ) -> Result<Vec<Trace>, DiagnosisError> {
+    derivatives_beyond(laboratory, material, causes, prediction, &[])
+}
+
+/// As [`derivatives`], with the `known` changes for as many parameters as these are (none, or the material's and those
+/// of the first causes).
+fn derivatives_beyond(
+    laboratory: &mut Laboratory,
+    material: &Ogden,
+    causes: &[Supposed],
+    prediction: &Prediction,
+    known: &[Trace],
+) -> Result<Vec<Trace>, DiagnosisError> {
     let scene = scene_of(causes);
     let paths = paths_of(causes);
-    let paths: Vec<&Path> = paths.iter().collect();
-    let mut columns = laboratory.derivatives(material, &scene, prediction, true, &paths, STEP)?;
-    for (trace, parameter) in columns.iter_mut().zip(material.parameters()) {
-        *trace = trace.scaled(material.value(parameter));
+    let with_material = known.is_empty();
+    let num_known_paths = known.len().saturating_sub(material.parameters().len());
+    let paths: Vec<&Path> = paths[num_known_paths..].iter().collect();
+    let mut columns = laboratory.derivatives(material, &scene, prediction, with_material, &paths, STEP)?;
+    if with_material {
+        for (trace, parameter) in columns.iter_mut().zip(material.parameters()) {
+            *trace = trace.scaled(material.value(parameter));
+        }
     }
-    Ok(columns)
+    Ok(known.iter().cloned().chain(columns).collect())
 }
 
 /// Fits `material` and `causes` from where they are.
@@ -58,6 +74,24 @@ pub fn fit(
     settings: &FitSettings,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<CauseFit, DiagnosisError> {
+    fit_beyond(laboratory, metric, measured, material, causes, settings, &[], is_cancelled)
+}
+
+/// As [`fit`], with changes of the prediction for the first parameters (see [`Member::known`]).
+///
+/// # Errors
+/// As [`fit`].
+#[allow(clippy::too_many_arguments)]
+pub(super) fn fit_beyond(
+    laboratory: &mut Laboratory,
+    metric: &Metric,
+    measured: &Trace,
+    material: &Ogden,
+    causes: &[Supposed],
+    settings: &FitSettings,
+    known: &[Trace],
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<CauseFit, DiagnosisError> {
     let own = material.parameters().len() + causes.iter().map(|c| c.values.len()).sum::<usize>();
     let member = Member {
         laboratory,
@@ -65,6 +99,7 @@ pub fn fit(
         measured,
         causes: causes.to_vec(),
         settings: *settings,
+        known,
         places: (0..own).collect(),
     };
     let mut found = fit_members(&mut [member], material, is_cancelled)?;
@@ -84,6 +119,10 @@ pub struct Member<'a, 'b> {
     pub causes: Vec<Supposed>,
     /// Priors. How many iterations are made, and when they end, the first member's settings say for all.
     pub settings: FitSettings,
+    /// Changes of its prediction with its first parameters (all of the material and those of some causes), near enough to
+    /// be taken as they are; empty where all are worked out at every step. The fit then ends where it would have ended,
+    /// after a few more but far shorter steps.
+    pub known: &'a [Trace],
     /// For each of its parameters (the material's, then the causes') its place among the parameters of the whole fit. A
     /// parameter that members share has the same place in each. All places together are 0, 1, … without a gap.
     pub places: Vec<usize>,
@@ -128,7 +167,8 @@ pub fn fit_members(
         Err(error) => return Err(error),
     };
     let linear = whole_system(members, &at, &columns, num);
-    let mut problem = MembersProblem { members, num_parameters: num, tolerance: settings.tolerance, is_cancelled };
+    let num_data = members.iter().map(|m| m.metric.num_data() as f64).sum();
+    let mut problem = MembersProblem { members, num_parameters: num, num_data, settings, is_cancelled };
     let rules = Rules {
         shortening: Shortening::Damped(Damping { small_gain: 0.2 * settings.tolerance, ..DAMPING }),
         tolerated_rise: 0.0,
@@ -157,7 +197,8 @@ const DAMPING: Damping = Damping {
 struct MembersProblem<'f, 'a, 'b> {
     members: &'f mut [Member<'a, 'b>],
     num_parameters: usize,
-    tolerance: f64,
+    num_data: f64,
+    settings: FitSettings,
     is_cancelled: &'f dyn Fn() -> bool,
 }
 
@@ -179,7 +220,7 @@ impl LeastSquares for MembersProblem<'_, '_, '_> {
 
     fn step(
         &mut self,
-        _: &Point,
+        at: &Point,
         (matrix, gradient): &Self::Linear,
         damping: f64,
     ) -> Result<Option<Step>, DiagnosisError> {
@@ -190,7 +231,9 @@ impl LeastSquares for MembersProblem<'_, '_, '_> {
         }
         let change = damped.cholesky().map(|c| c.solve(gradient)).unwrap_or_else(|| DVector::zeros(num));
         let promised = 2.0 * gradient.dot(&change) - change.dot(&(matrix * &change));
-        Ok(if promised < self.tolerance { None } else { Some(Step { change, promised }) })
+        let beyond_noise = (at.deviance() - self.num_data).max(0.0);
+        let tolerance = self.settings.tolerance.max(self.settings.relative_tolerance * beyond_noise);
+        Ok(if promised < tolerance { None } else { Some(Step { change, promised }) })
     }
 
     fn trial(&mut self, at: &Point, _: &Self::Linear, step: &Step, part: f64) -> Result<Option<Point>, DiagnosisError> {
@@ -239,7 +282,7 @@ fn columns_at(members: &mut [Member], at: &Point) -> Result<Vec<Vec<Trace>>, Dia
     members
         .iter_mut()
         .zip(at.causes.iter().zip(&at.predictions))
-        .map(|(m, (causes, prediction))| derivatives(m.laboratory, &at.material, causes, prediction))
+        .map(|(m, (causes, prediction))| derivatives_beyond(m.laboratory, &at.material, causes, prediction, m.known))
         .collect()
 }
 

@@ -2,19 +2,22 @@
 
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
-use super::evidence::{EVIDENCE, is_large, penalty};
+use super::evidence::{EVIDENCE, SMALLEST_SHARE, is_large, penalty};
 use super::fit::STEP;
 use super::inference::Inference;
 use super::prior::shear_modulus;
-use super::scene::Scene;
 use super::score::ScoreTest;
 use super::trace::Trace;
 use crate::material::{MAX_TERMS, OgdenTerm};
 
+/// Terms are added up to this number.
+const MOST_TERMS: usize = 3;
 /// Exponents tried for a further Ogden term.
 const EXPONENTS: [f64; 5] = [-6.0, -2.0, 5.0, 9.0, 14.0];
 
-/// The fit with one more Ogden term and its evidence, where the data call for it.
+/// The fit with one more Ogden term beside the causes of `current`, and its evidence, where the data call for it: by as
+/// much as for a cause, and by some part of what is left to be explained. Of a misfit that is not the material's, every
+/// term takes a little.
 ///
 /// # Errors
 /// [`DiagnosisError`]: the work was cancelled.
@@ -23,14 +26,15 @@ pub(super) fn further_term(
     measured: &Trace,
     current: &CauseFit,
 ) -> Result<Option<(CauseFit, f64)>, DiagnosisError> {
-    let Some(term) = best_term(inference, current) else { return Ok(None) };
+    let least = EVIDENCE.max(SMALLEST_SHARE * inference.misfit_beyond_noise(current));
+    let Some(term) = best_term(inference, current, least) else { return Ok(None) };
     let mut richer = current.material.clone();
     richer.terms.push(term);
-    match inference.fit(measured, &richer, &[]) {
+    match inference.fit(measured, &richer, &current.causes) {
         Ok(found) => {
             let gain = current.deviance - found.deviance - penalty(&inference.metric, 2);
             let effect = found.prediction.trace.plus(-1.0, &current.prediction.trace);
-            let is_used = gain > EVIDENCE && is_large(inference.laboratory.observed(), &effect, inference.allowance_mm);
+            let is_used = gain > least && is_large(inference.laboratory.observed(), &effect, inference.allowance_mm);
             Ok(is_used.then_some((found, gain)))
         }
         Err(error) if (inference.is_cancelled)() => Err(error),
@@ -38,8 +42,11 @@ pub(super) fn further_term(
     }
 }
 
-/// The further term that explains most to first order, all exponents tried at once; `None` where none explains enough.
-fn best_term(inference: &mut Inference, current: &CauseFit) -> Option<OgdenTerm> {
+/// The further term that explains most to first order, all exponents tried at once; `None` where none explains `least`.
+fn best_term(inference: &mut Inference, current: &CauseFit, least: f64) -> Option<OgdenTerm> {
+    if current.material.terms.len() >= MOST_TERMS {
+        return None;
+    }
     let mut probe = current.material.clone();
     let base = current.material.terms.len();
     let exponents = || EXPONENTS.into_iter().take(MAX_TERMS - base);
@@ -47,8 +54,8 @@ fn best_term(inference: &mut Inference, current: &CauseFit) -> Option<OgdenTerm>
         let mu_kpa = 1e-9 * shear_modulus(&current.material) / alpha;
         probe.terms.push(OgdenTerm { mu_kpa, alpha });
     }
-    let columns =
-        inference.laboratory.derivatives(&probe, &Scene::default(), &current.prediction, true, &[], STEP).ok()?;
+    let scene = current.scene();
+    let columns = inference.laboratory.derivatives(&probe, &scene, &current.prediction, true, &[], STEP).ok()?;
     let nuisance: Vec<Trace> = columns[..=2 * base]
         .iter()
         .zip(current.material.parameters())
@@ -66,5 +73,5 @@ fn best_term(inference: &mut Inference, current: &CauseFit) -> Option<OgdenTerm>
             best = Some((score.explained, OgdenTerm { mu_kpa, alpha }));
         }
     }
-    best.filter(|b| b.0 > EVIDENCE).map(|b| b.1)
+    best.filter(|b| b.0 > least).map(|b| b.1)
 }

@@ -3,7 +3,7 @@
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
 use super::evidence::EVIDENCE;
-use super::fit::{deviance_at, fit};
+use super::fit::{deviance_at, fit, fit_beyond};
 use super::laboratory::Laboratory;
 use super::leftover::leftover;
 use super::metric::Metric;
@@ -48,16 +48,21 @@ impl Inference<'_> {
     /// What a misfit weighs at the voxels for which `is_kept`.
     pub(super) fn metric_of(&self, is_kept: &dyn Fn(usize) -> bool) -> Metric {
         let metric = Metric::new(self.laboratory.observed(), self.allowance_mm, is_kept);
-        if self.discrepancy_mm2.iter().any(|v| *v > 0.0) { metric.with_variance(self.discrepancy_mm2) } else { metric }
+        if self.accepts_discrepancy() { metric.with_variance(self.discrepancy_mm2) } else { metric }
     }
 
-    /// Weighs misfits from now on by what `residual` leaves beyond noise and allowance: the mean of a box of voxels
-    /// then has the standard deviation that such means are seen to have. Without it a model that cannot be exact is
-    /// fitted to its own errors, and whatever is believed of its parameters counts for nothing.
+    /// Whether misfits are weighed by what a model is known to leave.
+    pub(super) fn accepts_discrepancy(&self) -> bool {
+        self.discrepancy_mm2.iter().any(|v| *v > 0.0)
+    }
+
+    /// Weighs misfits from now on by what `residual` leaves beyond noise, and at least by the allowance: the mean of a
+    /// box of voxels then has the standard deviation that such means are seen to have. Without it a model that cannot
+    /// be exact is fitted to its own errors, and whatever is believed of its parameters counts for nothing.
     pub(super) fn accept_discrepancy(&mut self, residual: &Trace) {
         let left = leftover(self.laboratory.observed(), residual, &self.metric);
-        let beyond = |mm: f64| (mm * mm - self.allowance_mm * self.allowance_mm).max(0.0);
-        self.discrepancy_mm2 = left.structured_by_component_mm.map(|mm| beyond(mm) * left.voxels_per_box);
+        let size_mm = |structured_mm: f64| structured_mm.max(self.allowance_mm);
+        self.discrepancy_mm2 = left.structured_by_component_mm.map(|mm| size_mm(mm).powi(2) * left.voxels_per_box);
         self.metric = self.metric_of(&|_| true);
     }
 
@@ -73,6 +78,11 @@ impl Inference<'_> {
         self.metric.inner(&weighed, &weighed)
     }
 
+    /// How much of a fit's deviance noise does not account for.
+    pub(super) fn misfit_beyond_noise(&self, fitted: &CauseFit) -> f64 {
+        (fitted.deviance - self.metric.num_data() as f64).max(0.0)
+    }
+
     /// Fits a material and causes from where they are.
     ///
     /// # Errors
@@ -86,7 +96,8 @@ impl Inference<'_> {
         fit(&mut self.laboratory, &self.metric, measured, material, causes, &self.settings, self.is_cancelled)
     }
 
-    /// As [`Self::fit`], and then from where the last cause could leap to, as long as that explains more.
+    /// As [`Self::fit`], with `known` changes of the prediction for all parameters but the last cause's (none known: all
+    /// are worked out), and then from where the last cause could leap to, as long as that explains more.
     ///
     /// # Errors
     /// As [`fit`].
@@ -95,18 +106,30 @@ impl Inference<'_> {
         measured: &Trace,
         material: &Ogden,
         causes: &[Supposed],
+        known: &[Trace],
     ) -> Result<CauseFit, DiagnosisError> {
-        let mut found = self.fit(measured, material, causes)?;
+        let mut found = self.fit_beyond(measured, material, causes, known)?;
         for _ in 0..MAX_LEAPS {
             let limit = WORSE_BEFORE_BETTER * found.deviance;
             let Some((_, leapt)) = self.best_leap(measured, &found)?.filter(|leap| leap.0 < limit) else { break };
-            match self.fit(measured, &found.material, &leapt) {
+            match self.fit_beyond(measured, &found.material, &leapt, known) {
                 Ok(other) if other.deviance < found.deviance - EVIDENCE => found = other,
                 Err(error) if (self.is_cancelled)() => return Err(error),
                 _ => break,
             }
         }
         Ok(found)
+    }
+
+    fn fit_beyond(
+        &mut self,
+        measured: &Trace,
+        material: &Ogden,
+        causes: &[Supposed],
+        known: &[Trace],
+    ) -> Result<CauseFit, DiagnosisError> {
+        let Inference { laboratory, metric, settings, is_cancelled, .. } = self;
+        fit_beyond(laboratory, metric, measured, material, causes, settings, known, *is_cancelled)
     }
 
     /// Of the leaps of a fit's last cause the one with the smallest deviance, and that deviance; the material stays.

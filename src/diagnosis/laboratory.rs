@@ -209,6 +209,15 @@ impl<'a> Laboratory<'a> {
         // As many factors as threads are held at once.
         for group in numbers.chunks(rayon::current_num_threads().max(1)) {
             let tangents = self.tangents(at, material, scene, prediction, with_material, group)?;
+            // What moves with the nodes is seen against the gradient of the displacement, alike for all paths.
+            let moves_nodes = velocities.iter().any(Option::is_some);
+            let gradients: Vec<Vec<[[f64; 3]; 3]>> = if moves_nodes {
+                let view = &self.stations[at].view;
+                let of_step = |&n: &usize| view.gradients(&prediction.states[n].displacement);
+                group.par_iter().map(of_step).collect::<Result<_, _>>()?
+            } else {
+                Vec::new()
+            };
             let tasks: Vec<(usize, usize)> =
                 (0..group.len()).flat_map(|k| (0..paths.len()).map(move |index| (k, index))).collect();
             let found = tasks
@@ -222,7 +231,7 @@ impl<'a> Laboratory<'a> {
                     }
                     let mut tangent = tangents[k].0.shared();
                     match velocity {
-                        Some(velocity) => self.change_by_nodes(at, &mut tangent, &prediction.states[n], velocity),
+                        Some(velocity) => self.change_by_nodes(at, &mut tangent, &gradients[k], velocity),
                         None => self.change_by_departures(at, &mut tangent, material, path, n, step),
                     }
                 })
@@ -281,15 +290,15 @@ impl<'a> Laboratory<'a> {
         &self,
         at: usize,
         tangent: &mut Tangent,
-        state: &Equilibrium,
+        gradients: &[[[f64; 3]; 3]],
         velocity: &[[f64; 3]],
     ) -> Result<(Vec<[f64; 3]>, f64), DiagnosisError> {
         let view = &self.stations[at].view;
         let s = tangent.path_sensitivity(&[], Some(velocity), 0.0)?;
         // The derivative follows the nodes; the scan's voxels stay: u′ − ∇u V.
         let mut field = view.average(&s.displacement)?;
-        let (moved, gradients) = (view.average(velocity)?, view.gradients(&state.displacement)?);
-        for ((u, v), g) in field.iter_mut().zip(&moved).zip(&gradients) {
+        let moved = view.average(velocity)?;
+        for ((u, v), g) in field.iter_mut().zip(&moved).zip(gradients) {
             for i in 0..3 {
                 u[i] -= (0..3).map(|j| g[i][j] * v[j]).sum::<f64>();
             }
@@ -438,3 +447,7 @@ fn bond_scale(material: &Ogden) -> f64 {
     let mu = material.initial_shear_modulus_kpa();
     mu.abs() / BOND_LENGTH_MM
 }
+
+#[cfg(test)]
+#[path = "laboratory_tests.rs"]
+mod tests;

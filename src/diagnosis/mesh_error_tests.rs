@@ -55,6 +55,7 @@ fn a_finer_mesh_corrects_estimates() {
         bulk: BulkPrior { center_kpa: material.bulk_kpa, log_sd: 0.1 },
         shear: None,
         tolerance: 1e-3,
+        relative_tolerance: 0.0,
     };
     let swelling = Registry::standard()
         .tested(&observed.specimen)

@@ -87,7 +87,7 @@ pub use options::DiagnosisOptions;
 pub use outcome::Diagnosis;
 pub use prior::{BulkPrior, FitSettings, ShearPrior};
 pub use ranked::Ranked;
-pub use registry::cause_names;
+pub use registry::{answers, cause_names};
 pub use result::{CauseResult, DiagnosisResult, ModulusAgainstBelief, ParameterResult, RankedResult};
 pub use scene::{ImageChange, Jump, Scene};
 pub use supposed::Supposed;

@@ -2,6 +2,7 @@
 
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
+use super::evidence::ROUGH_TOLERANCE;
 use super::further_term::further_term;
 use super::inference::Inference;
 use super::laboratory::Laboratory;
@@ -33,7 +34,7 @@ pub(super) fn first_guess(
     Ok(material)
 }
 
-/// The nominal model's fit: as many terms as the material believed (`is_believed`), or one or two as the data call for.
+/// The nominal model's fit: as many terms as the material believed (`is_believed`), or as the data call for.
 ///
 /// # Errors
 /// As [`first_guess`].
@@ -43,9 +44,24 @@ pub(super) fn fit_nominal(
     start: &Ogden,
     is_believed: bool,
 ) -> Result<CauseFit, DiagnosisError> {
-    let simplest = inference.fit(measured, start, &[])?;
-    if is_believed {
-        return Ok(simplest);
+    let settings = inference.settings;
+    inference.settings.relative_tolerance = ROUGH_TOLERANCE;
+    let found = fit_with_terms(inference, measured, start, is_believed);
+    inference.settings = settings;
+    found
+}
+
+fn fit_with_terms(
+    inference: &mut Inference,
+    measured: &Trace,
+    start: &Ogden,
+    is_believed: bool,
+) -> Result<CauseFit, DiagnosisError> {
+    let mut found = inference.fit(measured, start, &[])?;
+    if !is_believed {
+        while let Some((richer, _)) = further_term(inference, measured, &found)? {
+            found = richer;
+        }
     }
-    Ok(further_term(inference, measured, &simplest)?.map_or(simplest, |found| found.0))
+    Ok(found)
 }

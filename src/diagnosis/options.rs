@@ -22,7 +22,7 @@ pub struct DiagnosisOptions {
     pub force_sd_n: f64,
     /// What moves the boundary of the model. Where it is what was measured, no cause at the boundary is looked for.
     pub boundary: Boundary,
-    /// Causes that are not to be supposed.
+    /// Causes that are not to be supposed, neither by themselves nor as special cases of others.
     pub left_out: Vec<CauseName>,
 }
 

@@ -50,6 +50,8 @@ pub struct FitSettings {
     pub shear: Option<ShearPrior>,
     /// A fit ends when a step promises, by the linear model, to lower the deviance by less than this.
     pub tolerance: f64,
+    /// It also ends when a step promises less than this part of what noise does not account for.
+    pub relative_tolerance: f64,
 }
 
 /// ½ Σ μᵢαᵢ, kPa.

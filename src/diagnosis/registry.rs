@@ -19,6 +19,15 @@ pub fn cause_names() -> Vec<CauseName> {
     Registry::standard().names()
 }
 
+/// Whether naming `named` answers what was hidden: it is the same cause, a special case of it, or one of which it is a
+/// special case.
+pub fn answers(hidden: CauseName, named: &str) -> bool {
+    let covers = |general: &str, special: &str| {
+        REGISTRY.iter().any(|e| e.name.as_str() == general && e.special_cases().iter().any(|c| c.as_str() == special))
+    };
+    hidden.as_str() == named || covers(named, hidden.as_str()) || covers(hidden.as_str(), named)
+}
+
 /// The causes that a diagnosis supposes.
 #[derive(Clone)]
 pub(super) struct Registry {
@@ -31,7 +40,7 @@ impl Registry {
         Registry { entries: REGISTRY.to_vec() }
     }
 
-    /// Without the causes of some names.
+    /// Without the causes of some names, and without those of which they are special cases.
     ///
     /// # Errors
     /// [`DiagnosisError::UnknownCause`] for a name that no cause has.
@@ -41,7 +50,7 @@ impl Registry {
             let known = known.iter().map(|n| n.as_str()).collect::<Vec<_>>().join(", ");
             return Err(DiagnosisError::UnknownCause { name: name.as_str(), known });
         }
-        self.entries.retain(|e| !names.contains(&e.name));
+        self.entries.retain(|e| !names.contains(&e.name) && !e.special_cases().iter().any(|n| names.contains(n)));
         Ok(self)
     }
 
@@ -62,6 +71,12 @@ impl Registry {
         names
     }
 
+    /// The names of the causes that are special cases of one in `causes`.
+    pub(super) fn special_cases(&self, causes: &[Supposed]) -> Vec<CauseName> {
+        let is_in = |e: &&Entry| causes.iter().any(|c| c.cause.name() == e.name);
+        self.entries.iter().filter(is_in).flat_map(|e| e.special_cases()).copied().collect()
+    }
+
     /// Suspects for which every recording of a specimen is tested.
     pub(super) fn tested(&self, specimen: &Specimen) -> Vec<Arc<dyn Cause>> {
         let of_entry = |entry: &Entry| match entry.origin {
@@ -74,7 +89,7 @@ impl Registry {
     /// The parts of the set-up of a recording.
     pub(super) fn set_up(&self, observed: &Observed) -> Vec<Arc<dyn Cause>> {
         let of_entry = |entry: &Entry| match entry.origin {
-            Origin::SetUp(parts) => parts(observed),
+            Origin::SetUp { parts, .. } => parts(observed),
             _ => Vec::new(),
         };
         self.entries.iter().flat_map(of_entry).collect()

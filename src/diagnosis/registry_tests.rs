@@ -111,6 +111,11 @@ fn causes_are_left_out_by_name() {
     let left = all.clone().without(&[cell]).unwrap();
     assert_eq!(all.load_effects().len() - left.load_effects().len(), 2);
     assert!(left.load_effects().iter().all(|e| e.name() != cell));
+    // A cause that holds the one left out as a special case would find it again under its own name.
+    assert_eq!(all.special_cases(&[]), []);
+    let left = all.clone().without(&[CauseName::new("tilt")]).unwrap();
+    assert_eq!(all.names().len() - left.names().len(), 2);
+    assert!(!left.names().contains(&CauseName::new("travel")));
     let error = all.without(&[CauseName::new("tlit")]).map(|_| ()).unwrap_err().to_string();
     assert!(error.contains("'tlit'") && error.contains("tilt"), "{error}");
 }
@@ -125,7 +130,7 @@ fn entries_are_named_as_what_they_hold() {
             Origin::Tested(suspects) => assert!(suspects(&specimen).iter().all(|c| c.name() == entry.name)),
             Origin::LoadCurve(effect) => assert_eq!(effect.name(), entry.name),
             Origin::Material(cause) => assert_eq!(cause.name(), entry.name),
-            Origin::Searched(_) | Origin::Artefact { .. } | Origin::SetUp(_) => {}
+            Origin::Searched(_) | Origin::Artefact { .. } | Origin::SetUp { .. } => {}
         }
     }
     // Holes are suspects of one name and different identities.

@@ -4,10 +4,11 @@
 use super::candidate::Candidate;
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
-use super::evidence::{EVIDENCE, SMALLEST_SHARE, is_large, penalty};
+use super::evidence::{EVIDENCE, ROUGH_TOLERANCE, SMALLEST_SHARE, is_large, penalty};
 use super::experiment::experiments;
 use super::findings::Findings;
 use super::found::FoundCause;
+use super::further_term::further_term;
 use super::inference::Inference;
 use super::ranked::Ranked;
 use super::registry::Registry;
@@ -24,11 +25,23 @@ const AMBIGUITY: f64 = 15.0;
 /// for: a full fit may explain several times what first order promises.
 const LEAST_PROMISE: f64 = 0.25;
 
+/// Fits that ended early may lie so many times that apart from where they would have ended.
+const NEAR_TOLERANCES: f64 = 5.0;
+
 /// A fit with one more cause.
 struct Trial {
     /// Fall of the deviance, less ln n per parameter of the cause.
     gain: f64,
     fit: CauseFit,
+}
+
+/// What the first half of a round found.
+pub(super) struct Scored {
+    /// Suspects, most explaining first.
+    pub(super) candidates: Vec<Candidate>,
+    /// Changes of the prediction with the parameters of the fit so far, for fits of further causes; empty where these
+    /// are to work them out.
+    known: Vec<Trace>,
 }
 
 /// How far rounds go.
@@ -38,6 +51,8 @@ pub(super) struct RoundLimits {
     pub(super) max_causes: usize,
     /// Whether a load curve was read.
     pub(super) has_load_curve: bool,
+    /// Whether a material is believed, so that its number of terms is stated.
+    pub(super) is_believed: bool,
 }
 
 /// The first half of a round: tests all suspects to first order.
@@ -49,12 +64,12 @@ pub(super) fn score_round(
     registry: &Registry,
     findings: &mut Findings,
     limits: RoundLimits,
-) -> Result<Vec<Candidate>, DiagnosisError> {
+) -> Result<Scored, DiagnosisError> {
     findings.num_rounds += 1;
     let round = findings.num_rounds;
     (inference.progress)(&format!("round {round}: testing causes"));
     let scope = RoundScope { has_load_curve: limits.has_load_curve };
-    let RoundScores { candidates, maps } = score_suspects(inference, registry, &findings.current, scope)?;
+    let RoundScores { candidates, known, maps } = score_suspects(inference, registry, &findings.current, scope)?;
     if round == 1 {
         findings.maps.extend(maps);
     }
@@ -65,10 +80,13 @@ pub(super) fn score_round(
         fitted: None,
         round,
     }));
-    Ok(candidates)
+    // The nominal model's few parameters are worked out at every step: they change most with the first cause.
+    let known = if findings.current.causes.is_empty() { Vec::new() } else { known };
+    Ok(Scored { candidates, known })
 }
 
-/// The second half of a round: fits the leading candidates and names the best; whether there was one.
+/// The second half of a round: fits the leading candidates and names the best, unless a further Ogden term of the
+/// material explains more; whether there was either.
 ///
 /// # Errors
 /// As [`score_round`].
@@ -76,9 +94,20 @@ pub(super) fn fit_round(
     inference: &mut Inference,
     findings: &mut Findings,
     measured: &Trace,
-    candidates: &[Candidate],
+    scored: &Scored,
+    limits: RoundLimits,
 ) -> Result<bool, DiagnosisError> {
-    let trials = fit_leading(inference, candidates, findings, measured, findings.num_rounds);
+    let trials = fit_leading(inference, scored, findings, measured)?;
+    if !limits.is_believed {
+        let best = trials.first().map_or(0.0, |t| t.gain);
+        if let Some((richer, gain)) = further_term(inference, measured, &findings.current)?
+            && gain > best
+        {
+            (inference.progress)("a further Ogden term explains more than any cause");
+            findings.current = richer;
+            return Ok(true);
+        }
+    }
     take_best(inference, findings, trials)
 }
 
@@ -94,24 +123,32 @@ pub(super) fn add_causes(
     limits: RoundLimits,
 ) -> Result<(), DiagnosisError> {
     while findings.causes.len() < limits.max_causes {
-        let candidates = score_round(inference, registry, findings, limits)?;
-        if !fit_round(inference, findings, measured, &candidates)? {
+        let scored = score_round(inference, registry, findings, limits)?;
+        if !fit_round(inference, findings, measured, &scored, limits)? {
             break;
         }
     }
     Ok(())
 }
 
-/// Fits the leading candidates in full, the best first; those without a fit are left out.
+/// Fits the leading candidates, the best first; those without a fit are left out. Fits end early, and with the changes of
+/// the prediction that are known; those that may be the best are then gone on with.
+///
+/// # Errors
+/// [`DiagnosisError`]: the work was cancelled.
 fn fit_leading(
     inference: &mut Inference,
-    candidates: &[Candidate],
+    scored: &Scored,
     findings: &mut Findings,
     measured: &Trace,
-    round: usize,
-) -> Vec<Trial> {
+) -> Result<Vec<Trial>, DiagnosisError> {
+    let Scored { candidates, known } = scored;
+    let round = findings.num_rounds;
     let mut trials: Vec<Trial> = Vec::new();
     let least = LEAST_PROMISE * SMALLEST_SHARE * findings.explained();
+    let settings = inference.settings;
+    let tolerance = settings.tolerance.max(ROUGH_TOLERANCE * inference.misfit_beyond_noise(&findings.current));
+    inference.settings.relative_tolerance = ROUGH_TOLERANCE;
     for c in leading(candidates, &findings.current).into_iter().filter(|c| c.score > least) {
         if (inference.is_cancelled)() {
             break;
@@ -120,8 +157,8 @@ fn fit_leading(
         let current = &findings.current;
         let mut supposed = current.causes.clone();
         supposed.push(Supposed { cause: c.cause.clone(), values: c.values.clone() });
-        let Ok(fit) = inference.fit_with_leaps(measured, &current.material, &supposed) else { continue };
-        let gain = current.deviance - fit.deviance - penalty(&inference.metric, c.values.len());
+        let Ok(fit) = inference.fit_with_leaps(measured, &current.material, &supposed, known) else { continue };
+        let gain = gain_of(inference, current, &fit);
         // Suspects without an identity of their own, as two balls, share the last entry.
         let identity = c.cause.identity();
         if let Some(ranked) = findings.ranked.iter_mut().rev().find(|r| r.identity == identity) {
@@ -129,8 +166,24 @@ fn fit_leading(
         }
         trials.push(Trial { gain, fit });
     }
+    inference.settings = settings;
+    let best = trials.iter().fold(f64::NEG_INFINITY, |best, t| best.max(t.gain));
+    let near = best - 2.0 * AMBIGUITY - NEAR_TOLERANCES * tolerance;
+    for trial in trials.iter_mut().filter(|t| t.gain > near.max(EVIDENCE - NEAR_TOLERANCES * tolerance)) {
+        match inference.fit(measured, &trial.fit.material, &trial.fit.causes) {
+            Ok(fit) => *trial = Trial { gain: gain_of(inference, &findings.current, &fit), fit },
+            Err(error) if (inference.is_cancelled)() => return Err(error),
+            Err(_) => {}
+        }
+    }
     trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    trials
+    Ok(trials)
+}
+
+/// By how much the deviance of `current` falls with the last cause of `fit`, less what its parameters cost.
+fn gain_of(inference: &Inference, current: &CauseFit, fit: &CauseFit) -> f64 {
+    let num = fit.causes.last().map_or(0, |c| c.values.len());
+    current.deviance - fit.deviance - penalty(&inference.metric, num)
 }
 
 /// Names the best trial as a cause where the evidence for it is strong enough, with what cannot be told apart from it;

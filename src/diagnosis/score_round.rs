@@ -38,6 +38,8 @@ pub(super) struct RoundScope {
 pub(super) struct RoundScores {
     /// All candidates, most explaining first.
     pub(super) candidates: Vec<Candidate>,
+    /// Changes of the prediction with the scaled parameters of the fit so far.
+    pub(super) known: Vec<Trace>,
     /// The maps of what the fit so far leaves, with their names.
     pub(super) maps: Vec<(String, ScoreMap)>,
 }
@@ -66,7 +68,8 @@ pub(super) fn score_suspects(
     registry.search(&mut search, &mut candidates)?;
     let maps = search.into_maps()?;
     candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
-    Ok(RoundScores { candidates, maps })
+    drop(test);
+    Ok(RoundScores { candidates, known: nuisance, maps })
 }
 
 /// What the set-up as a whole explains of what `current` leaves, to first order and as far as its beliefs allow.
@@ -128,14 +131,15 @@ fn suspects_of(
 ) -> Vec<Arc<dyn Cause>> {
     let has_several_drives = has_several_drives(observed);
     let has = |is: fn(&dyn Cause) -> bool| current.causes.iter().any(|s| is(&*s.cause));
-    let (are_plates_free, has_set_up) = (has(|c| c.frees_plates()), has(|c| c.is_of_set_up()));
+    let (is_said, has_set_up) = (registry.special_cases(&current.causes), has(|c| c.is_of_set_up()));
     registry
         .tested(&observed.specimen)
         .into_iter()
         .filter(|c| !(has_load_curve && c.is_read_from_load_curve()))
         .filter(|c| has_several_drives || !c.needs_several_drives())
-        .filter(|c| !(are_plates_free && c.is_plain_motion() || has_set_up && c.is_sponge()))
+        .filter(|c| !(is_said.contains(&c.name()) || has_set_up && c.is_sponge()))
         .filter(|c| !current.causes.iter().any(|s| s.cause.identity() == c.identity()))
+        .filter(|c| !(c.is_several_in_one() && current.causes.iter().any(|s| s.cause.name() == c.name())))
         .collect()
 }
 

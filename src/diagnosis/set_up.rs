@@ -24,7 +24,7 @@ use std::sync::Arc;
 /// Most iterations of a fit whose weights are still to change.
 const ROUGH_ITERATIONS: usize = 5;
 /// Such a fit ends when a step would lower the deviance by less than this: a tenth of what decides about a cause.
-const ROUGH_TOLERANCE: f64 = 3.0;
+const SMALL_GAIN: f64 = 3.0;
 /// Most fits, each weighed by what the one before left.
 const MAX_FITS: usize = 8;
 /// The weights are settled where the misfit beyond noise changes by less than this part.
@@ -84,7 +84,7 @@ fn roughly(
 ) -> Result<CauseFit, DiagnosisError> {
     let settings = inference.settings;
     inference.settings.max_iterations = ROUGH_ITERATIONS;
-    inference.settings.tolerance = ROUGH_TOLERANCE;
+    inference.settings.tolerance = SMALL_GAIN;
     let found = fit(inference);
     inference.settings = settings;
     found
@@ -120,7 +120,8 @@ pub(super) fn with_plain_motions(
     measured: &Trace,
     fitted: CauseFit,
 ) -> Result<CauseFit, DiagnosisError> {
-    if !fitted.causes.iter().any(|c| c.cause.frees_plates()) {
+    let special_cases = registry.special_cases(&fitted.causes);
+    if special_cases.is_empty() {
         return Ok(fitted);
     }
     let observed = inference.laboratory.observed();
@@ -128,10 +129,11 @@ pub(super) fn with_plain_motions(
     let plain = registry
         .tested(&observed.specimen)
         .into_iter()
-        .filter(|c| c.is_plain_motion() && (has_several_drives || !c.needs_several_drives()))
+        .filter(|c| special_cases.contains(&c.name()) && (has_several_drives || !c.needs_several_drives()))
         .filter(|c| !fitted.causes.iter().any(|s| s.cause.identity() == c.identity()))
         .map(|cause| Supposed { values: cause.start(), cause });
-    let mut causes: Vec<Supposed> = fitted.causes.iter().filter(|c| !c.cause.frees_plates()).cloned().collect();
+    let is_kept = |c: &&Supposed| registry.special_cases(std::slice::from_ref(*c)).is_empty();
+    let mut causes: Vec<Supposed> = fitted.causes.iter().filter(is_kept).cloned().collect();
     causes.extend(plain);
     let Ok(other) = inference.fit(measured, &fitted.material, &causes) else { return Ok(fitted) };
     let other = thinned(inference, measured, other)?;

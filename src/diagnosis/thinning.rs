@@ -3,11 +3,12 @@
 //! Near its end a fit's deviance is a quadratic form in its parameters. Of that form it is known at once what it costs
 //! to do without a cause (Wald's statistic with all others free to follow), and where the others go. Causes are taken
 //! out one after the other, the one that is missed least first (backward elimination), as long as none of them is
-//! missed by more than it costs; then what is left is fitted again.
+//! missed by more than it costs; then what is left is fitted again. A cause that changes the sample must also do more than a
+//! mesh's error could: where hardly anything would be left without it, it goes, whatever the evidence.
 
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
-use super::evidence::{EVIDENCE, penalty};
+use super::evidence::{EVIDENCE, UNEXPLAINED, penalty};
 use super::fit::{derivatives, normal_matrix, prior_scales};
 use super::found::FoundCause;
 use super::inference::Inference;
@@ -50,18 +51,24 @@ impl QuadraticModel {
         (0..self.owners.len()).filter(|i| self.owners[*i] == Some(cause)).collect()
     }
 
-    /// By how much the deviance rises without a cause, all others free to follow; infinite where it is not known.
-    fn missed(&self, cause: usize) -> f64 {
+    /// The part of the matrix that belongs to a cause once all others have followed (its Schur complement); `None` where
+    /// the others are not known.
+    fn own(&self, cause: usize) -> Option<DMatrix<f64>> {
         let places = self.places_of(cause);
         let rest: Vec<usize> = (0..self.owners.len()).filter(|i| !places.contains(i)).collect();
         let part = |rows: &[usize], columns: &[usize]| {
             DMatrix::from_fn(rows.len(), columns.len(), |i, j| self.matrix[(rows[i], columns[j])])
         };
-        let Some(factor) = part(&rest, &rest).cholesky() else { return f64::INFINITY };
         let cross = part(&rest, &places);
-        let own = part(&places, &places) - cross.tr_mul(&factor.solve(&cross));
+        let followed = part(&rest, &rest).cholesky()?.solve(&cross);
+        Some(part(&places, &places) - cross.tr_mul(&followed))
+    }
+
+    /// By how much the deviance rises without a cause, all others free to follow; infinite where it is not known.
+    fn missed(&self, cause: usize) -> f64 {
+        let places = self.places_of(cause);
         let away = DVector::from_fn(places.len(), |i, _| self.away[places[i]]);
-        away.dot(&(own * &away))
+        self.own(cause).map_or(f64::INFINITY, |own| away.dot(&(own * &away)))
     }
 
     /// What the parameters of a cause cost: of one that is believed in the logarithm of how far the data narrow the
@@ -71,14 +78,7 @@ impl QuadraticModel {
         if parameters.iter().any(|p| p.believed_sd.is_none()) {
             return penalty(&inference.metric, parameters.len()).max(EVIDENCE);
         }
-        let places = self.places_of(cause);
-        let rest: Vec<usize> = (0..self.owners.len()).filter(|i| !places.contains(i)).collect();
-        let part = |rows: &[usize], columns: &[usize]| {
-            DMatrix::from_fn(rows.len(), columns.len(), |i, j| self.matrix[(rows[i], columns[j])])
-        };
-        let Some(factor) = part(&rest, &rest).cholesky() else { return 0.0 };
-        let cross = part(&rest, &places);
-        let own = part(&places, &places) - cross.tr_mul(&factor.solve(&cross));
+        let Some(own) = self.own(cause) else { return 0.0 };
         let prior: f64 = parameters.iter().map(|p| -2.0 * prior_scales(p).ln()).sum();
         let log_determinant =
             own.cholesky().map_or(0.0, |c| 2.0 * c.l().diagonal().iter().map(|x| x.ln()).sum::<f64>());
@@ -90,16 +90,35 @@ impl QuadraticModel {
         let places = self.places_of(cause);
         let rest: Vec<usize> = (0..self.owners.len()).filter(|i| !places.contains(i)).collect();
         let matrix = DMatrix::from_fn(rest.len(), rest.len(), |i, j| self.matrix[(rest[i], rest[j])]);
-        let pull = DVector::from_fn(rest.len(), |i, _| {
-            places.iter().map(|&p| self.matrix[(rest[i], p)] * self.away[p]).sum::<f64>()
-        });
-        let followed = matrix.clone().cholesky().map_or_else(|| DVector::zeros(rest.len()), |f| f.solve(&pull));
+        let followed = self.followed(&places, &rest);
         let away = DVector::from_fn(rest.len(), |i, _| {
             if self.owners[rest[i]].is_some() { self.away[rest[i]] + followed[i] } else { 0.0 }
         });
         let owners = rest.iter().map(|&i| self.owners[i]).collect();
         let columns = rest.iter().map(|&i| self.columns[i].clone()).collect();
         QuadraticModel { matrix, away, owners, columns }
+    }
+
+    /// Root mean square of what would be left of the displacement at the last drive without a cause, all others having
+    /// followed, mm, to first order.
+    fn left_without_mm(&self, cause: usize) -> f64 {
+        let places = self.places_of(cause);
+        let rest: Vec<usize> = (0..self.owners.len()).filter(|i| !places.contains(i)).collect();
+        let zero = self.columns[0].scaled(0.0);
+        let own = places.iter().fold(zero, |sum, &p| sum.plus(self.away[p], &self.columns[p]));
+        let left =
+            rest.iter().zip(&self.followed(&places, &rest)).fold(own, |sum, (&q, by)| sum.plus(-by, &self.columns[q]));
+        Trace { displacement: left.displacement.last().cloned().into_iter().collect(), force: vec![] }.rms_mm()
+    }
+
+    /// How far the parameters at `rest` follow where those at `places` go back to where they would be without their
+    /// cause.
+    fn followed(&self, places: &[usize], rest: &[usize]) -> DVector<f64> {
+        let matrix = DMatrix::from_fn(rest.len(), rest.len(), |i, j| self.matrix[(rest[i], rest[j])]);
+        let pull = DVector::from_fn(rest.len(), |i, _| {
+            places.iter().map(|&p| self.matrix[(rest[i], p)] * self.away[p]).sum::<f64>()
+        });
+        matrix.cholesky().map_or_else(|| DVector::zeros(rest.len()), |f| f.solve(&pull))
     }
 
     /// Root mean square of what a cause adds to the displacement, mm, to first order.
@@ -131,12 +150,14 @@ pub(super) fn thinned(
             .iter()
             .filter(|&&cause| may_go(&fitted.causes[cause]))
             .map(|&cause| {
-                let (missed, cost) = (model.missed(cause), model.cost(cause, &fitted.causes[cause], inference));
-                let name = fitted.causes[cause].cause.name();
+                let supposed = &fitted.causes[cause];
+                let (missed, cost) = (model.missed(cause), model.cost(cause, supposed, inference));
+                let (name, left_mm) = (supposed.cause.name(), model.left_without_mm(cause));
                 (inference.progress)(&format!(
-                    "without '{name}' the deviance rises by {missed:.0}; it costs {cost:.0}"
+                    "without '{name}' {left_mm:.4} mm rms are left and the deviance rises by {missed:.0}; it costs {cost:.0}"
                 ));
-                (cause, missed - cost)
+                let is_a_meshs = supposed.cause.changes_sample() && left_mm < UNEXPLAINED * inference.allowance_mm;
+                (cause, if is_a_meshs { f64::min(missed - cost, -f64::MIN_POSITIVE) } else { missed - cost })
             })
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let Some((cause, _)) = least.filter(|(_, beyond)| *beyond < 0.0) else { break };

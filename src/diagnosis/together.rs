@@ -262,6 +262,7 @@ impl CommonFit<'_> {
                 measured: &case.measured,
                 causes: causes.clone(),
                 settings: shared_prior(case.found.settings, num_cases),
+                known: &[],
                 places,
             });
         }

@@ -144,6 +144,7 @@ impl Departures {
             && self.fibre.is_none()
             && !self.moves_plates()
             && self.bond_kpa_per_mm.is_none()
+            && self.faces_per_mm.iter().all(Option::is_none)
     }
 
     /// The same with the departures of both plates times a factor.

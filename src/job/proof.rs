@@ -2,9 +2,12 @@
 
 use super::{Context, JobError, Outcome, Progress, Request, Run, defaults, summary};
 use crate::field::FieldError;
-use crate::proof::{HiddenCause, ProofOptions, Scored, prove};
+use crate::proof::{
+    ExperimentKind, HiddenCause, ProofOptions, Scored, SeveralOptions, SeveralScored, prove, prove_several,
+};
 use crate::provenance::build_id;
-use crate::report::confusion_picture;
+use crate::report::{confusion_picture, detection_picture};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::io::Write;
 use std::sync::Mutex;
@@ -23,10 +26,19 @@ pub struct ProofRequest {
     #[serde(default = "controls")]
     #[schema(maximum = 100000, default = controls)]
     pub controls: usize,
-    /// Recordings per cause that the diagnosis is not told of.
-    #[serde(default = "unknown")]
-    #[schema(maximum = 100000, default = unknown)]
-    pub unknown: usize,
+    /// Recordings per cause that the diagnosis is not told of: 10 where this is left out. With several causes at once:
+    /// recordings in which one cause is known and one is not, 60 where this is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(maximum = 100000)]
+    pub unknown: Option<usize>,
+    /// Hide two to four causes at once, in place of one; controls then have a mount that is not perfect by less than does
+    /// any harm.
+    #[serde(default)]
+    pub has_several: bool,
+    /// Recordings with several causes at once.
+    #[serde(default = "recordings")]
+    #[schema(maximum = 100000, default = recordings)]
+    pub recordings: usize,
     /// Seed of all draws.
     #[serde(default = "seed")]
     #[schema(default = seed)]
@@ -49,9 +61,13 @@ fn controls() -> usize {
     100
 }
 
-fn unknown() -> usize {
-    10
+fn recordings() -> usize {
+    300
 }
+
+/// Recordings with an unknown cause where their number is left out: per cause, and in all beside a known one.
+const UNKNOWN_PER_CAUSE: usize = 10;
+const UNKNOWN_BESIDE_KNOWN: usize = 60;
 
 fn seed() -> u64 {
     1
@@ -63,6 +79,10 @@ fn mesh_factor() -> f64 {
 
 struct CheckedProof {
     options: ProofOptions,
+}
+
+struct CheckedSeveral {
+    options: SeveralOptions,
 }
 
 impl Request for ProofRequest {
@@ -86,10 +106,20 @@ impl Request for ProofRequest {
         if !errors.is_empty() {
             return Err(errors);
         }
+        if self.has_several {
+            let options = SeveralOptions {
+                num_recordings: self.recordings,
+                num_controls: self.controls,
+                num_unknown: self.unknown.unwrap_or(UNKNOWN_BESIDE_KNOWN),
+                seed: self.seed,
+                mesh_factor: self.mesh_factor,
+            };
+            return Ok(Box::new(CheckedSeveral { options }));
+        }
         let options = ProofOptions {
             per_cause: self.per_cause,
             controls: self.controls,
-            unknown: self.unknown,
+            unknown: self.unknown.unwrap_or(UNKNOWN_PER_CAUSE),
             seed: self.seed,
             mesh_factor: self.mesh_factor,
             only,
@@ -126,11 +156,80 @@ impl Run for CheckedProof {
     }
 
     fn run(&self, context: &Context) -> Result<Outcome, JobError> {
-        // Results are kept as they come: a stopped proof goes on where it was. Those of another build are not mixed in.
         let options = &self.options;
-        let name = format!("scored-{}-{}-{}.jsonl", options.seed, options.mesh_factor, build_id());
-        let (mut done, mut log): (Vec<Scored>, _) = (Vec::new(), None);
-        if let Some(path) = context.surroundings.checkpoint(&name) {
+        let kept: Kept<Scored> = Kept::open(context, &format!("scored-{}-{}", options.seed, options.mesh_factor))?;
+        let report = |s: &Scored, _: usize, total: usize| kept.add(context, s, line(s), total);
+        let specimen = defaults::two_hole_shear();
+        let proof = prove(&specimen, options, &kept.done, &report, &|| context.is_cancelled());
+        let table = summary::proof(&proof);
+        let mut outcome = Outcome::new("proof.json", &proof, table.clone())?;
+        outcome.add("proof.md", table);
+        outcome.add("confusion.svg", confusion_picture(&proof));
+        finished(context, outcome)
+    }
+}
+
+/// What became of one recording with several causes, in a line.
+fn line_of_several(s: &SeveralScored) -> String {
+    let mark = match &s.failure {
+        Some(failure) => failure,
+        None if s.is_right && s.false_names.is_empty() => "right",
+        None => "WRONG",
+    };
+    let hidden: Vec<String> = s
+        .causes
+        .iter()
+        .map(|c| format!("{}{} {:.3}", if c.is_detectable { "" } else { "~" }, c.cause.name(), c.own_effect_rms_mm))
+        .collect();
+    let kind = match s.kind {
+        ExperimentKind::Several => "",
+        ExperimentKind::Harmless => "harmless ",
+        ExperimentKind::Unknown => "last unknown ",
+    };
+    let verdict = s.verdict.map_or("no verdict".into(), |v| format!("{v:?}"));
+    format!("{kind}{}: {verdict}, {} | {}: {mark}", hidden.join(", "), s.named.join(", "), s.alternatives.join(", "))
+}
+
+impl Run for CheckedSeveral {
+    fn title(&self) -> String {
+        format!("proof of the diagnosis with several causes at once, seed {}", self.options.seed)
+    }
+
+    fn run(&self, context: &Context) -> Result<Outcome, JobError> {
+        let options = &self.options;
+        let name = format!("several-{}-{}", options.seed, options.mesh_factor);
+        let kept: Kept<SeveralScored> = Kept::open(context, &name)?;
+        let report = |s: &SeveralScored, _: usize, total: usize| kept.add(context, s, line_of_several(s), total);
+        let specimen = defaults::two_hole_shear();
+        let proof = prove_several(&specimen, options, &kept.done, &report, &|| context.is_cancelled());
+        let table = summary::several(&proof);
+        let mut outcome = Outcome::new("proof.json", &proof, table.clone())?;
+        outcome.add("proof.md", table);
+        outcome.add("detection.svg", detection_picture(&proof));
+        finished(context, outcome)
+    }
+}
+
+fn finished(context: &Context, outcome: Outcome) -> Result<Outcome, JobError> {
+    if context.is_cancelled() {
+        let summary = "the results so far are kept".into();
+        return Err(JobError::Stopped { summary, unfinished: Some(Box::new(outcome)) });
+    }
+    Ok(outcome)
+}
+
+/// Results that are kept as they come: a stopped proof goes on where it was. Those of another build are not mixed in.
+struct Kept<S> {
+    /// Results of an earlier run.
+    done: Vec<S>,
+    log: Option<Mutex<std::fs::File>>,
+    count: AtomicUsize,
+}
+
+impl<S: Serialize + DeserializeOwned> Kept<S> {
+    fn open(context: &Context, name: &str) -> Result<Kept<S>, JobError> {
+        let (mut done, mut log): (Vec<S>, _) = (Vec::new(), None);
+        if let Some(path) = context.surroundings.checkpoint(&format!("{name}-{}.jsonl", build_id())) {
             if let Ok(text) = std::fs::read_to_string(&path) {
                 // A line cut off by a crash is done again.
                 done = text.lines().filter_map(|l| serde_json::from_str(l).ok()).collect();
@@ -139,25 +238,18 @@ impl Run for CheckedProof {
             log = Some(Mutex::new(file.map_err(|e| JobError::Internal(format!("{}: {e}", path.display())))?));
         }
         let count = AtomicUsize::new(done.len());
-        let report = |s: &Scored, _: usize, total: usize| {
-            let n = count.fetch_add(1, Ordering::Relaxed) + 1;
-            context.progress(&Progress::new(line(s), n, total));
-            if let Some(log) = &log
-                && let (Ok(mut file), Ok(line)) = (log.lock(), serde_json::to_string(s))
-                && let Err(error) = writeln!(file, "{line}")
-            {
-                context.progress(&Progress::stage(&format!("a result could not be kept: {error}")));
-            }
-        };
-        let proof = prove(&defaults::two_hole_shear(), options, &done, &report, &|| context.is_cancelled());
-        let table = summary::proof(&proof);
-        let mut outcome = Outcome::new("proof.json", &proof, table.clone())?;
-        outcome.add("proof.md", table);
-        outcome.add("confusion.svg", confusion_picture(&proof));
-        if context.is_cancelled() {
-            let summary = "the results so far are kept".into();
-            return Err(JobError::Stopped { summary, unfinished: Some(Box::new(outcome)) });
+        Ok(Kept { done, log, count })
+    }
+
+    /// Keeps one more of `total` results and tells of it in a line.
+    fn add(&self, context: &Context, scored: &S, line: String, total: usize) {
+        let n = self.count.fetch_add(1, Ordering::Relaxed) + 1;
+        context.progress(&Progress::new(line, n, total));
+        if let Some(log) = &self.log
+            && let (Ok(mut file), Ok(line)) = (log.lock(), serde_json::to_string(scored))
+            && let Err(error) = writeln!(file, "{line}")
+        {
+            context.progress(&Progress::stage(&format!("a result could not be kept: {error}")));
         }
-        Ok(outcome)
     }
 }

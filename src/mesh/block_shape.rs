@@ -3,15 +3,45 @@
 //!
 //! A point X of the drawn block comes to x = X + Σ_axes e_i [ (1 − s_i)/2 f_i⁻(X) + (1 + s_i)/2 f_i⁺(X) ], where s_i is
 //! X_i in half extents and f_i^± is how far the face across axis i lies off at the low and the high side: a polynomial
-//! of second degree in the two other coordinates. The map is linear in the coefficients of the polynomials, so that
-//! derivatives with respect to them are its terms. On quadratic elements with axes along the block's it is exact.
+//! of fourth degree in the two other coordinates. The map is linear in the coefficients of the polynomials, so that
+//! derivatives with respect to them are its terms.
 
 use super::Mesh;
 use crate::specimen::Specimen;
 use nalgebra::Matrix3;
 
-/// Terms of a face's polynomial: 1, a, b, a², ab, b² in the two axes of the face (in order), in half extents.
-pub const FACE_TERMS: usize = 6;
+/// Terms of a face's polynomial: P_i(a) P_j(b) with Legendre polynomials P in the two axes of the face (in order), in half
+/// extents, by their degree i + j up to four: 1, a, b, aa, ab, bb, aaa and so on. The first is the mean over the face.
+pub const FACE_TERMS: usize = 15;
+/// Degrees in a and b of the terms.
+const DEGREES: [[usize; 2]; FACE_TERMS] = [
+    [0, 0],
+    [1, 0],
+    [0, 1],
+    [2, 0],
+    [1, 1],
+    [0, 2],
+    [3, 0],
+    [2, 1],
+    [1, 2],
+    [0, 3],
+    [4, 0],
+    [3, 1],
+    [2, 2],
+    [1, 3],
+    [0, 4],
+];
+
+/// The letters of a term for names, as `xxz`, where a face has the axes of these letters; none for the mean.
+pub fn face_term_name(term: usize, [a, b]: [&str; 2]) -> String {
+    let [i, j] = DEGREES[term];
+    a.repeat(i) + &b.repeat(j)
+}
+
+/// The degree of a term of a face.
+pub fn face_term_degree(term: usize) -> usize {
+    DEGREES[term][0] + DEGREES[term][1]
+}
 
 /// Iterations of the inverse map: the offsets are small against the block, each gains two digits or more.
 const INVERSIONS: usize = 12;
@@ -119,15 +149,28 @@ fn other_axes(axis: usize) -> [usize; 2] {
     [[1, 2], [0, 2], [0, 1]][axis]
 }
 
+/// P₀ to P₄.
+fn legendre(t: f64) -> [f64; 5] {
+    let s = t * t;
+    [1.0, t, 1.5 * s - 0.5, (2.5 * s - 1.5) * t, (4.375 * s - 3.75) * s + 0.375]
+}
+
+/// Their derivatives.
+fn legendre_rates(t: f64) -> [f64; 5] {
+    let s = t * t;
+    [0.0, 1.0, 3.0 * t, 7.5 * s - 1.5, (17.5 * s - 7.5) * t]
+}
+
 fn face_terms(axis: usize, t: [f64; 3]) -> [f64; FACE_TERMS] {
-    let [a, b] = other_axes(axis).map(|i| t[i]);
-    [1.0, a, b, a * a, a * b, b * b]
+    let [a, b] = other_axes(axis).map(|i| legendre(t[i]));
+    DEGREES.map(|[i, j]| a[i] * b[j])
 }
 
 /// Derivatives of the terms with respect to a and b.
 fn face_term_rates(axis: usize, t: [f64; 3]) -> [[f64; FACE_TERMS]; 2] {
-    let [a, b] = other_axes(axis).map(|i| t[i]);
-    [[0.0, 1.0, 0.0, 2.0 * a, b, 0.0], [0.0, 0.0, 1.0, 0.0, a, 2.0 * b]]
+    let [a, b] = other_axes(axis).map(|i| legendre(t[i]));
+    let [da, db] = other_axes(axis).map(|i| legendre_rates(t[i]));
+    [DEGREES.map(|[i, j]| da[i] * b[j]), DEGREES.map(|[i, j]| a[i] * db[j])]
 }
 
 #[cfg(test)]
@@ -138,9 +181,17 @@ mod tests {
 
     fn shape() -> BlockShape {
         let mut shape = BlockShape::default();
-        shape.faces_mm[0] = [[0.3, 0.1, -0.2, 0.0, 0.0, 0.0], [-0.2, 0.05, 0.1, 0.0, 0.0, 0.0]];
-        shape.faces_mm[1] = [[0.4, 0.1, -0.1, 0.2, 0.05, -0.1], [-0.5, 0.1, 0.2, -0.1, 0.03, 0.1]];
-        shape.faces_mm[2] = [[0.1, 0.2, 0.1, 0.0, 0.0, 0.0], [0.0, -0.1, 0.1, 0.0, 0.0, 0.0]];
+        let faces = [
+            [vec![0.3, 0.1, -0.2], vec![-0.2, 0.05, 0.1]],
+            [
+                vec![0.4, 0.1, -0.1, 0.2, 0.05, -0.1, 0.05, -0.03, 0.02, 0.04],
+                vec![-0.5, 0.1, 0.2, -0.1, 0.03, 0.1, 0.0, 0.0, 0.0, 0.0, 0.05, -0.02, 0.03, 0.01, -0.04],
+            ],
+            [vec![0.1, 0.2, 0.1], vec![0.0, -0.1, 0.1]],
+        ];
+        for (face, terms) in shape.faces_mm.iter_mut().flatten().zip(faces.iter().flatten()) {
+            face[..terms.len()].copy_from_slice(terms);
+        }
         shape
     }
 
@@ -148,8 +199,9 @@ mod tests {
     #[test]
     fn the_map_goes_there_and_back() {
         let shape = shape();
-        // The middle of the moved face.
-        assert!((shape.offset(HALF, [0.0, HALF[1], 0.0])[1] + 0.5).abs() < 1e-15);
+        // The middle of the moved face: P₂(0) = −1/2, P₄(0) = 3/8.
+        let middle = -0.5 - 0.5 * (-0.1 + 0.1) + 0.375 * (0.05 - 0.04) + 0.25 * 0.03;
+        assert!((shape.offset(HALF, [0.0, HALF[1], 0.0])[1] - middle).abs() < 1e-15);
         for x in [[3.0, 1.0, -2.0], [-12.0, -3.0, 9.0], [0.0, 3.1, 0.0]] {
             let offset = shape.offset(HALF, x);
             let made = [0, 1, 2].map(|i| x[i] + offset[i]);

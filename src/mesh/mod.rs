@@ -37,7 +37,7 @@ mod layout_tests;
 #[cfg(test)]
 mod test_specimens;
 
-pub use block_shape::{BlockShape, FACE_TERMS, half_extents_mm, made_mesh};
+pub use block_shape::{BlockShape, FACE_TERMS, face_term_degree, face_term_name, half_extents_mm, made_mesh};
 pub use build::{mesh_specimen, mesh_specimen_along};
 pub use check::MeshQuality;
 pub use element::ElementKind;

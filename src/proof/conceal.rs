@@ -1,33 +1,31 @@
-//! The recording of a hidden cause.
+//! The recording of an experiment with hidden causes.
 
 use super::draw::{Draw, Hidden, HiddenCause};
+use super::experiment::Experiment;
+use super::history::{BEYOND, DRIFT_SD_N, history};
 use crate::fem::{
     Departures, Equilibrium, Fibre, Field, ForwardModel, PlateMotion, PrepareError, SolveError, SolveOptions,
 };
-use crate::mesh::{MeshOptions, mesh_specimen, mesh_specimen_along};
-use crate::recording::{Filter, LoadCurve, RecordedStep, Recording};
+use crate::material::Ogden;
+use crate::mesh::{MeshOptions, half_extents_mm, mesh_specimen, mesh_specimen_along};
+use crate::recording::{Filter, RecordedStep, Recording};
 use crate::specimen::Specimen;
 use crate::voxel::{Sampling, VoxelError, VoxelGrid, VoxelMask, VoxelOperator};
 
 /// Strips thinner than this are not meshed, mm.
 const LEAST_STRIP_MM: f64 = 0.3;
 /// κ over the shear modulus of a rubber.
-const RUBBER: f64 = 130.0;
+pub(super) const RUBBER: f64 = 130.0;
 /// Element size as a factor on the standard one.
 const MESH_FACTOR: f64 = 1.6;
 /// Voxels of the concealed recordings, mm.
 const VOXEL_MM: [f64; 3] = [1.5, 0.4, 1.1];
-/// The load cell: drift of each hold and a single reading, N.
-const DRIFT_SD_N: f64 = 0.02;
-const READING_SD_N: f64 = 0.03;
-/// The loading: time between readings, rest, hold, and what of a hold is not scanned, s; speed, mm/s.
-const INTERVAL_S: f64 = 0.5;
-const REST_S: f64 = 8.0;
-const HOLD_S: f64 = 56.0;
-const SETTLE_S: f64 = 7.0;
-const SPEED_MM_PER_S: f64 = 0.5;
-/// The first cycle goes this much beyond the largest drive.
-const BEYOND: f64 = 1.1;
+/// How much stiffer a layer at a bonded face is.
+const LAYER_FACTOR: f64 = 60.0;
+/// A block that is a wedge, among the geometries drawn.
+const WEDGE: usize = 2;
+/// Voxels without a signal show any displacement within a turn of phase, mm.
+const LOST_MM: f64 = 1.5;
 
 /// Why a recording cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -44,91 +42,111 @@ pub enum ConcealError {
     Voxel(#[from] VoxelError),
 }
 
-/// A recording and what its cause does to it.
+/// A recording and what its causes do to it.
 #[derive(Clone, Debug)]
 pub struct Concealed {
     /// The recording.
     pub recording: Recording,
-    /// Root mean square change of the displacement by the cause at the largest drive, mm, the material unchanged.
+    /// Root mean square change of the displacement by the causes at the largest drive, mm, the material unchanged.
     pub effect_rms_mm: f64,
-    /// Largest change of a force by the cause, relative to it.
+    /// Largest change of a force by the causes, relative to it.
     pub effect_force_relative: f64,
 }
 
-/// Makes the recording of `hidden` in `specimen`.
+/// What a scan of an experiment would show without noise.
+pub(super) struct Shown {
+    /// Voxels that hold material.
+    pub(super) mask: VoxelMask,
+    /// Displacement at every drive of the specimen (mm), at the voxels of the mask.
+    pub(super) displacement: Vec<Vec<[f64; 3]>>,
+    /// Forces at these drives and beyond them ([`BEYOND`]), N.
+    pub(super) forces: Vec<f64>,
+}
+
+/// The drives of a specimen and one beyond the largest, mm.
+fn drives_mm(specimen: &Specimen) -> Vec<f64> {
+    let largest = specimen.drive_mm.iter().fold(0.0f64, |s, d| s.max(d.abs()));
+    specimen.drive_mm.iter().copied().chain([BEYOND * largest]).collect()
+}
+
+/// What a scan of `experiment` with `specimen` would show, on prisms whose size is `mesh_factor` times the standard
+/// one.
 ///
 /// # Errors
 /// [`ConcealError`].
-pub fn conceal(specimen: &Specimen, hidden: &Hidden) -> Result<Concealed, ConcealError> {
-    let made = made_specimen(specimen, hidden);
-    let largest = specimen.drive_mm.iter().fold(0.0f64, |s, d| s.max(d.abs()));
-    let mut drives = specimen.drive_mm.clone();
-    drives.push(BEYOND * largest);
-    let mut model = model_of(&made, hidden)?;
-    let states = path(&mut model, hidden, &drives)?;
-    let mut grid = VoxelGrid::covering(specimen, VOXEL_MM)?;
-    let drawn = grid.clone();
-    if hidden.cause == HiddenCause::Registration {
-        grid.origin_mm[hidden.which] += hidden.strength;
+pub(super) fn show(specimen: &Specimen, experiment: &Experiment, mesh_factor: f64) -> Result<Shown, ConcealError> {
+    let made = made_specimen(specimen, experiment);
+    let model = model_of(&made, experiment, mesh_factor)?;
+    let states = path(&model, &made, experiment, &drives_mm(specimen))?;
+    let drawn = VoxelGrid::covering(specimen, VOXEL_MM)?;
+    let mut grid = drawn.clone();
+    for h in experiment.of(HiddenCause::Registration) {
+        grid.origin_mm[h.which] += h.strength;
     }
     let mask = VoxelMask::of_specimen(&made, grid)?;
     let operator = VoxelOperator::new(&made, model.mesh(), &mask, Sampling::default())?;
-    // What the nominal model would show, for the size of the effect.
-    let mut nominal = Hidden { cause: HiddenCause::None, ..hidden.clone() };
-    if hidden.cause == HiddenCause::Compressibility {
-        let shear_modulus = nominal.material.initial_shear_modulus_kpa();
-        nominal.material.bulk_kpa = RUBBER * shear_modulus;
-    }
-    let mut reference = model_of(specimen, &nominal)?;
-    let plain = path(&mut reference, &nominal, &drives)?;
-    let plain_mask = VoxelMask::of_specimen(specimen, drawn.clone())?;
-    let plain_operator = VoxelOperator::new(specimen, reference.mesh(), &plain_mask, Sampling::default())?;
-
-    let mut noise = Draw::new(hidden.seed, 2);
-    let mut steps = Vec::new();
-    let (mut squares, mut count) = (0.0, 0usize);
-    let flags = mask.spread(&vec![true; mask.num_voxels()], false);
-    for (n, &drive_mm) in specimen.drive_mm.iter().enumerate() {
-        let mut field = operator.average(&states[n].displacement)?;
+    let num_steps = specimen.drive_mm.len();
+    let mut displacement = Vec::with_capacity(num_steps);
+    for (n, state) in states[..num_steps].iter().enumerate() {
+        let mut field = operator.average(&state.displacement)?;
         for (u, &voxel) in field.iter_mut().zip(&mask.voxels) {
-            image(u, drawn.center_mm(voxel as usize), hidden, specimen, n + 1 == specimen.drive_mm.len());
-        }
-        if n + 1 == specimen.drive_mm.len() {
-            let expected = plain_mask.spread(&plain_operator.average(&plain[n].displacement)?, [f64::NAN; 3]);
-            for (u, &voxel) in field.iter().zip(&mask.voxels) {
-                for c in 0..3 {
-                    let change = u[c] - expected[voxel as usize][c];
-                    if change.is_finite() {
-                        squares += change * change;
-                        count += 1;
-                    }
-                }
+            for hidden in &experiment.hidden {
+                image(u, drawn.center_mm(voxel as usize), hidden, specimen, n + 1 == num_steps);
             }
         }
-        let noisy: Vec<[f64; 3]> = field.iter().map(|u| u.map(|x| x + hidden.noise_sd_mm * noise.normal())).collect();
+        displacement.push(field);
+    }
+    Ok(Shown { mask, displacement, forces: states.iter().map(|s| s.force_n).collect() })
+}
+
+/// Makes the recording of `experiment` with `specimen`.
+///
+/// # Errors
+/// [`ConcealError`].
+pub fn conceal(specimen: &Specimen, experiment: &Experiment) -> Result<Concealed, ConcealError> {
+    let shown = show(specimen, experiment, MESH_FACTOR)?;
+    // What the nominal model would show, for the size of the effect.
+    let plain = show(specimen, &experiment.nominal(RUBBER), MESH_FACTOR)?;
+    let last = specimen.drive_mm.len() - 1;
+    let expected = plain.mask.spread(&plain.displacement[last], [f64::NAN; 3]);
+    let (mut squares, mut count) = (0.0, 0usize);
+    for (u, &voxel) in shown.displacement[last].iter().zip(&shown.mask.voxels) {
+        for c in 0..3 {
+            let change = u[c] - expected[voxel as usize][c];
+            if change.is_finite() {
+                squares += change * change;
+                count += 1;
+            }
+        }
+    }
+    let mut noise = Draw::new(experiment.seed, 2);
+    let mut steps = Vec::new();
+    for (&drive_mm, field) in specimen.drive_mm.iter().zip(&shown.displacement) {
+        let noisy: Vec<[f64; 3]> =
+            field.iter().map(|u| u.map(|x| x + experiment.noise_sd_mm * noise.normal())).collect();
         steps.push(RecordedStep {
             drive_mm,
             force_n: None,
             force_sd_n: Some(DRIFT_SD_N),
             window_s: None,
-            displacement: mask.spread(&noisy, [f64::NAN; 3]),
+            displacement: shown.mask.spread(&noisy, [f64::NAN; 3]),
         });
     }
-    let forces: Vec<f64> = states.iter().map(|s| s.force_n).collect();
-    let (load, windows, means) = history(&drives, &forces, hidden, &mut noise);
+    let (load, windows, means) = history(&drives_mm(specimen), &shown.forces, experiment, &mut noise);
     let mut effect_force_relative = 0.0f64;
     for (n, step) in steps.iter_mut().enumerate() {
         step.force_n = Some(means[n]);
         step.window_s = Some(windows[n]);
-        effect_force_relative = effect_force_relative.max((means[n] / plain[n].force_n - 1.0).abs());
+        effect_force_relative = effect_force_relative.max((means[n] / plain.forces[n] - 1.0).abs());
+        lose_voxels(&mut step.displacement, &shown.mask, experiment.lost_share, &mut noise);
     }
     let recording = Recording {
-        id: format!("hidden-{}", hidden.seed),
+        id: format!("hidden-{}", experiment.seed),
         specimen: specimen.clone(),
-        grid: drawn,
-        mask: flags,
+        grid: VoxelGrid::covering(specimen, VOXEL_MM)?,
+        mask: shown.mask.spread(&vec![true; shown.mask.num_voxels()], false),
         steps,
-        noise_sd_mm: Some([hidden.noise_sd_mm; 3]),
+        noise_sd_mm: experiment.is_noise_stated.then_some([experiment.noise_sd_mm; 3]),
         filter: Filter::None,
         load: Some(load),
         notes: None,
@@ -137,34 +155,59 @@ pub fn conceal(specimen: &Specimen, hidden: &Hidden) -> Result<Concealed, Concea
     Ok(Concealed { recording, effect_rms_mm, effect_force_relative })
 }
 
+/// Voxels that show nothing of the sample, as a wrong mask or lost fringes leave them: each with a chance of `share`.
+fn lose_voxels(displacement: &mut [[f64; 3]], mask: &VoxelMask, share: f64, noise: &mut Draw) {
+    if share > 0.0 {
+        for &voxel in &mask.voxels {
+            if noise.within(0.0, 1.0) < share {
+                displacement[voxel as usize] = [0; 3].map(|_| noise.within(-LOST_MM, LOST_MM));
+            }
+        }
+    }
+}
+
 /// The specimen as made, remeshed from its drawing.
-fn made_specimen(specimen: &Specimen, hidden: &Hidden) -> Specimen {
+fn made_specimen(specimen: &Specimen, experiment: &Experiment) -> Specimen {
     let mut made = specimen.clone();
-    if hidden.cause == HiddenCause::Hole
-        && let Some(hole) = made.holes.get_mut(hidden.which)
-    {
-        hole.diameter_mm += hidden.strength * hidden.direction[0];
-        hole.center_mm[0] += hidden.strength * hidden.direction[1];
-        hole.center_mm[1] += hidden.strength * hidden.direction[2];
+    for hidden in &experiment.hidden {
+        match hidden.cause {
+            HiddenCause::Hole => {
+                if let Some(hole) = made.holes.get_mut(hidden.which) {
+                    hole.diameter_mm += hidden.strength * hidden.direction[0];
+                    hole.center_mm[0] += hidden.strength * hidden.direction[1];
+                    hole.center_mm[1] += hidden.strength * hidden.direction[2];
+                }
+            }
+            HiddenCause::Geometry if hidden.which == 0 => made.block.length_mm += hidden.strength,
+            HiddenCause::Geometry if hidden.which == 1 => made.block.width_mm += hidden.strength,
+            _ => {}
+        }
     }
     made
 }
 
 /// Prisms; a free patch is made of free nodes, whose elements end at its edges unless these come too near to a hole.
-fn model_of(made: &Specimen, hidden: &Hidden) -> Result<ForwardModel, ConcealError> {
-    let options = MeshOptions { use_mirror: false, force_prisms: true, ..MeshOptions::scaled(made, MESH_FACTOR) };
-    let lines = if hidden.cause == HiddenCause::Debond { patch_lines(made, hidden) } else { Vec::new() };
+fn model_of(made: &Specimen, experiment: &Experiment, mesh_factor: f64) -> Result<ForwardModel, ConcealError> {
+    let options = MeshOptions { use_mirror: false, force_prisms: true, ..MeshOptions::scaled(made, mesh_factor) };
+    let patch = experiment.of(HiddenCause::Debond).next();
+    let lines = patch.map_or_else(Vec::new, |hidden| patch_lines(made, hidden));
     let mesh =
         if lines.is_empty() { mesh_specimen(made, &options) } else { mesh_specimen_along(made, &options, &lines) };
-    let mesh = mesh.map_err(PrepareError::from)?;
+    let mut mesh = mesh.map_err(PrepareError::from)?;
+    for wedge in experiment.of(HiddenCause::Geometry).filter(|h| h.which == WEDGE) {
+        // Wider by half of it at one end, narrower at the other.
+        for x in &mut mesh.nodes {
+            x[2] *= 1.0 + wedge.strength * x[0] / (made.block.length_mm * made.block.width_mm);
+        }
+    }
     let half = [0.5 * made.block.length_mm, 0.0, 0.5 * made.block.width_mm];
     let is_free = |x: [f64; 3], is_moved: bool| {
-        hidden.cause == HiddenCause::Bond && hidden.which != usize::from(!is_moved)
-            || hidden.cause == HiddenCause::Debond
-                && is_moved == (hidden.which == 1)
-                && [0, 2].into_iter().all(|a| is_inside(x[a], hidden, a, half[a]))
+        experiment.of(HiddenCause::Bond).any(|h| h.which != usize::from(!is_moved))
+            || experiment
+                .of(HiddenCause::Debond)
+                .any(|h| is_moved == (h.which == 1) && [0, 2].into_iter().all(|a| is_inside(x[a], h, a, half[a])))
     };
-    Ok(ForwardModel::with_released(mesh, made, &is_free)?.departed(&departures(made, hidden)))
+    Ok(ForwardModel::with_released(mesh, made, &is_free)?)
 }
 
 /// Whether a node is in the patch along an axis: its edges hold, but for those that are the face's own.
@@ -198,61 +241,85 @@ fn patch_lines(made: &Specimen, hidden: &Hidden) -> Vec<[[f64; 2]; 2]> {
     if lines.iter().any(is_near_hole) { Vec::new() } else { lines }
 }
 
-fn departures(made: &Specimen, hidden: &Hidden) -> Departures {
+/// What departs from the nominal experiment at a drive.
+fn departures(made: &Specimen, experiment: &Experiment, drive_mm: f64) -> Departures {
     let mut d = Departures::default();
-    let b = made.block;
-    let half = [0.5 * b.length_mm, 0.5 * b.thickness_mm, 0.5 * b.width_mm];
+    for hidden in &experiment.hidden {
+        depart(&mut d, made, &experiment.material, hidden, drive_mm);
+    }
+    d
+}
+
+fn depart(d: &mut Departures, made: &Specimen, material: &Ogden, hidden: &Hidden, drive_mm: f64) {
+    let half = half_extents_mm(made);
     let (strength, which) = (hidden.strength, hidden.which);
     let largest = made.drive_mm.iter().fold(1e-9f64, |s, x| s.max(x.abs()));
-    let shear_modulus = hidden.material.initial_shear_modulus_kpa();
+    let shear_modulus = material.initial_shear_modulus_kpa();
+    let mut motion = PlateMotion::default();
     match hidden.cause {
-        HiddenCause::Gradient => {
-            d.stiffness_factor = Some(Field::new(move |x| 1.0 + strength * x[which] / half[which]));
-        }
+        HiddenCause::Gradient => stiffen(d, move |x| 1.0 + strength * x[which] / half[which]),
         HiddenCause::Inclusion => {
             let (center, radius) = (hidden.center_mm, 0.5 * hidden.extent_mm[0]);
-            d.stiffness_factor = Some(Field::new(move |x| {
+            stiffen(d, move |x| {
                 let r = (0..3).map(|a| (x[a] - center[a]).powi(2)).sum::<f64>().sqrt();
                 if r < radius { strength.exp() } else { 1.0 }
-            }));
+            });
+        }
+        HiddenCause::Layer => {
+            let [moved_mm, slope_mm, _] = hidden.extent_mm;
+            stiffen(d, move |x| {
+                let slant = slope_mm * x[0] / half[0];
+                let is_in = x[1] < -half[1] + strength + slant || x[1] > half[1] - moved_mm + slant;
+                if is_in { LAYER_FACTOR } else { 1.0 }
+            });
         }
         HiddenCause::Swelling => d.log_growth = Some(Field::new(move |_| strength)),
         HiddenCause::Fibre => {
             d.fibre = Some(Fibre { direction: hidden.direction, modulus_kpa: strength * shear_modulus });
         }
-        HiddenCause::Tilt => {
-            let mut turn = PlateMotion::default();
-            turn.rotation_rad_per_mm[which] = strength.to_radians() / largest;
-            d.moved_plate = turn;
-        }
-        HiddenCause::Offaxis => {
-            let mut shift = PlateMotion::default();
-            shift.translation_per_mm[which] = strength / largest;
-            d.moved_plate = shift;
-        }
+        HiddenCause::Tilt => motion.rotation_rad_per_mm[which] = strength.to_radians() / largest,
+        HiddenCause::Offaxis => motion.translation_per_mm[which] = strength / largest,
         HiddenCause::Debond => d.bond_kpa_per_mm = Some(Field::new(|_| 0.0)),
         HiddenCause::Bond => d.bond_kpa_per_mm = Some(Field::new(move |_| 1.0 / strength)),
-        HiddenCause::Slack => d.moved_plate.translation_mm[0] = -strength,
-        HiddenCause::Mount if which < 2 => d.moved_plate.translation_mm[1 + which] = strength,
-        HiddenCause::Mount => d.moved_plate.rotation_rad[which - 2] = strength.to_radians(),
+        HiddenCause::Slack => motion.translation_mm[0] = -strength,
+        HiddenCause::Mount if which < 2 => motion.translation_mm[1 + which] = strength,
+        HiddenCause::Mount => motion.rotation_rad[which - 2] = strength.to_radians(),
+        HiddenCause::Travel => {
+            let part = strength * (drive_mm.abs() / largest).powf(hidden.extent_mm[0]);
+            motion.translation_mm = hidden.direction.map(|x| part * x);
+        }
         _ => {}
     }
-    d
+    d.moved_plate = d.moved_plate.plus(&motion);
+}
+
+/// A factor on the stiffness, beside those that are there.
+fn stiffen(d: &mut Departures, factor: impl Fn([f64; 3]) -> f64 + Send + Sync + 'static) {
+    d.stiffness_factor = Some(match d.stiffness_factor.take() {
+        Some(other) => Field::new(move |x| other.at(x) * factor(x)),
+        None => Field::new(factor),
+    });
 }
 
 /// Equilibria at the commanded drives.
-fn path(model: &mut ForwardModel, hidden: &Hidden, drives: &[f64]) -> Result<Vec<Equilibrium>, ConcealError> {
+fn path(
+    model: &ForwardModel,
+    made: &Specimen,
+    experiment: &Experiment,
+    drives: &[f64],
+) -> Result<Vec<Equilibrium>, ConcealError> {
     let options = SolveOptions::default();
     let never = || false;
+    let material = &experiment.material;
+    let is_out_of_place = experiment.hidden.iter().any(|h| matches!(h.cause, HiddenCause::Mount | HiddenCause::Travel));
     let mut found: Vec<Equilibrium> = Vec::new();
     for &drive in drives {
-        let mut state = match model.solve(&hidden.material, drive, found.last(), &options, &never) {
-            Err(_) if hidden.cause == HiddenCause::Mount => {
-                model.solve_by_parts(&hidden.material, drive, &options, &never)?
-            }
+        let mut here = model.departed(&departures(made, experiment, drive));
+        let mut state = match here.solve(material, drive, found.last(), &options, &never) {
+            Err(_) if is_out_of_place => here.solve_by_parts(material, drive, &options, &never)?,
             found => found?,
         };
-        if hidden.cause == HiddenCause::Compliance {
+        for hidden in experiment.of(HiddenCause::Compliance) {
             // What the sample sees: the load train takes its part. A secant iteration on the real drive.
             let mut real = drive;
             for _ in 0..6 {
@@ -260,7 +327,7 @@ fn path(model: &mut ForwardModel, hidden: &Hidden, drives: &[f64]) -> Result<Vec
                 let next = drive / (1.0 + hidden.strength * stiffness);
                 let change = next - real;
                 real = next;
-                state = model.solve(&hidden.material, real, Some(&state), &options, &never)?;
+                state = here.solve(material, real, Some(&state), &options, &never)?;
                 if change.abs() < 1e-6 {
                     break;
                 }
@@ -288,96 +355,4 @@ fn image(u: &mut [f64; 3], x: [f64; 3], hidden: &Hidden, specimen: &Specimen, is
         }
         _ => {}
     }
-}
-
-/// The load curve of a first cycle beyond the largest drive and then the steps with holds; windows and mean forces of
-/// the steps.
-fn history(drives: &[f64], forces: &[f64], hidden: &Hidden, noise: &mut Draw) -> (LoadCurve, Vec<[f64; 2]>, Vec<f64>) {
-    let num_steps = drives.len() - 1;
-    let beyond = drives[num_steps];
-    let mut corners = vec![[0.0, 0.0], [REST_S, 0.0]];
-    let ramp = |corners: &mut Vec<[f64; 2]>, to: f64| {
-        let [t, from] = corners[corners.len() - 1];
-        corners.push([t + (to - from).abs() / SPEED_MM_PER_S, to]);
-    };
-    let hold = |corners: &mut Vec<[f64; 2]>, time: f64| {
-        let [t, at] = corners[corners.len() - 1];
-        corners.push([t + time, at]);
-    };
-    ramp(&mut corners, beyond);
-    ramp(&mut corners, 0.0);
-    hold(&mut corners, 3.0 * REST_S);
-    let mut windows = Vec::new();
-    for &drive in &drives[..num_steps] {
-        ramp(&mut corners, drive);
-        let arrival = corners[corners.len() - 1][0];
-        hold(&mut corners, HOLD_S);
-        windows.push([arrival + SETTLE_S, arrival + HOLD_S - SETTLE_S]);
-    }
-    ramp(&mut corners, 0.0);
-    let end = corners[corners.len() - 1][0];
-    let mut load = LoadCurve::default();
-    let mut piece = 0;
-    let (mut memory, mut last_elastic, mut furthest) = (0.0, 0.0, 0.0f64);
-    let mut drift = DRIFT_SD_N * noise.normal();
-    for n in 0..=(end / INTERVAL_S) as usize {
-        let time = n as f64 * INTERVAL_S;
-        while piece + 2 < corners.len() && corners[piece + 1][0] <= time {
-            piece += 1;
-            drift = DRIFT_SD_N * noise.normal();
-        }
-        let ([t0, d0], [t1, d1]) = (corners[piece], corners[piece + 1]);
-        let drive = if t1 > t0 { d0 + (d1 - d0) * ((time - t0) / (t1 - t0)).clamp(0.0, 1.0) } else { d1 };
-        let elastic = interpolated(drives, forces, drive);
-        let mut force = elastic;
-        match hidden.cause {
-            HiddenCause::Relaxation => {
-                // The force itself relaxes (Fung's quasi-linear model), which the diagnosis does not suppose.
-                let tau = hidden.center_mm[0];
-                memory =
-                    memory * (-INTERVAL_S / tau).exp() + (elastic - last_elastic) * (-0.5 * INTERVAL_S / tau).exp();
-                force += hidden.strength * memory;
-            }
-            HiddenCause::Mullins => {
-                // Softening in proportion to how far the drive has been, of a form of its own.
-                furthest = furthest.max(drive);
-                force *= 1.0 - hidden.strength * (1.0 - (-3.0 * (furthest - drive) / beyond).exp());
-            }
-            HiddenCause::Cell => force += hidden.strength,
-            _ => {}
-        }
-        last_elastic = elastic;
-        load.time_s.push(time);
-        load.drive_mm.push(drive);
-        load.force_n.push(force + drift + READING_SD_N * noise.normal());
-    }
-    let means = windows
-        .iter()
-        .map(|[start, end]| {
-            let inside: Vec<f64> = load
-                .time_s
-                .iter()
-                .zip(&load.force_n)
-                .filter(|(t, _)| **t >= *start && **t <= *end)
-                .map(|(_, f)| *f)
-                .collect();
-            inside.iter().sum::<f64>() / inside.len().max(1) as f64
-        })
-        .collect();
-    (load, windows, means)
-}
-
-/// The odd polynomial in the drive through rest and all points (Lagrange): smooth, and exact at the steps.
-fn interpolated(drives: &[f64], forces: &[f64], drive: f64) -> f64 {
-    let mut sum = 0.0;
-    for (i, (d, f)) in drives.iter().zip(forces).enumerate() {
-        let mut weight = drive / d;
-        for (j, other) in drives.iter().enumerate() {
-            if i != j {
-                weight *= (drive * drive - other * other) / (d * d - other * other);
-            }
-        }
-        sum += weight * f;
-    }
-    sum
 }

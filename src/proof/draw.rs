@@ -52,10 +52,16 @@ pub enum HiddenCause {
     Mount,
     /// The bonds of the faces give way.
     Bond,
+    /// Stiff layers lie at the bonded faces.
+    Layer,
+    /// The moved plate strays from its course, neither alike at all drives nor in proportion to them.
+    Travel,
+    /// The block is longer or wider than drawn, or a wedge.
+    Geometry,
 }
 
 impl HiddenCause {
-    /// All but [`Self::None`].
+    /// All that are hidden alone.
     pub const ALL: [HiddenCause; 20] = [
         HiddenCause::Relaxation,
         HiddenCause::Mullins,
@@ -78,6 +84,9 @@ impl HiddenCause {
         HiddenCause::Mount,
         HiddenCause::Bond,
     ];
+
+    /// Those that are hidden only beside others: alone each is one of several causes that look alike.
+    pub const IN_COMPANY: [HiddenCause; 3] = [HiddenCause::Layer, HiddenCause::Travel, HiddenCause::Geometry];
 
     /// Whether it is to be seen in the displacement.
     pub fn acts_on_displacement(self) -> bool {
@@ -113,6 +122,9 @@ impl HiddenCause {
             HiddenCause::Slack => "slack",
             HiddenCause::Mount => "mount",
             HiddenCause::Bond => "bond",
+            HiddenCause::Layer => "layer",
+            HiddenCause::Travel => "travel",
+            HiddenCause::Geometry => "geometry",
         }
     }
 }
@@ -157,15 +169,15 @@ impl Draw {
         low + (high - low) * (self.0.next_u64() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    fn log_within(&mut self, low: f64, high: f64) -> f64 {
+    pub(super) fn log_within(&mut self, low: f64, high: f64) -> f64 {
         self.within(low.ln(), high.ln()).exp()
     }
 
-    fn sign(&mut self) -> f64 {
+    pub(super) fn sign(&mut self) -> f64 {
         if self.within(0.0, 1.0) < 0.5 { -1.0 } else { 1.0 }
     }
 
-    fn below(&mut self, n: usize) -> usize {
+    pub(super) fn below(&mut self, n: usize) -> usize {
         (self.within(0.0, n as f64) as usize).min(n - 1)
     }
 
@@ -181,7 +193,9 @@ impl Draw {
 /// relative change from the centre to a face; ln of an inclusion's stiffness factor; ln of the swelling's volume ratio;
 /// 1 for a debond; degrees of tilt at full drive; mm off axis at full drive; mm/N; N; mm of a hole's diameter or place;
 /// relative gain error; mm of background; mm of a jump; mm of shift; mm of slack; mm or degrees of the plate (along y,
-/// z; about x, y, z); mm/kPa of the bonds (fixed, moved, both).
+/// z; about x, y, z); mm/kPa of the bonds (fixed, moved, both); mm of a layer's depth (that of the moved plate's layer and its slope along x
+/// stand in `extent_mm`); mm off course at full drive along `direction`, growing with the power `extent_mm[0]` of the
+/// drive; mm of the block's length, width or, as a wedge, of its width from end to end.
 pub fn draw_cause(cause: HiddenCause, seed: u64) -> Hidden {
     let mut d = Draw::new(seed, 1);
     let mu_kpa = d.within(12.0, 22.0);
@@ -283,6 +297,21 @@ pub fn draw_cause(cause: HiddenCause, seed: u64) -> Hidden {
         HiddenCause::Bond => {
             hidden.which = d.below(3);
             hidden.strength = d.log_within(1e-3, 3e-2);
+        }
+        HiddenCause::Layer => {
+            hidden.strength = d.log_within(0.05, 0.6);
+            hidden.extent_mm = [d.log_within(0.05, 0.6), d.within(-0.15, 0.15), 0.0];
+        }
+        HiddenCause::Travel => {
+            hidden.strength = d.sign() * d.log_within(0.03, 0.4);
+            hidden.extent_mm[0] = [0.4, 2.0][d.below(2)];
+            let raw = [d.normal(), d.normal(), d.normal()];
+            let norm = raw.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-9);
+            hidden.direction = raw.map(|x| x / norm);
+        }
+        HiddenCause::Geometry => {
+            hidden.strength = d.sign() * d.log_within(0.1, 1.2);
+            hidden.which = d.below(3);
         }
     }
     hidden

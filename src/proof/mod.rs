@@ -7,15 +7,25 @@
 //! * [`prove`]: diagnoses each and scores cause, place and intervals; [`Proof`] sums up.
 
 mod conceal;
+mod detection;
 mod draw;
+mod experiment;
+mod history;
 mod options;
+mod own_effect;
 mod result;
 mod score;
+mod several;
+mod several_result;
 mod summary;
 mod truths;
 
 pub use conceal::{ConcealError, Concealed, conceal};
+pub use detection::DetectionCurve;
 pub use draw::{Hidden, HiddenCause, draw_cause};
+pub use experiment::{Experiment, draw_harmless, draw_several, draw_with_unknown};
 pub use options::ProofOptions;
 pub use result::{CauseSummary, FirstNamed, Proof, Scored};
 pub use score::{prove, score_one};
+pub use several::{SeveralOptions, prove_several, score_experiment};
+pub use several_result::{CauseOfSeveral, CauseScore, ExperimentKind, SeveralProof, SeveralScored};

@@ -2,6 +2,7 @@
 
 use super::conceal::{ConcealError, Concealed, conceal};
 use super::draw::{Hidden, HiddenCause, draw_cause};
+use super::experiment::Experiment;
 use super::options::ProofOptions;
 use super::result::{Proof, Scored};
 use super::summary::sum_up;
@@ -50,24 +51,40 @@ pub fn prove(
     report: &(dyn Fn(&Scored, usize, usize) + Sync),
     is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Proof {
+    let of_task = |&(cause, seed, is_known): &(HiddenCause, u64, bool)| {
+        let same = |s: &&Scored| s.hidden.cause == cause && s.hidden.seed == seed && s.is_known == is_known;
+        done.iter().find(same).cloned()
+    };
+    let score = |&(cause, seed, is_known): &(HiddenCause, u64, bool)| {
+        let hidden = draw_cause(cause, seed);
+        score_one(specimen, &hidden, is_known, options.mesh_factor, is_cancelled)
+            .unwrap_or_else(|e| Scored { failure: Some(e.to_string()), ..Scored::undiagnosed(&hidden, is_known) })
+    };
+    sum_up(score_all(&tasks(options), &of_task, &score, report, is_cancelled), options)
+}
+
+/// The scores of all tasks, in their order, one task at a time per thread: what `done` has of an earlier run, and else
+/// what `score` gives, of which `report` is told. After a cancellation only those that were finished.
+pub(super) fn score_all<T: Sync, S: Send>(
+    tasks: &[T],
+    done: &(dyn Fn(&T) -> Option<S> + Sync),
+    score: &(dyn Fn(&T) -> S + Sync),
+    report: &(dyn Fn(&S, usize, usize) + Sync),
+    is_cancelled: &(dyn Fn() -> bool + Sync),
+) -> Vec<S> {
     use rayon::prelude::*;
-    let tasks = tasks(options);
-    let scored: Vec<Option<Scored>> = tasks
+    let scored: Vec<Option<S>> = tasks
         .par_iter()
         .enumerate()
-        // One at a time per thread, in order.
         .with_max_len(1)
-        .map(|(n, &(cause, seed, is_known))| {
-            let same = |s: &&Scored| s.hidden.cause == cause && s.hidden.seed == seed && s.is_known == is_known;
-            if let Some(found) = done.iter().find(same) {
-                return Some(found.clone());
+        .map(|(n, task)| {
+            if let Some(found) = done(task) {
+                return Some(found);
             }
             if is_cancelled() {
                 return None;
             }
-            let hidden = draw_cause(cause, seed);
-            let found = score_one(specimen, &hidden, is_known, options.mesh_factor, is_cancelled)
-                .unwrap_or_else(|e| Scored { failure: Some(e.to_string()), ..Scored::undiagnosed(&hidden, is_known) });
+            let found = score(task);
             if is_cancelled() {
                 return None;
             }
@@ -75,7 +92,7 @@ pub fn prove(
             Some(found)
         })
         .collect();
-    sum_up(scored.into_iter().flatten().collect(), options)
+    scored.into_iter().flatten().collect()
 }
 
 /// Conceals and diagnoses one cause.
@@ -89,7 +106,7 @@ pub fn score_one(
     mesh_factor: f64,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Scored, ConcealError> {
-    let made = conceal(specimen, hidden)?;
+    let made = conceal(specimen, &Experiment::of_one(hidden))?;
     let mut options = DiagnosisOptions { mesh_factor, ..DiagnosisOptions::default() };
     if !is_known {
         options.left_out.extend(hidden.cause.diagnosed());

@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("geometry");
 /// Its line in the registry.
-pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::SetUp(suspects) };
+pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::SetUp { parts: suspects, special_cases: &[] } };
 
 /// A dumb-bell keeps its standard outline.
 fn suspects(observed: &Observed) -> Vec<Arc<dyn Cause>> {
@@ -23,10 +23,14 @@ fn suspects(observed: &Observed) -> Vec<Arc<dyn Cause>> {
 
 /// A free face is believed to be where the drawing has it to about this, mm.
 const BELIEVED_MM: f64 = 0.3;
-/// Terms of a plane: 1 and the two axes of the face.
-const PLANE_TERMS: usize = 3;
+/// It is believed to bow by about this, mm: what is cut or cast gives way and shrinks.
+const BELIEVED_BOW_MM: f64 = 0.2;
 
-/// Each free face of the block is a plane of its own: length or width, slanted ends, a wedge.
+/// Terms of a surface of second degree.
+const SURFACE_TERMS: usize = 6;
+
+/// Each free face of the block is a surface of second degree of its own: length or width, slanted ends, a wedge, ends
+/// that bow in or out.
 pub struct Block {
     /// The axes across the free faces.
     axes: [usize; 2],
@@ -49,7 +53,7 @@ impl Cause for Block {
     }
 
     fn description(&self) -> String {
-        "the block is not the one of the drawing: its free faces lie elsewhere or slant".into()
+        "the block is not the one of the drawing: its free faces lie elsewhere, slant or bow".into()
     }
 
     fn parameters(&self) -> Vec<CauseParameter> {
@@ -58,8 +62,13 @@ impl Cause for Block {
             let [a, b] = [["y", "z"], ["x", "z"], ["x", "y"]][axis];
             for side in ["low", "high"] {
                 let face = format!("{side}_{}", ["x", "y", "z"][axis]);
-                for name in [format!("{face}_mm"), format!("{face}_slope_{a}_mm"), format!("{face}_slope_{b}_mm")] {
+                for plane in ["".into(), format!("_slope_{a}"), format!("_slope_{b}")] {
+                    let name = format!("{face}{plane}_mm");
                     all.push(CauseParameter::new(name, 0.1, [-3.0, 3.0]).believed(BELIEVED_MM));
+                }
+                for bow in [format!("{a}{a}"), format!("{a}{b}"), format!("{b}{b}")] {
+                    let name = format!("{face}_bow_{bow}_mm");
+                    all.push(CauseParameter::new(name, 0.1, [-2.0, 2.0]).believed(BELIEVED_BOW_MM));
                 }
             }
         }
@@ -67,16 +76,16 @@ impl Cause for Block {
     }
 
     fn apply(&self, values: &[f64], scene: &mut Scene) {
-        for (n, plane) in values.chunks(PLANE_TERMS).enumerate() {
+        for (n, surface) in values.chunks(SURFACE_TERMS).enumerate() {
             let face = &mut scene.shape.faces_mm[self.axes[n / 2]][n % 2];
-            for (offset, value) in face.iter_mut().zip(plane) {
+            for (offset, value) in face.iter_mut().zip(surface) {
                 *offset += value;
             }
         }
     }
 
     fn location(&self, values: &[f64], specimen: &Specimen) -> Option<Location> {
-        let size = |n: &usize| values[PLANE_TERMS * n].abs();
+        let size = |n: &usize| values[SURFACE_TERMS * n].abs();
         let face = (0..4).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0);
         Some(Location::of_face(specimen, self.axes[face / 2], face % 2, "free face"))
     }

@@ -37,7 +37,7 @@ impl Cause for Compliance {
         Course::InProportion
     }
 
-    fn is_plain_motion(&self) -> bool {
+    fn moves_only_plates(&self) -> bool {
         true
     }
 }

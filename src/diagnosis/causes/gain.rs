@@ -7,13 +7,22 @@ use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("gain");
 /// Its line in the registry.
-pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Tested(|_| vec![Arc::new(Gain)]) };
+pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Tested(|_| suspects()) };
+
+/// One axis alone, or all three.
+fn suspects() -> Vec<Arc<dyn Cause>> {
+    let axes: [&'static [usize]; 4] = [&[0, 1, 2], &[0], &[1], &[2]];
+    axes.into_iter().map(|axes| Arc::new(Gain { axes }) as Arc<dyn Cause>).collect()
+}
 
 /// Gradients are calibrated to this part or better.
 const BELIEVED: f64 = 0.05;
 
 /// Recorded displacement = (1 + gain) × displacement, per axis.
-pub struct Gain;
+pub struct Gain {
+    /// The axes that are off.
+    axes: &'static [usize],
+}
 
 impl Cause for Gain {
     fn name(&self) -> CauseName {
@@ -29,18 +38,33 @@ impl Cause for Gain {
     }
 
     fn parameters(&self) -> Vec<CauseParameter> {
-        ["x", "y", "z"]
-            .map(|a| CauseParameter::new(format!("relative_gain_error_{a}"), 0.02, [-0.5, 0.5]).believed(BELIEVED))
-            .to_vec()
+        let of_axis = |a: &usize| {
+            let name = format!("relative_gain_error_{}", ["x", "y", "z"][*a]);
+            CauseParameter::new(name, 0.02, [-0.5, 0.5]).believed(BELIEVED)
+        };
+        self.axes.iter().map(of_axis).collect()
     }
 
     fn apply(&self, values: &[f64], scene: &mut Scene) {
-        for a in 0..3 {
-            scene.image.gain[a] += values[a];
+        for (&a, value) in self.axes.iter().zip(values) {
+            scene.image.gain[a] += value;
         }
     }
 
     fn changes_sample(&self) -> bool {
         false
+    }
+
+    fn variant(&self) -> [i64; 3] {
+        [0, 1, 2].map(|a| i64::from(self.axes.contains(&a)))
+    }
+
+    /// All axes and the best single one.
+    fn max_suspects(&self) -> usize {
+        2
+    }
+
+    fn is_several_in_one(&self) -> bool {
+        self.axes.len() > 1
     }
 }

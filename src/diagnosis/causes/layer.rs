@@ -5,13 +5,13 @@ use crate::diagnosis::cause::{Category, Cause, CauseName, CauseParameter};
 use crate::diagnosis::entry::{Entry, Origin};
 use crate::diagnosis::location::Location;
 use crate::diagnosis::scene::Scene;
-use crate::mesh::FACE_TERMS;
+use crate::mesh::{FACE_TERMS, face_term_degree, face_term_name};
 use crate::specimen::{Outline, Specimen, TestKind};
 use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("layer");
 /// Its line in the registry.
-pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::SetUp(suspects) };
+pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::SetUp { parts: suspects, special_cases: &[] } };
 
 /// A dumb-bell's grips hold it along its tabs: it has no faces of which a layer could be told.
 fn suspects(observed: &Observed) -> Vec<Arc<dyn Cause>> {
@@ -26,8 +26,12 @@ const BELIEVED_DEPTH_MM: f64 = 0.5;
 /// Its depth is believed to vary by about this over half the face.
 const BELIEVED_SLOPE_MM: f64 = 0.3;
 
+/// Terms of third and fourth degree are believed to be smaller: what is spread by hand is smooth.
+const BELIEVED_RIPPLE_MM: f64 = 0.15;
+
 /// At each bonded face a layer that moves with the plate: glue, a skin, or a foot of the sample that hardly shears. The
-/// depth of each is a polynomial of second degree over the face, alike at all drives.
+/// depth of each is a polynomial of fourth degree over the face (in Legendre's, so that the first term is the mean), alike
+/// at all drives.
 pub struct Layer {
     /// The axis across the bonded faces.
     axis: usize,
@@ -62,13 +66,17 @@ impl Cause for Layer {
     }
 
     fn parameters(&self) -> Vec<CauseParameter> {
-        let [a, b] = [["y", "z"], ["x", "z"], ["x", "y"]][self.axis];
-        let terms = [String::new(), a.into(), b.into(), format!("{a}{a}"), format!("{a}{b}"), format!("{b}{b}")];
+        let axes = [["y", "z"], ["x", "z"], ["x", "y"]][self.axis];
         let mut all = Vec::new();
         for plate in ["fixed", "moved"] {
-            for (n, term) in terms.iter().enumerate() {
-                let name = if n == 0 { format!("{plate}_depth_mm") } else { format!("{plate}_depth_{term}_mm") };
-                let sd = if n == 0 { BELIEVED_DEPTH_MM } else { BELIEVED_SLOPE_MM };
+            for term in 0..FACE_TERMS {
+                let sd = match face_term_degree(term) {
+                    0 => BELIEVED_DEPTH_MM,
+                    1 | 2 => BELIEVED_SLOPE_MM,
+                    _ => BELIEVED_RIPPLE_MM,
+                };
+                let separator = if term == 0 { "" } else { "_" };
+                let name = format!("{plate}_depth{separator}{}_mm", face_term_name(term, axes));
                 all.push(CauseParameter::new(name, 0.1, [-2.0, 3.0]).believed(sd));
             }
         }

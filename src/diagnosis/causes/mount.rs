@@ -55,7 +55,7 @@ impl Cause for Mount {
         Course::Alike
     }
 
-    fn is_plain_motion(&self) -> bool {
+    fn moves_only_plates(&self) -> bool {
         true
     }
 }

@@ -13,8 +13,10 @@ pub(super) const ENTRY: Entry = Entry {
     origin: Origin::Tested(|_| vec![Arc::new(Registration { is_of_set_up: false, has_shift: true })]),
 };
 /// Its line in the registry as a part of the set-up.
-pub(super) const OF_SET_UP: Entry =
-    Entry { name: NAME, origin: Origin::SetUp(|observed| vec![Arc::new(Registration::of_set_up(observed))]) };
+pub(super) const OF_SET_UP: Entry = Entry {
+    name: NAME,
+    origin: Origin::SetUp { parts: |observed| vec![Arc::new(Registration::of_set_up(observed))], special_cases: &[] },
+};
 
 /// The rig is believed to lie in the scanner to about this, mm.
 const BELIEVED_MM: f64 = 0.3;

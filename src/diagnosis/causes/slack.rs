@@ -41,7 +41,7 @@ impl Cause for Slack {
         Course::Alike
     }
 
-    fn is_plain_motion(&self) -> bool {
+    fn moves_only_plates(&self) -> bool {
         true
     }
 }

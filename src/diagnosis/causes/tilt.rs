@@ -57,7 +57,7 @@ impl Cause for Tilt {
         Course::InProportion
     }
 
-    fn is_plain_motion(&self) -> bool {
+    fn moves_only_plates(&self) -> bool {
         true
     }
 }

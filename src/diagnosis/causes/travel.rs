@@ -1,5 +1,6 @@
 //! The plates do not move as they were told.
 
+use super::{compliance, mount, offaxis, slack, tilt};
 use crate::calibration::Observed;
 use crate::diagnosis::cause::{Category, Cause, CauseName, CauseParameter};
 use crate::diagnosis::entry::{Entry, Origin};
@@ -10,8 +11,19 @@ use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("travel");
 /// Its line in the registry.
-pub(super) const ENTRY: Entry =
-    Entry { name: NAME, origin: Origin::SetUp(|observed| vec![Arc::new(Travel::of(observed))]) };
+pub(super) const ENTRY: Entry = Entry {
+    name: NAME,
+    origin: Origin::SetUp {
+        parts: |observed| vec![Arc::new(Travel::of(observed))],
+        special_cases: &[
+            tilt::ENTRY.name,
+            offaxis::ENTRY.name,
+            mount::ENTRY.name,
+            compliance::ENTRY.name,
+            slack::ENTRY.name,
+        ],
+    },
+};
 
 /// A plate is believed to be where it was told to be to about this, mm.
 const BELIEVED_MM: f64 = 0.3;
@@ -86,7 +98,7 @@ impl Cause for Travel {
         Some(Location::of_moved_plate(specimen))
     }
 
-    fn frees_plates(&self) -> bool {
+    fn moves_only_plates(&self) -> bool {
         true
     }
 

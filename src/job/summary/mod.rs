@@ -9,6 +9,7 @@ mod load_curves;
 mod paper_tables;
 mod proof;
 mod scan;
+mod several;
 mod solve;
 mod sweep;
 
@@ -21,5 +22,6 @@ pub(super) use load_curves::load_curves;
 pub(super) use paper_tables::paper_tables;
 pub(super) use proof::proof;
 pub(super) use scan::{import, scan};
+pub(super) use several::several;
 pub(super) use solve::solve;
 pub(super) use sweep::sweep;
