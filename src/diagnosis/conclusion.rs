@@ -58,8 +58,8 @@ pub(super) fn explain_too_little(verdict: Verdict, [before, after]: [f64; 2]) ->
 pub(super) struct KeptBack {
     /// Rms misfit (mm) on the blocks of voxels that the fits did not see, without and with the causes.
     pub(super) rms_mm: [f64; 2],
-    /// Half the difference of each parameter between the fits to the two halves, with the causes (the standard deviation
-    /// of the whole by half samples, McCarthy 1969), in the order and units of [`CauseFit::sd`].
+    /// Half the difference of each parameter between the fits to the two halves, with the causes (the standard
+    /// deviation of the whole by half samples, McCarthy 1969), in the order and units of [`CauseFit::sd`].
     pub(super) half_differences: Vec<f64>,
 }
 

@@ -74,34 +74,24 @@ pub fn fit(
     settings: &FitSettings,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<CauseFit, DiagnosisError> {
-    fit_beyond(laboratory, metric, measured, material, causes, settings, &[], is_cancelled)
+    let places = (0..scales(material, causes).len()).collect();
+    let causes = causes.to_vec();
+    fit_member(
+        Member { laboratory, metric, measured, causes, settings: *settings, known: &[], places },
+        material,
+        is_cancelled,
+    )
 }
 
-/// As [`fit`], with changes of the prediction for the first parameters (see [`Member::known`]).
+/// Fits `material` and the causes of one recording, whose parameters have their places in order.
 ///
 /// # Errors
 /// As [`fit`].
-#[allow(clippy::too_many_arguments)]
-pub(super) fn fit_beyond(
-    laboratory: &mut Laboratory,
-    metric: &Metric,
-    measured: &Trace,
+pub(super) fn fit_member(
+    member: Member,
     material: &Ogden,
-    causes: &[Supposed],
-    settings: &FitSettings,
-    known: &[Trace],
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<CauseFit, DiagnosisError> {
-    let own = material.parameters().len() + causes.iter().map(|c| c.values.len()).sum::<usize>();
-    let member = Member {
-        laboratory,
-        metric,
-        measured,
-        causes: causes.to_vec(),
-        settings: *settings,
-        known,
-        places: (0..own).collect(),
-    };
     let mut found = fit_members(&mut [member], material, is_cancelled)?;
     // One member, one fit.
     Ok(found.swap_remove(0))
@@ -119,9 +109,9 @@ pub struct Member<'a, 'b> {
     pub causes: Vec<Supposed>,
     /// Priors. How many iterations are made, and when they end, the first member's settings say for all.
     pub settings: FitSettings,
-    /// Changes of its prediction with its first parameters (all of the material and those of some causes), near enough to
-    /// be taken as they are; empty where all are worked out at every step. The fit then ends where it would have ended,
-    /// after a few more but far shorter steps.
+    /// Changes of its prediction with its first parameters (all of the material and those of some causes), near
+    /// enough to be taken as they are; empty where all are worked out at every step. The fit then ends where it would
+    /// have ended, after a few more but far shorter steps.
     pub known: &'a [Trace],
     /// For each of its parameters (the material's, then the causes') its place among the parameters of the whole fit. A
     /// parameter that members share has the same place in each. All places together are 0, 1, … without a gap.

@@ -3,7 +3,7 @@
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
 use super::evidence::EVIDENCE;
-use super::fit::{deviance_at, fit, fit_beyond};
+use super::fit::{Member, deviance_at, fit, fit_member, scales};
 use super::laboratory::Laboratory;
 use super::leftover::leftover;
 use super::metric::Metric;
@@ -96,8 +96,8 @@ impl Inference<'_> {
         fit(&mut self.laboratory, &self.metric, measured, material, causes, &self.settings, self.is_cancelled)
     }
 
-    /// As [`Self::fit`], with `known` changes of the prediction for all parameters but the last cause's (none known: all
-    /// are worked out), and then from where the last cause could leap to, as long as that explains more.
+    /// As [`Self::fit`], with `known` changes of the prediction for all parameters but the last cause's (none known:
+    /// all are worked out), and then from where the last cause could leap to, as long as that explains more.
     ///
     /// # Errors
     /// As [`fit`].
@@ -128,8 +128,11 @@ impl Inference<'_> {
         causes: &[Supposed],
         known: &[Trace],
     ) -> Result<CauseFit, DiagnosisError> {
+        let places = (0..scales(material, causes).len()).collect();
         let Inference { laboratory, metric, settings, is_cancelled, .. } = self;
-        fit_beyond(laboratory, metric, measured, material, causes, settings, known, *is_cancelled)
+        let causes = causes.to_vec();
+        let member = Member { laboratory, metric, measured, causes, settings: *settings, known, places };
+        fit_member(member, material, *is_cancelled)
     }
 
     /// Of the leaps of a fit's last cause the one with the smallest deviance, and that deviance; the material stays.

@@ -20,13 +20,18 @@ fn supposed(cause: Arc<dyn Cause>, from: usize) -> Supposed {
     Supposed { cause, values }
 }
 
-/// Every parameter of the set-up, all others away from where they start: the change of the prediction is that of two
-/// predictions half a hundredth of the parameter's scale to either side.
+/// Element size, as a factor on the standard one.
+const FINE: f64 = 2.0;
+/// Of each part of the set-up every so many parameters are tested.
+const EVERY: usize = 4;
+
+/// Parameters of every part of the set-up, all others away from where they start: the change of the prediction is
+/// that of two predictions half a hundredth of the parameter's scale to either side.
 #[test]
 fn the_set_up_changes_predictions_as_its_derivatives_say() {
     let recording = recorded(&material(), &Scene::default(), MESH_FACTOR);
     let observed = Observed::new(&recording, FORCE_SD_N).unwrap();
-    let mut laboratory = Laboratory::new(&observed, &MeshOptions::scaled(&observed.specimen, MESH_FACTOR)).unwrap();
+    let mut laboratory = Laboratory::new(&observed, &MeshOptions::scaled(&observed.specimen, FINE)).unwrap();
     let parts = Registry::standard().set_up(&observed);
     let causes: Vec<Supposed> = parts.into_iter().enumerate().map(|(n, c)| supposed(c, 100 * n)).collect();
     let material = material();
@@ -38,6 +43,9 @@ fn the_set_up_changes_predictions_as_its_derivatives_say() {
     for index in 0..causes.len() {
         for (n, p) in causes[index].cause.parameters().iter().enumerate() {
             let column = columns.next().unwrap();
+            if n % EVERY != index % EVERY {
+                continue;
+            }
             let mut at = |t: f64| {
                 let mut moved = causes.clone();
                 moved[index].values[n] += t * p.scale;
@@ -46,9 +54,9 @@ fn the_set_up_changes_predictions_as_its_derivatives_say() {
             let difference = at(5e-3).plus(-1.0, &at(-5e-3)).scaled(100.0);
             let off = difference.plus(-1.0, &column).rms_mm() / column.rms_mm();
             println!("{} {}: {off:.4} of {:.5} mm", causes[index].cause.name(), p.name, column.rms_mm());
-            // Elements of a quarter of the block's length carry the slopes of third and fourth degree but roughly.
+            // Elements of an eighth of the block's length carry slopes of third and fourth degree but roughly.
             let degree = p.name.split("_depth_").nth(1).map_or(0, |term| term.trim_end_matches("_mm").len());
-            let limit = if degree > 2 { 0.3 } else { 0.05 };
+            let limit = if degree > 2 { 0.2 } else { 0.05 };
             assert!(off < limit, "{} {}: {off}", causes[index].cause.name(), p.name);
         }
     }

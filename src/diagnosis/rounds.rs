@@ -131,8 +131,8 @@ pub(super) fn add_causes(
     Ok(())
 }
 
-/// Fits the leading candidates, the best first; those without a fit are left out. Fits end early, and with the changes of
-/// the prediction that are known; those that may be the best are then gone on with.
+/// Fits the leading candidates, the best first; those without a fit are left out. Fits end early, and with the
+/// changes of the prediction that are known; those that may be the best are then gone on with.
 ///
 /// # Errors
 /// [`DiagnosisError`]: the work was cancelled.

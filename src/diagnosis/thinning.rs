@@ -3,8 +3,8 @@
 //! Near its end a fit's deviance is a quadratic form in its parameters. Of that form it is known at once what it costs
 //! to do without a cause (Wald's statistic with all others free to follow), and where the others go. Causes are taken
 //! out one after the other, the one that is missed least first (backward elimination), as long as none of them is
-//! missed by more than it costs; then what is left is fitted again. A cause that changes the sample must also do more than a
-//! mesh's error could: where hardly anything would be left without it, it goes, whatever the evidence.
+//! missed by more than it costs; then what is left is fitted again. A cause that changes the sample must also do more
+//! than a mesh's error could: where hardly anything would be left without it, it goes, whatever the evidence.
 
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
@@ -51,8 +51,8 @@ impl QuadraticModel {
         (0..self.owners.len()).filter(|i| self.owners[*i] == Some(cause)).collect()
     }
 
-    /// The part of the matrix that belongs to a cause once all others have followed (its Schur complement); `None` where
-    /// the others are not known.
+    /// The part of the matrix that belongs to a cause once all others have followed (its Schur complement); `None`
+    /// where the others are not known.
     fn own(&self, cause: usize) -> Option<DMatrix<f64>> {
         let places = self.places_of(cause);
         let rest: Vec<usize> = (0..self.owners.len()).filter(|i| !places.contains(i)).collect();

@@ -31,8 +31,8 @@ pub struct ProofRequest {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(maximum = 100000)]
     pub unknown: Option<usize>,
-    /// Hide two to four causes at once, in place of one; controls then have a mount that is not perfect by less than does
-    /// any harm.
+    /// Hide two to four causes at once, in place of one; controls then have a mount that is not perfect by less than
+    /// does any harm.
     #[serde(default)]
     pub has_several: bool,
     /// Recordings with several causes at once.

@@ -10,8 +10,9 @@ use super::Mesh;
 use crate::specimen::Specimen;
 use nalgebra::Matrix3;
 
-/// Terms of a face's polynomial: P_i(a) P_j(b) with Legendre polynomials P in the two axes of the face (in order), in half
-/// extents, by their degree i + j up to four: 1, a, b, aa, ab, bb, aaa and so on. The first is the mean over the face.
+/// Terms of a face's polynomial: P_i(a) P_j(b) with Legendre polynomials P in the two axes of the face (in order), in
+/// half extents, by their degree i + j up to four: 1, a, b, aa, ab, bb, aaa and so on. The first is the mean over the
+/// face.
 pub const FACE_TERMS: usize = 15;
 /// Degrees in a and b of the terms.
 const DEGREES: [[usize; 2]; FACE_TERMS] = [

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 const ITERATIONS: usize = 100;
 /// A fit has settled where a step moves both coefficients by less than this.
 const SETTLED: f64 = 1e-10;
-/// Strength of the prior that keeps the slope finite where hits and misses do not overlap: a logistic distribution of the
-/// slope of this scale (Firth's remedy in its simplest form).
+/// Strength of the prior that keeps the slope finite where hits and misses do not overlap: a logistic distribution of
+/// the slope of this scale (Firth's remedy in its simplest form).
 const SLOPE_SD: f64 = 10.0;
 /// Of a standard normal distribution: 95 % lie below.
 const ONE_SIDED_95: f64 = 1.645;

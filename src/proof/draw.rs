@@ -193,9 +193,9 @@ impl Draw {
 /// relative change from the centre to a face; ln of an inclusion's stiffness factor; ln of the swelling's volume ratio;
 /// 1 for a debond; degrees of tilt at full drive; mm off axis at full drive; mm/N; N; mm of a hole's diameter or place;
 /// relative gain error; mm of background; mm of a jump; mm of shift; mm of slack; mm or degrees of the plate (along y,
-/// z; about x, y, z); mm/kPa of the bonds (fixed, moved, both); mm of a layer's depth (that of the moved plate's layer and its slope along x
-/// stand in `extent_mm`); mm off course at full drive along `direction`, growing with the power `extent_mm[0]` of the
-/// drive; mm of the block's length, width or, as a wedge, of its width from end to end.
+/// z; about x, y, z); mm/kPa of the bonds (fixed, moved, both); mm of a layer's depth (that of the moved plate's
+/// layer and its slope along x stand in `extent_mm`); mm off course at full drive along `direction`, growing with the
+/// power `extent_mm[0]` of the drive; mm of the block's length, width or, as a wedge, of its width from end to end.
 pub fn draw_cause(cause: HiddenCause, seed: u64) -> Hidden {
     let mut d = Draw::new(seed, 1);
     let mu_kpa = d.within(12.0, 22.0);

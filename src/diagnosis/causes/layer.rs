@@ -30,8 +30,8 @@ const BELIEVED_SLOPE_MM: f64 = 0.3;
 const BELIEVED_RIPPLE_MM: f64 = 0.15;
 
 /// At each bonded face a layer that moves with the plate: glue, a skin, or a foot of the sample that hardly shears. The
-/// depth of each is a polynomial of fourth degree over the face (in Legendre's, so that the first term is the mean), alike
-/// at all drives.
+/// depth of each is a polynomial of fourth degree over the face (in Legendre's, so that the first term is the mean),
+/// alike at all drives.
 pub struct Layer {
     /// The axis across the bonded faces.
     axis: usize,
