@@ -72,7 +72,7 @@ fn diagnosed(recording: &Recording) -> DiagnosisResult {
 fn found_in(recording: &Recording) -> Diagnosis {
     // The coarse mesh errs by some 0.01 mm at 4 mm of drive.
     let options = DiagnosisOptions { mesh_factor: 2.0, allowance_mm: Some(0.01), ..DiagnosisOptions::default() };
-    diagnose(recording, &options, &|_| {}, &|| false).unwrap()
+    diagnose(recording, &options, &|line| eprintln!("{line}"), &|| false).unwrap()
 }
 
 /// With causes that the diagnosis is not told of.
@@ -81,7 +81,7 @@ fn diagnosed_without(recording: &Recording, left_out: &[&'static str]) -> Diagno
     // The coarse mesh errs by some 0.01 mm at 4 mm of drive.
     let options =
         DiagnosisOptions { mesh_factor: 2.0, allowance_mm: Some(0.01), left_out, ..DiagnosisOptions::default() };
-    let found = diagnose(recording, &options, &|_| {}, &|| false).unwrap();
+    let found = diagnose(recording, &options, &|line| eprintln!("{line}"), &|| false).unwrap();
     DiagnosisResult::new(&found, &recording.id, String::new())
 }
 

@@ -292,7 +292,8 @@ impl<'a> Run<'a> {
         let mut goes_on = is_set_up;
         if !is_set_up {
             goes_on = fit_round(&mut self.inference, &mut self.findings, &measured, &scored, limits)?;
-            is_set_up = self.consider_set_up(&measured)?;
+            // What was not worth it before the first cause is not worth it after.
+            is_set_up = !comes_first && self.consider_set_up(&measured)?;
         }
         let num_before = self.findings.current.causes.len();
         if goes_on || is_set_up {
