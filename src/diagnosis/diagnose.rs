@@ -21,7 +21,7 @@ use super::outcome::Diagnosis;
 use super::prior::{BulkPrior, FitSettings, ShearPrior, shear_modulus};
 use super::registry::Registry;
 use super::rounds::{RoundLimits, add_causes, fit_round, score_round};
-use super::set_up::{fit_set_up, promises_more, simplest_set_up};
+use super::set_up::{SetUpPromise, fit_set_up, promise_of_set_up, simplest_set_up};
 use super::supposed::Supposed;
 use super::thinning::named_causes;
 use super::trace::Trace;
@@ -286,14 +286,16 @@ impl<'a> Run<'a> {
         let scored = score_round(inference, registry, findings, limits)?;
         let left = leftover(self.observed, &findings.current.residual, &inference.metric);
         // What is no more than a mesh's needs no set-up.
-        let comes_first = left.structured_rms_mm > inference.allowance_mm
-            && promises_more(inference, registry, &findings.current, &scored.candidates)?;
-        let mut is_set_up = comes_first && self.consider_set_up(&measured)?;
+        let promise = match left.structured_rms_mm > inference.allowance_mm {
+            true => promise_of_set_up(inference, registry, &findings.current, &scored.candidates)?,
+            false => SetUpPromise::Nothing,
+        };
+        let mut is_set_up = promise == SetUpPromise::First && self.consider_set_up(&measured)?;
         let mut goes_on = is_set_up;
         if !is_set_up {
             goes_on = fit_round(&mut self.inference, &mut self.findings, &measured, &scored, limits)?;
             // What was not worth it before the first cause is not worth it after.
-            is_set_up = !comes_first && self.consider_set_up(&measured)?;
+            is_set_up = promise == SetUpPromise::Later && self.consider_set_up(&measured)?;
         }
         let num_before = self.findings.current.causes.len();
         if goes_on || is_set_up {

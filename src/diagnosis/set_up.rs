@@ -36,19 +36,30 @@ const SINGLE_EXPLAINS: f64 = 0.75;
 /// The set-up is looked at first where, to first order, it explains so many times what the best single cause does.
 const SET_UP_EXPLAINS: f64 = 1.5;
 
-/// Whether the set-up as a whole promises so much more than any of `candidates` that it is to be fitted before them.
+/// What the set-up as a whole promises.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum SetUpPromise {
+    /// So much more than any single cause that it is fitted before them.
+    First,
+    /// More than any single cause, or it was not asked: it is fitted where the first cause leaves much.
+    Later,
+    /// Less than a single cause does.
+    Nothing,
+}
+
+/// What the set-up as a whole promises beside `candidates`, to first order.
 ///
 /// # Errors
 /// [`DiagnosisError`]: no derivatives.
-pub(super) fn promises_more(
+pub(super) fn promise_of_set_up(
     inference: &mut Inference,
     registry: &Registry,
     current: &CauseFit,
     candidates: &[Candidate],
-) -> Result<bool, DiagnosisError> {
+) -> Result<SetUpPromise, DiagnosisError> {
     let (best, all) = (candidates.first().map_or(0.0, |c| c.score), inference.misfit_of(&current.residual));
     if best > SINGLE_EXPLAINS * all || registry.set_up(inference.laboratory.observed()).is_empty() {
-        return Ok(false);
+        return Ok(SetUpPromise::Later);
     }
     let set_up = score_of_set_up(inference, registry, current)?;
     (inference.progress)(&format!(
@@ -56,7 +67,13 @@ pub(super) fn promises_more(
         100.0 * set_up / all,
         100.0 * best / all
     ));
-    Ok(set_up > SET_UP_EXPLAINS * best)
+    Ok(if set_up > SET_UP_EXPLAINS * best {
+        SetUpPromise::First
+    } else if set_up > best {
+        SetUpPromise::Later
+    } else {
+        SetUpPromise::Nothing
+    })
 }
 
 /// The fit of `measured` with all parts of the set-up, from where `start` ended; the causes that it has stay.
