@@ -5,8 +5,8 @@ mod common;
 
 use lambdak::diagnosis::Verdict;
 use lambdak::proof::{
-    Experiment, ExperimentKind, HiddenCause, ProofOptions, conceal, draw_cause, draw_harmless, draw_several,
-    draw_with_unknown, prove, score_experiment, score_one,
+    Experiment, HiddenCause, ProofOptions, conceal, draw_cause, draw_harmless, draw_several, draw_with_unknown, prove,
+    score_one,
 };
 use lambdak::specimen::Specimen;
 
@@ -53,7 +53,8 @@ fn an_unknown_cause_is_not_named_no_mismatch() {
         extent_mm: [4.0, 0.0, 19.1],
         ..draw_cause(HiddenCause::Debond, 23)
     };
-    let found = score_one(&specimen(), &hidden, false, 2.2, &common::never).unwrap();
+    // A coarse mesh suffices: the patch moves the sample by many times what any mesh errs.
+    let found = score_one(&specimen(), &hidden, false, 3.0, &common::never).unwrap();
     assert_ne!(found.verdict, Some(Verdict::NoMismatch), "{found:?}");
     assert!(!found.named.iter().any(|n| n == "debond"), "{found:?}");
 }
@@ -129,20 +130,4 @@ fn experiments_with_several_causes_are_drawn_as_told() {
         let last = draw_with_unknown(seed).hidden.pop().unwrap().cause;
         assert!(!matches!(last, HiddenCause::Tilt | HiddenCause::Gain), "{last:?}");
     }
-}
-
-/// A plate that drifts off its axis and a gradient of the modulus at once, both plain: both are named.
-#[test]
-fn two_causes_at_once_are_both_named() {
-    let mut experiment =
-        Experiment::of_one(&lambdak::proof::Hidden { strength: 0.4, which: 2, ..draw_cause(HiddenCause::Offaxis, 31) });
-    experiment.hidden.push(lambdak::proof::Hidden {
-        strength: 0.3,
-        which: 0,
-        material: experiment.material.clone(),
-        ..draw_cause(HiddenCause::Gradient, 31)
-    });
-    let found = score_experiment(&specimen(), ExperimentKind::Several, &experiment, 2.2, &common::never).unwrap();
-    assert!(found.causes.iter().all(|c| c.is_detectable && c.is_named), "{found:?}");
-    assert!(found.is_right && found.false_names.is_empty(), "{found:?}");
 }
