@@ -60,17 +60,24 @@ pub struct CauseParameter {
     pub believed_sd: Option<f64>,
     /// The only step of the recording that it changes, where it is one.
     pub only_step: Option<usize>,
+    /// Whether it belongs to the rig or the scanner, and so is one number in all recordings of an acquisition.
+    pub is_of_rig: bool,
 }
 
 impl CauseParameter {
     /// A parameter with its scale and range.
     pub fn new(name: impl Into<String>, scale: f64, range: [f64; 2]) -> CauseParameter {
-        CauseParameter { name: name.into(), scale, range, believed_sd: None, only_step: None }
+        CauseParameter { name: name.into(), scale, range, believed_sd: None, only_step: None, is_of_rig: false }
     }
 
     /// The same, believed to be within about `sd` of the start.
     pub fn believed(self, sd: f64) -> CauseParameter {
         CauseParameter { believed_sd: Some(sd), ..self }
+    }
+
+    /// The same, of the rig or the scanner.
+    pub fn of_rig(self) -> CauseParameter {
+        CauseParameter { is_of_rig: true, ..self }
     }
 
     /// The same, of one step alone.

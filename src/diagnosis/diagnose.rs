@@ -472,6 +472,7 @@ impl<'a> Run<'a> {
             num_unknowns: self.num_unknowns,
             num_solves: self.inference.laboratory.num_solves,
             allowance_mm: self.inference.allowance_mm,
+            discrepancy_mm2: self.inference.discrepancy_mm2,
             mesh_defect: self.mesh_defect,
             interior: self.interior,
         })

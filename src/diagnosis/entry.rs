@@ -17,6 +17,8 @@ use std::sync::Arc;
 pub(super) struct Entry {
     /// Its name. Entries of one name are one cause that is suspected in several ways.
     pub(super) name: CauseName,
+    /// What a laboratory can do about it, in a sentence of its own.
+    pub(super) remedy: &'static str,
     /// How it is suspected.
     pub(super) origin: Origin,
 }

@@ -12,10 +12,12 @@
 
 mod balls;
 mod candidate;
+mod case;
 mod cause;
 mod cause_fit;
 mod causes;
 mod conclusion;
+mod cross_prediction;
 mod diagnose;
 mod division;
 mod elastic_table;
@@ -69,6 +71,7 @@ mod trace;
 pub use crate::rate::{BeforeAfter, Verdict};
 pub use cause::{Category, Cause, CauseIdentity, CauseName, CauseParameter, Course};
 pub use cause_fit::CauseFit;
+pub use cross_prediction::CrossPrediction;
 pub use diagnose::diagnose;
 pub use division::Division;
 pub use error::DiagnosisError;
@@ -91,5 +94,5 @@ pub use registry::{answers, cause_names};
 pub use result::{CauseResult, DiagnosisResult, ModulusAgainstBelief, ParameterResult, RankedResult};
 pub use scene::{ImageChange, Jump, Scene};
 pub use supposed::Supposed;
-pub use together::{Agreement, CommonCause, CrossPrediction, TogetherResult, together};
+pub use together::{Agreement, CommonCause, TogetherResult, together};
 pub use trace::Trace;

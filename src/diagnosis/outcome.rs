@@ -48,6 +48,9 @@ pub struct Diagnosis {
     pub num_solves: usize,
     /// The allowance in use, mm.
     pub allowance_mm: f64,
+    /// Variance (mm²) of each component at every voxel for what the model is known to leave; zero where it is taken to
+    /// be exact.
+    pub discrepancy_mm2: [f64; 3],
     /// What a finer mesh predicts beyond the mesh of the diagnosis, the causes included.
     pub mesh_defect: Option<MeshDefect>,
     /// Whether the misfit was made at the boundary or inside; `None` where there is none or the test cannot be made.

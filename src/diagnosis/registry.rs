@@ -19,6 +19,12 @@ pub fn cause_names() -> Vec<CauseName> {
     Registry::standard().names()
 }
 
+/// What a laboratory can do about a cause.
+pub(super) fn remedy_of(name: CauseName) -> &'static str {
+    // Every name of a cause stands in the registry.
+    REGISTRY.iter().find(|e| e.name == name).map_or("", |e| e.remedy)
+}
+
 /// Whether naming `named` answers what was hidden: it is the same cause, a special case of it, or one of which it is a
 /// special case.
 pub fn answers(hidden: CauseName, named: &str) -> bool {

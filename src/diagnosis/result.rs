@@ -9,6 +9,7 @@ use super::interval::{interval, log_interval};
 use super::location::Location;
 use super::outcome::Diagnosis;
 use super::prior::shear_modulus;
+use super::registry::remedy_of;
 use crate::material::{Ogden, Parameter};
 use crate::rate::{BeforeAfter, Verdict};
 use serde::{Deserialize, Serialize};
@@ -46,6 +47,9 @@ pub struct CauseResult {
     /// Of an alternative: further steps that would tell it apart, most telling first.
     #[serde(default)]
     pub experiments: Vec<Experiment>,
+    /// What a laboratory can do about it.
+    #[serde(default)]
+    pub remedy: String,
 }
 
 /// A sample stiffer or softer than believed. A load cell that reads too much or too little would look the same:
@@ -220,6 +224,7 @@ fn cause(c: &FoundCause) -> CauseResult {
         evidence: c.evidence,
         effect_rms_mm: c.effect_rms_mm,
         experiments: c.experiments.clone(),
+        remedy: remedy_of(c.name).into(),
     }
 }
 

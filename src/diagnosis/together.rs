@@ -1,24 +1,20 @@
 //! Several recordings together: does one material serve them all, do causes named in each have the same size, and does
 //! what one recording taught predict the others?
 
-use super::cause::Category;
+use super::case::Case;
+use super::cause::CauseIdentity;
 use super::cause_fit::CauseFit;
+use super::cross_prediction::{CrossPrediction, Predictor};
 use super::error::DiagnosisError;
 use super::evidence::EVIDENCE;
 use super::fit::{Member, fit_members};
 use super::interval::interval;
-use super::laboratory::{Laboratory, Prediction};
-use super::load_curve::take_off_effects;
 use super::mesh_error::widen;
-use super::metric::Metric;
 use super::outcome::Diagnosis;
 use super::prior::{BulkPrior, FitSettings, ShearPrior};
 use super::result::{ParameterResult, material_parameters, parameter};
-use super::supposed::{Supposed, scene_of};
-use super::trace::Trace;
+use super::supposed::Supposed;
 use crate::material::Ogden;
-use crate::mesh::MeshOptions;
-use crate::rate::BeforeAfter;
 use serde::{Deserialize, Serialize};
 
 /// Whether recordings agree: a supposition that saves parameters is compared with fits of every recording for itself.
@@ -35,7 +31,8 @@ pub struct Agreement {
     pub agrees: bool,
 }
 
-/// A cause that is named in every recording.
+/// A cause that is named in every recording. Of a cause of which some numbers are the rig's or the scanner's, those
+/// alone.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CommonCause {
@@ -43,25 +40,10 @@ pub struct CommonCause {
     pub name: String,
     /// In words.
     pub description: String,
-    /// Its parameters where it is the same in all.
+    /// Its parameters that are the same in all.
     pub parameters: Vec<ParameterResult>,
     /// Whether one size serves all, compared with a size for each in one material.
     pub agreement: Agreement,
-}
-
-/// What one recording's model says of another recording.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CrossPrediction {
-    /// The recording that was fitted.
-    pub from: String,
-    /// The recording that is predicted; `from` itself is what its own fit leaves.
-    pub to: String,
-    /// Misfit, mm rms over all drives, noise included: by the nominal material; with the causes too. Null where that
-    /// model has no equilibrium.
-    pub displacement_rms_mm: Option<BeforeAfter>,
-    /// Largest misfit of a force relative to it; null where there is none.
-    pub force_relative: Option<BeforeAfter>,
 }
 
 /// Several recordings together (part of `diagnoses/1`).
@@ -80,27 +62,27 @@ pub struct TogetherResult {
     pub predictions: Vec<CrossPrediction>,
 }
 
-/// One diagnosed recording.
-struct Case<'a> {
-    name: &'a str,
-    found: &'a Diagnosis,
-    laboratory: Laboratory<'a>,
-    metric: Metric,
-    measured: Trace,
+/// Where the causes that recordings have in common stand in each of them, and which of their parameters are shared.
+struct Common {
+    identity: CauseIdentity,
+    /// Per recording: the place among its causes.
+    places: Vec<usize>,
+    /// The parameters that are one number in all.
+    parameters: Vec<usize>,
 }
 
-impl<'a> Case<'a> {
-    fn new(name: &'a str, found: &'a Diagnosis, mesh_factor: f64) -> Result<Case<'a>, DiagnosisError> {
-        let mesh = MeshOptions::scaled(&found.observed.specimen, mesh_factor);
-        let laboratory = Laboratory::new(&found.observed, &mesh)?;
-        let mut measured = laboratory.measured();
-        // As in the diagnosis: what the load curve explained is taken off, and what the mesh gets wrong.
-        take_off_effects(&mut measured, found.load.as_ref());
-        if let Some(defect) = &found.mesh_defect {
-            measured = defect.taken_off(&measured);
-        }
-        let metric = Metric::new(&found.observed, found.allowance_mm, &|_| true);
-        Ok(Case { name, found, laboratory, metric, measured })
+impl Common {
+    /// Of the cause `of`, where all recordings have it: what belongs to the rig or the scanner; where nothing does, all
+    /// that is no single step's.
+    fn of(of: &Supposed, own: &[Vec<Supposed>]) -> Option<Common> {
+        let identity = of.cause.identity();
+        let place = |causes: &Vec<Supposed>| causes.iter().position(|c| c.cause.identity() == identity);
+        let places = own.iter().map(place).collect::<Option<Vec<usize>>>()?;
+        let all = of.cause.parameters();
+        let those = |is_shared: &dyn Fn(usize) -> bool| (0..all.len()).filter(|i| is_shared(*i)).collect::<Vec<_>>();
+        let of_rig = those(&|i| all[i].is_of_rig);
+        let parameters = if of_rig.is_empty() { those(&|i| all[i].only_step.is_none()) } else { of_rig };
+        (!parameters.is_empty()).then_some(Common { identity, places, parameters })
     }
 }
 
@@ -135,12 +117,15 @@ pub fn together(
     progress("estimating what the mesh does to the common material");
     widen_all(&mut common.cases, mesh_factor, &mut shared, is_cancelled)?;
     progress("predicting every recording by every other");
+    let refused = common_causes.iter().filter(|(_, c)| !c.agreement.agrees).map(|(identity, _)| *identity).collect();
+    let predictor = Predictor { refused, is_cancelled };
     let mut predictions = Vec::new();
     for to in 0..diagnoses.len() {
         for from in 0..diagnoses.len() {
-            predictions.push(cross_prediction(&mut common.cases, from, to, is_cancelled)?);
+            predictions.push(predictor.prediction(&mut common.cases, from, to)?);
         }
     }
+    let common_causes = common_causes.into_iter().map(|(_, c)| c).collect();
     Ok(TogetherResult {
         material: shared[0].material.clone(),
         material_parameters: material_parameters(&shared[0]),
@@ -186,74 +171,69 @@ impl CommonFit<'_> {
         shared: &[CauseFit],
         own: &[Vec<Supposed>],
         progress: &dyn Fn(&str),
-    ) -> Result<Vec<CommonCause>, DiagnosisError> {
+    ) -> Result<Vec<(CauseIdentity, CommonCause)>, DiagnosisError> {
         let mut found = Vec::new();
         for cause in own[0].iter().filter(|c| !c.cause.is_artefact()) {
-            let identity = cause.cause.identity();
-            let place = |causes: &[Supposed]| causes.iter().position(|c| c.cause.identity() == identity);
-            let Some(places) = own.iter().map(|causes| place(causes)).collect::<Option<Vec<usize>>>() else { continue };
+            let Some(common) = Common::of(cause, own) else { continue };
             progress(&format!("fitting one size of '{}' to all recordings", cause.cause.description()));
-            found.push(self.common_cause(shared, own, &places)?);
+            found.push((common.identity, self.common_cause(shared, own, &common)?));
         }
         Ok(found)
     }
 
-    /// The cause at `places` (one per recording), fitted with one size for all.
+    /// A cause fitted with one size for all.
     fn common_cause(
         &mut self,
         shared: &[CauseFit],
         own: &[Vec<Supposed>],
-        places: &[usize],
+        common: &Common,
     ) -> Result<CommonCause, DiagnosisError> {
         let num_cases = self.cases.len();
-        let num_values = own[0][places[0]].values.len();
-        let mean: Vec<f64> = (0..num_values)
-            .map(|i| {
-                let sum: f64 = shared.iter().zip(places).map(|(f, &at)| f.causes[at].values[i]).sum();
-                sum / num_cases as f64
-            })
-            .collect();
         let mut same = own.to_vec();
-        for (causes, &at) in same.iter_mut().zip(places) {
-            causes[at].values.clone_from(&mean);
+        for &i in &common.parameters {
+            let sum: f64 = shared.iter().zip(&common.places).map(|(f, &at)| f.causes[at].values[i]).sum();
+            for (causes, &at) in same.iter_mut().zip(&common.places) {
+                causes[at].values[i] = sum / num_cases as f64;
+            }
         }
-        let fits = self.fit(&shared[0].material, &same, Some(places))?;
+        let fits = self.fit(&shared[0].material, &same, Some(common))?;
         let rise = deviance_of(&fits) - deviance_of(shared);
-        let (at, first) = (places[0], &fits[0]);
-        let cause = &first.causes[at].cause;
+        let (at, first) = (common.places[0], &fits[0]);
+        let (cause, all) = (&first.causes[at].cause, first.causes[at].cause.parameters());
+        let of_parameter = |&i: &usize| {
+            let (value, sd) = (first.causes[at].values[i], first.sd_of(at)[i]);
+            parameter(&all[i].name, value, interval(value, sd))
+        };
         Ok(CommonCause {
             name: cause.name().as_str().into(),
             description: cause.description(),
-            parameters: cause
-                .parameters()
-                .iter()
-                .zip(first.causes[at].values.iter().zip(first.sd_of(at)))
-                .map(|(p, (value, sd))| parameter(&p.name, *value, interval(*value, *sd)))
-                .collect(),
-            agreement: self.agreement(rise, num_values * (num_cases - 1)),
+            parameters: common.parameters.iter().map(of_parameter).collect(),
+            agreement: self.agreement(rise, common.parameters.len() * (num_cases - 1)),
         })
     }
 
-    /// Fits one material to all cases with `causes`; the causes at the places of `common` (one per case) share their
-    /// parameters.
+    /// Fits one material to all cases with `causes`; what is `common` is one number in all.
     fn fit(
         &mut self,
         start: &Ogden,
         causes: &[Vec<Supposed>],
-        common: Option<&[usize]>,
+        common: Option<&Common>,
     ) -> Result<Vec<CauseFit>, DiagnosisError> {
         let (num_cases, num_material) = (self.cases.len() as f64, self.num_material);
-        let num_common = common.map_or(0, |places| causes[0][places[0]].values.len());
-        let mut next = num_material + num_common;
+        let mut next = num_material + common.map_or(0, |c| c.parameters.len());
         let mut members: Vec<Member> = Vec::new();
         for (n, (case, causes)) in self.cases.iter_mut().zip(causes).enumerate() {
             let mut places: Vec<usize> = (0..num_material).collect();
             for (index, c) in causes.iter().enumerate() {
-                if common.is_some_and(|places| places[n] == index) {
-                    places.extend(num_material..num_material + num_common);
-                } else {
-                    places.extend(next..next + c.values.len());
-                    next += c.values.len();
+                let shared = common.filter(|common| common.places[n] == index);
+                for i in 0..c.values.len() {
+                    match shared.and_then(|common| common.parameters.iter().position(|p| *p == i)) {
+                        Some(at) => places.push(num_material + at),
+                        None => {
+                            places.push(next);
+                            next += 1;
+                        }
+                    }
                 }
             }
             members.push(Member {
@@ -308,66 +288,4 @@ fn widen_all(
         *sd = noise.hypot(square.sqrt());
     }
     Ok(())
-}
-
-/// What the models of case `from` say of case `to`.
-fn cross_prediction(
-    cases: &mut [Case],
-    from: usize,
-    to: usize,
-    is_cancelled: &dyn Fn() -> bool,
-) -> Result<CrossPrediction, DiagnosisError> {
-    let teacher = cases[from].found;
-    let is_same_sample = {
-        let [a, b] = [from, to].map(|n| &cases[n].found.observed.specimen);
-        a.block == b.block && a.holes == b.holes
-    };
-    // Artefacts belong to one recording alone. A recording of another sample shares neither places nor plates with this
-    // one.
-    let causes: Vec<Supposed> = teacher
-        .corrected
-        .causes
-        .iter()
-        .filter(|c| from == to || !c.cause.is_artefact())
-        .filter(|c| {
-            let located = c.cause.location(&c.values, &teacher.observed.specimen).is_some();
-            is_same_sample || c.cause.category() == Category::Material && !located
-        })
-        .cloned()
-        .collect();
-    let case = &mut cases[to];
-    case.laboratory.forget();
-    let mut predict = |material: &Ogden, causes: &[Supposed]| -> Result<Option<Prediction>, DiagnosisError> {
-        match case.laboratory.predict(material, &scene_of(causes), is_cancelled) {
-            Ok(prediction) => Ok(Some(prediction)),
-            Err(error) if is_cancelled() => Err(error),
-            Err(_) => Ok(None),
-        }
-    };
-    let before = predict(&teacher.nominal.material, &[])?;
-    let after = predict(&teacher.corrected.material, &causes)?;
-    let misfits = before.zip(after).map(|(b, a)| [b, a].map(|p| misfit(case, &p.trace)));
-    Ok(CrossPrediction {
-        from: cases[from].name.into(),
-        to: cases[to].name.into(),
-        displacement_rms_mm: misfits.map(|m| BeforeAfter { before: m[0].0, after: m[1].0 }),
-        force_relative: misfits.and_then(|[b, a]| Some(BeforeAfter { before: b.1?, after: a.1? })),
-    })
-}
-
-/// Displacement misfit (mm rms) and the largest relative misfit of a force.
-fn misfit(case: &Case, predicted: &Trace) -> (f64, Option<f64>) {
-    let left = case.measured.plus(-1.0, predicted);
-    let finite = left.displacement.iter().flatten().flatten().filter(|x| x.is_finite());
-    let (sum, count) = finite.fold((0.0, 0usize), |(s, n), x| (s + x * x, n + 1));
-    let force = case
-        .found
-        .observed
-        .steps
-        .iter()
-        .zip(left.force.iter().zip(&case.measured.force))
-        .filter(|(step, (_, f))| step.force.is_some() && f.abs() > 0.0)
-        .map(|(_, (l, f))| (l / f).abs())
-        .reduce(f64::max);
-    ((sum / count.max(1) as f64).sqrt(), force)
 }

@@ -5,11 +5,14 @@ use super::diagnosis_pictures::DiagnosisPictures;
 use super::html::{Report, ReportHeader};
 use super::html_parts::{CalloutKind, Column, Table};
 use super::number::significant;
+use super::plain_words::in_plain_words;
 use crate::diagnosis::{CauseResult, Diagnosis, DiagnosisResult, Verdict};
 
 /// The page.
 pub fn diagnosis_report(d: &Diagnosis, r: &DiagnosisResult) -> Report {
     let mut page = Report::new(verdict_words(r.verdict), header(d, r));
+    page.section("In plain words");
+    in_plain_words(&mut page, d, r);
     page.section("What was found");
     verdict(&mut page, r);
     interior(&mut page, r);

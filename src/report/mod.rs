@@ -53,6 +53,7 @@ mod maps;
 mod number;
 mod parallel;
 mod pareto;
+mod plain_words;
 mod ranking;
 mod scan_pictures;
 mod shape;

@@ -96,6 +96,8 @@ pub fn together_report(t: &TogetherResult, all: &[&DiagnosisResult], specimen: &
             Column::words("by the fit to"),
             Column::numbers("mm rms, nominal to with causes", ""),
             Column::numbers("force, %", ""),
+            Column::numbers("χ² per datum", ""),
+            Column::numbers("χ², plates' motions fitted", ""),
         ],
         rows: t
             .predictions
@@ -106,6 +108,8 @@ pub fn together_report(t: &TogetherResult, all: &[&DiagnosisResult], specimen: &
                     p.from.clone(),
                     pair(p.displacement_rms_mm, 1.0, "no equilibrium"),
                     pair(p.force_relative, 100.0, "none"),
+                    pair(p.chi2_per_datum, 1.0, "no equilibrium"),
+                    pair(p.chi2_per_datum_with_own_motions, 1.0, "not asked"),
                 ]
             })
             .collect(),

@@ -6,8 +6,11 @@ use crate::diagnosis::scene::Scene;
 use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("background");
+/// What a laboratory can do about it.
+const REMEDY: &str = "Unwrap and reference the phase anew; scan a resting sample and subtract what is left.";
 /// Its line in the registry.
-pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Tested(|_| vec![Arc::new(Background)]) };
+pub(super) const ENTRY: Entry =
+    Entry { name: NAME, remedy: REMEDY, origin: Origin::Tested(|_| vec![Arc::new(Background)]) };
 
 /// A polynomial of second degree in the position, added to each component at every drive.
 pub struct Background;

@@ -10,8 +10,12 @@ use crate::specimen::{Outline, Specimen};
 use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("geometry");
+/// What a laboratory can do about it.
+const REMEDY: &str =
+    "Measure the block as cast (length, width, thickness, slant of its faces) and give the specimen those sizes.";
 /// Its line in the registry.
-pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::SetUp { parts: suspects, special_cases: &[] } };
+pub(super) const ENTRY: Entry =
+    Entry { name: NAME, remedy: REMEDY, origin: Origin::SetUp { parts: suspects, special_cases: &[] } };
 
 /// A dumb-bell keeps its standard outline.
 fn suspects(observed: &Observed) -> Vec<Arc<dyn Cause>> {

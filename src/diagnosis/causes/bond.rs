@@ -11,8 +11,10 @@ use crate::diagnosis::trace::Trace;
 use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("bond");
+/// What a laboratory can do about it.
+const REMEDY: &str = "Bond with a thinner or stiffer adhesive, or give the stiffness of the one in use.";
 /// Its line in the registry.
-pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Searched(suspects) };
+pub(super) const ENTRY: Entry = Entry { name: NAME, remedy: REMEDY, origin: Origin::Searched(suspects) };
 
 /// Compliance of the layers that bond the sample to its plates: each point of a bonded face lags behind its plate by
 /// compliance × traction.

@@ -7,12 +7,16 @@ use crate::diagnosis::scene::Scene;
 use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("cell");
+/// What a laboratory can do about it.
+const REMEDY: &str =
+    "Read the load cell unloaded before and after the scan, and calibrate its gain with a known weight.";
 /// The zero as the mean forces of the steps tell it.
-pub(super) const OF_STEPS: Entry = Entry { name: NAME, origin: Origin::Tested(|_| vec![Arc::new(CellOffset)]) };
+pub(super) const OF_STEPS: Entry =
+    Entry { name: NAME, remedy: REMEDY, origin: Origin::Tested(|_| vec![Arc::new(CellOffset)]) };
 /// The zero as a load curve tells it.
-pub(super) const OFFSET: Entry = Entry { name: NAME, origin: Origin::LoadCurve(&Offset) };
+pub(super) const OFFSET: Entry = Entry { name: NAME, remedy: REMEDY, origin: Origin::LoadCurve(&Offset) };
 /// Friction, which only a load curve tells.
-pub(super) const FRICTION: Entry = Entry { name: NAME, origin: Origin::LoadCurve(&Friction) };
+pub(super) const FRICTION: Entry = Entry { name: NAME, remedy: REMEDY, origin: Origin::LoadCurve(&Friction) };
 
 const ZERO_IN_WORDS: &str = "the load cell does not read zero at rest";
 

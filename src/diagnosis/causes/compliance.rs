@@ -6,8 +6,11 @@ use crate::diagnosis::scene::Scene;
 use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("compliance");
+/// What a laboratory can do about it.
+const REMEDY: &str = "Measure the plates' travel at the sample, not at the drive, or stiffen the load train.";
 /// Its line in the registry.
-pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Tested(|_| vec![Arc::new(Compliance)]) };
+pub(super) const ENTRY: Entry =
+    Entry { name: NAME, remedy: REMEDY, origin: Origin::Tested(|_| vec![Arc::new(Compliance)]) };
 
 /// Real drive = commanded drive − compliance × force.
 pub struct Compliance;

@@ -13,8 +13,10 @@ use crate::diagnosis::material_cause::{MaterialCase, MaterialCause, MaterialFind
 use crate::diagnosis::prior::{BulkPrior, FitSettings, shear_modulus};
 
 const NAME: CauseName = CauseName::new("compressibility");
+/// What a laboratory can do about it.
+const REMEDY: &str = "Determine the bulk modulus on its own, or let it be fitted.";
 /// Its line in the registry.
-pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Material(&Compressibility) };
+pub(super) const ENTRY: Entry = Entry { name: NAME, remedy: REMEDY, origin: Origin::Material(&Compressibility) };
 
 /// κ is looked at where the data pull it below the believed one by this many standard deviations of ln κ.
 const PULL_OF_BULK: f64 = 1.5;

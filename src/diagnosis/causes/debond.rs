@@ -13,8 +13,11 @@ use crate::specimen::Specimen;
 use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("debond");
+/// What a laboratory can do about it.
+const REMEDY: &str =
+    "Bond the face anew and look at its edges before the scan; in a finished recording leave the patch in the model.";
 /// Its line in the registry.
-pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Searched(suspects) };
+pub(super) const ENTRY: Entry = Entry { name: NAME, remedy: REMEDY, origin: Origin::Searched(suspects) };
 
 /// Width of the edge of a debonded patch, mm. It is a third of the spacing of nodes on the face, so that the bond
 /// changes smoothly as the edge passes from node to node.

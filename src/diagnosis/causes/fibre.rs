@@ -12,8 +12,10 @@ use crate::fem::Fibre;
 use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("fibre");
+/// What a laboratory can do about it.
+const REMEDY: &str = "Test samples cut along two directions, and use a material with fibres.";
 /// Its line in the registry.
-pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Searched(suspects) };
+pub(super) const ENTRY: Entry = Entry { name: NAME, remedy: REMEDY, origin: Origin::Searched(suspects) };
 
 /// Fibres near a direction.
 pub struct Fibres {

@@ -6,8 +6,10 @@ use crate::diagnosis::scene::Scene;
 use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("gain");
+/// What a laboratory can do about it.
+const REMEDY: &str = "Calibrate the encoding gradients with a phantom that is moved by a known distance.";
 /// Its line in the registry.
-pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Tested(|_| suspects()) };
+pub(super) const ENTRY: Entry = Entry { name: NAME, remedy: REMEDY, origin: Origin::Tested(|_| suspects()) };
 
 /// One axis alone, or all three.
 fn suspects() -> Vec<Arc<dyn Cause>> {
@@ -40,7 +42,7 @@ impl Cause for Gain {
     fn parameters(&self) -> Vec<CauseParameter> {
         let of_axis = |a: &usize| {
             let name = format!("relative_gain_error_{}", ["x", "y", "z"][*a]);
-            CauseParameter::new(name, 0.02, [-0.5, 0.5]).believed(BELIEVED)
+            CauseParameter::new(name, 0.02, [-0.5, 0.5]).believed(BELIEVED).of_rig()
         };
         self.axes.iter().map(of_axis).collect()
     }

@@ -8,9 +8,11 @@ use crate::specimen::Specimen;
 use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("gradient");
+/// What a laboratory can do about it.
+const REMEDY: &str = "Cure and mix more evenly, or cut the sample from one place of the cast.";
 /// Its line in the registry.
 pub(super) const ENTRY: Entry =
-    Entry { name: NAME, origin: Origin::Tested(|specimen| vec![Arc::new(Gradient::of(specimen))]) };
+    Entry { name: NAME, remedy: REMEDY, origin: Origin::Tested(|specimen| vec![Arc::new(Gradient::of(specimen))]) };
 
 /// Stiffness × (1 + Σ gᵢ xᵢ / half extent).
 pub struct Gradient {

@@ -8,8 +8,10 @@ use crate::specimen::{HoleAxis, Specimen};
 use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("hole");
+/// What a laboratory can do about it.
+const REMEDY: &str = "Measure the holes as cast and give the specimen their places and diameters.";
 /// Its line in the registry.
-pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Tested(all_of) };
+pub(super) const ENTRY: Entry = Entry { name: NAME, remedy: REMEDY, origin: Origin::Tested(all_of) };
 
 /// Diameter and centre of one hole.
 pub struct HoleError {

@@ -15,8 +15,10 @@ use crate::specimen::Specimen;
 use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("inclusion");
+/// What a laboratory can do about it.
+const REMEDY: &str = "Degas the mixture and look at the magnitude image for bubbles and lumps before the test.";
 /// Its line in the registry.
-pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Searched(suspects) };
+pub(super) const ENTRY: Entry = Entry { name: NAME, remedy: REMEDY, origin: Origin::Searched(suspects) };
 
 /// Width of the inclusion's edge, mm. With a wider edge a fit makes the stiffness factor f of stiff balls too large and
 /// their radius too small: with twice the width, ln f is off by a tenth. The points in an element at which the field is

@@ -10,8 +10,12 @@ use crate::specimen::{Outline, Specimen, TestKind};
 use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("layer");
+/// What a laboratory can do about it.
+const REMEDY: &str = "Map where the sheared zone begins at the bonded faces, by a scan with finer voxels across them or by a \
+    cut sample, and keep glue and skin thin and even.";
 /// Its line in the registry.
-pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::SetUp { parts: suspects, special_cases: &[] } };
+pub(super) const ENTRY: Entry =
+    Entry { name: NAME, remedy: REMEDY, origin: Origin::SetUp { parts: suspects, special_cases: &[] } };
 
 /// A dumb-bell's grips hold it along its tabs: it has no faces of which a layer could be told.
 fn suspects(observed: &Observed) -> Vec<Arc<dyn Cause>> {

@@ -8,8 +8,10 @@ use crate::specimen::Specimen;
 use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("mount");
+/// What a laboratory can do about it.
+const REMEDY: &str = "Scan once more after the sample was clamped, and use that scan as the reference.";
 /// Its line in the registry.
-pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Tested(|_| vec![Arc::new(Mount)]) };
+pub(super) const ENTRY: Entry = Entry { name: NAME, remedy: REMEDY, origin: Origin::Tested(|_| vec![Arc::new(Mount)]) };
 
 /// Translation of the moved plate across the drive (along y the gap) and rotation about its centre, alike at every
 /// step: it settled between the reference scan and the first step.

@@ -6,8 +6,10 @@ use crate::diagnosis::load_effect::{EffectParameter, ForceChange, LoadEffect, Lo
 use crate::homogeneous::erf;
 
 const NAME: CauseName = CauseName::new("mullins");
+/// What a laboratory can do about it.
+const REMEDY: &str = "Stretch the sample several times beyond the largest drive before the test.";
 /// Its line in the registry.
-pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::LoadCurve(&Mullins) };
+pub(super) const ENTRY: Entry = Entry { name: NAME, remedy: REMEDY, origin: Origin::LoadCurve(&Mullins) };
 
 /// Ogden and Roxburgh's softening, η = 1 − ρ erf((W_max − W)/m), with the work W of the whole sample: ρ, and m as a
 /// part of the largest work.

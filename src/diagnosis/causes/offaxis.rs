@@ -8,9 +8,11 @@ use crate::specimen::Specimen;
 use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("offaxis");
+/// What a laboratory can do about it.
+const REMEDY: &str = "Guide the moved plate so that the gap stays, or measure how it moves across the drive.";
 /// Its line in the registry.
 pub(super) const ENTRY: Entry =
-    Entry { name: NAME, origin: Origin::Tested(|specimen| vec![Arc::new(OffAxis::of(specimen))]) };
+    Entry { name: NAME, remedy: REMEDY, origin: Origin::Tested(|specimen| vec![Arc::new(OffAxis::of(specimen))]) };
 
 /// Translation of the moved plate across the drive, in proportion to it: along y (the gap changes) and z.
 pub struct OffAxis {

@@ -7,14 +7,18 @@ use crate::diagnosis::scene::Scene;
 use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("registration");
+/// What a laboratory can do about it.
+const REMEDY: &str = "Fix the rig's angle in the scanner, or read its pose from a scout scan of marks on the plates.";
 /// Its line in the registry.
 pub(super) const ENTRY: Entry = Entry {
     name: NAME,
+    remedy: REMEDY,
     origin: Origin::Tested(|_| vec![Arc::new(Registration { is_of_set_up: false, has_shift: true })]),
 };
 /// Its line in the registry as a part of the set-up.
 pub(super) const OF_SET_UP: Entry = Entry {
     name: NAME,
+    remedy: REMEDY,
     origin: Origin::SetUp { parts: |observed| vec![Arc::new(Registration::of_set_up(observed))], special_cases: &[] },
 };
 
@@ -54,7 +58,9 @@ impl Cause for Registration {
 
     fn parameters(&self) -> Vec<CauseParameter> {
         let shifts = ["x", "y", "z"].map(|a| CauseParameter::new(format!("shift_{a}_mm"), 0.2, [-5.0, 5.0]));
-        let turns = ["x", "y", "z"].map(|a| CauseParameter::new(format!("rotation_{a}_degrees"), 0.5, [-20.0, 20.0]));
+        // The rig stays in the scanner as samples are changed; where a sample lies in its rig is its own.
+        let turn = |a| CauseParameter::new(format!("rotation_{a}_degrees"), 0.5, [-20.0, 20.0]).of_rig();
+        let turns = ["x", "y", "z"].map(turn);
         let mut all: Vec<CauseParameter> = Vec::new();
         if self.has_shift {
             all.extend(shifts.map(|p| if self.is_of_set_up { p.believed(BELIEVED_MM) } else { p }));

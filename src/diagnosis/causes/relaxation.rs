@@ -5,8 +5,10 @@ use crate::diagnosis::entry::{Entry, Origin};
 use crate::diagnosis::load_effect::{EffectParameter, ForceChange, LoadEffect, LoadReadings};
 
 const NAME: CauseName = CauseName::new("relaxation");
+/// What a laboratory can do about it.
+const REMEDY: &str = "Wait at every drive until the force is steady, or state when the scans were made.";
 /// Its line in the registry.
-pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::LoadCurve(&Relaxation) };
+pub(super) const ENTRY: Entry = Entry { name: NAME, remedy: REMEDY, origin: Origin::LoadCurve(&Relaxation) };
 
 /// Times from which a fit starts, s.
 const START_TIMES_S: [f64; 4] = [2.0, 8.0, 30.0, 100.0];

@@ -6,8 +6,10 @@ use crate::diagnosis::scene::Scene;
 use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("slack");
+/// What a laboratory can do about it.
+const REMEDY: &str = "Take up the play before the first drive, and set zero where the force begins to rise.";
 /// Its line in the registry.
-pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Tested(|_| vec![Arc::new(Slack)]) };
+pub(super) const ENTRY: Entry = Entry { name: NAME, remedy: REMEDY, origin: Origin::Tested(|_| vec![Arc::new(Slack)]) };
 
 /// Real drive = commanded drive − slack, at every step: play in the load train, or a start that was not at rest.
 pub struct Slack;

@@ -6,8 +6,11 @@ use crate::diagnosis::scene::Scene;
 use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("swelling");
+/// What a laboratory can do about it.
+const REMEDY: &str = "Weigh the sample before and after the scan, and keep it from drying or taking up liquid.";
 /// Its line in the registry.
-pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Tested(|_| vec![Arc::new(Swelling)]) };
+pub(super) const ENTRY: Entry =
+    Entry { name: NAME, remedy: REMEDY, origin: Origin::Tested(|_| vec![Arc::new(Swelling)]) };
 
 /// Uniform swelling by a volume ratio.
 pub struct Swelling;

@@ -11,8 +11,10 @@ use crate::diagnosis::interval::interval;
 use crate::diagnosis::material_cause::{MaterialCase, MaterialCause, MaterialFinding};
 
 const NAME: CauseName = CauseName::new("terms");
+/// What a laboratory can do about it.
+const REMEDY: &str = "Nothing is wrong with the experiment: use the material with the further term.";
 /// Its line in the registry.
-pub(super) const ENTRY: Entry = Entry { name: NAME, origin: Origin::Material(&Terms) };
+pub(super) const ENTRY: Entry = Entry { name: NAME, remedy: REMEDY, origin: Origin::Material(&Terms) };
 
 /// Parameters of an Ogden term: μ and α.
 const PER_TERM: usize = 2;

@@ -8,9 +8,11 @@ use crate::specimen::Specimen;
 use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("tilt");
+/// What a laboratory can do about it.
+const REMEDY: &str = "Guide the moved plate stiffly, or measure its rotation by marks on it.";
 /// Its line in the registry.
 pub(super) const ENTRY: Entry =
-    Entry { name: NAME, origin: Origin::Tested(|specimen| vec![Arc::new(Tilt::of(specimen))]) };
+    Entry { name: NAME, remedy: REMEDY, origin: Origin::Tested(|specimen| vec![Arc::new(Tilt::of(specimen))]) };
 
 /// Rotation of the moved plate about its centre, in proportion to the drive.
 pub struct Tilt {

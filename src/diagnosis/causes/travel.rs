@@ -10,9 +10,13 @@ use crate::specimen::Specimen;
 use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("travel");
+/// What a laboratory can do about it.
+const REMEDY: &str =
+    "Measure the plates' motion at every drive, by marks on them in the image or by a gauge at the sample.";
 /// Its line in the registry.
 pub(super) const ENTRY: Entry = Entry {
     name: NAME,
+    remedy: REMEDY,
     origin: Origin::SetUp {
         parts: |observed| vec![Arc::new(Travel::of(observed))],
         special_cases: &[

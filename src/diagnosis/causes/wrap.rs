@@ -12,9 +12,12 @@ use crate::specimen::Specimen;
 use std::sync::Arc;
 
 const NAME: CauseName = CauseName::new("wrap");
+/// What a laboratory can do about it.
+const REMEDY: &str = "Encode fewer millimetres of displacement per turn, or scan at smaller steps of drive.";
 /// Its line in the registry.
 pub(super) const ENTRY: Entry = Entry {
     name: NAME,
+    remedy: REMEDY,
     origin: Origin::Artefact { find: all_in, in_words: "groups of voxels are a whole turn of phase off" },
 };
 

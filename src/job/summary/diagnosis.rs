@@ -1,6 +1,6 @@
 //! Diagnoses as text.
 
-use crate::diagnosis::{Diagnosis, DiagnosisResult, TogetherResult, Verdict};
+use crate::diagnosis::{BeforeAfter, Diagnosis, DiagnosisResult, TogetherResult, Verdict};
 use crate::report::in_words;
 
 pub(in crate::job) fn diagnosis(r: &DiagnosisResult, d: &Diagnosis) -> String {
@@ -29,6 +29,7 @@ pub(in crate::job) fn diagnosis(r: &DiagnosisResult, d: &Diagnosis) -> String {
             text += &format!("  at the {}: centre {:.1?} mm, extent {:.1?} mm\n", l.region, l.center_mm, l.extent_mm);
         }
         text += &format!("  evidence {:.0}, explains {:.4} mm rms\n", c.evidence, c.effect_rms_mm);
+        text += &format!("  what can be done: {}\n", c.remedy);
     }
     for c in &r.alternatives {
         let what =
@@ -103,6 +104,13 @@ pub(in crate::job) fn together(results: &[&DiagnosisResult], found: Option<&Toge
             .force_relative
             .map_or("no force".into(), |b| format!("{:.2} -> {:.2} %", 100.0 * b.before, 100.0 * b.after));
         text += &format!("  {:<18} by {:<18} {displacement}; {force}\n", p.to, p.from);
+        let chi2 = |b: BeforeAfter| format!("{:.1} -> {:.1}", b.before, b.after);
+        if let Some(plain) = p.chi2_per_datum {
+            let own = p
+                .chi2_per_datum_with_own_motions
+                .map_or(String::new(), |b| format!("; with the plates' motions at each step fitted {}", chi2(b)));
+            text += &format!("  {:<18}    chi2 per datum {}{own}\n", "", chi2(plain));
+        }
     }
     text
 }
