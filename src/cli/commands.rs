@@ -91,6 +91,7 @@ const DIAGNOSE: &[Flag] = &[
     Flag::of("mesh", "mesh_factor"),
     Flag::of("allowance", "allowance_mm"),
     Flag::of("max-causes", "max_causes"),
+    Flag::of("without", "without"),
     Flag::of("boundary", "boundary"),
 ];
 /// Options of commands that read curves.

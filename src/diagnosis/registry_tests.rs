@@ -12,7 +12,8 @@ mod turned_image {
     use std::sync::Arc;
 
     pub(super) const NAME: CauseName = CauseName::new("turned_image");
-    pub(super) const ENTRY: Entry = Entry { name: NAME, remedy: "Turn it back.", origin: Origin::Tested(|_| vec![Arc::new(TurnedImage)]) };
+    pub(super) const ENTRY: Entry =
+        Entry { name: NAME, remedy: "Turn it back.", origin: Origin::Tested(|_| vec![Arc::new(TurnedImage)]) };
 
     /// The image is turned about y.
     struct TurnedImage;

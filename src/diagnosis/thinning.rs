@@ -4,7 +4,8 @@
 //! to do without a cause (Wald's statistic with all others free to follow), and where the others go. Causes are taken
 //! out one after the other, the one that is missed least first (backward elimination), as long as none of them is
 //! missed by more than it costs; then what is left is fitted again. A cause that changes the sample must also do more
-//! than a mesh's error could: where hardly anything would be left without it, it goes, whatever the evidence.
+//! than a mesh's error could: where hardly anything would be left without it, it goes, whatever the evidence. One that
+//! changes the image alone then needs far more evidence than usual.
 
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
@@ -15,6 +16,10 @@ use super::inference::Inference;
 use super::supposed::Supposed;
 use super::trace::Trace;
 use nalgebra::{DMatrix, DVector};
+
+/// A cause that changes the image alone looks like no mesh's error where it is plain. Where no more would be left without
+/// it than a mesh could leave, it needs so many times the usual evidence.
+const OF_IMAGE_ALONE: f64 = 10.0;
 
 /// The quadratic form of a fit at its end, in scaled parameters.
 struct QuadraticModel {
@@ -156,8 +161,13 @@ pub(super) fn thinned(
                 (inference.progress)(&format!(
                     "without '{name}' {left_mm:.4} mm rms are left and the deviance rises by {missed:.0}; it costs {cost:.0}"
                 ));
-                let is_a_meshs = supposed.cause.changes_sample() && left_mm < UNEXPLAINED * inference.allowance_mm;
-                (cause, if is_a_meshs { f64::min(missed - cost, -f64::MIN_POSITIVE) } else { missed - cost })
+                let beyond = missed - cost;
+                let could_be_a_meshs = left_mm < UNEXPLAINED * inference.allowance_mm;
+                (cause, match (could_be_a_meshs, supposed.cause.changes_sample()) {
+                    (false, _) => beyond,
+                    (true, true) => beyond.min(-f64::MIN_POSITIVE),
+                    (true, false) => beyond - OF_IMAGE_ALONE * EVIDENCE,
+                })
             })
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let Some((cause, _)) = least.filter(|(_, beyond)| *beyond < 0.0) else { break };

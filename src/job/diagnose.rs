@@ -5,7 +5,8 @@ use super::subject::check_mesh;
 use super::{Context, JobError, Outcome, Progress, Request, Run, summary};
 use crate::calibration::Boundary;
 use crate::diagnosis::{
-    Diagnosis, DiagnosisError, DiagnosisOptions, DiagnosisResult, TogetherResult, diagnose, together,
+    CauseName, Diagnosis, DiagnosisError, DiagnosisOptions, DiagnosisResult, TogetherResult, cause_names, diagnose,
+    together,
 };
 use crate::field::FieldError;
 use crate::material::Ogden;
@@ -49,6 +50,10 @@ pub struct DiagnosisRequest {
     #[serde(default = "max_causes")]
     #[schema(minimum = 1, maximum = 20, default = max_causes)]
     pub max_causes: usize,
+    /// Causes that are not to be supposed (by the names that results give them), nor what contains them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 100)]
+    pub without: Vec<String>,
 }
 
 fn mesh_factor() -> f64 {
@@ -68,6 +73,11 @@ struct Several<'a> {
     together: Option<&'a TogetherResult>,
 }
 
+/// The cause of a name.
+fn known_cause(name: &str) -> Option<CauseName> {
+    cause_names().into_iter().find(|c| c.as_str() == name)
+}
+
 impl DiagnosisRequest {
     fn options(&self) -> DiagnosisOptions {
         DiagnosisOptions {
@@ -76,6 +86,7 @@ impl DiagnosisRequest {
             prior: self.material.clone(),
             max_causes: self.max_causes,
             boundary: self.boundary,
+            left_out: self.without.iter().filter_map(|name| known_cause(name)).collect(),
             ..DiagnosisOptions::default()
         }
     }
@@ -105,6 +116,11 @@ impl Request for DiagnosisRequest {
         }
         for error in self.material.iter().flat_map(Ogden::field_errors) {
             errors.push(error.below("/material"));
+        }
+        for (index, name) in self.without.iter().enumerate().filter(|(_, name)| known_cause(name).is_none()) {
+            let known = cause_names().iter().map(|c| c.as_str()).collect::<Vec<_>>().join(", ");
+            let allowed = format!("a cause that can be named: {known}");
+            errors.push(FieldError::new(format!("/without/{index}"), format!("{name:?}"), allowed));
         }
         if errors.is_empty() { Ok(Box::new(self)) } else { Err(errors) }
     }

@@ -16,6 +16,7 @@ mod own_effect;
 mod result;
 mod score;
 mod several;
+mod several_answer;
 mod several_result;
 mod summary;
 mod truths;
@@ -27,5 +28,9 @@ pub use experiment::{Experiment, draw_harmless, draw_several, draw_with_unknown}
 pub use options::ProofOptions;
 pub use result::{CauseSummary, FirstNamed, Proof, Scored};
 pub use score::{prove, score_one};
-pub use several::{SeveralOptions, prove_several, score_experiment};
+pub use several::{
+    SeveralOptions, prove_several, score_answer, score_experiment, several_experiments, specimen_of, sum_up,
+    unknown_cause,
+};
+pub use several_answer::{Answer, AnsweredCause};
 pub use several_result::{CauseOfSeveral, CauseScore, ExperimentKind, SeveralProof, SeveralScored};

@@ -6,9 +6,11 @@ use super::draw::HiddenCause;
 use super::experiment::{Experiment, draw_harmless, draw_several, draw_with_unknown};
 use super::own_effect::{OwnEffect, own_effects};
 use super::score::score_all;
+use super::several_answer::Answer;
 use super::several_result::{CauseOfSeveral, CauseScore, ExperimentKind, SeveralProof, SeveralScored};
 use super::truths::truths;
 use crate::diagnosis::{CauseName, DiagnosisOptions, DiagnosisResult, Verdict, answers, diagnose};
+use crate::recording::Recording;
 use crate::specimen::Specimen;
 
 /// A cause counts as detectable where its own effect (what neither the material nor the other causes could do in its
@@ -34,7 +36,12 @@ pub struct SeveralOptions {
     pub mesh_factor: f64,
 }
 
-/// Kinds and seeds of all recordings, mixed so that a stopped proof has seen all kinds alike.
+/// All experiments of a proof, mixed so that a stopped one has seen all kinds alike.
+pub fn several_experiments(options: &SeveralOptions) -> Vec<(ExperimentKind, Experiment)> {
+    tasks(options).into_iter().map(|(kind, seed)| (kind, draw(kind, seed))).collect()
+}
+
+/// Kinds and seeds of all recordings.
 fn tasks(options: &SeveralOptions) -> Vec<(ExperimentKind, u64)> {
     let kinds = [
         (ExperimentKind::Several, options.num_recordings),
@@ -61,7 +68,7 @@ fn draw(kind: ExperimentKind, seed: u64) -> Experiment {
 }
 
 /// The specimen of an experiment: `specimen`, or the same block without its holes.
-fn specimen_of(specimen: &Specimen, experiment: &Experiment) -> Specimen {
+pub fn specimen_of(specimen: &Specimen, experiment: &Experiment) -> Specimen {
     let mut own = specimen.clone();
     if experiment.is_solid {
         own.holes.clear();
@@ -117,24 +124,56 @@ pub fn score_experiment(
     mesh_factor: f64,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<SeveralScored, ConcealError> {
-    let specimen = specimen_of(specimen, experiment);
-    let made = conceal(&specimen, experiment)?;
-    let effects = own_effects(&specimen, experiment)?;
+    let own_specimen = specimen_of(specimen, experiment);
+    let made = conceal(&own_specimen, experiment)?;
     let mut options = DiagnosisOptions { mesh_factor, ..DiagnosisOptions::default() };
-    if let (ExperimentKind::Unknown, Some(last)) = (kind, experiment.hidden.last()) {
-        options.left_out.extend(last.cause.diagnosed());
-    }
-    let num_data = made.recording.steps.len() * made.recording.mask.iter().filter(|m| **m).count() * 3;
-    let mut scored = unmade(kind, experiment.clone(), String::new());
+    options.left_out.extend(unknown_cause(kind, experiment));
     match diagnose(&made.recording, &options, &|_| {}, is_cancelled) {
-        Ok(found) => fill(&mut scored, &specimen, &DiagnosisResult::new(&found, "", String::new())),
-        Err(error) => scored.failure = Some(error.to_string()),
+        Ok(found) => {
+            let answer = Answer::from(&DiagnosisResult::new(&found, "", String::new()));
+            score_made(&own_specimen, &made.recording, kind, experiment, &answer)
+        }
+        Err(error) => Ok(unmade(kind, experiment.clone(), error.to_string())),
     }
+}
+
+/// The cause that a diagnosis must not be told of, by the name that it has there.
+pub fn unknown_cause(kind: ExperimentKind, experiment: &Experiment) -> Option<CauseName> {
+    let last = experiment.hidden.last().filter(|_| kind == ExperimentKind::Unknown)?;
+    last.cause.diagnosed()
+}
+
+/// Scores what was said of one experiment.
+///
+/// # Errors
+/// [`ConcealError`] where its recording cannot be made.
+pub fn score_answer(
+    specimen: &Specimen,
+    kind: ExperimentKind,
+    experiment: &Experiment,
+    answer: &Answer,
+) -> Result<SeveralScored, ConcealError> {
+    let specimen = specimen_of(specimen, experiment);
+    let recording = conceal(&specimen, experiment)?.recording;
+    score_made(&specimen, &recording, kind, experiment, answer)
+}
+
+fn score_made(
+    specimen: &Specimen,
+    recording: &Recording,
+    kind: ExperimentKind,
+    experiment: &Experiment,
+    answer: &Answer,
+) -> Result<SeveralScored, ConcealError> {
+    let num_data = recording.steps.len() * recording.mask.iter().filter(|m| **m).count() * 3;
+    let effects = own_effects(specimen, experiment)?;
+    let mut scored = unmade(kind, experiment.clone(), String::new());
+    fill(&mut scored, specimen, answer);
     for (n, effect) in effects.iter().enumerate() {
         let cause = &mut scored.causes[n];
         cause.own_effect_rms_mm = effect.rms_mm;
         cause.own_force_relative = effect.force_relative;
-        cause.is_detectable = is_detectable(&specimen, experiment, n, effect, num_data);
+        cause.is_detectable = is_detectable(specimen, experiment, n, effect, num_data);
     }
     judge(&mut scored);
     Ok(scored)
@@ -163,12 +202,12 @@ fn is_detectable(
 const TYPICAL_FORCE_N: f64 = 15.0;
 
 /// What the diagnosis said.
-fn fill(scored: &mut SeveralScored, specimen: &Specimen, result: &DiagnosisResult) {
+fn fill(scored: &mut SeveralScored, specimen: &Specimen, result: &Answer) {
     scored.failure = None;
     scored.verdict = Some(result.verdict);
     scored.named = result.causes.iter().map(|c| c.name.clone()).collect();
     scored.alternatives = result.alternatives.iter().map(|c| c.name.clone()).collect();
-    scored.chi2 = Some([result.chi2_per_datum.before, result.chi2_per_datum.after]);
+    scored.chi2 = result.chi2_per_datum.map(|chi2| [chi2.before, chi2.after]);
     let num_known = scored.experiment.hidden.len() - usize::from(scored.kind == ExperimentKind::Unknown);
     let hidden: Vec<CauseName> =
         scored.experiment.hidden[..num_known].iter().filter_map(|h| h.cause.diagnosed()).collect();
@@ -220,7 +259,8 @@ fn judge(scored: &mut SeveralScored) {
 /// How far (in half diagonals of the place) what is left may lie from the unknown cause to count as located.
 const LOCATED: f64 = 1.5;
 
-fn sum_up(scored: Vec<SeveralScored>, options: &SeveralOptions) -> SeveralProof {
+/// The sums over all that was scored.
+pub fn sum_up(scored: Vec<SeveralScored>, options: &SeveralOptions) -> SeveralProof {
     let of = |kind: ExperimentKind| scored.iter().filter(move |s| s.kind == kind);
     let several = || of(ExperimentKind::Several);
     let share = |part: usize, whole: usize| [part, whole];

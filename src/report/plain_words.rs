@@ -58,7 +58,9 @@ fn what_was_wrong(r: &DiagnosisResult) -> String {
     };
     let inside = r.interior.as_ref().map_or(String::new(), |test| {
         let words = test.origin.in_words();
-        format!(" Before any cause was asked, a part inside the sample was driven by what was measured around it: {words}.")
+        format!(
+            " Before any cause was asked, a part inside the sample was driven by what was measured around it: {words}."
+        )
     });
     format!("{named} {ends}{inside}")
 }
