@@ -40,6 +40,10 @@ const EVALUATE: &[Flag] = &[
     Flag::of("voxel", "scan/voxel_mm"),
     Flag::of("noise", "scan/noise_sd_mm"),
     Flag::of("force-sd", "scan/force_sd_n"),
+    Flag::of("force-drives", "protocol/force_drive_mm"),
+    Flag::of("force-gain-sd", "protocol/force_gain_sd"),
+    Flag::of("force-zero-sd", "protocol/force_zero_sd_n"),
+    Flag::of("drive-zero-sd", "protocol/drive_zero_sd_mm"),
 ];
 const SCAN: &[Flag] = &[
     Flag::read("material", "material", JsonFile),

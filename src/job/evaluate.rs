@@ -6,7 +6,7 @@ use crate::field::FieldError;
 use crate::material::Ogden;
 use crate::mesh::MeshSize;
 use crate::report::{bar_pictures, histogram_picture, map_pictures, surface_json, vtu_of};
-use crate::sensitivity::{DriveSelection, EvaluationError, EvaluationOptions, ScanSettings, evaluate_model};
+use crate::sensitivity::{DriveSelection, EvaluationError, EvaluationOptions, Protocol, ScanSettings, evaluate_model};
 use crate::specimen::Specimen;
 use crate::voxel::VoxelGrid;
 use serde::{Deserialize, Serialize};
@@ -28,6 +28,10 @@ pub struct EvaluationRequest {
     #[serde(default = "defaults::scan")]
     #[schema(default = defaults::scan)]
     pub scan: ScanSettings,
+    /// Forces read beside those at the scans, and what is not known exactly of the load cell and the drive.
+    #[serde(default)]
+    #[schema(default = Protocol::default)]
+    pub protocol: Protocol,
     /// Drives in mm instead of the specimen's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(min_items = 1, max_items = 1000)]
@@ -62,6 +66,7 @@ impl EvaluationRequest {
         driven(&self.specimen, self.drive_mm.as_ref(), &mut errors);
         errors.extend(self.material.field_errors().into_iter().map(|e| e.below("/material")));
         errors.extend(self.scan.field_errors().into_iter().map(|e| e.below("/scan")));
+        errors.extend(self.protocol.field_errors().into_iter().map(|e| e.below("/protocol")));
         if let (Some(stretch), Some(_)) = (self.median_stretch, &self.drive_mm) {
             let error = FieldError::new("/median_stretch", stretch, "left out where drive_mm is given");
             errors.push(error.remedy("give one of the two"));
@@ -111,7 +116,7 @@ impl CheckedEvaluation {
         let specimen = &self.request.specimen;
         let mut mesh = self.request.mesh.options(specimen);
         mesh.use_mirror &= !self.request.is_whole;
-        EvaluationOptions { mesh, ..EvaluationOptions::standard(specimen) }
+        EvaluationOptions { mesh, protocol: self.request.protocol.clone(), ..EvaluationOptions::standard(specimen) }
     }
 }
 
@@ -128,7 +133,7 @@ impl Run for CheckedEvaluation {
         let r = &self.request;
         let content = serde_json::json!({
             "specimen": r.specimen, "material": r.material, "scan": r.scan, "drives": self.drives,
-            "mesh": self.options().mesh,
+            "mesh": self.options().mesh, "protocol": r.protocol,
         });
         Some((content, !r.has_files))
     }

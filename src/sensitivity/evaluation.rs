@@ -5,9 +5,11 @@ use super::covariance::{IDENTIFIABILITY_LIMIT, PromisedSd};
 use super::drives::{DriveSelection, check_drives, solve_for_median};
 use super::error::EvaluationError;
 use super::information::FisherInformation;
-use super::observation::{DriveMaps, DrivenState, EvaluationStep, Scanner};
+use super::joint_information::JointInformation;
+use super::observation::{DriveMaps, DrivenState, EvaluationStep, Scanner, Unknown};
+use super::protocol::{Nuisance, Protocol};
 use super::scan_settings::ScanSettings;
-use crate::fem::{Equilibrium, ForwardModel, PrepareError, SolveOptions};
+use crate::fem::{Equilibrium, ForwardModel, PrepareError, SolveOptions, Tangent};
 use crate::material::{Ogden, Parameter};
 use crate::mesh::MeshOptions;
 use crate::provenance::input_hash;
@@ -15,8 +17,11 @@ use crate::specimen::Specimen;
 use crate::voxel::{Sampling, VoxelMask};
 use serde::{Deserialize, Serialize};
 
+/// Drives nearer to each other than this are one, mm.
+const SAME_DRIVE_MM: f64 = 1e-9;
+
 /// Settings of an evaluation.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct EvaluationOptions {
     /// The mesh.
     pub mesh: MeshOptions,
@@ -28,6 +33,8 @@ pub struct EvaluationOptions {
     pub identifiability_limit: f64,
     /// Standard deviation of ln κ known beforehand, added to the joint information; none by default.
     pub bulk_log_prior_sd: Option<f64>,
+    /// Forces read beside the scans, and what is not known exactly of the set-up; none by default.
+    pub protocol: Protocol,
 }
 
 impl EvaluationOptions {
@@ -39,6 +46,7 @@ impl EvaluationOptions {
             solve: SolveOptions::default(),
             identifiability_limit: IDENTIFIABILITY_LIMIT,
             bulk_log_prior_sd: None,
+            protocol: Protocol::default(),
         }
     }
 }
@@ -49,8 +57,11 @@ impl EvaluationOptions {
 pub struct Evaluation {
     /// Always `evaluation/1`.
     pub schema: String,
-    /// Drives, increasing.
+    /// Drives that are scanned, increasing.
     pub steps: Vec<EvaluationStep>,
+    /// Drives at which the force alone is read.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub force_steps: Vec<ForceStep>,
     /// Standard deviations that all drives together promise.
     pub promised_sd: Vec<PromisedSd>,
     /// Correlation of the estimates, rows and columns as `promised_sd`; null where undetermined.
@@ -71,6 +82,16 @@ pub struct Evaluation {
     pub version: String,
     /// SHA-256 of specimen, material, scan, drives and settings, hexadecimal.
     pub input_hash: String,
+}
+
+/// A drive at which the force alone is read.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ForceStep {
+    /// Drive, mm.
+    pub drive_mm: f64,
+    /// Force of all samples together, N.
+    pub force_n: f64,
 }
 
 /// Meaning of the numbers, for readers of the JSON alone.
@@ -178,26 +199,32 @@ pub fn evaluate_model(
             (vec![found], count)
         }
     };
-    let mut information = FisherInformation::none(material);
-    if let Some(sd) = options.bulk_log_prior_sd {
-        information.add_log_prior(Parameter::Kappa, sd)?;
-    }
+    let nuisances = options.protocol.nuisances();
+    let mut joint = JointInformation::none(material, nuisances.len());
     let (mut steps, mut maps, mut information_by_drive) = (Vec::new(), Vec::new(), Vec::new());
     for equilibrium in &equilibria {
-        let sensitivities = model.tangent(material, equilibrium)?.material_sensitivities()?;
         let stretch = largest_principal_stretch(&model.quadrature_fields(material, equilibrium));
+        let mut tangent = model.tangent(material, equilibrium)?;
+        let sensitivities = tangent.material_sensitivities()?;
         let state = DrivenState {
             drive_mm: equilibrium.drive_mm,
             force_n: equilibrium.force_n,
             displacement: &equilibrium.displacement,
             sensitivities: &sensitivities,
             largest_principal_stretch: stretch,
+            unknowns: &unknowns_at(&nuisances, equilibrium, &mut tangent)?,
         };
         let seen = scanner.observe(material, &state, options.identifiability_limit)?;
-        information.add(&seen.information)?;
+        joint.add(&seen.joint)?;
         information_by_drive.push(seen.information);
         steps.push(seen.step);
         maps.push(seen.maps);
+    }
+    let force_steps = add_forces(&mut joint, model, material, scan, options, &steps, is_cancelled)?;
+    let sd: Vec<f64> = nuisances.iter().map(|n| n.1).collect();
+    let mut information = joint.about_material(material, &sd)?;
+    if let Some(sd) = options.bulk_log_prior_sd {
+        information.add_log_prior(Parameter::Kappa, sd)?;
     }
     let covariance = information.covariance();
     let evaluation = Evaluation {
@@ -207,6 +234,7 @@ pub fn evaluate_model(
         condition_number: covariance.condition_number(&information.shear_indices()),
         largest_principal_stretch: steps.iter().map(|s| s.largest_principal_stretch).fold(f64::NAN, f64::max),
         steps,
+        force_steps,
         voxel_material_volume_mm3: scanner.mask.material_volume_mm3(),
         scan: *scan,
         notes: EvaluationNotes::default(),
@@ -222,6 +250,57 @@ pub fn evaluate_model(
         input_hash: hash_of_inputs(specimen, material, scan, drives, options),
     };
     Ok((evaluation, EvaluationMaps { mask: scanner.mask, drives: maps, equilibria, information, information_by_drive }))
+}
+
+/// How the state of a drive changes with each unknown of the set-up.
+fn unknowns_at(
+    nuisances: &[(Nuisance, f64)],
+    equilibrium: &Equilibrium,
+    tangent: &mut Tangent,
+) -> Result<Vec<Unknown>, EvaluationError> {
+    let of = |&(nuisance, sd): &(Nuisance, f64)| {
+        let (displacement, force_n) = match nuisance {
+            Nuisance::ForceGain => (None, equilibrium.force_n),
+            Nuisance::ForceZero => (None, 1.0),
+            Nuisance::DriveZero => {
+                let along = tangent.path_sensitivity(&[], None, 1.0)?;
+                (Some(along.displacement), along.force_n)
+            }
+        };
+        Ok(Unknown { sd, displacement, force_n })
+    };
+    nuisances.iter().map(of).collect()
+}
+
+/// Adds the forces that are read without a scan, and gives them. A drive that is scanned has its force already.
+fn add_forces(
+    joint: &mut JointInformation,
+    model: &mut ForwardModel,
+    material: &Ogden,
+    scan: &ScanSettings,
+    options: &EvaluationOptions,
+    scanned: &[EvaluationStep],
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Vec<ForceStep>, EvaluationError> {
+    let is_scanned = |drive: &f64| scanned.iter().any(|s| (s.drive_mm - drive).abs() < SAME_DRIVE_MM);
+    let mut drives: Vec<f64> = options.protocol.force_drive_mm.iter().copied().filter(|d| !is_scanned(d)).collect();
+    drives.sort_by(f64::total_cmp);
+    drives.dedup_by(|a, b| (*a - *b).abs() < SAME_DRIVE_MM);
+    if drives.is_empty() {
+        return Ok(Vec::new());
+    }
+    check_drives(&DriveSelection::DriveMm(drives.clone()))?;
+    let nuisances = options.protocol.nuisances();
+    let mut steps = Vec::new();
+    for equilibrium in model.solve_path(material, &drives, &options.solve, is_cancelled)? {
+        let mut tangent = model.tangent(material, &equilibrium)?;
+        let forces: Vec<f64> = tangent.material_sensitivities()?.iter().map(|s| s.force_n).collect();
+        let unknowns = unknowns_at(&nuisances, &equilibrium, &mut tangent)?;
+        let of_unknowns: Vec<f64> = unknowns.iter().map(|u| u.force_n).collect();
+        joint.add_force(&forces, &of_unknowns, scan.force_sd_n);
+        steps.push(ForceStep { drive_mm: equilibrium.drive_mm, force_n: equilibrium.force_n });
+    }
+    Ok(steps)
 }
 
 /// SHA-256 over the JSON of all inputs. Field order is fixed by the types, so equal inputs have equal hashes.
@@ -243,6 +322,7 @@ fn hash_of_inputs(
         "solver_tolerance": options.solve.tolerance,
         "identifiability_limit": options.identifiability_limit,
         "bulk_log_prior_sd": options.bulk_log_prior_sd,
+        "protocol": options.protocol,
     });
     input_hash(&inputs)
 }

@@ -7,8 +7,10 @@ mod error;
 mod evaluation;
 mod information;
 mod integrated;
+mod joint_information;
 mod observation;
 mod pointwise;
+mod protocol;
 mod scan_settings;
 mod separation;
 
@@ -19,11 +21,13 @@ pub use covariance::{Covariance, Criterion, IDENTIFIABILITY_LIMIT, PromisedSd};
 pub use drives::DriveSelection;
 pub use error::EvaluationError;
 pub use evaluation::{
-    Evaluation, EvaluationMaps, EvaluationNotes, EvaluationOptions, EvaluationStatistics, evaluate, evaluate_model,
+    Evaluation, EvaluationMaps, EvaluationNotes, EvaluationOptions, EvaluationStatistics, ForceStep, evaluate,
+    evaluate_model,
 };
 pub use information::{FisherInformation, InformationError, MeasurementNoise};
 pub use integrated::{IntegratedSensitivity, integrate_over_voxels, parameter_sensitivity, sensitivity_map};
-pub use observation::{DriveMaps, DrivenState, EvaluationStep, Observation, Scanner, median};
+pub use observation::{DriveMaps, DrivenState, EvaluationStep, Observation, Scanner, Unknown, median};
 pub use pointwise::{PointwiseSensitivity, alpha_sensitivity, mu_sensitivity};
+pub use protocol::Protocol;
 pub use scan_settings::{PartialVoxels, ScanSettings};
 pub use separation::{MaterialState, Separation, separation_over_quadrature};

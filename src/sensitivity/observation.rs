@@ -4,6 +4,7 @@ use super::covariance::PromisedSd;
 use super::error::EvaluationError;
 use super::information::{FisherInformation, MeasurementNoise};
 use super::integrated::{IntegratedSensitivity, integrate_over_voxels, sensitivity_map, shear_parameters};
+use super::joint_information::{JointInformation, NuisanceColumn};
 use super::scan_settings::ScanSettings;
 use crate::fem::ParameterSensitivity;
 use crate::kinematics::{Decomposition, decompose};
@@ -70,6 +71,8 @@ pub struct Observation {
     pub maps: DriveMaps,
     /// Of this drive.
     pub information: FisherInformation,
+    /// The same with the unknowns of the set-up.
+    pub(super) joint: JointInformation,
 }
 
 /// Median of finite numbers: the middle one, or the mean of the two middle ones; none without any.
@@ -96,6 +99,19 @@ pub struct DrivenState<'a> {
     pub sensitivities: &'a [ParameterSensitivity],
     /// From [`super::largest_principal_stretch`].
     pub largest_principal_stretch: f64,
+    /// What is not known exactly of the set-up, and how the state changes with it.
+    pub unknowns: &'a [Unknown],
+}
+
+/// An unknown of the set-up at a solved drive.
+#[derive(Clone, Debug)]
+pub struct Unknown {
+    /// Standard deviation to which it is known beforehand.
+    pub sd: f64,
+    /// Change of the nodal displacements with it, mm per unit; `None` where they do not change.
+    pub displacement: Option<Vec<[f64; 3]>>,
+    /// Change of the force with it, N per unit.
+    pub force_n: f64,
 }
 
 /// The scan of one specimen on one mesh: its mask and how it weighs what it sees.
@@ -150,7 +166,18 @@ impl Scanner {
             .map(|s| self.operator.average(&s.displacement))
             .collect::<Result<Vec<_>, _>>()?;
         let forces: Vec<f64> = state.sensitivities.iter().map(|s| s.force_n).collect();
-        let information = FisherInformation::of_drive(material, &fields, &self.weights, &forces, &self.noise)?;
+        let alone = FisherInformation::of_drive(material, &fields, &self.weights, &forces, &self.noise)?;
+        let nuisances = state
+            .unknowns
+            .iter()
+            .map(|u| {
+                let field = u.displacement.as_ref().map(|d| self.operator.average(d)).transpose()?;
+                Ok(NuisanceColumn { field, force_n: u.force_n })
+            })
+            .collect::<Result<Vec<_>, VoxelError>>()?;
+        let joint = JointInformation::of_drive(alone, &fields, &forces, &nuisances, &self.weights, &self.noise);
+        let sd: Vec<f64> = state.unknowns.iter().map(|u| u.sd).collect();
+        let information = joint.about_material(material, &sd)?;
         let largest = states.iter().map(|s| s.stretch_amplitude).fold(1.0, f64::max);
         let end = ((largest - 1.0) / STRETCH_AXIS_STEP).ceil().max(1.0) * STRETCH_AXIS_STEP + 1.0;
         let histogram = Histogram2d::of(
@@ -172,7 +199,7 @@ impl Scanner {
         };
         let sensitivities = shear_parameters(material).map(|p| (p, sensitivity_map(material, p, &states))).collect();
         let maps = DriveMaps { drive_mm: state.drive_mm, displacement, states, sensitivities, histogram };
-        Ok(Observation { step, maps, information })
+        Ok(Observation { step, maps, information, joint })
     }
 }
 
@@ -204,6 +231,7 @@ mod tests {
             displacement: &displacement,
             sensitivities: &made_up_sensitivities(&mesh),
             largest_principal_stretch: largest_principal_stretch(&quadrature_points(&mesh, &displacement)),
+            unknowns: &[],
         };
         let seen = scanner.observe(&one_term(), &state, 0.5).unwrap();
         let lambda = 0.3 + 1.09f64.sqrt();

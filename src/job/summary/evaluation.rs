@@ -18,6 +18,9 @@ pub(in crate::job) fn evaluation(name: &str, evaluation: &Evaluation) -> String 
             );
         }
     }
+    for step in &evaluation.force_steps {
+        text += &format!("\ndrive {} mm: force {:.3} N, read without a scan\n", step.drive_mm, step.force_n);
+    }
     text += "\npromised standard deviations, all drives together\n";
     for p in &evaluation.promised_sd {
         text += &match (p.value, p.relative_sd) {

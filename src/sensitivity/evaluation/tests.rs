@@ -176,3 +176,44 @@ fn comparison_at_equal_median_stretch() {
         }
     }
 }
+
+/// Forces on the way to a scan tell two terms apart; an unknown gain of the load cell takes some of that back, and a
+/// gain as good as known takes nothing.
+#[test]
+fn forces_on_the_way_and_unknowns_of_the_set_up() {
+    use crate::material::OgdenTerm;
+    let specimen = with_hole();
+    let material = Ogden {
+        bulk_kpa: 2000.0,
+        terms: vec![OgdenTerm { mu_kpa: 12.0, alpha: 1.5 }, OgdenTerm { mu_kpa: 2.0, alpha: 5.0 }],
+    };
+    let drives = DriveSelection::DriveMm(vec![2.5]);
+    let promised = |protocol: Protocol| -> (Vec<f64>, Evaluation) {
+        let options = EvaluationOptions {
+            mesh: MeshOptions::search(&specimen),
+            protocol,
+            ..EvaluationOptions::standard(&specimen)
+        };
+        let (found, _) = evaluate(&specimen, &material, &coarse_scan(), &drives, &options, &|| false).unwrap();
+        (found.promised_sd.iter().map(|p| p.value.unwrap()).collect(), found)
+    };
+    let alone = promised(Protocol::default()).0;
+    let with_forces = Protocol { force_drive_mm: vec![1.0, 1.75, 2.5], ..Protocol::default() };
+    let (forces, found) = promised(with_forces.clone());
+    // The scanned drive has its force already.
+    assert_eq!(found.force_steps.iter().map(|s| s.drive_mm).collect::<Vec<_>>(), [1.0, 1.75]);
+    assert!(found.force_steps[0].force_n < found.force_steps[1].force_n);
+    let (gain, _) = promised(Protocol { force_gain_sd: 0.02, ..with_forces.clone() });
+    let (known, _) = promised(Protocol { force_gain_sd: 1e-9, ..with_forces.clone() });
+    let (zero, _) = promised(Protocol { drive_zero_sd_mm: 0.05, force_zero_sd_n: 0.05, ..with_forces });
+    for (i, sd) in forces.iter().enumerate() {
+        assert!(*sd < alone[i], "{forces:?} {alone:?}");
+        // An unknown never helps; one of 10⁻⁹ takes a 10⁻¹⁸th.
+        assert!(gain[i] > *sd && zero[i] > *sd, "{gain:?} {zero:?} {forces:?}");
+        assert!((known[i] / sd - 1.0).abs() < 1e-9, "{known:?} {forces:?}");
+    }
+    // The data know moduli times gain alone: no modulus is known better than the gain.
+    for (i, modulus) in [(1, 12.0), (3, 2.0)] {
+        assert!(gain[i] > 0.02 * modulus * (1.0 - 1e-6), "{gain:?}");
+    }
+}
