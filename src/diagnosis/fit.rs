@@ -321,8 +321,8 @@ fn fitted_members(members: &[Member], at: Point, matrix: &DMatrix<f64>, iteratio
         .collect()
 }
 
-/// Half the Hessian of the deviance in scaled parameters and its negative half gradient, where `columns` are the changes
-/// of the prediction.
+/// Half the Hessian of the deviance in scaled parameters and its negative half gradient, where `columns` are the
+/// changes of the prediction.
 pub(super) fn normal_system(
     metric: &Metric,
     measured: &Trace,

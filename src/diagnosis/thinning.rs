@@ -17,8 +17,8 @@ use super::supposed::Supposed;
 use super::trace::Trace;
 use nalgebra::{DMatrix, DVector};
 
-/// A cause that changes the image alone looks like no mesh's error where it is plain. Where no more would be left without
-/// it than a mesh could leave, it needs so many times the usual evidence.
+/// A cause that changes the image alone looks like no mesh's error where it is plain. Where no more would be left
+/// without it than a mesh could leave, it needs so many times the usual evidence.
 const OF_IMAGE_ALONE: f64 = 10.0;
 
 /// The quadratic form of a fit at its end, in scaled parameters.
