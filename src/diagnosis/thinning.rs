@@ -162,12 +162,15 @@ pub(super) fn thinned(
                     "without '{name}' {left_mm:.4} mm rms are left and the deviance rises by {missed:.0}; it costs {cost:.0}"
                 ));
                 let beyond = missed - cost;
-                let could_be_a_meshs = left_mm < UNEXPLAINED * inference.allowance_mm;
-                (cause, match (could_be_a_meshs, supposed.cause.changes_sample()) {
-                    (false, _) => beyond,
-                    (true, true) => beyond.min(-f64::MIN_POSITIVE),
-                    (true, false) => beyond - OF_IMAGE_ALONE * EVIDENCE,
-                })
+                // Of those that are called for by the data, what a mesh could do goes last: what it stands for may be
+                // seen only once the others are out.
+                let needed = match (left_mm < UNEXPLAINED * inference.allowance_mm, supposed.cause.changes_sample()) {
+                    (false, _) => 0.0,
+                    (true, true) => f64::INFINITY,
+                    (true, false) => OF_IMAGE_ALONE * EVIDENCE,
+                };
+                let beyond = missed - cost;
+                (cause, if beyond < needed { beyond.min(-f64::MIN_POSITIVE) } else { beyond })
             })
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let Some((cause, _)) = least.filter(|(_, beyond)| *beyond < 0.0) else { break };
