@@ -161,7 +161,6 @@ pub(super) fn thinned(
                 (inference.progress)(&format!(
                     "without '{name}' {left_mm:.4} mm rms are left and the deviance rises by {missed:.0}; it costs {cost:.0}"
                 ));
-                let beyond = missed - cost;
                 // Of those that are called for by the data, what a mesh could do goes last: what it stands for may be
                 // seen only once the others are out.
                 let needed = match (left_mm < UNEXPLAINED * inference.allowance_mm, supposed.cause.changes_sample()) {
