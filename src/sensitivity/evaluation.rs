@@ -312,7 +312,7 @@ fn hash_of_inputs(
     options: &EvaluationOptions,
 ) -> String {
     let Sampling { gauss_points, cut_slices } = options.sampling;
-    let inputs = serde_json::json!({
+    let mut inputs = serde_json::json!({
         "specimen": specimen,
         "material": material,
         "scan": scan,
@@ -322,8 +322,11 @@ fn hash_of_inputs(
         "solver_tolerance": options.solve.tolerance,
         "identifiability_limit": options.identifiability_limit,
         "bulk_log_prior_sd": options.bulk_log_prior_sd,
-        "protocol": options.protocol,
     });
+    // Left out where there is nothing beside the scans, so that older results can be compared.
+    if options.protocol != Protocol::default() {
+        inputs["protocol"] = serde_json::json!(options.protocol);
+    }
     input_hash(&inputs)
 }
 

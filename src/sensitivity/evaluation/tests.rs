@@ -21,7 +21,15 @@ fn hash_follows_the_inputs() {
     let hash = hash_of_inputs(&specimen, &one_term(), &scan(), &drives, &options);
     assert_eq!(hash.len(), 64);
     assert_eq!(hash, hash_of_inputs(&specimen, &one_term(), &scan(), &drives, &options));
+    let protocol = Protocol { force_drive_mm: vec![1.0], ..Protocol::default() };
     let others = [
+        hash_of_inputs(
+            &specimen,
+            &one_term(),
+            &scan(),
+            &drives,
+            &EvaluationOptions { protocol, ..EvaluationOptions::standard(&specimen) },
+        ),
         hash_of_inputs(&block("other"), &one_term(), &scan(), &drives, &options),
         hash_of_inputs(&specimen, &Ogden { bulk_kpa: 1.0, ..one_term() }, &scan(), &drives, &options),
         hash_of_inputs(&specimen, &one_term(), &ScanSettings { force_sd_n: 0.03, ..scan() }, &drives, &options),
