@@ -113,7 +113,7 @@ fn interior(page: &mut Report, r: &DiagnosisResult) {
     let Some(test) = &r.interior else { return };
     page.subsection("Where it was made, asked before any cause");
     page.paragraph(&format!(
-        "The part of the sample between two planes {} mm from its middle was driven by the displacement that was measured on them,          whatever the plates and bonds did. There χ² per datum falls from {} to {}, and the misfit beyond noise from {} to {} mm rms: {}.",
+        "The part of the sample between two planes {} mm from its middle was driven by the displacement that was measured on them, whatever the plates and bonds did. There χ² per datum falls from {} to {}, and the misfit beyond noise from {} to {} mm rms: {}.",
         significant(test.plane_mm, 3),
         significant(test.chi2_per_datum.before, 3),
         significant(test.chi2_per_datum.after, 3),

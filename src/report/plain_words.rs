@@ -74,9 +74,10 @@ fn what_the_material_is(d: &Diagnosis, r: &DiagnosisResult) -> String {
         let is_modulus = !matches!(kind, Parameter::Alpha(_));
         match p.interval_95.filter(|i| is_known(p, *i) && (has_force || !is_modulus)) {
             Some([a, b]) => known.push(format!(
-                "{} is {} (95 % interval {} to {})",
+                "{} is {}{} (95 % interval {} to {})",
                 p.name.replace('_', " "),
                 significant(p.value, 3),
+                if is_modulus { " kPa" } else { "" },
                 significant(a, 3),
                 significant(b, 3)
             )),
