@@ -5,7 +5,7 @@
 //! out one after the other, the one that is missed least first (backward elimination), as long as none of them is
 //! missed by more than it costs; then what is left is fitted again. A cause that changes the sample must also do more
 //! than a mesh's error could: where hardly anything would be left without it, it goes, whatever the evidence. One that
-//! changes the image alone then needs far more evidence than usual.
+//! changes the image alone, and by no more than that, needs far more evidence than usual.
 
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
@@ -17,8 +17,8 @@ use super::supposed::Supposed;
 use super::trace::Trace;
 use nalgebra::{DMatrix, DVector};
 
-/// A cause that changes the image alone looks like no mesh's error where it is plain. Where no more would be left
-/// without it than a mesh could leave, it needs so many times the usual evidence.
+/// A cause that changes the image alone looks like no mesh's error where it is plain. Where it does no more than a mesh
+/// could, it needs so many times the usual evidence.
 const OF_IMAGE_ALONE: f64 = 10.0;
 
 /// The quadratic form of a fit at its end, in scaled parameters.
@@ -163,10 +163,11 @@ pub(super) fn thinned(
                 ));
                 // Of those that are called for by the data, what a mesh could do goes last: what it stands for may be
                 // seen only once the others are out.
-                let needed = match (left_mm < UNEXPLAINED * inference.allowance_mm, supposed.cause.changes_sample()) {
-                    (false, _) => 0.0,
-                    (true, true) => f64::INFINITY,
-                    (true, false) => OF_IMAGE_ALONE * EVIDENCE,
+                let is_a_meshs = |mm: f64| mm < UNEXPLAINED * inference.allowance_mm;
+                let needed = match supposed.cause.changes_sample() {
+                    true if is_a_meshs(left_mm) => f64::INFINITY,
+                    false if is_a_meshs(model.effect_rms_mm(cause)) => OF_IMAGE_ALONE * EVIDENCE,
+                    _ => 0.0,
                 };
                 let beyond = missed - cost;
                 (cause, if beyond < needed { beyond.min(-f64::MIN_POSITIVE) } else { beyond })
