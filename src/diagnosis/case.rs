@@ -18,6 +18,8 @@ pub(super) struct Case<'a> {
     pub(super) laboratory: Laboratory<'a>,
     /// The weights of its misfit, as in the last fit of the diagnosis.
     pub(super) metric: Metric,
+    /// Noise alone, as χ² weighs it.
+    pub(super) noise: Metric,
     /// What was recorded, less what the load curve explained and what the mesh gets wrong.
     pub(super) measured: Trace,
 }
@@ -41,6 +43,7 @@ impl<'a> Case<'a> {
             true => metric.with_variance(found.discrepancy_mm2),
             false => metric,
         };
-        Ok(Case { name, found, laboratory, metric, measured })
+        let noise = Metric::new(&found.observed, 0.0, &|_| true);
+        Ok(Case { name, found, laboratory, metric, noise, measured })
     }
 }

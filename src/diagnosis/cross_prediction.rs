@@ -150,7 +150,7 @@ impl Predictor<'_> {
         Ok(self.predict(case, material, causes)?.map(|p| misfit(case, &p.trace)))
     }
 
-    /// The misfit with the plates' motions at each step fitted, material and causes as they are.
+    /// The misfit with the plates' motions at each step fitted so that χ² is smallest, material and causes as they are.
     fn with_own_motions(
         &self,
         case: &mut Case,
@@ -165,15 +165,8 @@ impl Predictor<'_> {
         for _ in 0..NUM_STEPS {
             let Some(prediction) = self.predict(case, material, &all)? else { return Ok(None) };
             let Ok(columns) = derivatives(&mut case.laboratory, material, &all, &prediction) else { return Ok(None) };
-            let (matrix, gradient) = normal_system(
-                &case.metric,
-                &case.measured,
-                &prediction,
-                material,
-                &all,
-                &case.found.settings,
-                &columns,
-            );
+            let (matrix, gradient) =
+                normal_system(&case.noise, &case.measured, &prediction, material, &all, &case.found.settings, &columns);
             let Some(own) = all.last_mut() else { return Ok(None) };
             let (num, num_own) = (matrix.nrows(), own.values.len());
             let first = num - num_own;

@@ -65,9 +65,9 @@ pub(super) fn experiments(
         let (Ok(ours), Ok(theirs)) = (ours, theirs) else { continue };
         let Ok(columns) = derivatives(&mut there, &other.material, &other.causes, &theirs) else { continue };
         let apart = metric.weigh(&ours.trace.plus(-1.0, &theirs.trace));
-        let weighed: Vec<_> = columns.iter().map(|c| metric.weigh(c)).collect();
+        let weighed = metric.weigh_all(&columns);
         let gradient = DVector::from_iterator(weighed.len(), weighed.iter().map(|c| metric.inner(c, &apart)));
-        let own = DMatrix::from_fn(weighed.len(), weighed.len(), |i, j| metric.inner(&weighed[i], &weighed[j]));
+        let own = metric.products(&weighed, &weighed);
         let Some(factor) = (&known + own).cholesky() else { continue };
         let squared = metric.inner(&apart, &apart) - gradient.dot(&factor.solve(&gradient));
         found.push(Experiment { drive_mm, distance_sd: squared.max(0.0).sqrt() });
@@ -84,6 +84,6 @@ fn information(
     settings: &FitSettings,
 ) -> Result<DMatrix<f64>, DiagnosisError> {
     let columns = derivatives(laboratory, &fitted.material, &fitted.causes, &fitted.prediction)?;
-    let weighed: Vec<_> = columns.iter().map(|c| metric.weigh(c)).collect();
+    let weighed = metric.weigh_all(&columns);
     Ok(normal_matrix(metric, &weighed, &fitted.material, &fitted.causes, settings))
 }

@@ -333,10 +333,9 @@ pub(super) fn normal_system(
     columns: &[Trace],
 ) -> (DMatrix<f64>, DVector<f64>) {
     let residual = metric.weigh(&measured.plus(-1.0, &prediction.trace));
-    let weighed: Vec<_> = columns.iter().map(|c| metric.weigh(c)).collect();
+    let weighed = metric.weigh_all(columns);
     let matrix = normal_matrix(metric, &weighed, material, causes, settings);
-    let mut gradient =
-        DVector::from_iterator(weighed.len(), weighed.iter().map(|column| metric.inner(column, &residual)));
+    let mut gradient = metric.products(&weighed, &[residual]).column(0).into_owned();
     gradient[0] += settings.bulk.log_sd.powi(-2) * (settings.bulk.center_kpa / material.bulk_kpa).ln();
     if let Some(shear) = &settings.shear {
         let (_, slope, pull) = shear.terms(material);
@@ -365,14 +364,9 @@ pub fn normal_matrix(
     causes: &[Supposed],
     settings: &FitSettings,
 ) -> DMatrix<f64> {
-    let n = weighed.len();
-    let mut matrix = DMatrix::zeros(n, n);
-    for i in 0..n {
-        for j in 0..=i {
-            matrix[(i, j)] = metric.inner(&weighed[i], &weighed[j]);
-            matrix[(j, i)] = matrix[(i, j)];
-        }
-    }
+    let mut matrix = metric.products(weighed, weighed);
+    // Symmetric but for rounding.
+    matrix.fill_upper_triangle_with_lower_triangle();
     matrix[(0, 0)] += settings.bulk.log_sd.powi(-2);
     if let Some(shear) = &settings.shear {
         let (_, slope, _) = shear.terms(material);

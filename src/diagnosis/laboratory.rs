@@ -7,7 +7,7 @@ use super::station::Stations;
 use super::supposed::Path;
 use super::trace::Trace;
 use crate::calibration::Observed;
-use crate::fem::{Departures, Equilibrium, ForwardModel, SolveError, SolveOptions, Tangent};
+use crate::fem::{Change, Departures, Equilibrium, ForwardModel, SolveError, SolveOptions, Tangent};
 use crate::material::Ogden;
 use crate::mesh::{MeshOptions, half_extents_mm, mesh_specimen};
 use crate::specimen::TestKind;
@@ -25,6 +25,18 @@ pub struct Prediction {
     pub states: Vec<Equilibrium>,
     /// Voxel averages before the image's changes.
     pub(super) seen: Vec<Vec<[f64; 3]>>,
+}
+
+/// A step at which changes are looked at.
+struct OfStep<'a> {
+    /// The station.
+    at: usize,
+    /// The step's number.
+    n: usize,
+    /// Half the difference of t over which departures are differenced.
+    step: f64,
+    /// The gradient of the displacement at every voxel; empty where no path moves nodes.
+    gradients: &'a [[[f64; 3]; 3]],
 }
 
 /// Predicts recordings of scenes.
@@ -218,27 +230,25 @@ impl<'a> Laboratory<'a> {
             } else {
                 Vec::new()
             };
-            let tasks: Vec<(usize, usize)> =
-                (0..group.len()).flat_map(|k| (0..paths.len()).map(move |index| (k, index))).collect();
+            // Paths that are differentiated together share the work on the state; threads share the paths.
+            let indices: Vec<usize> = (0..paths.len()).collect();
+            let size = paths.len().div_ceil(2 * rayon::current_num_threads()).max(1);
+            let tasks: Vec<(usize, &[usize])> =
+                (0..group.len()).flat_map(|k| indices.chunks(size).map(move |some| (k, some))).collect();
             let found = tasks
                 .par_iter()
-                .map(|&(k, index)| {
-                    let n = group[k];
-                    let (path, velocity) = (paths[index], velocities[index].as_deref());
-                    let is_still = !path.changes_sample || path.only_step.is_some_and(|only| only != n);
-                    if is_still && velocity.is_none() {
-                        return Ok((vec![[0.0; 3]; prediction.seen[n].len()], 0.0));
-                    }
-                    let mut tangent = tangents[k].0.shared();
-                    match velocity {
-                        Some(velocity) => self.change_by_nodes(at, &mut tangent, &gradients[k], velocity),
-                        None => self.change_by_departures(at, &mut tangent, material, path, n, step),
-                    }
+                .map(|&(k, some)| {
+                    let tangent = tangents[k].0.shared();
+                    let of_step = OfStep { at, n: group[k], step, gradients: gradients.get(k).map_or(&[][..], |g| g) };
+                    let of_path = |&index: &usize| (paths[index], velocities[index].as_deref());
+                    self.changes_along(tangent, material, &of_step, &some.iter().map(of_path).collect::<Vec<_>>())
                 })
                 .collect::<Result<Vec<_>, DiagnosisError>>()?;
-            for (&(_, index), (field, force)) in tasks.iter().zip(found) {
-                changes[index].displacement.push(field);
-                changes[index].force.push(force);
+            for (&(_, some), found) in tasks.iter().zip(found) {
+                for (&index, (field, force)) in some.iter().zip(found) {
+                    changes[index].displacement.push(field);
+                    changes[index].force.push(force);
+                }
             }
             for ((_, sensitivities), &n) in tangents.into_iter().zip(group) {
                 let has_force = self.observed.steps[n].force.is_some();
@@ -285,43 +295,52 @@ impl<'a> Laboratory<'a> {
             .collect()
     }
 
-    /// Changes of the voxel averages and of the force as the nodes move.
-    fn change_by_nodes(
+    /// Changes of the voxel averages and of the force along some paths, each with the velocity of the nodes where it
+    /// moves them.
+    fn changes_along(
         &self,
-        at: usize,
-        tangent: &mut Tangent,
-        gradients: &[[[f64; 3]; 3]],
-        velocity: &[[f64; 3]],
-    ) -> Result<(Vec<[f64; 3]>, f64), DiagnosisError> {
-        let view = &self.stations[at].view;
-        let s = tangent.path_sensitivity(&[], Some(velocity), 0.0)?;
-        // The derivative follows the nodes; the scan's voxels stay: u′ − ∇u V.
-        let mut field = view.average(&s.displacement)?;
-        let moved = view.average(velocity)?;
-        for ((u, v), g) in field.iter_mut().zip(&moved).zip(gradients) {
-            for i in 0..3 {
-                u[i] -= (0..3).map(|j| g[i][j] * v[j]).sum::<f64>();
-            }
-        }
-        Ok((field, s.force_n))
-    }
-
-    /// Changes of the voxel averages and of the force along a path of departures, at a step.
-    fn change_by_departures(
-        &self,
-        at: usize,
-        tangent: &mut Tangent,
+        mut tangent: Tangent,
         material: &Ogden,
-        path: &Path,
-        n: usize,
-        step: f64,
-    ) -> Result<(Vec<[f64; 3]>, f64), DiagnosisError> {
-        let departures = |t: f64| self.departures(material, &(path.to)(t), n);
-        let s = match path.moves_only_plates {
-            true => tangent.plates_sensitivity(&departures, step)?,
-            false => tangent.departure_sensitivity(&departures, step)?,
+        of_step: &OfStep,
+        paths: &[(&Path, Option<&[[f64; 3]]>)],
+    ) -> Result<Vec<(Vec<[f64; 3]>, f64)>, DiagnosisError> {
+        let &OfStep { at, n, step, gradients } = of_step;
+        let change_of = |&(path, velocity): &(&Path, Option<&[[f64; 3]]>)| -> Option<Change> {
+            if velocity.is_some() {
+                return Some(tangent.change_of_nodes(velocity, 0.0));
+            }
+            if !path.changes_sample || path.only_step.is_some_and(|only| only != n) {
+                return None;
+            }
+            let departures = |t: f64| self.departures(material, &(path.to)(t), n);
+            Some(match path.moves_only_plates {
+                true => tangent.change_of_plates(&departures, step),
+                false => tangent.change_of_departures(&departures, step),
+            })
         };
-        Ok((self.stations[at].view.average(&s.displacement)?, s.force_n))
+        let changes: Vec<Option<Change>> = paths.iter().map(change_of).collect();
+        let is_still: Vec<bool> = changes.iter().map(Option::is_none).collect();
+        let changes: Vec<Change> = changes.into_iter().flatten().collect();
+        let mut found = tangent.sensitivities(&changes)?.into_iter();
+        let view = &self.stations[at].view;
+        let mut all = Vec::with_capacity(paths.len());
+        for (&(_, velocity), is_still) in paths.iter().zip(is_still) {
+            let Some(s) = (if is_still { None } else { found.next() }) else {
+                all.push((vec![[0.0; 3]; self.observed.mask.voxels.len()], 0.0));
+                continue;
+            };
+            let mut field = view.average(&s.displacement)?;
+            if let Some(velocity) = velocity {
+                // The derivative follows the nodes; the scan's voxels stay: u′ − ∇u V.
+                for ((u, v), g) in field.iter_mut().zip(&view.average(velocity)?).zip(gradients) {
+                    for i in 0..3 {
+                        u[i] -= (0..3).map(|j| g[i][j] * v[j]).sum::<f64>();
+                    }
+                }
+            }
+            all.push((field, s.force_n));
+        }
+        Ok(all)
     }
 
     /// What the image and the load cell make of a change of the sample, and their own change: a difference of both.
@@ -387,15 +406,22 @@ impl<'a> Laboratory<'a> {
             let face = if is_moved_face { &mesh.moved_nodes } else { &mesh.fixed_nodes };
             let parts: Vec<(u32, usize)> = face.iter().map(|&v| (v, part_of(mesh.nodes[v as usize]))).collect();
             let has_force = self.observed.steps[n].force.is_some();
-            all.par_iter_mut().enumerate().try_for_each(|(part, trace)| -> Result<(), DiagnosisError> {
-                let mut rate = vec![[0.0; 3]; tractions.len()];
-                for (v, _) in parts.iter().filter(|(_, p)| *p == part) {
-                    // The sample lags behind what pulls it.
-                    rate[*v as usize] = tractions[*v as usize].map(|t| -t);
+            let size = num_parts.div_ceil(2 * rayon::current_num_threads()).max(1);
+            all.par_chunks_mut(size).enumerate().try_for_each(|(chunk, traces)| -> Result<(), DiagnosisError> {
+                let mut tangent = tangent.shared();
+                let change_of = |part: usize| {
+                    let mut rate = vec![[0.0; 3]; tractions.len()];
+                    for (v, _) in parts.iter().filter(|(_, p)| *p == part) {
+                        // The sample lags behind what pulls it.
+                        rate[*v as usize] = tractions[*v as usize].map(|t| -t);
+                    }
+                    tangent.change_of_held_nodes(&rate)
+                };
+                let changes: Vec<Change> = (0..traces.len()).map(|i| change_of(chunk * size + i)).collect();
+                for (s, trace) in tangent.sensitivities(&changes)?.into_iter().zip(traces) {
+                    trace.displacement.push(self.shown(scene, station.view.average(&s.displacement)?));
+                    trace.force.push(if has_force { s.force_n * (1.0 + scene.force_gain) } else { 0.0 });
                 }
-                let s = tangent.shared().imposed_sensitivity(&rate)?;
-                trace.displacement.push(self.shown(scene, station.view.average(&s.displacement)?));
-                trace.force.push(if has_force { s.force_n * (1.0 + scene.force_gain) } else { 0.0 });
                 Ok(())
             })?;
         }

@@ -121,7 +121,7 @@ pub fn widen(
 ) -> Result<(), DiagnosisError> {
     let observed = laboratory.observed();
     let columns = derivatives(laboratory, &fitted.material, &fitted.causes, &fitted.prediction)?;
-    let weighed: Vec<_> = columns.iter().map(|c| metric.weigh(c)).collect();
+    let weighed = metric.weigh_all(&columns);
     let matrix = normal_matrix(metric, &weighed, &fitted.material, &fitted.causes, settings);
     let Some(factor) = matrix.cholesky() else { return Ok(()) };
     let shift_by = |change: &Trace| {

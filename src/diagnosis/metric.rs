@@ -11,7 +11,10 @@
 
 use super::trace::Trace;
 use crate::calibration::Observed;
+use faer::linalg::matmul::matmul;
+use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use rayon::prelude::*;
 
 /// Numbers of boxes along x, y, z at each level.
 const LEVELS: [[usize; 3]; 3] = [[1, 1, 1], [4, 1, 3], [8, 2, 6]];
@@ -45,7 +48,9 @@ pub struct Metric {
 
 /// A trace with what its inner products need.
 pub struct Weighed {
-    pub(super) trace: Trace,
+    /// Displacements over their noise; zero where they do not count.
+    white: Vec<f64>,
+    force: Vec<f64>,
     moments: [DVector<f64>; 3],
     solved: [DVector<f64>; 3],
 }
@@ -152,10 +157,14 @@ impl Metric {
     /// Prepares a trace; NaN entries (voxels that a changed specimen does not fill) count as zero.
     pub fn weigh(&self, trace: &Trace) -> Weighed {
         let mut moments = [0, 1, 2].map(|_| DVector::<f64>::zeros(self.num_boxes));
+        let root = self.precision.map(f64::sqrt);
+        let mut white = Vec::with_capacity(3 * trace.displacement.iter().map(Vec::len).sum::<usize>());
         for ((field, used), scale) in trace.displacement.iter().zip(&self.is_used).zip(&self.scale) {
-            for ((u, boxes), _) in field.iter().zip(&self.boxes).zip(used).filter(|(_, used)| **used) {
+            for ((u, boxes), used) in field.iter().zip(&self.boxes).zip(used) {
                 for c in 0..3 {
-                    if u[c].is_finite() {
+                    let counts = *used && u[c].is_finite();
+                    white.push(if counts { root[c] * u[c] } else { 0.0 });
+                    if counts {
                         for &i in boxes {
                             moments[c][i as usize] += scale * self.precision[c] * u[c];
                         }
@@ -164,35 +173,30 @@ impl Metric {
             }
         }
         let solved = [0, 1, 2].map(|c| self.capacitance[c].solve(&moments[c]));
-        Weighed { trace: trace.clone(), moments, solved }
+        Weighed { white, force: trace.force.clone(), moments, solved }
+    }
+
+    /// Prepares traces.
+    pub fn weigh_all(&self, traces: &[Trace]) -> Vec<Weighed> {
+        traces.par_iter().map(|t| self.weigh(t)).collect()
     }
 
     /// ⟨a, b⟩.
     pub fn inner(&self, a: &Weighed, b: &Weighed) -> f64 {
-        let mut sum = self.noise_only(&a.trace, &b.trace);
-        for c in 0..3 {
-            sum -= a.moments[c].dot(&b.solved[c]);
-        }
-        let n = self.scale.len();
-        for i in 0..n {
-            for j in 0..n {
-                sum += a.trace.force[i] * self.force_precision[(i, j)] * b.trace.force[j];
-            }
-        }
-        sum
+        self.products(std::slice::from_ref(a), std::slice::from_ref(b))[(0, 0)]
     }
 
-    /// Σ a b / σ² over displacements alone, without the allowance.
-    pub fn noise_only(&self, a: &Trace, b: &Trace) -> f64 {
-        let mut sum = 0.0;
-        for ((f, g), used) in a.displacement.iter().zip(&b.displacement).zip(&self.is_used) {
-            for ((x, y), _) in f.iter().zip(g).zip(used).filter(|(_, used)| **used) {
-                for c in 0..3 {
-                    let p = x[c] * y[c] * self.precision[c];
-                    if p.is_finite() {
-                        sum += p;
-                    }
-                }
+    /// ⟨a, b⟩ of each of `a` (rows) with each of `b` (columns).
+    pub fn products(&self, a: &[Weighed], b: &[Weighed]) -> DMatrix<f64> {
+        let mut sum = products_of(a, &|w| &w.white, b, &|w| &w.white);
+        for c in 0..3 {
+            sum -= products_of(a, &|w| w.moments[c].as_slice(), b, &|w| w.solved[c].as_slice());
+        }
+        for (i, a) in a.iter().enumerate() {
+            for (j, b) in b.iter().enumerate() {
+                let forces = (0..a.force.len()).flat_map(|k| (0..b.force.len()).map(move |l| (k, l)));
+                let own: f64 = forces.map(|(k, l)| a.force[k] * self.force_precision[(k, l)] * b.force[l]).sum();
+                sum[(i, j)] += own;
             }
         }
         sum
@@ -207,6 +211,30 @@ impl Metric {
     pub fn is_used(&self, step: usize, voxel: usize) -> bool {
         self.is_used[step][voxel]
     }
+}
+
+/// Products of a vector of each of `a` (rows) with one of each of `b` (columns), all of one length.
+fn products_of(
+    a: &[Weighed],
+    of_a: &(dyn Fn(&Weighed) -> &[f64] + Sync),
+    b: &[Weighed],
+    of_b: &(dyn Fn(&Weighed) -> &[f64] + Sync),
+) -> DMatrix<f64> {
+    let num = a.first().map_or(0, |w| of_a(w).len());
+    let left: Vec<f64> = a.iter().flat_map(|w| of_a(w)).copied().collect();
+    let left = MatRef::from_column_major_slice(&left, num, a.len());
+    let mut found = DMatrix::zeros(a.len(), b.len());
+    if a.is_empty() || b.is_empty() {
+        return found;
+    }
+    let size = b.len().div_ceil(rayon::current_num_threads());
+    found.as_mut_slice().par_chunks_mut(size * a.len()).zip(b.par_chunks(size)).for_each(|(found, b)| {
+        let right: Vec<f64> = b.iter().flat_map(|w| of_b(w)).copied().collect();
+        let right = MatRef::from_column_major_slice(&right, num, b.len());
+        let found = MatMut::from_column_major_slice_mut(found, a.len(), b.len());
+        matmul(found, Accum::Replace, left.transpose(), right, 1.0, Par::Seq);
+    });
+    found
 }
 
 fn force_precision(observed: &Observed) -> (DMatrix<f64>, Vec<bool>) {

@@ -20,7 +20,7 @@ pub struct Score {
 /// A residual and nuisance directions (the material's), against which directions are tested.
 pub struct ScoreTest<'a> {
     metric: &'a Metric,
-    residual: Weighed,
+    residual: [Weighed; 1],
     nuisance: Vec<Weighed>,
     inverse: DMatrix<f64>,
     nuisance_residual: DVector<f64>,
@@ -30,32 +30,28 @@ impl<'a> ScoreTest<'a> {
     /// `prior` adds to the diagonal of the nuisance directions' information.
     pub fn new(metric: &'a Metric, residual: &Trace, nuisance: &[Trace], prior: &[f64]) -> ScoreTest<'a> {
         let residual = metric.weigh(residual);
-        let nuisance: Vec<Weighed> = nuisance.iter().map(|t| metric.weigh(t)).collect();
+        let nuisance = metric.weigh_all(nuisance);
         let n = nuisance.len();
-        let matrix = DMatrix::from_fn(n, n, |i, j| {
-            metric.inner(&nuisance[i], &nuisance[j]) + if i == j { prior.get(i).copied().unwrap_or(0.0) } else { 0.0 }
-        });
+        let mut matrix = metric.products(&nuisance, &nuisance);
+        matrix.fill_upper_triangle_with_lower_triangle();
+        for (i, prior) in prior.iter().enumerate().take(n) {
+            matrix[(i, i)] += prior;
+        }
         let inverse = matrix.pseudo_inverse(1e-14).unwrap_or_else(|_| DMatrix::zeros(n, n));
-        let nuisance_residual = DVector::from_fn(n, |i, _| metric.inner(&nuisance[i], &residual));
+        let residual = [residual];
+        let nuisance_residual = metric.products(&nuisance, &residual).column(0).into_owned();
         ScoreTest { metric, residual, nuisance, inverse, nuisance_residual }
     }
 
     /// Prepares directions: their products with the residual and with each other, the nuisance taken out.
     pub fn prepare(&self, directions: &[Trace]) -> Prepared {
-        let weighed: Vec<Weighed> = directions.iter().map(|t| self.metric.weigh(t)).collect();
-        let m = weighed.len();
-        let cross = DMatrix::from_fn(self.nuisance.len(), m, |i, j| self.metric.inner(&self.nuisance[i], &weighed[j]));
+        let weighed = self.metric.weigh_all(directions);
+        let cross = self.metric.products(&self.nuisance, &weighed);
         let projected = &self.inverse * &cross;
-        let mut gram = DMatrix::zeros(m, m);
-        for i in 0..m {
-            for j in 0..=i {
-                gram[(i, j)] = self.metric.inner(&weighed[i], &weighed[j]) - cross.column(i).dot(&projected.column(j));
-                gram[(j, i)] = gram[(i, j)];
-            }
-        }
-        let gradient = DVector::from_fn(m, |j, _| {
-            self.metric.inner(&weighed[j], &self.residual) - projected.column(j).dot(&self.nuisance_residual)
-        });
+        let mut gram = self.metric.products(&weighed, &weighed) - cross.tr_mul(&projected);
+        gram.fill_upper_triangle_with_lower_triangle();
+        let gradient =
+            self.metric.products(&weighed, &self.residual).column(0) - projected.tr_mul(&self.nuisance_residual);
         Prepared { gram, gradient }
     }
 

@@ -38,7 +38,7 @@ impl QuadraticModel {
     fn of(inference: &mut Inference, fitted: &CauseFit) -> Result<QuadraticModel, DiagnosisError> {
         let Inference { laboratory, metric, settings, .. } = inference;
         let columns = derivatives(laboratory, &fitted.material, &fitted.causes, &fitted.prediction)?;
-        let weighed: Vec<_> = columns.iter().map(|c| metric.weigh(c)).collect();
+        let weighed = metric.weigh_all(&columns);
         let matrix = normal_matrix(metric, &weighed, &fitted.material, &fitted.causes, settings);
         let num_material = fitted.material.parameters().len();
         let (mut away, mut owners) = (vec![0.0; num_material], vec![None; num_material]);

@@ -6,14 +6,15 @@
 use super::condensation::Condensation;
 use super::departures::Departures;
 use super::departures_on_mesh::{DeparturesOnMesh, PointPositions};
-use super::element_data::{Direction, ElementInput, ElementOutput, ElementTables, MAX_NODES};
+use super::element_data::{ElementInput, ElementOutput, ElementTables, MAX_GROUPS, MAX_NODES};
 use super::equilibrium::Equilibrium;
 use super::error::{SolveError, StepFailure};
-use super::kernel::Kernels;
+use super::kernels::Kernels;
 use super::linearisation::Linearisation;
 use super::plates::Plates;
+use super::rates::Rates;
 use super::topology::Topology;
-use crate::material::{Ogden, Parameter};
+use crate::material::{Lanes, Ogden, Parameter};
 use crate::mesh::Mesh;
 use crate::specimen::Specimen;
 use std::sync::{Arc, OnceLock};
@@ -146,6 +147,16 @@ impl Assembler {
         &self.departures.departures
     }
 
+    /// Per element: the factor on the stiffness at the quadrature points. Empty where there is none.
+    pub(super) fn stiffness_factors(&self) -> &[[Lanes; MAX_GROUPS]] {
+        &self.departures.factor
+    }
+
+    /// Per element: ln of the volume ratio free of pressure at the quadrature points. Empty where there is none.
+    pub(super) fn log_growths(&self) -> &[[Lanes; MAX_GROUPS]] {
+        &self.departures.growth
+    }
+
     /// How often the meshed part stands in the test.
     pub(super) fn multiplicity(&self) -> f64 {
         self.discretisation.multiplicity
@@ -220,17 +231,49 @@ impl Assembler {
         elements: Option<&[u32]>,
         derivative: &mut [[f64; 3]],
     ) -> Result<(), StepFailure> {
-        self.sum_over_elements(elements, derivative, |e, out| {
-            let displacements = direction.map(|nodal| {
-                let mut local = [[0.0; 3]; MAX_NODES];
-                for (a, &v) in self.mesh().element(e).iter().enumerate() {
-                    local[a] = nodal[v as usize];
+        let rates = Rates { displacement: direction, parameter, ..Rates::default() };
+        let mut found = self.assemble_rates(at, &[rates], elements)?;
+        derivative.copy_from_slice(&found.swap_remove(0));
+        Ok(())
+    }
+
+    /// Derivatives of the condensed residual, per node, along each of `rates`, springs left out; `elements` restricts
+    /// the sum.
+    pub(super) fn assemble_rates(
+        &self,
+        at: &Configuration,
+        rates: &[Rates],
+        elements: Option<&[u32]>,
+    ) -> Result<Vec<Vec<[f64; 3]>>, StepFailure> {
+        let mut sums = vec![vec![[0.0; 3]; self.mesh().nodes.len()]; rates.len()];
+        let mut out = ElementOutput::default();
+        let mut found = vec![[[0.0; 3]; MAX_NODES]; rates.len()];
+        let (mut places, mut variations) = (Vec::new(), Vec::new());
+        let mut add = |e: usize| {
+            places.clear();
+            variations.clear();
+            for (place, rates) in rates.iter().enumerate() {
+                if let Some(variation) = rates.of_element(e, self.mesh().element(e)) {
+                    places.push(place);
+                    variations.push(variation);
                 }
-                local
-            });
-            let direction = Direction { displacements, parameter };
-            self.kernels.directional(self.tables(), &self.input(e, at, None), &direction, out)
-        })
+            }
+            if places.is_empty() {
+                return Ok(());
+            }
+            if !self.kernels.variations(self.tables(), &self.input(e, at, None), &variations, &mut out, &mut found) {
+                return Err(StepFailure::InvertedElement { element: e, jacobian: out.min_jacobian });
+            }
+            for (&place, local) in places.iter().zip(&found) {
+                scatter(self.mesh().element(e), local, &mut sums[place]);
+            }
+            Ok(())
+        };
+        match elements {
+            Some(list) => list.iter().try_for_each(|&e| add(e as usize)),
+            None => (0..self.mesh().num_elements()).try_for_each(add),
+        }?;
+        Ok(sums)
     }
 
     /// Sums the nodal vectors that `evaluate` leaves in the output of each element; it returns false where the element

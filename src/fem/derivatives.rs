@@ -6,11 +6,12 @@
 //! * along a path X + tV, drive + tḋ: K u′ = −d/dt r(u + t ḋ w, X + tV), u′ the derivative *following the node*;
 //! * of s along that path: K s′ = −d/dt [∂r/∂ξ + K s](u + t u′, X + tV) at fixed s.
 //!
-//! The derivatives of r in u and ξ are closed forms. Those along a path are fourth-order central differences of
-//! closed-form element vectors (no solve is differenced): with t a 1/500 of the smallest element their error is
-//! (1/500)⁴ κ/μ ≈ 10⁻⁸ at κ/μ = 10³.
+//! The derivatives of r are closed forms ([`change`](super::change)). Those of ∂r/∂ξ + K s along a path are
+//! fourth-order central differences of closed-form element vectors (no solve is differenced): with t a 1/500 of the
+//! smallest element their error is (1/500)⁴ κ/μ ≈ 10⁻⁸ at κ/μ = 10³.
 
 use super::assembler::Configuration;
+use super::change::{ACCURACY, ChangeSensitivity};
 use super::error::{SolveError, StepFailure};
 use super::tangent::Tangent;
 use crate::material::Parameter;
@@ -37,9 +38,6 @@ pub struct PathSensitivity {
     /// d/dt of the sensitivities given, in their order (displacements following each node).
     pub parameters: Vec<ParameterSensitivity>,
 }
-
-/// Relative accuracy of the linear solves (two iterations with the single-precision factor).
-const ACCURACY: f64 = 1e-8;
 
 /// A path t ↦ (X + t `velocity`, u + t `rate`), differenced over multiples of `step`.
 #[derive(Clone, Copy)]
@@ -91,27 +89,16 @@ impl Tangent<'_> {
         velocity: Option<&[[f64; 3]]>,
         drive_rate: f64,
     ) -> Result<PathSensitivity, SolveError> {
+        let change = self.change_of_nodes(velocity, drive_rate);
+        let mut found = self.sensitivities(std::slice::from_ref(&change))?;
+        // One change, one derivative.
+        let ChangeSensitivity { displacement, force_n } = found.swap_remove(0);
         let assembler = self.assembler.clone();
         let mesh = assembler.mesh();
+        let driven = Some(&assembler.plates().driven_elements[..]);
         let still = vec![[0.0; 3]; mesh.nodes.len()];
         let velocity = velocity.unwrap_or(&still);
-        let mut drive = vec![[0.0; 3]; mesh.nodes.len()];
-        for &v in &mesh.moved_nodes {
-            drive[v as usize][0] = drive_rate;
-        }
-        self.add_turning_of_plates(velocity, &mut drive);
-        let driven = Some(&assembler.plates().driven_elements[..]);
-        let along = Path { velocity, rate: &drive, step: difference_step(mesh, velocity, &drive) };
-        let derivative = self.residual_along(along, None)?;
-        let x = self.solve_all(&[assembler.collect(&derivative, -1.0)], ACCURACY)?;
-        let mut displacement = assembler.spread(&x[0]);
-        for (u, d) in displacement.iter_mut().zip(&drive) {
-            for i in 0..3 {
-                u[i] += d[i];
-            }
-        }
         let along = Path { velocity, rate: &displacement, step: difference_step(mesh, velocity, &displacement) };
-        let force_n = assembler.force_n(&self.residual_along(along, driven)?);
         let mut reactions = Vec::with_capacity(sensitivities.len());
         let mut right = Vec::with_capacity(sensitivities.len());
         for s in sensitivities {
@@ -134,32 +121,6 @@ impl Tangent<'_> {
             });
         }
         Ok(PathSensitivity { displacement, force_n, parameters })
-    }
-
-    /// Adds to `rate` (mm per unit of t) how the displacement that plates and faces impose changes as their nodes move:
-    /// a turned plate moves a node by its arm.
-    fn add_turning_of_plates(&self, velocity: &[[f64; 3]], rate: &mut [[f64; 3]]) {
-        let (plates, departures) = (self.assembler.plates(), self.assembler.departures());
-        if !departures.moves_plates() {
-            return;
-        }
-        let (nodes, drive_mm) = (&self.assembler.mesh().nodes, self.equilibrium.drive_mm);
-        for v in plates.held_nodes() {
-            let at =
-                |t: f64| plates.imposed([0, 1, 2].map(|i| nodes[v][i] + t * velocity[v][i]), departures, v, drive_mm);
-            // Rigid motions are linear in the position, measured faces of low degree: differences over a micrometre
-            // are exact to rounding.
-            let step = 1e-3 / velocity[v].iter().fold(1e-12, |s: f64, x| s.max(x.abs()));
-            let (ahead, behind) = (at(step), at(-step));
-            for i in 0..3 {
-                rate[v][i] += (ahead[i] - behind[i]) / (2.0 * step);
-            }
-        }
-    }
-
-    /// d/dt r along a path; `elements` restricts the sum.
-    fn residual_along(&self, path: Path, elements: Option<&[u32]>) -> Result<Vec<[f64; 3]>, SolveError> {
-        self.difference(path, |at, out| self.assembler.assemble_residual(at, elements, out))
     }
 
     /// d/dt [∂r/∂ξ + K s] along a path.

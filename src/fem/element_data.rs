@@ -86,23 +86,42 @@ pub struct ElementInput<'a> {
     pub fibre: Option<Fibre>,
 }
 
-/// A direction in which the condensed residual is differentiated.
-pub struct Direction {
-    /// δu at the nodes; `None` where only the parameter moves.
+/// A direction in which the condensed residual of an element is differentiated: rates per unit of t. What is absent
+/// stays.
+#[derive(Clone, Default)]
+pub struct Variation<'a> {
+    /// Of the reference positions of the nodes, mm.
+    pub velocities: Option<[[f64; 3]; MAX_NODES]>,
+    /// Of the displacements following the nodes, mm.
     pub displacements: Option<[[f64; 3]; MAX_NODES]>,
-    /// The parameter that moves by 1, if any.
+    /// The parameter of the material that moves by 1.
     pub parameter: Option<Parameter>,
+    /// Of the factor on the isochoric stiffness at the quadrature points.
+    pub stiffness_factor: Option<&'a [Lanes; MAX_GROUPS]>,
+    /// Of ln of the volume ratio free of pressure at the quadrature points.
+    pub log_growth: Option<&'a [Lanes; MAX_GROUPS]>,
+    /// The fibres at the ends of a central difference.
+    pub fibre: Option<FibreDifference>,
+}
+
+/// Fibres ahead and behind, and half of what lies between them in t. The stress of fibres is differenced between them.
+#[derive(Clone, Copy, Debug)]
+pub struct FibreDifference {
+    /// Fibres at t = `step`, at t = −`step`.
+    pub ends: [Option<Fibre>; 2],
+    /// Half the difference of t.
+    pub step: f64,
 }
 
 /// What one element yields. Reused between elements.
 pub struct ElementOutput {
-    /// Condensed residual r, or its directional derivative, per node, kPa·mm².
+    /// Condensed residual r per node, kPa·mm².
     pub residual: [[f64; 3]; MAX_NODES],
     /// What the pressure iterate misses.
     pub pressure_gap: [f64; 4],
     /// D.
     pub bulk: [[f64; 4]; 4],
-    /// Pressure coefficients used (condensed ones where none were given), or their directional derivative.
+    /// Pressure coefficients used: condensed ones where none were given.
     pub pressure: [f64; 4],
     /// B: `[m][i][group of nodes]`.
     pub divergence: [[[Lanes; MAX_GROUPS]; 3]; 4],
@@ -126,6 +145,8 @@ pub struct ElementOutput {
     pub(super) jacobian: [Lanes; MAX_GROUPS],
     /// φ at the quadrature points, `[m][group]`.
     pub basis: [[Lanes; MAX_GROUPS]; 4],
+    /// ∇φ, which is constant over the element, 1/mm.
+    pub(super) basis_slope: [[f64; 3]; 4],
     pub(super) tangent: Vec<[[Lanes; 9]; 9]>,
 }
 
@@ -149,6 +170,7 @@ impl Default for ElementOutput {
             cofactor: [tensor; MAX_GROUPS],
             jacobian: [Lanes::ZERO; MAX_GROUPS],
             basis: [[Lanes::ZERO; MAX_GROUPS]; 4],
+            basis_slope: [[0.0; 3]; 4],
             tangent: vec![[[Lanes::ZERO; 9]; 9]; MAX_GROUPS],
         }
     }

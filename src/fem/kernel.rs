@@ -17,9 +17,12 @@
 //!
 //! Quadrature points are worked on eight at a time, nodes of the stiffness likewise.
 
-use super::element_data::{Direction, ElementInput, ElementOutput, ElementTables, MAX_GROUPS, MAX_NODES};
+use super::element_data::{ElementInput, ElementOutput, ElementTables, MAX_GROUPS, MAX_NODES};
 use super::fibre_kernel::{add_fibre_stress, add_fibre_tangent};
-use crate::material::{LANES, Lanes, Parameter, SpectralState, Tensor};
+use crate::material::{LANES, Lanes, SpectralState, Tensor};
+
+/// A vector at the nodes of an element.
+pub type NodalVector = [[f64; 3]; MAX_NODES];
 
 /// Determinant and cofactor (determinant × inverse transpose) of a tensor.
 #[inline(always)]
@@ -36,7 +39,11 @@ fn cofactor(f: &Tensor) -> (Lanes, Tensor) {
 
 /// Σ_a x_a ⊗ ∂N_a/∂ξ at the points of a group.
 #[inline(always)]
-fn gradient_of<const FMA: bool>(tables: &ElementTables, nodal: &[[f64; 3]; MAX_NODES], group: usize) -> Tensor {
+pub(super) fn gradient_of<const FMA: bool>(
+    tables: &ElementTables,
+    nodal: &[[f64; 3]; MAX_NODES],
+    group: usize,
+) -> Tensor {
     let mut out = [[Lanes::ZERO; 3]; 3];
     for a in 0..tables.num {
         for i in 0..3 {
@@ -50,7 +57,7 @@ fn gradient_of<const FMA: bool>(tables: &ElementTables, nodal: &[[f64; 3]; MAX_N
 }
 
 #[inline(always)]
-fn multiply(a: &Tensor, b: &Tensor) -> Tensor {
+pub(super) fn multiply(a: &Tensor, b: &Tensor) -> Tensor {
     let mut out = [[Lanes::ZERO; 3]; 3];
     for i in 0..3 {
         for j in 0..3 {
@@ -61,7 +68,7 @@ fn multiply(a: &Tensor, b: &Tensor) -> Tensor {
 }
 
 #[inline(always)]
-fn contract(a: &Tensor, b: &Tensor) -> Lanes {
+pub(super) fn contract(a: &Tensor, b: &Tensor) -> Lanes {
     let mut s = Lanes::ZERO;
     for i in 0..3 {
         for j in 0..3 {
@@ -72,7 +79,7 @@ fn contract(a: &Tensor, b: &Tensor) -> Lanes {
 }
 
 #[inline(always)]
-fn scaled(a: &Tensor, factor: Lanes) -> Tensor {
+pub(super) fn scaled(a: &Tensor, factor: Lanes) -> Tensor {
     let mut out = *a;
     for x in out.iter_mut().flatten() {
         *x = *x * factor;
@@ -127,6 +134,7 @@ fn kinematics<const FMA: bool>(tables: &ElementTables, input: &ElementInput, out
         for g in 0..tables.groups {
             out.basis[m][g] = if m == 0 { Lanes::splat(1.0) } else { out.points[m - 1][g] * (1.0 / size) };
         }
+        out.basis_slope[m] = [0, 1, 2].map(|i| if m == i + 1 { 1.0 / size } else { 0.0 });
         // Twice is enough (Kahan): the second pass removes what rounding left.
         for _ in 0..2 {
             for l in 0..m {
@@ -138,6 +146,9 @@ fn kinematics<const FMA: bool>(tables: &ElementTables, input: &ElementInput, out
                     let b = out.basis[l][g];
                     out.basis[m][g] -= b * dot;
                 }
+                for i in 0..3 {
+                    out.basis_slope[m][i] -= out.basis_slope[l][i] * dot;
+                }
             }
         }
         let mut norm = 0.0;
@@ -148,6 +159,7 @@ fn kinematics<const FMA: bool>(tables: &ElementTables, input: &ElementInput, out
         for g in 0..tables.groups {
             out.basis[m][g] = out.basis[m][g] * scale;
         }
+        out.basis_slope[m] = out.basis_slope[m].map(|s| s * scale);
     }
     for g in 0..tables.groups {
         for i in 0..3 {
@@ -159,7 +171,7 @@ fn kinematics<const FMA: bool>(tables: &ElementTables, input: &ElementInput, out
 
 /// Adds ∫ stress : ∇N to the residual; `stress` is weighted by the volume already.
 #[inline(always)]
-fn add_internal_force<const FMA: bool>(
+pub(super) fn add_internal_force<const FMA: bool>(
     tables: &ElementTables,
     inverse_map: &[Tensor; MAX_GROUPS],
     stress: &[Tensor; MAX_GROUPS],
@@ -189,7 +201,7 @@ fn add_internal_force<const FMA: bool>(
 
 /// Residual and, where `TANGENT`, stiffness. Returns false where det F ≤ 0 somewhere (then only the minima are set).
 #[inline(always)]
-fn element<const FMA: bool, const TANGENT: bool>(
+pub(super) fn element<const FMA: bool, const TANGENT: bool>(
     tables: &ElementTables,
     input: &ElementInput,
     out: &mut ElementOutput,
@@ -401,185 +413,5 @@ fn column_of<const FMA: bool, const N: usize>(
         for n in 0..N {
             column[i][block + n] = sum[i][n];
         }
-    }
-}
-
-/// Directional derivative of the condensed residual at fixed geometry: in δu and, where given, a parameter. The state's
-/// pressure must be the condensed one (`input.pressure` = `None`) or a converged iterate.
-#[inline(always)]
-fn directional<const FMA: bool>(
-    tables: &ElementTables,
-    input: &ElementInput,
-    direction: &Direction,
-    out: &mut ElementOutput,
-) -> bool {
-    if !element::<FMA, false>(tables, input, out) {
-        return false;
-    }
-    let tensor = [[Lanes::ZERO; 3]; 3];
-    let mut delta_f = [tensor; MAX_GROUPS];
-    let mut dilation = [0.0; 4];
-    for g in 0..tables.groups {
-        let Some(displacements) = &direction.displacements else { break };
-        let h = gradient_of::<FMA>(tables, displacements, g);
-        delta_f[g] = multiply(&h, &out.inverse_map[g]);
-        let d = contract(&out.cofactor[g], &delta_f[g]) * out.volume[g];
-        for m in 0..4 {
-            dilation[m] += (d * out.basis[m][g]).sum();
-        }
-    }
-    let mut delta_pressure = [0.0; 4];
-    for m in 0..4 {
-        for n in 0..4 {
-            delta_pressure[m] += out.bulk[m][n] * dilation[n];
-        }
-        if direction.parameter == Some(Parameter::Kappa) {
-            // The condensed pressure is proportional to κ.
-            delta_pressure[m] += (out.pressure[m] + out.pressure_gap[m]) / input.material.bulk_kpa;
-        }
-    }
-    let mut weighted = [tensor; MAX_GROUPS];
-    for g in 0..tables.groups {
-        let (mut p, mut dp) = (Lanes::ZERO, Lanes::ZERO);
-        for m in 0..4 {
-            p += out.basis[m][g] * out.pressure[m];
-            dp += out.basis[m][g] * delta_pressure[m];
-        }
-        let state = SpectralState::new(input.material, &out.deformation_gradient[g]);
-        let factor = input.stiffness_factor.map_or(Lanes::splat(1.0), |f| f[g]);
-        let kirchhoff = p * out.jacobian[g] / factor;
-        let mut s = match direction.parameter {
-            Some(parameter) => scaled(&state.stress_parameter_derivative(input.material, parameter), factor),
-            None => tensor,
-        };
-        if direction.displacements.is_some() {
-            state.material_tangent::<FMA>(input.material, kirchhoff, kirchhoff, &mut out.tangent[g]);
-            for row in &mut out.tangent[g] {
-                for x in row.iter_mut() {
-                    *x = *x * factor;
-                }
-            }
-            if let Some(fibre) = &input.fibre {
-                add_fibre_tangent(fibre, &out.deformation_gradient[g], &mut out.tangent[g]);
-            }
-            for i in 0..3 {
-                for j in 0..3 {
-                    for k in 0..3 {
-                        for l in 0..3 {
-                            s[i][j] = out.tangent[g][3 * i + j][3 * k + l].mul_add::<FMA>(delta_f[g][k][l], s[i][j]);
-                        }
-                    }
-                }
-            }
-        }
-        for i in 0..3 {
-            for j in 0..3 {
-                weighted[g][i][j] = (s[i][j] + dp * out.cofactor[g][i][j]) * out.volume[g];
-            }
-        }
-    }
-    out.pressure = delta_pressure;
-    out.residual = [[0.0; 3]; MAX_NODES];
-    add_internal_force::<FMA>(tables, &out.inverse_map, &weighted, &mut out.residual);
-    true
-}
-
-/// The kernels, compiled for one instruction set.
-#[derive(Clone, Copy)]
-pub struct Kernels {
-    residual: unsafe fn(&ElementTables, &ElementInput, &mut ElementOutput) -> bool,
-    tangent: unsafe fn(&ElementTables, &ElementInput, &mut ElementOutput) -> bool,
-    directional: unsafe fn(&ElementTables, &ElementInput, &Direction, &mut ElementOutput) -> bool,
-    /// Name of the instruction set.
-    pub name: &'static str,
-}
-
-macro_rules! compile_for {
-    ($module:ident, $fma:literal, $feature:meta) => {
-        mod $module {
-            use super::*;
-            #[$feature]
-            pub fn residual(t: &ElementTables, i: &ElementInput, o: &mut ElementOutput) -> bool {
-                element::<$fma, false>(t, i, o)
-            }
-            #[$feature]
-            pub fn tangent(t: &ElementTables, i: &ElementInput, o: &mut ElementOutput) -> bool {
-                element::<$fma, true>(t, i, o)
-            }
-            #[$feature]
-            pub fn directional(t: &ElementTables, i: &ElementInput, d: &Direction, o: &mut ElementOutput) -> bool {
-                super::directional::<$fma>(t, i, d, o)
-            }
-        }
-    };
-}
-
-compile_for!(portable, false, inline(never));
-#[cfg(target_arch = "x86_64")]
-compile_for!(avx2, true, target_feature(enable = "avx2,fma"));
-#[cfg(target_arch = "x86_64")]
-compile_for!(avx512, true, target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma"));
-
-impl Kernels {
-    /// The best that this processor runs.
-    pub fn detect() -> Kernels {
-        #[cfg(target_arch = "x86_64")]
-        {
-            let has_512 = is_x86_feature_detected!("avx512f")
-                && is_x86_feature_detected!("avx512dq")
-                && is_x86_feature_detected!("avx512vl")
-                && is_x86_feature_detected!("avx512bw");
-            if has_512 && is_x86_feature_detected!("fma") {
-                return Kernels {
-                    residual: avx512::residual,
-                    tangent: avx512::tangent,
-                    directional: avx512::directional,
-                    name: "avx512",
-                };
-            }
-            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-                return Kernels {
-                    residual: avx2::residual,
-                    tangent: avx2::tangent,
-                    directional: avx2::directional,
-                    name: "avx2",
-                };
-            }
-        }
-        Kernels::portable()
-    }
-
-    /// Kernels without special instructions.
-    pub fn portable() -> Kernels {
-        Kernels {
-            residual: portable::residual,
-            tangent: portable::tangent,
-            directional: portable::directional,
-            name: "portable",
-        }
-    }
-
-    /// Condensed residual. False where an element is inverted.
-    pub fn residual(&self, tables: &ElementTables, input: &ElementInput, out: &mut ElementOutput) -> bool {
-        // SAFETY: `detect` only hands out functions whose instructions this processor has.
-        unsafe { (self.residual)(tables, input, out) }
-    }
-
-    /// Residual, B and K. False where an element is inverted.
-    pub fn tangent(&self, tables: &ElementTables, input: &ElementInput, out: &mut ElementOutput) -> bool {
-        // SAFETY: as above.
-        unsafe { (self.tangent)(tables, input, out) }
-    }
-
-    /// Directional derivative of the condensed residual. False where an element is inverted.
-    pub fn directional(
-        &self,
-        tables: &ElementTables,
-        input: &ElementInput,
-        direction: &Direction,
-        out: &mut ElementOutput,
-    ) -> bool {
-        // SAFETY: as above.
-        unsafe { (self.directional)(tables, input, direction, out) }
     }
 }

@@ -10,8 +10,8 @@
 
 mod adjoint;
 mod assembler;
+mod change;
 mod condensation;
-mod departure_sensitivity;
 mod departures;
 mod departures_on_mesh;
 #[cfg(test)]
@@ -25,6 +25,7 @@ mod fields;
 mod forward_model;
 mod guide;
 mod kernel;
+mod kernels;
 mod linear;
 mod linearisation;
 mod mesh_model;
@@ -32,6 +33,7 @@ mod newton;
 mod options;
 mod ordering;
 mod plates;
+mod rates;
 mod result;
 mod rotation;
 mod stages;
@@ -40,9 +42,10 @@ mod tangent;
 #[cfg(test)]
 mod tangent_tests;
 mod topology;
+mod variation_kernel;
 mod verification;
 
-pub use departure_sensitivity::DepartureSensitivity;
+pub use change::{Change, ChangeSensitivity};
 pub use departures::{Departures, FIRM_BOND_KPA_PER_MM, Fibre, Field, PlateMotion, VectorField};
 pub use derivatives::{ParameterSensitivity, PathSensitivity};
 pub use equilibrium::Equilibrium;

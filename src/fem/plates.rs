@@ -16,8 +16,6 @@ pub(super) struct Plates {
     pub(super) released: Vec<(u32, f64)>,
     /// Elements with a node on the moved face.
     pub(super) driven_elements: Vec<u32>,
-    /// Elements with a node on either face.
-    pub(super) elements_beside: Vec<u32>,
     /// Affine displacement along x per unit of drive at each node: the first guess of a load step.
     pub(super) lift: Vec<f64>,
     /// Largest first load step, mm.
@@ -52,10 +50,6 @@ impl Plates {
         for &(v, _) in &released {
             is_held[v as usize] = false;
         }
-        let is_on_face = |v: u32| is_held[v as usize] || flags[v as usize];
-        let elements_beside = (0..mesh.num_elements() as u32)
-            .filter(|&e| mesh.element(e as usize).iter().any(|&v| is_on_face(v)))
-            .collect();
         let driven_elements = (0..mesh.num_elements() as u32)
             .filter(|&e| mesh.element(e as usize).iter().any(|&v| is_moved[v as usize]))
             .collect();
@@ -69,7 +63,6 @@ impl Plates {
             is_released: flags,
             released,
             driven_elements,
-            elements_beside,
             lift: mesh.nodes.iter().map(|x| x[axis] / extent + 0.5).collect(),
             // One step to a shear strain of 0.8 takes five or six iterations; stretching is more nonlinear.
             first_step_mm: if axis == 1 { 0.85 } else { 0.3 } * extent,

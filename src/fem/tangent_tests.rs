@@ -30,7 +30,7 @@ fn derivatives(tangent: &mut Tangent, drive_rate: f64) -> Vec<u64> {
     let material = tangent.material_sensitivities().unwrap();
     let path = tangent.path_sensitivity(&material, None, drive_rate).unwrap();
     let swelling = |t: f64| Departures { log_growth: Some(Field::new(move |_| 0.1 * t)), ..Departures::default() };
-    let swollen = tangent.departure_sensitivity(&swelling, 1e-3).unwrap();
+    let swollen = departures_tests::along(tangent, &swelling);
     let by_displacement = path.displacement.clone();
     let adjoint = tangent.adjoint_gradient(&by_displacement, 1.0).unwrap();
     let parameters = material.iter().chain(&path.parameters);

@@ -5,6 +5,10 @@ use super::{Sampling, VoxelError, VoxelMask};
 use crate::kinematics::{IDENTITY, Tensor, inverse};
 use crate::mesh::{Locator, Mesh};
 use crate::specimen::Specimen;
+use rayon::prelude::*;
+
+/// Voxels that one thread works on at a time.
+const CHUNK: usize = 512;
 
 /// Sparse operator from nodal fields to voxel averages.
 ///
@@ -52,44 +56,84 @@ impl VoxelOperator {
         mesh: &Mesh,
         mask: &VoxelMask,
         sampling: Sampling,
-        place_of: &dyn Fn([f64; 3]) -> ([f64; 3], Tensor),
+        place_of: &(dyn Fn([f64; 3]) -> ([f64; 3], Tensor) + Sync),
     ) -> Result<Self, VoxelError> {
         sampling.check()?;
         let section = Section::new(specimen);
         let locator = Locator::new(mesh);
+        let of_chunk = |voxels: &[u32]| {
+            let mut part = VoxelOperator::empty(mesh, voxels.len());
+            part.add_voxels(voxels, mesh, &locator, place_of, &|voxel, points| {
+                sampling.points(&section, &mask.grid, voxel, points);
+            })
+            .map_err(|voxel| VoxelError::OutsideMesh { voxel, center_mm: mask.grid.center_mm(voxel) })?;
+            Ok(part)
+        };
+        // Every voxel stands for itself: the operator is the same for any number of threads.
+        let parts = mask.voxels.par_chunks(CHUNK).map(of_chunk).collect::<Result<Vec<_>, VoxelError>>()?;
+        let mut operator = VoxelOperator::empty(mesh, mask.num_voxels());
+        parts.into_iter().for_each(|part| operator.append(part));
+        Ok(operator)
+    }
+
+    /// Without voxels; memory for some.
+    fn empty(mesh: &Mesh, num_voxels: usize) -> VoxelOperator {
         let mut operator = VoxelOperator {
             num_nodes: mesh.nodes.len(),
-            offsets: Vec::with_capacity(mask.num_voxels() + 1),
-            keys: Vec::with_capacity(40 * mask.num_voxels()),
-            values: Vec::with_capacity(40 * mask.num_voxels()),
-            gradients: Vec::with_capacity(40 * mask.num_voxels()),
+            offsets: Vec::with_capacity(num_voxels + 1),
+            keys: Vec::with_capacity(40 * num_voxels),
+            values: Vec::with_capacity(40 * num_voxels),
+            gradients: Vec::with_capacity(40 * num_voxels),
             num_points: 0,
             num_dropped_points: 0,
         };
         operator.offsets.push(0);
+        operator
+    }
+
+    /// Adds the voxels of another operator of the same mesh behind its own.
+    fn append(&mut self, other: VoxelOperator) {
+        let first = self.keys.len() as u32;
+        self.offsets.extend(other.offsets[1..].iter().map(|offset| first + offset));
+        self.keys.extend(other.keys);
+        self.values.extend(other.values);
+        self.gradients.extend(other.gradients);
+        self.num_points += other.num_points;
+        self.num_dropped_points += other.num_dropped_points;
+    }
+
+    /// Adds voxels, whose sample points with weights `points_of` gives; the error is a voxel without a point in the
+    /// mesh.
+    fn add_voxels(
+        &mut self,
+        voxels: &[u32],
+        mesh: &Mesh,
+        locator: &Locator,
+        place_of: &dyn Fn([f64; 3]) -> ([f64; 3], Tensor),
+        points_of: &dyn Fn(usize, &mut Vec<([f64; 3], f64)>),
+    ) -> Result<(), usize> {
         // Place of a key among the current voxel's entries; valid where it is at or after the voxel's first entry.
         let mut place = vec![u32::MAX; 4 * mesh.nodes.len()];
         let mut points = Vec::new();
-        for &voxel in &mask.voxels {
-            let first = operator.keys.len();
-            sampling.points(&section, &mask.grid, voxel as usize, &mut points);
+        for &voxel in voxels {
+            let first = self.keys.len();
+            points_of(voxel as usize, &mut points);
             let mut total = 0.0;
             for &(point, weight) in &points {
-                if operator.add_point(mesh, &locator, &mut place, first, place_of(point), weight) {
+                if self.add_point(mesh, locator, &mut place, first, place_of(point), weight) {
                     total += weight;
                 }
             }
-            if operator.keys.len() == first {
-                let center_mm = mask.grid.center_mm(voxel as usize);
-                return Err(VoxelError::OutsideMesh { voxel: voxel as usize, center_mm });
+            if self.keys.len() == first {
+                return Err(voxel as usize);
             }
-            for n in first..operator.keys.len() {
-                operator.values[n] /= total;
-                operator.gradients[n] = operator.gradients[n].map(|g| g / total);
+            for n in first..self.keys.len() {
+                self.values[n] /= total;
+                self.gradients[n] = self.gradients[n].map(|g| g / total);
             }
-            operator.offsets.push(operator.keys.len() as u32);
+            self.offsets.push(self.keys.len() as u32);
         }
-        Ok(operator)
+        Ok(())
     }
 
     /// Adds one sample point to the current voxel; false where it lies in no element.
