@@ -103,7 +103,9 @@ pub fn confirm(
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Confirmed, EvaluationFailure> {
     let mut by_material: Vec<MaterialEvaluation> = Vec::new();
-    let options = EvaluationOptions::standard(specimen);
+    let scanned_mm = specimen.drive_mm.last().copied().unwrap_or(0.0);
+    let protocol = study.protocol.on_the_way_to(scanned_mm);
+    let options = EvaluationOptions { protocol, ..EvaluationOptions::standard(specimen) };
     let mut model = ForwardModel::of_specimen(specimen, &options.mesh)?;
     let mut solved: Vec<(MaterialState, Equilibrium)> = Vec::new();
     for prior in &study.materials {

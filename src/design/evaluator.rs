@@ -16,7 +16,7 @@ use crate::fem::{Equilibrium, ForwardModel, ParameterSensitivity, PathSensitivit
 use crate::kinematics::principal_stretches;
 use crate::material::Ogden;
 use crate::mesh::{MeshOptions, shape_velocity};
-use crate::sensitivity::{FisherInformation, MaterialState, information_over_quadrature, integrate_over_quadrature};
+use crate::sensitivity::{ForceReading, MaterialState, information_of_protocol, integrate_over_quadrature};
 use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
 
@@ -50,10 +50,19 @@ struct ImitatingMaterial {
     state: MaterialState,
 }
 
+/// Forces read on the way to the scan with one material, and their derivatives.
+struct OnTheWay {
+    readings: Vec<ForceReading>,
+    /// Per move, then per reading: rates.
+    rates: Vec<Vec<ForceReading>>,
+}
+
 /// All that a design does at one drive.
 struct Solved {
     /// Per sample.
     states: Vec<MaterialState>,
+    /// Per sample: the forces before.
+    on_the_way: Vec<OnTheWay>,
     /// Earlier materials fitted to them, where the study asks for it.
     imitators: Vec<ImitatingMaterial>,
     /// Per state, then per fitted material: derivatives along each move.
@@ -115,7 +124,8 @@ impl<'a> Evaluator<'a> {
         let moves: Vec<Move> =
             subspace.map(|s| s.variables.iter().map(|&v| a_move(&model, specimen, s, v)).collect()).unwrap_or_default();
         let solved = self.solve(&mut model, drive, &moves, is_cancelled)?;
-        let responses = self.responses(&model, &model.mesh().nodes, &solved.states, &solved.imitators)?;
+        let readings: Vec<&[ForceReading]> = solved.on_the_way.iter().map(|w| &w.readings[..]).collect();
+        let responses = self.responses(&model, &model.mesh().nodes, &solved.states, &readings, &solved.imitators)?;
         let mut gradients = Vec::new();
         if subspace.is_some() {
             gradients = vec![Vec::with_capacity(moves.len()); solved.states.len()];
@@ -135,7 +145,8 @@ impl<'a> Evaluator<'a> {
         moves: &[Move],
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Solved, EvaluationFailure> {
-        let mut solved = Solved { states: Vec::new(), imitators: Vec::new(), paths: Vec::new() };
+        let mut solved =
+            Solved { states: Vec::new(), on_the_way: Vec::new(), imitators: Vec::new(), paths: Vec::new() };
         let mut equilibria: Vec<Equilibrium> = Vec::new();
         let along_moves = |tangent: &mut Tangent, state: &MaterialState| {
             let along = |m: &Move| tangent.path_sensitivity(&state.sensitivities, m.0.as_deref(), m.1);
@@ -143,6 +154,7 @@ impl<'a> Evaluator<'a> {
         };
         for sample in &self.samples {
             let material = &sample.material;
+            solved.on_the_way.push(self.on_the_way(model, material, drive, moves, is_cancelled)?);
             let found = match equilibria.last() {
                 // A neighbouring material's state is closer than rest; where it is not, start over.
                 Some(previous) => model
@@ -178,6 +190,40 @@ impl<'a> Evaluator<'a> {
             }
         }
         Ok(solved)
+    }
+
+    /// The forces that are read before `drive` with `material`, and their derivatives along each of `moves`.
+    fn on_the_way(
+        &self,
+        model: &mut ForwardModel,
+        material: &Ogden,
+        drive: f64,
+        moves: &[Move],
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<OnTheWay, EvaluationFailure> {
+        let drives = self.study.protocol.on_the_way_to(drive).force_drives_mm();
+        let mut found = OnTheWay { readings: Vec::new(), rates: vec![Vec::new(); moves.len()] };
+        if drives.is_empty() {
+            return Ok(found);
+        }
+        let forces = |s: &[ParameterSensitivity]| s.iter().map(|s| s.force_n).collect();
+        for equilibrium in model.solve_path(material, &drives, &self.solve, is_cancelled)? {
+            let mut tangent = model.tangent(material, &equilibrium)?;
+            let sensitivities = tangent.material_sensitivities()?;
+            for (rates, (velocity, _)) in found.rates.iter_mut().zip(moves) {
+                // The drives at which forces are read stay as the scan's drive moves.
+                rates.push(match velocity {
+                    Some(_) => {
+                        let along = tangent.path_sensitivity(&sensitivities, velocity.as_deref(), 0.0)?;
+                        ForceReading { force_n: along.force_n, sensitivities: forces(&along.parameters) }
+                    }
+                    None => ForceReading { force_n: 0.0, sensitivities: vec![0.0; sensitivities.len()] },
+                });
+            }
+            let force_n = equilibrium.force_n;
+            found.readings.push(ForceReading { force_n, sensitivities: forces(&sensitivities) });
+        }
+        Ok(found)
     }
 
     /// Derivative of every sample's response entries along the move with this index, per mm. Fitted materials keep
@@ -224,7 +270,12 @@ impl<'a> Evaluator<'a> {
                 .zip(of_imitators)
                 .map(|(i, paths)| ImitatingMaterial { state: follow(&i.state, &paths[index]), ..i.clone() })
                 .collect();
-            sides.push(self.responses(model, &positions, &moved, &imitators)?);
+            let followed = |way: &OnTheWay| -> Vec<ForceReading> {
+                way.readings.iter().zip(&way.rates[index]).map(|(r, rate)| followed_reading(r, rate, step)).collect()
+            };
+            let readings: Vec<Vec<ForceReading>> = solved.on_the_way.iter().map(followed).collect();
+            let readings: Vec<&[ForceReading]> = readings.iter().map(|r| &r[..]).collect();
+            sides.push(self.responses(model, &positions, &moved, &readings, &imitators)?);
         }
         let slope = |(a, b): (&Response, &Response)| -> Vec<f64> {
             a.to_vector().iter().zip(b.to_vector()).map(|(a, b)| (a - b) / (2.0 * t)).collect()
@@ -238,11 +289,12 @@ impl<'a> Evaluator<'a> {
         model: &ForwardModel,
         positions: &[[f64; 3]],
         states: &[MaterialState],
+        readings: &[&[ForceReading]],
         imitators: &[ImitatingMaterial],
     ) -> Result<Vec<Response>, EvaluationFailure> {
         let mut all = Vec::with_capacity(states.len());
         for (index, (sample, state)) in self.samples.iter().zip(states).enumerate() {
-            let mut response = self.response(model, &sample.material, positions, state)?;
+            let mut response = self.response(model, &sample.material, positions, state, readings[index])?;
             let mut distances = Vec::new();
             for i in imitators.iter().filter(|i| i.of == index) {
                 distances.push(separation(self.study, model, positions, &i.material, &i.state, state)?.distance_sd);
@@ -264,14 +316,19 @@ impl<'a> Evaluator<'a> {
         material: &Ogden,
         positions: &[[f64; 3]],
         state: &MaterialState,
+        before: &[ForceReading],
     ) -> Result<Response, EvaluationFailure> {
         let scan = &self.study.scan;
         let voxel_volume = scan.voxel_mm.iter().product();
         let fields = model.quadrature_fields_at(material, positions, &state.displacement);
         let integrated = integrate_over_quadrature(material, &fields, model.mesh().mirror, voxel_volume);
         let (mesh, noise) = (model.mesh(), scan.noise());
-        let information: FisherInformation =
-            information_over_quadrature(material, mesh, &fields, &state.sensitivities, &noise, voxel_volume)?;
+        let own = state.sensitivities.iter().map(|s| s.force_n).collect();
+        let readings = [before, &[ForceReading { force_n: state.force_n, sensitivities: own }]].concat();
+        let protocol = &self.study.protocol;
+        let scanned = &state.sensitivities;
+        let information =
+            information_of_protocol(material, mesh, &fields, scanned, &readings, protocol, &noise, voxel_volume)?;
         let covariance = information.covariance();
         let shear = information.shear_indices();
         let normalisation = self.study.objective.normalisation;
@@ -287,6 +344,12 @@ impl<'a> Evaluator<'a> {
             .ln(),
         })
     }
+}
+
+/// A force and its sensitivities a `step` further on.
+fn followed_reading(reading: &ForceReading, rate: &ForceReading, step: f64) -> ForceReading {
+    let sensitivities = reading.sensitivities.iter().zip(&rate.sensitivities).map(|(s, d)| s + step * d).collect();
+    ForceReading { force_n: reading.force_n + step * rate.force_n, sensitivities }
 }
 
 /// How `variable` moves the nodes and the drive.

@@ -3,6 +3,7 @@
 use super::*;
 use crate::design::space::subspaces;
 use crate::mesh::{mesh_specimen, morphed};
+use crate::sensitivity::Protocol;
 use std::path::Path;
 
 fn study() -> Study {
@@ -16,6 +17,9 @@ fn study() -> Study {
     study.materials.iter_mut().for_each(|m| m.relative_sd = 0.0);
     // So that the materials' distance is evaluated too.
     study.objective.kind = ObjectiveKind::TellApart;
+    // And forces on the way, by a load cell that is not perfect.
+    study.protocol =
+        Protocol { force_drive_mm: vec![2.5], force_gain_sd: 0.01, force_zero_sd_n: 0.05, ..Protocol::default() };
     study
 }
 
@@ -42,8 +46,10 @@ fn every_gradient_passes_the_taylor_test() {
         moved.block.thickness_mm += thicker_mm;
         let mut model = ForwardModel::new(mesh, &moved).expect("a model");
         let solved = evaluator.solve(&mut model, drive, moves, &|| false).expect("equilibria");
+        let readings: Vec<&[ForceReading]> = solved.on_the_way.iter().map(|w| &w.readings[..]).collect();
+        let nodes = &model.mesh().nodes;
         let responses =
-            evaluator.responses(&model, &model.mesh().nodes, &solved.states, &solved.imitators).expect("responses");
+            evaluator.responses(&model, nodes, &solved.states, &readings, &solved.imitators).expect("responses");
         (model, solved, responses.iter().map(Response::to_vector).collect::<Vec<_>>())
     };
     for &variable in &space.variables {

@@ -4,7 +4,7 @@
 use super::aim::Objective;
 use super::study_limits::{Count, HoleCount, LengthMm};
 use crate::material::Ogden;
-use crate::sensitivity::ScanSettings;
+use crate::sensitivity::{Protocol, ScanSettings};
 use crate::specimen::{HoleAxis, ManufacturingLimits, Specimen, TestKind};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -123,6 +123,11 @@ impl Default for VerificationSettings {
     }
 }
 
+/// Studies without a protocol are written as they were before there was one.
+fn is_plain(protocol: &Protocol) -> bool {
+    *protocol == Protocol::default()
+}
+
 /// A validated study with its files read.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Study {
@@ -134,6 +139,9 @@ pub struct Study {
     pub materials: Vec<MaterialPrior>,
     /// The scan.
     pub scan: ScanSettings,
+    /// Forces read on the way to the scan, of the base as of every design, and what is not known of the load cell.
+    #[serde(default, skip_serializing_if = "is_plain")]
+    pub protocol: Protocol,
     /// What may vary.
     pub vary: Vary,
     /// What can be made and measured.

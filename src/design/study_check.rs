@@ -38,6 +38,7 @@ impl Study {
         problems.extend(self.base.validate().err().map(StudyError::Base));
         problems.extend(self.limits.validate().err().map(StudyError::Limits));
         problems.extend(self.scan.field_errors().into_iter().map(StudyError::Scan));
+        problems.extend(self.protocol.field_errors().into_iter().map(StudyError::Protocol));
         let length = self.name.chars().count();
         if length > MAX_NAME_LENGTH {
             problems.push(StudyError::NameTooLong { length, limit: MAX_NAME_LENGTH });

@@ -8,7 +8,7 @@ use super::study_limits::{DEFAULT_SEED, DEFAULT_WEIGHT, RelativeSd, SCHEMA, Weig
 use crate::field::schema::{schema_of_file, schema_tag};
 use crate::field::{FieldError, read};
 use crate::material::Ogden;
-use crate::sensitivity::ScanSettings;
+use crate::sensitivity::{Protocol, ScanSettings};
 use crate::specimen::json::schema_of;
 use crate::specimen::{ManufacturingLimits, Name, Specimen};
 use serde::Deserialize;
@@ -36,6 +36,10 @@ struct StudyFile {
     materials: Vec<MaterialEntry>,
     /// The scan.
     scan: ScanSettings,
+    /// Forces read on the way to the scan, of the base as of every design, and what is not known of the load cell. A
+    /// force at or beyond the drive of a design's scan is left out. The drive's zero counts at confirmation alone.
+    #[serde(default)]
+    protocol: Protocol,
     /// What may vary; what is absent stays as in the base specimen.
     vary: Vary,
     /// What can be made and measured.
@@ -103,6 +107,7 @@ impl StudyFile {
             base: base(self.base)?,
             materials,
             scan: self.scan,
+            protocol: self.protocol,
             vary: self.vary,
             limits: self.limits,
             objective: self.objective,

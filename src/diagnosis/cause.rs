@@ -177,6 +177,10 @@ pub trait Cause: Send + Sync {
     fn is_of_set_up(&self) -> bool {
         false
     }
+    /// Whether its model simplifies the shape of what it stands for, so that it errs by some percent of its effect.
+    fn is_idealised(&self) -> bool {
+        false
+    }
     /// Whether it is a smooth field without a mechanism, which takes up whatever is smooth.
     fn is_sponge(&self) -> bool {
         false

@@ -21,9 +21,9 @@ use super::outcome::Diagnosis;
 use super::prior::{BulkPrior, FitSettings, ShearPrior, shear_modulus};
 use super::registry::Registry;
 use super::rounds::{RoundLimits, add_causes, fit_round, score_round};
-use super::set_up::{SetUpPromise, fit_set_up, promise_of_set_up, simplest_set_up};
+use super::set_up::{fit_set_up, is_set_up_promising, simplest_set_up};
 use super::supposed::Supposed;
-use super::thinning::named_causes;
+use super::thinning::{Needed, named_causes, thinned};
 use super::trace::Trace;
 use crate::calibration::{Boundary, Observed};
 use crate::material::Ogden;
@@ -39,10 +39,13 @@ const TOLERANCE: f64 = 0.3;
 /// The allowance where none is stated, as a part of the largest drive.
 const ALLOWANCE_OF_DRIVE: f64 = 1e-3;
 
-/// The set-up as a whole is looked at where the first cause leaves more than this part of the misfit (rms).
+/// The set-up as a whole is looked at where single causes leave more than this part of the misfit (rms).
 const SET_UP_LEAVES: f64 = 0.25;
-/// It is gone on from where it leaves less than this part of what that cause leaves (rms).
+/// It is gone on from where it leaves less than this part of what they leave (rms).
 const SET_UP_GAINS: f64 = 0.7;
+
+/// Single causes are given up for the set-up where they explain less than their share, were so many alike at work.
+const MANY_CAUSES: f64 = 5.0;
 
 /// The interior is tested where the misfit beyond noise exceeds this multiple of the allowance (rms).
 const INTERIOR_ABOVE: f64 = 2.0;
@@ -90,6 +93,7 @@ pub(super) fn diagnose_among(
     run.question_material()?;
     run.take_out_artefacts()?;
     run.add_causes()?;
+    run.read_load_curve_again(recording)?;
     run.question_material_again()?;
     run.name_artefacts();
     let seen = run.correct_fits()?;
@@ -270,8 +274,8 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Tests, fits and names causes, round by round. Where no single cause explains much of the misfit, the set-up as a
-    /// whole is fitted in its place, and rounds go on from that.
+    /// Tests, fits and names causes, round by round. Where single causes leave much of the misfit, the set-up as a whole
+    /// is fitted in their place, and rounds go on from that.
     fn add_causes(&mut self) -> Result<(), DiagnosisError> {
         let measured = self.measured();
         let limits = RoundLimits {
@@ -279,34 +283,74 @@ impl<'a> Run<'a> {
             has_load_curve: self.load.is_some(),
             is_believed: self.options.prior.is_some(),
         };
-        let Run { inference, registry, findings, .. } = self;
+        let Run { inference, registry, findings, observed, .. } = self;
         if findings.causes.len() >= limits.max_causes {
             return Ok(());
         }
         let scored = score_round(inference, registry, findings, limits)?;
-        let left = leftover(self.observed, &findings.current.residual, &inference.metric);
+        let left_mm =
+            |fitted: &CauseFit, metric: &Metric| leftover(observed, &fitted.residual, metric).structured_rms_mm;
+        let before_mm = left_mm(&findings.current, &inference.metric);
         // What is no more than a mesh's needs no set-up.
-        let promise = match left.structured_rms_mm > inference.allowance_mm {
-            true => promise_of_set_up(inference, registry, &findings.current, &scored.candidates)?,
-            false => SetUpPromise::Nothing,
+        let is_promising = before_mm > inference.allowance_mm
+            && is_set_up_promising(inference, registry, &findings.current, &scored.candidates)?;
+        let is_hopeless = |inference: &Inference, findings: &Findings| {
+            let explained = findings.current.causes.len() as f64 / MANY_CAUSES;
+            let left = left_mm(&findings.current, &inference.metric) / before_mm;
+            is_promising && left.powi(2) > 1.0 - explained
         };
-        let mut is_set_up = promise == SetUpPromise::First && self.consider_set_up(&measured)?;
-        let mut goes_on = is_set_up;
-        if !is_set_up {
-            goes_on = fit_round(&mut self.inference, &mut self.findings, &measured, &scored, limits)?;
-            // What was not worth it before the first cause is not worth it after.
-            is_set_up = promise == SetUpPromise::Later && self.consider_set_up(&measured)?;
+        if fit_round(inference, findings, &measured, &scored, limits)? {
+            add_causes(inference, registry, findings, &measured, limits, &is_hopeless)?;
+            self.leave_out_what_is_not_needed(&measured)?;
         }
-        let num_before = self.findings.current.causes.len();
-        if goes_on || is_set_up {
+        if is_promising && self.consider_set_up(&measured)? {
+            let num_before = self.findings.current.causes.len();
             let Run { inference, registry, findings, .. } = self;
-            add_causes(inference, registry, findings, &measured, limits)?;
+            add_causes(inference, registry, findings, &measured, limits, &|_, _| false)?;
+            if findings.current.causes.len() > num_before {
+                findings.current = simplest_set_up(inference, registry, &measured, findings.current.clone())?;
+                self.name_causes_of_fit()?;
+            }
         }
-        if is_set_up && self.findings.current.causes.len() > num_before {
-            let Run { inference, registry, findings, .. } = self;
-            findings.current = simplest_set_up(inference, registry, &measured, findings.current.clone())?;
-            self.name_causes_of_fit()?;
+        Ok(())
+    }
+
+    /// Takes out of the fit the causes that later ones have made needless.
+    fn leave_out_what_is_not_needed(&mut self, measured: &Trace) -> Result<(), DiagnosisError> {
+        let Run { inference, findings, .. } = self;
+        let num_causes = findings.current.causes.len();
+        if num_causes > 1 {
+            findings.current = thinned(inference, measured, findings.current.clone(), Needed::ByEvidence)?;
+            if findings.current.causes.len() < num_causes {
+                self.name_causes_of_fit()?;
+            }
         }
+        Ok(())
+    }
+
+    /// Reads the load curve again with the causes that were found: what looked like the load cell's or the memory's may
+    /// have been theirs. Where motions of the plates between the steps are not known, the first reading stands.
+    fn read_load_curve_again(&mut self, recording: &Recording) -> Result<(), DiagnosisError> {
+        let Run { inference, findings, registry, load, .. } = self;
+        let scene = findings.current.scene();
+        let is_course_known = scene.plates_at.is_empty() && scene.compliance_mm_per_n.abs() < f64::MIN_POSITIVE;
+        let has_effects = load.as_ref().is_some_and(|l| !l.effects.is_empty());
+        let changes_sample = findings.current.causes.iter().any(|c| c.cause.changes_sample())
+            || findings.current.material.terms.len() > findings.nominal.material.terms.len();
+        if !(has_effects && changes_sample && is_course_known) {
+            return Ok(());
+        }
+        (inference.progress)("reading the load curve again, with the causes");
+        let found = read_load_curve(inference, recording, &findings.current, &registry.load_effects())?;
+        let Some(found) = found else { return Ok(()) };
+        findings.causes.retain(|c| !c.is_of_load_curve());
+        findings.causes.extend(FoundCause::of_load_curve(&found.effects));
+        self.recorded = self.inference.laboratory.measured();
+        take_off_effects(&mut self.recorded, Some(&found));
+        self.load = Some(found);
+        let measured = self.measured();
+        let Findings { current, .. } = &self.findings;
+        self.findings.current = self.inference.fit(&measured, &current.material, &current.causes)?;
         Ok(())
     }
 

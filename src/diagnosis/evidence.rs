@@ -1,6 +1,7 @@
 //! How much evidence a cause needs: the limits that all stages of a diagnosis share.
 
 use super::metric::Metric;
+use super::supposed::Supposed;
 use super::trace::Trace;
 use crate::calibration::Observed;
 
@@ -11,14 +12,22 @@ pub(super) const EVIDENCE: f64 = 30.0;
 pub(super) const ROUGH_TOLERANCE: f64 = 1e-3;
 /// A cause is fitted where it explains more than this part of what the leading one does, to first order.
 pub(super) const WORTH_A_FIT: f64 = 0.1;
-/// A further cause must explain this part of what the ones before it did. The model of a large effect errs by some
-/// percent of it, and such an error is no cause of its own.
+/// A further cause must explain this part of what the ones before it did, where the model of one of these idealises its
+/// shape ([`is_idealised`](super::cause::Cause::is_idealised)): such a model errs by some percent of its effect, and that error is no cause of its
+/// own.
 pub(super) const SMALLEST_SHARE: f64 = 0.02;
+/// The same part where all models are exact but for the mesh.
+const SMALLEST_SHARE_OF_EXACT: f64 = 0.004;
 /// Structured misfit that is left counts as unexplained above this multiple of the allowance (rms).
 pub(super) const UNEXPLAINED: f64 = 2.0;
 /// An effect counts as physics where its displacement (rms) exceeds this multiple of the allowance, or its force the
 /// allowance of forces.
 const SMALLEST_EFFECT: f64 = 1.0;
+
+/// The part of what `causes` explain that a further cause must explain.
+pub(super) fn smallest_share(causes: &[Supposed]) -> f64 {
+    if causes.iter().any(|c| c.cause.is_idealised()) { SMALLEST_SHARE } else { SMALLEST_SHARE_OF_EXACT }
+}
 
 /// What parameters cost in deviance: ln n for each, n being the number of data.
 pub(super) fn penalty(metric: &Metric, num_parameters: usize) -> f64 {

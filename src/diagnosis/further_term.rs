@@ -13,7 +13,15 @@ use crate::material::{MAX_TERMS, OgdenTerm};
 /// Terms are added up to this number.
 const MOST_TERMS: usize = 3;
 /// Exponents tried for a further Ogden term.
-const EXPONENTS: [f64; 5] = [-6.0, -2.0, 5.0, 9.0, 14.0];
+const EXPONENTS: [f64; 6] = [-6.0, -2.0, 2.0, 5.0, 9.0, 14.0];
+/// Most further terms that are fitted in full: first order does not tell reliably which is best.
+const MAX_FITS: usize = 2;
+/// Such a term is fitted where it explains, to first order, this part of what is called for: its exponent then follows.
+const LEAST_PROMISE: f64 = 0.25;
+/// A term that leaves less than this part of the misfit beyond noise is as good as any.
+const EXPLAINED: f64 = 0.1;
+/// Parts of the first order's modulus from which a fit starts: a stiffening term may have no equilibrium at once.
+const STARTS: [f64; 2] = [1.0, 0.2];
 
 /// The fit with one more Ogden term beside the causes of `current`, and its evidence, where the data call for it: by as
 /// much as for a cause, and by some part of what is left to be explained. Of a misfit that is not the material's, every
@@ -27,35 +35,66 @@ pub(super) fn further_term(
     current: &CauseFit,
 ) -> Result<Option<(CauseFit, f64)>, DiagnosisError> {
     let least = EVIDENCE.max(SMALLEST_SHARE * inference.misfit_beyond_noise(current));
-    let Some(term) = best_term(inference, current, least) else { return Ok(None) };
-    let mut richer = current.material.clone();
-    richer.terms.push(term);
-    match inference.fit(measured, &richer, &current.causes) {
-        Ok(found) => {
-            let gain = current.deviance - found.deviance - penalty(&inference.metric, 2);
-            let effect = found.prediction.trace.plus(-1.0, &current.prediction.trace);
-            let is_used = gain > least && is_large(inference.laboratory.observed(), &effect, inference.allowance_mm);
-            Ok(is_used.then_some((found, gain)))
+    let mut best: Option<CauseFit> = None;
+    let beyond_noise = inference.misfit_beyond_noise(current);
+    for term in promising_terms(inference, current, LEAST_PROMISE * least) {
+        if best.as_ref().is_some_and(|b| inference.misfit_beyond_noise(b) < EXPLAINED * beyond_noise) {
+            break;
         }
-        Err(error) if (inference.is_cancelled)() => Err(error),
-        Err(_) => Ok(None),
+        match fit_with_term(inference, measured, current, term) {
+            Ok(found) if best.as_ref().is_none_or(|b| found.deviance < b.deviance) => best = Some(found),
+            Err(error) if (inference.is_cancelled)() => return Err(error),
+            _ => {}
+        }
     }
+    let Some(found) = best else { return Ok(None) };
+    let gain = current.deviance - found.deviance - penalty(&inference.metric, 2);
+    let effect = found.prediction.trace.plus(-1.0, &current.prediction.trace);
+    let is_used = gain > least && is_large(inference.laboratory.observed(), &effect, inference.allowance_mm);
+    Ok(is_used.then_some((found, gain)))
 }
 
-/// The further term that explains most to first order, all exponents tried at once; `None` where none explains `least`.
-fn best_term(inference: &mut Inference, current: &CauseFit, least: f64) -> Option<OgdenTerm> {
-    if current.material.terms.len() >= MOST_TERMS {
-        return None;
+/// The fit with one more term, from as much of it as has an equilibrium.
+fn fit_with_term(
+    inference: &mut Inference,
+    measured: &Trace,
+    current: &CauseFit,
+    term: OgdenTerm,
+) -> Result<CauseFit, DiagnosisError> {
+    let mut fit = |part: f64| {
+        let mut richer = current.material.clone();
+        richer.terms.push(OgdenTerm { mu_kpa: part * term.mu_kpa, ..term });
+        inference.fit(measured, &richer, &current.causes)
+    };
+    let [whole, part] = STARTS;
+    fit(whole).or_else(|_| fit(part))
+}
+
+/// The further terms that explain more than `least` to first order, best first and few.
+fn promising_terms(inference: &mut Inference, current: &CauseFit, least: f64) -> Vec<OgdenTerm> {
+    let num_terms = current.material.terms.len();
+    if num_terms >= MOST_TERMS {
+        return Vec::new();
     }
-    let mut probe = current.material.clone();
+    let probes = EXPONENTS.chunks(MAX_TERMS - num_terms);
+    let mut found: Vec<(f64, OgdenTerm)> = probes.flat_map(|alphas| probe(inference, current, alphas)).collect();
+    found.retain(|(explained, term)| *explained > least && term.mu_kpa * term.alpha > 0.0);
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    found.into_iter().take(MAX_FITS).map(|(_, term)| term).collect()
+}
+
+/// What terms of these exponents explain to first order, each alone, and the terms; none where there are no
+/// derivatives.
+fn probe(inference: &mut Inference, current: &CauseFit, alphas: &[f64]) -> Vec<(f64, OgdenTerm)> {
     let base = current.material.terms.len();
-    let exponents = || EXPONENTS.into_iter().take(MAX_TERMS - base);
-    for alpha in exponents() {
+    let mut probe = current.material.clone();
+    for &alpha in alphas {
         let mu_kpa = 1e-9 * shear_modulus(&current.material) / alpha;
         probe.terms.push(OgdenTerm { mu_kpa, alpha });
     }
     let scene = current.scene();
-    let columns = inference.laboratory.derivatives(&probe, &scene, &current.prediction, true, &[], STEP).ok()?;
+    let columns = inference.laboratory.derivatives(&probe, &scene, &current.prediction, true, &[], STEP);
+    let Ok(columns) = columns else { return Vec::new() };
     let nuisance: Vec<Trace> = columns[..=2 * base]
         .iter()
         .zip(current.material.parameters())
@@ -63,15 +102,10 @@ fn best_term(inference: &mut Inference, current: &CauseFit, least: f64) -> Optio
         .collect();
     let prior = [inference.settings.bulk.log_sd.powi(-2)];
     let test = ScoreTest::new(&inference.metric, &current.residual, &nuisance, &prior);
-    let mut best: Option<(f64, OgdenTerm)> = None;
-    for (n, alpha) in exponents().enumerate() {
+    let of_term = |(n, &alpha): (usize, &f64)| {
         // κ, then μ and α of each term.
-        let direction = &columns[1 + 2 * (base + n)];
-        let score = test.test(std::slice::from_ref(direction));
-        let mu_kpa = score.coefficients[0];
-        if mu_kpa * alpha > 0.0 && best.as_ref().is_none_or(|b| score.explained > b.0) {
-            best = Some((score.explained, OgdenTerm { mu_kpa, alpha }));
-        }
-    }
-    best.filter(|b| b.0 > least).map(|b| b.1)
+        let score = test.test(std::slice::from_ref(&columns[1 + 2 * (base + n)]));
+        (score.explained, OgdenTerm { mu_kpa: score.coefficients[0], alpha })
+    };
+    alphas.iter().enumerate().map(of_term).collect()
 }

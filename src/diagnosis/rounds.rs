@@ -4,7 +4,7 @@
 use super::candidate::Candidate;
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
-use super::evidence::{EVIDENCE, ROUGH_TOLERANCE, SMALLEST_SHARE, is_large, penalty};
+use super::evidence::{EVIDENCE, ROUGH_TOLERANCE, is_large, penalty, smallest_share};
 use super::experiment::experiments;
 use super::findings::Findings;
 use super::found::FoundCause;
@@ -25,6 +25,10 @@ const AMBIGUITY: f64 = 15.0;
 /// for: a full fit may explain several times what first order promises.
 const LEAST_PROMISE: f64 = 0.25;
 
+/// The gain of a smooth field without a mechanism counts for this part: it takes up what several causes leave, and
+/// each of them first explains a part of that. What later causes make needless is taken out at the end.
+const SPONGE_COUNTS: f64 = 1.0 / 3.0;
+
 /// Fits that ended early may lie so many times that apart from where they would have ended.
 const NEAR_TOLERANCES: f64 = 5.0;
 
@@ -33,6 +37,14 @@ struct Trial {
     /// Fall of the deviance, less ln n per parameter of the cause.
     gain: f64,
     fit: CauseFit,
+}
+
+impl Trial {
+    /// Its gain as it counts against others.
+    fn counted(&self) -> f64 {
+        let is_sponge = self.fit.causes.last().is_some_and(|c| c.cause.is_sponge());
+        if is_sponge { SPONGE_COUNTS * self.gain } else { self.gain }
+    }
 }
 
 /// What the first half of a round found.
@@ -99,7 +111,7 @@ pub(super) fn fit_round(
 ) -> Result<bool, DiagnosisError> {
     let trials = fit_leading(inference, scored, findings, measured)?;
     if !limits.is_believed {
-        let best = trials.first().map_or(0.0, |t| t.gain);
+        let best = trials.first().map_or(0.0, Trial::counted);
         if let Some((richer, gain)) = further_term(inference, measured, &findings.current)?
             && gain > best
         {
@@ -111,7 +123,7 @@ pub(super) fn fit_round(
     take_best(inference, findings, trials)
 }
 
-/// Adds causes round by round, until no further one is called for or the limits are reached.
+/// Adds causes round by round, until no further one is called for, the limits are reached, or `is_hopeless`.
 ///
 /// # Errors
 /// As [`score_round`].
@@ -121,8 +133,9 @@ pub(super) fn add_causes(
     findings: &mut Findings,
     measured: &Trace,
     limits: RoundLimits,
+    is_hopeless: &dyn Fn(&Inference, &Findings) -> bool,
 ) -> Result<(), DiagnosisError> {
-    while findings.causes.len() < limits.max_causes {
+    while findings.causes.len() < limits.max_causes && !is_hopeless(inference, findings) {
         let scored = score_round(inference, registry, findings, limits)?;
         if !fit_round(inference, findings, measured, &scored, limits)? {
             break;
@@ -145,7 +158,7 @@ fn fit_leading(
     let Scored { candidates, known } = scored;
     let round = findings.num_rounds;
     let mut trials: Vec<Trial> = Vec::new();
-    let least = LEAST_PROMISE * SMALLEST_SHARE * findings.explained();
+    let least = LEAST_PROMISE * smallest_share(&findings.current.causes) * findings.explained();
     let settings = inference.settings;
     let tolerance = settings.tolerance.max(ROUGH_TOLERANCE * inference.misfit_beyond_noise(&findings.current));
     inference.settings.relative_tolerance = ROUGH_TOLERANCE;
@@ -167,16 +180,16 @@ fn fit_leading(
         trials.push(Trial { gain, fit });
     }
     inference.settings = settings;
-    let best = trials.iter().fold(f64::NEG_INFINITY, |best, t| best.max(t.gain));
+    let best = trials.iter().map(Trial::counted).fold(f64::NEG_INFINITY, f64::max);
     let near = best - 2.0 * AMBIGUITY - NEAR_TOLERANCES * tolerance;
-    for trial in trials.iter_mut().filter(|t| t.gain > near.max(EVIDENCE - NEAR_TOLERANCES * tolerance)) {
+    for trial in trials.iter_mut().filter(|t| t.counted() > near.max(EVIDENCE - NEAR_TOLERANCES * tolerance)) {
         match inference.fit(measured, &trial.fit.material, &trial.fit.causes) {
             Ok(fit) => *trial = Trial { gain: gain_of(inference, &findings.current, &fit), fit },
             Err(error) if (inference.is_cancelled)() => return Err(error),
             Err(_) => {}
         }
     }
-    trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    trials.sort_by(|a, b| b.counted().total_cmp(&a.counted()));
     Ok(trials)
 }
 
@@ -192,12 +205,13 @@ fn take_best(inference: &mut Inference, findings: &mut Findings, trials: Vec<Tri
     let mut trials = trials.into_iter();
     let Some(best) = trials.next() else { return Ok(false) };
     let effect = best.fit.prediction.trace.plus(-1.0, &findings.current.prediction.trace);
-    let is_too_little = best.gain < EVIDENCE.max(SMALLEST_SHARE * findings.explained());
+    let share = smallest_share(&findings.current.causes);
+    let is_too_little = best.gain < EVIDENCE.max(share * findings.explained());
     if is_too_little || !is_large(inference.laboratory.observed(), &effect, inference.allowance_mm) {
         return Ok(false);
     }
     for other in trials {
-        if best.gain - other.gain < AMBIGUITY && !is_same(&best.fit, &other.fit, &effect) {
+        if best.counted() - other.counted() < AMBIGUITY && !is_same(&best.fit, &other.fit, &effect) {
             let alternative = alternative(inference, &findings.current, &best.fit, &other)?;
             findings.alternatives.push(alternative);
         }

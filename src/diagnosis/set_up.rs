@@ -17,7 +17,7 @@ use super::inference::Inference;
 use super::registry::Registry;
 use super::score_round::score_of_set_up;
 use super::supposed::Supposed;
-use super::thinning::thinned;
+use super::thinning::{Needed, thinned};
 use super::trace::Trace;
 use std::sync::Arc;
 
@@ -30,36 +30,26 @@ const MAX_FITS: usize = 8;
 /// The weights are settled where the misfit beyond noise changes by less than this part.
 const SETTLED: f64 = 0.05;
 
-/// A single cause that explains more than this part of the misfit, to first order, is fitted before the set-up is
-/// looked at.
+/// Where a single cause explains more than this part of the misfit, to first order, what the set-up promises is not
+/// worked out.
 const SINGLE_EXPLAINS: f64 = 0.75;
-/// The set-up is looked at first where, to first order, it explains so many times what the best single cause does.
-const SET_UP_EXPLAINS: f64 = 1.5;
 
-/// What the set-up as a whole promises.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum SetUpPromise {
-    /// So much more than any single cause that it is fitted before them.
-    First,
-    /// More than any single cause, or it was not asked: it is fitted where the first cause leaves much.
-    Later,
-    /// Less than a single cause does.
-    Nothing,
-}
-
-/// What the set-up as a whole promises beside `candidates`, to first order.
+/// Whether the set-up as a whole may explain more than any of `candidates`, to first order.
 ///
 /// # Errors
 /// [`DiagnosisError`]: no derivatives.
-pub(super) fn promise_of_set_up(
+pub(super) fn is_set_up_promising(
     inference: &mut Inference,
     registry: &Registry,
     current: &CauseFit,
     candidates: &[Candidate],
-) -> Result<SetUpPromise, DiagnosisError> {
+) -> Result<bool, DiagnosisError> {
+    if registry.set_up(inference.laboratory.observed()).is_empty() {
+        return Ok(false);
+    }
     let (best, all) = (candidates.first().map_or(0.0, |c| c.score), inference.misfit_of(&current.residual));
-    if best > SINGLE_EXPLAINS * all || registry.set_up(inference.laboratory.observed()).is_empty() {
-        return Ok(SetUpPromise::Later);
+    if best > SINGLE_EXPLAINS * all {
+        return Ok(true);
     }
     let set_up = score_of_set_up(inference, registry, current)?;
     (inference.progress)(&format!(
@@ -67,13 +57,7 @@ pub(super) fn promise_of_set_up(
         100.0 * set_up / all,
         100.0 * best / all
     ));
-    Ok(if set_up > SET_UP_EXPLAINS * best {
-        SetUpPromise::First
-    } else if set_up > best {
-        SetUpPromise::Later
-    } else {
-        SetUpPromise::Nothing
-    })
+    Ok(set_up > best)
 }
 
 /// The fit of `measured` with all parts of the set-up, from where `start` ended; the causes that it has stay.
@@ -153,7 +137,7 @@ pub(super) fn with_plain_motions(
     let mut causes: Vec<Supposed> = fitted.causes.iter().filter(is_kept).cloned().collect();
     causes.extend(plain);
     let Ok(other) = inference.fit(measured, &fitted.material, &causes) else { return Ok(fitted) };
-    let other = thinned(inference, measured, other)?;
+    let other = thinned(inference, measured, other, Needed::BeyondAMesh)?;
     let cost = |fit: &CauseFit| fit.deviance + penalty(&inference.metric, fit.num_parameters());
     Ok(if cost(&other) < cost(&fitted) { other } else { fitted })
 }
@@ -168,7 +152,7 @@ pub(super) fn simplest_set_up(
     measured: &Trace,
     fitted: CauseFit,
 ) -> Result<CauseFit, DiagnosisError> {
-    let fitted = thinned(inference, measured, fitted)?;
+    let fitted = thinned(inference, measured, fitted, Needed::BeyondAMesh)?;
     let fitted = with_plain_motions(inference, registry, measured, fitted)?;
     let fitted = settled(inference, measured, fitted)?;
     inference.fit(measured, &fitted.material, &fitted.causes)

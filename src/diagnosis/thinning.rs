@@ -21,6 +21,15 @@ use nalgebra::{DMatrix, DVector};
 /// could, it needs so many times the usual evidence.
 const OF_IMAGE_ALONE: f64 = 10.0;
 
+/// What a cause must do to stay.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Needed {
+    /// Be called for by the evidence: for causes of which each was found to be more than a mesh's error.
+    ByEvidence,
+    /// Do more than a mesh's error could besides: for parts that were put in together, unasked.
+    BeyondAMesh,
+}
+
 /// The quadratic form of a fit at its end, in scaled parameters.
 struct QuadraticModel {
     /// Half the Hessian of the deviance.
@@ -147,6 +156,7 @@ pub(super) fn thinned(
     inference: &mut Inference,
     measured: &Trace,
     fitted: CauseFit,
+    rule: Needed,
 ) -> Result<CauseFit, DiagnosisError> {
     let mut model = QuadraticModel::of(inference, &fitted)?;
     let mut left: Vec<usize> = (0..fitted.causes.len()).collect();
@@ -165,6 +175,7 @@ pub(super) fn thinned(
                 // seen only once the others are out.
                 let is_a_meshs = |mm: f64| mm < UNEXPLAINED * inference.allowance_mm;
                 let needed = match supposed.cause.changes_sample() {
+                    _ if rule == Needed::ByEvidence => 0.0,
                     true if is_a_meshs(left_mm) => f64::INFINITY,
                     false if is_a_meshs(model.effect_rms_mm(cause)) => OF_IMAGE_ALONE * EVIDENCE,
                     _ => 0.0,

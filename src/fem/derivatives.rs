@@ -13,6 +13,7 @@
 use super::assembler::Configuration;
 use super::change::{ACCURACY, ChangeSensitivity};
 use super::error::{SolveError, StepFailure};
+use super::rates::Rates;
 use super::tangent::Tangent;
 use crate::material::Parameter;
 use crate::mesh::Mesh;
@@ -55,26 +56,28 @@ impl Tangent<'_> {
     pub fn material_sensitivities(&mut self) -> Result<Vec<ParameterSensitivity>, SolveError> {
         let assembler = self.assembler.clone();
         let parameters = self.material.parameters();
-        let mut derivative = vec![[0.0; 3]; assembler.mesh().nodes.len()];
-        let mut right = Vec::with_capacity(parameters.len());
-        for &parameter in &parameters {
-            assembler
-                .assemble_directional(&self.configuration(), None, Some(parameter), None, &mut derivative)
-                .map_err(|cause| self.diverged(cause))?;
-            right.push(assembler.collect(&derivative, -1.0));
-        }
-        let solutions = self.solve_all(&right, ACCURACY)?;
+        let rates_of = |displacement| {
+            move |&parameter: &Parameter| Rates { parameter: Some(parameter), displacement, ..Rates::default() }
+        };
+        let rates: Vec<Rates> = parameters.iter().map(rates_of(None)).collect();
+        let derivatives =
+            assembler.assemble_rates(&self.configuration(), &rates, None).map_err(|cause| self.diverged(cause))?;
+        let right: Vec<Vec<f64>> = derivatives.iter().map(|d| assembler.collect(d, -1.0)).collect();
+        let displacements: Vec<Vec<[f64; 3]>> =
+            self.solve_all(&right, ACCURACY)?.iter().map(|x| assembler.spread(x)).collect();
+        let rates: Vec<Rates> =
+            parameters.iter().zip(&displacements).map(|(parameter, u)| rates_of(Some(u))(parameter)).collect();
         let driven = Some(&assembler.plates().driven_elements[..]);
-        let mut all = Vec::with_capacity(parameters.len());
-        for (&parameter, x) in parameters.iter().zip(&solutions) {
-            let displacement = assembler.spread(x);
-            let direction = Some(&displacement[..]);
-            assembler
-                .assemble_directional(&self.configuration(), direction, Some(parameter), driven, &mut derivative)
-                .map_err(|cause| self.diverged(cause))?;
-            all.push(ParameterSensitivity { parameter, displacement, force_n: assembler.force_n(&derivative) });
-        }
-        Ok(all)
+        let forces =
+            assembler.assemble_rates(&self.configuration(), &rates, driven).map_err(|cause| self.diverged(cause))?;
+        let found = parameters.into_iter().zip(displacements).zip(&forces);
+        Ok(found
+            .map(|((parameter, displacement), f)| ParameterSensitivity {
+                parameter,
+                displacement,
+                force_n: assembler.force_n(f),
+            })
+            .collect())
     }
 
     /// Derivatives along t ↦ (node positions X + t `velocity`, drive + t `drive_rate`) at t = 0; `sensitivities` are

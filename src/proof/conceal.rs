@@ -186,14 +186,14 @@ fn made_specimen(specimen: &Specimen, experiment: &Experiment) -> Specimen {
     made
 }
 
-/// Prisms; a free patch is made of free nodes, whose elements end at its edges unless these come too near to a hole.
+/// Prisms; a free patch is made of free nodes, whose elements end at its edges unless these come too near to a hole or
+/// would make an element too flat.
 fn model_of(made: &Specimen, experiment: &Experiment, mesh_factor: f64) -> Result<ForwardModel, ConcealError> {
     let options = MeshOptions { use_mirror: false, force_prisms: true, ..MeshOptions::scaled(made, mesh_factor) };
     let patch = experiment.of(HiddenCause::Debond).next();
     let lines = patch.map_or_else(Vec::new, |hidden| patch_lines(made, hidden));
-    let mesh =
-        if lines.is_empty() { mesh_specimen(made, &options) } else { mesh_specimen_along(made, &options, &lines) };
-    let mut mesh = mesh.map_err(PrepareError::from)?;
+    let along = (!lines.is_empty()).then(|| mesh_specimen_along(made, &options, &lines)).and_then(Result::ok);
+    let mut mesh = along.map_or_else(|| mesh_specimen(made, &options), Ok).map_err(PrepareError::from)?;
     for wedge in experiment.of(HiddenCause::Geometry).filter(|h| h.which == WEDGE) {
         // Wider by half of it at one end, narrower at the other.
         for x in &mut mesh.nodes {

@@ -6,6 +6,8 @@
 
 use super::information::{FisherInformation, InformationError, MeasurementNoise};
 use super::integrated::{IntegratedSensitivity, parameter_sensitivity, shear_parameters};
+use super::joint_information::JointInformation;
+use super::protocol::{Nuisance, Protocol};
 use crate::fem::{ParameterSensitivity, QuadraturePoint};
 use crate::kinematics::{decompose, principal_stretches};
 use crate::material::Ogden;
@@ -75,6 +77,48 @@ pub fn information_over_quadrature(
     }
     information.check_finite()?;
     Ok(information)
+}
+
+/// A force that the load cell reads, N.
+#[derive(Clone, Debug)]
+pub struct ForceReading {
+    /// The force.
+    pub force_n: f64,
+    /// Its derivatives with respect to the material's parameters, in the order of [`Ogden::parameters`].
+    pub sensitivities: Vec<f64>,
+}
+
+/// As [`information_over_quadrature`] for a scan and any number of forces read on the way to it, the scan's own among
+/// them, with the gain and the zero of the load cell as unknown as `protocol` says. (The drive's zero is not among the
+/// unknowns here.)
+///
+/// # Errors
+/// As [`information_over_quadrature`].
+pub fn information_of_protocol(
+    material: &Ogden,
+    mesh: &Mesh,
+    points: &[QuadraturePoint],
+    scanned: &[ParameterSensitivity],
+    readings: &[ForceReading],
+    protocol: &Protocol,
+    noise: &MeasurementNoise,
+    voxel_volume_mm3: f64,
+) -> Result<FisherInformation, InformationError> {
+    let fields: Vec<(&[[f64; 3]], f64)> = scanned.iter().map(|s| (&s.displacement[..], 0.0)).collect();
+    let gram = gram_over_quadrature(mesh, points, &fields, noise, voxel_volume_mm3)?;
+    let unknowns: Vec<(Nuisance, f64)> =
+        protocol.nuisances().into_iter().filter(|(n, _)| *n != Nuisance::DriveZero).collect();
+    let mut joint = JointInformation::of_scan(FisherInformation::from_matrix(material, gram)?, unknowns.len());
+    for reading in readings {
+        check_length("a force's sensitivities", reading.sensitivities.len(), scanned.len())?;
+        let of_unknown = |(unknown, _): &(Nuisance, f64)| match unknown {
+            Nuisance::ForceGain => reading.force_n,
+            Nuisance::ForceZero | Nuisance::DriveZero => 1.0,
+        };
+        let of_unknowns: Vec<f64> = unknowns.iter().map(of_unknown).collect();
+        joint.add_force(&reading.sensitivities, &of_unknowns, noise.force_sd_n);
+    }
+    joint.about_material(material, &unknowns.iter().map(|u| u.1).collect::<Vec<_>>())
 }
 
 /// Products of pairs (nodal displacements in mm, force in N) in the metric of the scan's noise: ∫ aᵀ N⁻¹ b dV / V_voxel

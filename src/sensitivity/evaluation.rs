@@ -7,7 +7,7 @@ use super::error::EvaluationError;
 use super::information::FisherInformation;
 use super::joint_information::JointInformation;
 use super::observation::{DriveMaps, DrivenState, EvaluationStep, Scanner, Unknown};
-use super::protocol::{Nuisance, Protocol};
+use super::protocol::{Nuisance, Protocol, SAME_DRIVE_MM};
 use super::scan_settings::ScanSettings;
 use crate::fem::{Equilibrium, ForwardModel, PrepareError, SolveOptions, Tangent};
 use crate::material::{Ogden, Parameter};
@@ -16,9 +16,6 @@ use crate::provenance::input_hash;
 use crate::specimen::Specimen;
 use crate::voxel::{Sampling, VoxelMask};
 use serde::{Deserialize, Serialize};
-
-/// Drives nearer to each other than this are one, mm.
-const SAME_DRIVE_MM: f64 = 1e-9;
 
 /// Settings of an evaluation.
 #[derive(Clone, Debug)]
@@ -283,9 +280,8 @@ fn add_forces(
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Vec<ForceStep>, EvaluationError> {
     let is_scanned = |drive: &f64| scanned.iter().any(|s| (s.drive_mm - drive).abs() < SAME_DRIVE_MM);
-    let mut drives: Vec<f64> = options.protocol.force_drive_mm.iter().copied().filter(|d| !is_scanned(d)).collect();
-    drives.sort_by(f64::total_cmp);
-    drives.dedup_by(|a, b| (*a - *b).abs() < SAME_DRIVE_MM);
+    let mut drives = options.protocol.force_drives_mm();
+    drives.retain(|d| !is_scanned(d));
     if drives.is_empty() {
         return Ok(Vec::new());
     }

@@ -30,9 +30,13 @@ pub(super) struct JointInformation {
 impl JointInformation {
     /// No information about `num` unknowns.
     pub(super) fn none(material: &Ogden, num: usize) -> JointInformation {
-        let of_material = FisherInformation::none(material);
-        let n = of_material.parameters().len();
-        JointInformation { material: of_material, cross: DMatrix::zeros(n, num), own: DMatrix::zeros(num, num) }
+        JointInformation::of_scan(FisherInformation::none(material), num)
+    }
+
+    /// Of a scan that tells nothing of `num` unknowns.
+    pub(super) fn of_scan(material: FisherInformation, num: usize) -> JointInformation {
+        let n = material.parameters().len();
+        JointInformation { material, cross: DMatrix::zeros(n, num), own: DMatrix::zeros(num, num) }
     }
 
     /// Of a scanned drive: `material` is what it tells of the material alone, from `fields` and `forces` (see

@@ -12,6 +12,9 @@ schema_type! {
     SdOrZero = number_within(0.0..=1000.0);
 }
 
+/// Drives closer than this are one, mm.
+pub(super) const SAME_DRIVE_MM: f64 = 1e-9;
+
 /// Forces that are read beside those at the scans, and what is known of the set-up no better than by a standard
 /// deviation. Such unknowns are common to all drives; they are estimated together with the material, so that a promise
 /// does not rest on a perfect load cell or drive.
@@ -55,6 +58,21 @@ impl Protocol {
         .into_iter()
         .filter(|(_, sd)| *sd > 0.0)
         .collect()
+    }
+
+    /// The same without the forces that are not on the way to `drive_mm`: those at it or beyond.
+    pub fn on_the_way_to(&self, drive_mm: f64) -> Protocol {
+        let mut own = self.clone();
+        own.force_drive_mm.retain(|d| *d < drive_mm - SAME_DRIVE_MM);
+        own
+    }
+
+    /// The drives at which the force alone is read, in order and each once, mm.
+    pub fn force_drives_mm(&self) -> Vec<f64> {
+        let mut drives = self.force_drive_mm.clone();
+        drives.sort_by(f64::total_cmp);
+        drives.dedup_by(|a, b| (*a - *b).abs() < SAME_DRIVE_MM);
+        drives
     }
 
     /// Every number that is not what it must be.

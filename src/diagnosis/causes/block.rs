@@ -79,6 +79,10 @@ impl Cause for Block {
         all
     }
 
+    fn is_idealised(&self) -> bool {
+        true
+    }
+
     fn apply(&self, values: &[f64], scene: &mut Scene) {
         for (n, surface) in values.chunks(SURFACE_TERMS).enumerate() {
             let face = &mut scene.shape.faces_mm[self.axes[n / 2]][n % 2];

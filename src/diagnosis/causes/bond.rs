@@ -75,6 +75,10 @@ impl Cause for SoftBond {
         self.start_mm_per_kpa.map(|c| c.max(FIRMEST)).to_vec()
     }
 
+    fn is_idealised(&self) -> bool {
+        true
+    }
+
     fn apply(&self, values: &[f64], scene: &mut Scene) {
         for (sum, value) in scene.bond_mm_per_kpa.iter_mut().zip(values) {
             *sum += value;

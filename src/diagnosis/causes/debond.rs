@@ -157,6 +157,10 @@ impl Cause for Debond {
         all
     }
 
+    fn is_idealised(&self) -> bool {
+        true
+    }
+
     fn apply(&self, values: &[f64], scene: &mut Scene) {
         scene.looseness[usize::from(self.is_moved_face)].push(self.patch(values, EDGE_MM));
     }

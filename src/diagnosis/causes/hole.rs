@@ -64,6 +64,10 @@ impl Cause for HoleError {
         2
     }
 
+    fn is_idealised(&self) -> bool {
+        true
+    }
+
     fn apply(&self, values: &[f64], scene: &mut Scene) {
         if scene.holes.len() <= self.hole {
             scene.holes.resize(self.hole + 1, [0.0; 3]);

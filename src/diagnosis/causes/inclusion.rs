@@ -127,6 +127,10 @@ impl Cause for Inclusion {
         vec![self.log_factor, c[0], c[1], c[2], self.radius_mm]
     }
 
+    fn is_idealised(&self) -> bool {
+        true
+    }
+
     fn apply(&self, values: &[f64], scene: &mut Scene) {
         scene.stiffness.push(ball(values, EDGE_MM));
     }

@@ -87,6 +87,10 @@ impl Cause for Layer {
         all
     }
 
+    fn is_idealised(&self) -> bool {
+        true
+    }
+
     fn apply(&self, values: &[f64], scene: &mut Scene) {
         for (side, depth) in values.chunks(FACE_TERMS).enumerate() {
             let inwards = [1.0, -1.0][side];
