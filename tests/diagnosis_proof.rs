@@ -44,6 +44,27 @@ fn a_plain_gain_error_is_found_with_its_size() {
     assert!(!found.deviations.is_empty() && num_outside <= found.deviations.len() / 3, "{found:?}");
 }
 
+/// A material that stiffens by a second term, in a mount that is not perfect, with voxels that show nothing of it: the
+/// nominal model takes the second term, and no physics is named in its place.
+#[test]
+fn a_stiffening_material_is_no_cause() {
+    let experiment = draw_harmless(694_000_851);
+    let made = conceal(&specimen(), &experiment).unwrap().recording;
+    let options = DiagnosisOptions { mesh_factor: 2.2, ..DiagnosisOptions::default() };
+    let found = diagnose(&made, &options, &|_| {}, &common::never).unwrap();
+    let names: Vec<&str> = found.causes.iter().map(|c| c.name.as_str()).collect();
+    assert_eq!((found.verdict, names), (Verdict::NoMismatch, vec![]));
+    assert_eq!(found.nominal.material.terms.len(), experiment.material.terms.len());
+}
+
+/// A plate that lags changes the force at rest: once it is found, no zero of the load cell is named for that.
+#[test]
+fn what_a_lagging_plate_does_to_the_force_is_no_load_cells() {
+    let found = diagnosed_without(&Hidden { strength: 0.24, ..draw_cause(HiddenCause::Slack, 24) }, &[], 2.2, 6);
+    let names: Vec<&str> = found.causes.iter().map(|c| c.name.as_str()).collect();
+    assert_eq!((found.verdict, names), (Verdict::Explained, vec!["slack"]));
+}
+
 /// Where the diagnosis is not told of debonds it must say that something is left.
 #[test]
 fn an_unknown_cause_is_not_named_no_mismatch() {

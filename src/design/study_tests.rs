@@ -46,6 +46,23 @@ fn a_whole_study_is_read_in_both_ways() {
     assert_eq!(from_request.field_errors(), []);
 }
 
+/// A protocol is read and tells studies apart; a study without one is written as before there was one.
+#[test]
+fn a_study_may_have_a_protocol() {
+    let plain = Study::from_request(&whole()).expect("it is valid");
+    assert!(serde_json::to_value(&plain).expect("it is JSON").get("protocol").is_none());
+    let mut value = whole();
+    value["protocol"] = json!({ "force_drive_mm": [5.0, 2.0, 2.0], "force_gain_sd": 0.01 });
+    let study = Study::from_request(&value).expect("it is valid");
+    assert_ne!(super::study_hash(&study), super::study_hash(&plain));
+    // Each drive once, in order, and those before the scan alone.
+    assert_eq!(study.protocol.on_the_way_to(5.0).force_drives_mm(), [2.0]);
+    assert_eq!(study.protocol.force_drives_mm(), [2.0, 5.0]);
+    value["protocol"]["force_drive_mm"][1] = json!(-1.0);
+    let errors = Study::from_request(&value).expect_err("it is refused");
+    assert_eq!(errors.iter().map(|e| e.pointer.as_str()).collect::<Vec<_>>(), ["/protocol/force_drive_mm/1"]);
+}
+
 #[test]
 fn each_rule_has_its_pointer() {
     for (pointer, bad) in [

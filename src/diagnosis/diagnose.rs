@@ -29,6 +29,7 @@ use crate::calibration::{Boundary, Observed};
 use crate::material::Ogden;
 use crate::mesh::MeshOptions;
 use crate::recording::Recording;
+use std::cell::RefCell;
 
 /// Standard deviation of ln κ of the material believed.
 const BELIEVED_LOG_SD: f64 = 0.5;
@@ -44,8 +45,10 @@ const SET_UP_LEAVES: f64 = 0.25;
 /// It is gone on from where it leaves less than this part of what they leave (rms).
 const SET_UP_GAINS: f64 = 0.7;
 
-/// Single causes are given up for the set-up where they explain less than their share, were so many alike at work.
-const MANY_CAUSES: f64 = 5.0;
+/// Single causes are given up for the set-up where the first explains less than this part of the deviance, …
+const LEAST_OF_FIRST: f64 = 0.2;
+/// … or where one explains less than this of the part that the one before it did.
+const LEAST_OF_NEXT: f64 = 0.8;
 
 /// The interior is tested where the misfit beyond noise exceeds this multiple of the allowance (rms).
 const INTERIOR_ABOVE: f64 = 2.0;
@@ -53,6 +56,17 @@ const INTERIOR_ABOVE: f64 = 2.0;
 /// The artefacts among the causes of a fit.
 fn artefacts_of(fitted: &CauseFit) -> Vec<Supposed> {
     fitted.causes.iter().filter(|c| c.cause.is_artefact()).cloned().collect()
+}
+
+/// Whether causes, found one after the other, explain less and less of what was left (`lefts`, before the first and after
+/// each): right ones explain more and more of it, down to nothing.
+fn explain_ever_less(lefts: &[f64]) -> bool {
+    let shares: Vec<f64> = lefts.windows(2).map(|pair| 1.0 - pair[1] / pair[0]).collect();
+    match shares[..] {
+        [] => false,
+        [first] => first < LEAST_OF_FIRST,
+        [.., before, last] => last < LEAST_OF_NEXT * before,
+    }
 }
 
 /// Diagnoses `recording`; `progress` is told what is being done.
@@ -294,10 +308,13 @@ impl<'a> Run<'a> {
         // What is no more than a mesh's needs no set-up.
         let is_promising = before_mm > inference.allowance_mm
             && is_set_up_promising(inference, registry, &findings.current, &scored.candidates)?;
+        // What was left of the deviance after each cause so far.
+        let lefts = RefCell::new(vec![inference.misfit_beyond_noise(&findings.current)]);
         let is_hopeless = |inference: &Inference, findings: &Findings| {
-            let explained = findings.current.causes.len() as f64 / MANY_CAUSES;
-            let left = left_mm(&findings.current, &inference.metric) / before_mm;
-            is_promising && left.powi(2) > 1.0 - explained
+            let left = left_mm(&findings.current, &inference.metric);
+            lefts.borrow_mut().push(inference.misfit_beyond_noise(&findings.current));
+            let is_explained = left < (SET_UP_LEAVES * before_mm).max(inference.allowance_mm);
+            is_promising && !is_explained && explain_ever_less(&lefts.borrow())
         };
         if fit_round(inference, findings, &measured, &scored, limits)? {
             add_causes(inference, registry, findings, &measured, limits, &is_hopeless)?;

@@ -120,3 +120,11 @@ fn a_cancelled_diagnosis_is_an_error() {
     let coarse = DiagnosisOptions { mesh_factor: 9.0, ..options() };
     assert!(matches!(diagnose(&recording, &coarse, &|_| {}, &never), Err(DiagnosisError::Setting { .. })));
 }
+
+/// Three causes alike: a third, a half, all. Causes that stand for others: a half, then less and less.
+#[test]
+fn causes_that_explain_ever_less_are_given_up() {
+    assert!(!explain_ever_less(&[9.0]));
+    assert!(!explain_ever_less(&[9.0, 6.0]) && !explain_ever_less(&[9.0, 6.0, 3.0]));
+    assert!(explain_ever_less(&[9.0, 8.0]) && explain_ever_less(&[9.0, 5.0, 3.5]));
+}
