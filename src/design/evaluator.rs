@@ -16,7 +16,9 @@ use crate::fem::{Equilibrium, ForwardModel, ParameterSensitivity, PathSensitivit
 use crate::kinematics::principal_stretches;
 use crate::material::Ogden;
 use crate::mesh::{MeshOptions, shape_velocity};
-use crate::sensitivity::{ForceReading, MaterialState, information_of_protocol, integrate_over_quadrature};
+use crate::sensitivity::{
+    ForceReading, ForceReadings, MaterialState, information_of_protocol, integrate_over_quadrature,
+};
 use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
 
@@ -325,10 +327,9 @@ impl<'a> Evaluator<'a> {
         let (mesh, noise) = (model.mesh(), scan.noise());
         let own = state.sensitivities.iter().map(|s| s.force_n).collect();
         let readings = [before, &[ForceReading { force_n: state.force_n, sensitivities: own }]].concat();
-        let protocol = &self.study.protocol;
+        let forces = ForceReadings { readings: &readings, protocol: &self.study.protocol };
         let scanned = &state.sensitivities;
-        let information =
-            information_of_protocol(material, mesh, &fields, scanned, &readings, protocol, &noise, voxel_volume)?;
+        let information = information_of_protocol(material, mesh, &fields, scanned, &forces, &noise, voxel_volume)?;
         let covariance = information.covariance();
         let shear = information.shear_indices();
         let normalisation = self.study.objective.normalisation;

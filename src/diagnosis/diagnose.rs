@@ -58,8 +58,8 @@ fn artefacts_of(fitted: &CauseFit) -> Vec<Supposed> {
     fitted.causes.iter().filter(|c| c.cause.is_artefact()).cloned().collect()
 }
 
-/// Whether causes, found one after the other, explain less and less of what was left (`lefts`, before the first and after
-/// each): right ones explain more and more of it, down to nothing.
+/// Whether causes, found one after the other, explain less and less of what was left (`lefts`, before the first and
+/// after each): right ones explain more and more of it, down to nothing.
 fn explain_ever_less(lefts: &[f64]) -> bool {
     let shares: Vec<f64> = lefts.windows(2).map(|pair| 1.0 - pair[1] / pair[0]).collect();
     match shares[..] {
@@ -107,7 +107,6 @@ pub(super) fn diagnose_among(
     run.question_material()?;
     run.take_out_artefacts()?;
     run.add_causes()?;
-    run.read_load_curve_again(recording)?;
     run.question_material_again()?;
     run.name_artefacts();
     let seen = run.correct_fits()?;
@@ -288,8 +287,8 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Tests, fits and names causes, round by round. Where single causes leave much of the misfit, the set-up as a whole
-    /// is fitted in their place, and rounds go on from that.
+    /// Tests, fits and names causes, round by round. Where single causes leave much of the misfit, the set-up as a
+    /// whole is fitted in their place, and rounds go on from that.
     fn add_causes(&mut self) -> Result<(), DiagnosisError> {
         let measured = self.measured();
         let limits = RoundLimits {
@@ -342,32 +341,6 @@ impl<'a> Run<'a> {
                 self.name_causes_of_fit()?;
             }
         }
-        Ok(())
-    }
-
-    /// Reads the load curve again with the causes that were found: what looked like the load cell's or the memory's may
-    /// have been theirs. Where motions of the plates between the steps are not known, the first reading stands.
-    fn read_load_curve_again(&mut self, recording: &Recording) -> Result<(), DiagnosisError> {
-        let Run { inference, findings, registry, load, .. } = self;
-        let scene = findings.current.scene();
-        let is_course_known = scene.plates_at.is_empty() && scene.compliance_mm_per_n.abs() < f64::MIN_POSITIVE;
-        let has_effects = load.as_ref().is_some_and(|l| !l.effects.is_empty());
-        let changes_sample = findings.current.causes.iter().any(|c| c.cause.changes_sample())
-            || findings.current.material.terms.len() > findings.nominal.material.terms.len();
-        if !(has_effects && changes_sample && is_course_known) {
-            return Ok(());
-        }
-        (inference.progress)("reading the load curve again, with the causes");
-        let found = read_load_curve(inference, recording, &findings.current, &registry.load_effects())?;
-        let Some(found) = found else { return Ok(()) };
-        findings.causes.retain(|c| !c.is_of_load_curve());
-        findings.causes.extend(FoundCause::of_load_curve(&found.effects));
-        self.recorded = self.inference.laboratory.measured();
-        take_off_effects(&mut self.recorded, Some(&found));
-        self.load = Some(found);
-        let measured = self.measured();
-        let Findings { current, .. } = &self.findings;
-        self.findings.current = self.inference.fit(&measured, &current.material, &current.causes)?;
         Ok(())
     }
 

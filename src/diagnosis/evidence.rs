@@ -13,8 +13,8 @@ pub(super) const ROUGH_TOLERANCE: f64 = 1e-3;
 /// A cause is fitted where it explains more than this part of what the leading one does, to first order.
 pub(super) const WORTH_A_FIT: f64 = 0.1;
 /// A further cause must explain this part of what the ones before it did, where the model of one of these idealises its
-/// shape ([`is_idealised`](super::cause::Cause::is_idealised)): such a model errs by some percent of its effect, and that error is no cause of its
-/// own.
+/// shape ([`is_idealised`](super::cause::Cause::is_idealised)): such a model errs by some percent of its effect, and
+/// that error is no cause of its own.
 pub(super) const SMALLEST_SHARE: f64 = 0.02;
 /// The same part where all models are exact but for the mesh.
 const SMALLEST_SHARE_OF_EXACT: f64 = 0.004;

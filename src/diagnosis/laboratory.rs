@@ -27,6 +27,9 @@ pub struct Prediction {
     pub(super) seen: Vec<Vec<[f64; 3]>>,
 }
 
+/// Changes of the voxel averages (mm) and of the force (N), before the image and the load cell.
+type SeenChange = (Vec<[f64; 3]>, f64);
+
 /// A step at which changes are looked at.
 struct OfStep<'a> {
     /// The station.
@@ -303,7 +306,7 @@ impl<'a> Laboratory<'a> {
         material: &Ogden,
         of_step: &OfStep,
         paths: &[(&Path, Option<&[[f64; 3]]>)],
-    ) -> Result<Vec<(Vec<[f64; 3]>, f64)>, DiagnosisError> {
+    ) -> Result<Vec<SeenChange>, DiagnosisError> {
         let &OfStep { at, n, step, gradients } = of_step;
         let change_of = |&(path, velocity): &(&Path, Option<&[[f64; 3]]>)| -> Option<Change> {
             if velocity.is_some() {

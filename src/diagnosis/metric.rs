@@ -221,7 +221,7 @@ fn products_of(
     of_b: &(dyn Fn(&Weighed) -> &[f64] + Sync),
 ) -> DMatrix<f64> {
     let num = a.first().map_or(0, |w| of_a(w).len());
-    let left: Vec<f64> = a.iter().flat_map(|w| of_a(w)).copied().collect();
+    let left: Vec<f64> = a.iter().flat_map(of_a).copied().collect();
     let left = MatRef::from_column_major_slice(&left, num, a.len());
     let mut found = DMatrix::zeros(a.len(), b.len());
     if a.is_empty() || b.is_empty() {
@@ -229,7 +229,7 @@ fn products_of(
     }
     let size = b.len().div_ceil(rayon::current_num_threads());
     found.as_mut_slice().par_chunks_mut(size * a.len()).zip(b.par_chunks(size)).for_each(|(found, b)| {
-        let right: Vec<f64> = b.iter().flat_map(|w| of_b(w)).copied().collect();
+        let right: Vec<f64> = b.iter().flat_map(of_b).copied().collect();
         let right = MatRef::from_column_major_slice(&right, num, b.len());
         let found = MatMut::from_column_major_slice_mut(found, a.len(), b.len());
         matmul(found, Accum::Replace, left.transpose(), right, 1.0, Par::Seq);

@@ -157,11 +157,14 @@ impl Tangent<'_> {
     /// How the springs' forces change between `ends` where the nodes stay.
     fn spring_rates(&self, ends: &[Assembler; 2], per_step: f64) -> Vec<(u32, [f64; 3])> {
         let (drive_mm, mut sum) = (self.equilibrium.drive_mm, self.still());
-        let [ahead, behind] =
+        let [mut rates, behind] =
             [0, 1].map(|n| ends[n].add_spring_forces(drive_mm, &self.equilibrium.displacement, &mut sum));
-        let rate =
-            |((v, a), (_, b)): (&(u32, [f64; 3]), &(u32, [f64; 3]))| (*v, [0, 1, 2].map(|i| (a[i] - b[i]) * per_step));
-        ahead.iter().zip(&behind).map(rate).collect()
+        for ((_, rate), (_, behind)) in rates.iter_mut().zip(&behind) {
+            for i in 0..3 {
+                rate[i] = (rate[i] - behind[i]) * per_step;
+            }
+        }
+        rates
     }
 
     /// Adds to `rate` (mm per unit of t) how the displacement that plates and faces impose changes as their nodes move:

@@ -17,8 +17,8 @@ const RIDGE: f64 = 1e-9;
 /// The effect of one hidden cause among the others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct OwnEffect {
-    /// What is left of its change of the displacement once the material, the sizes of all other causes and, where one of
-    /// them is a background, all of its coefficients have followed (to first order), mm rms over all drives.
+    /// What is left of its change of the displacement once the material, the sizes of all other causes and, where one
+    /// of them is a background, all of its coefficients have followed (to first order), mm rms over all drives.
     pub(super) rms_mm: f64,
     /// Largest relative change of a force with it.
     pub(super) force_relative: f64,

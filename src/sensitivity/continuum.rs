@@ -88,9 +88,18 @@ pub struct ForceReading {
     pub sensitivities: Vec<f64>,
 }
 
+/// Forces and what is not known of the load cell that reads them.
+#[derive(Clone, Copy, Debug)]
+pub struct ForceReadings<'a> {
+    /// The forces.
+    pub readings: &'a [ForceReading],
+    /// Tells what is not known.
+    pub protocol: &'a Protocol,
+}
+
 /// As [`information_over_quadrature`] for a scan and any number of forces read on the way to it, the scan's own among
-/// them, with the gain and the zero of the load cell as unknown as `protocol` says. (The drive's zero is not among the
-/// unknowns here.)
+/// them, with the gain and the zero of the load cell as unknown as their protocol says. (The drive's zero is not among
+/// the unknowns here.)
 ///
 /// # Errors
 /// As [`information_over_quadrature`].
@@ -99,17 +108,16 @@ pub fn information_of_protocol(
     mesh: &Mesh,
     points: &[QuadraturePoint],
     scanned: &[ParameterSensitivity],
-    readings: &[ForceReading],
-    protocol: &Protocol,
+    forces: &ForceReadings,
     noise: &MeasurementNoise,
     voxel_volume_mm3: f64,
 ) -> Result<FisherInformation, InformationError> {
     let fields: Vec<(&[[f64; 3]], f64)> = scanned.iter().map(|s| (&s.displacement[..], 0.0)).collect();
     let gram = gram_over_quadrature(mesh, points, &fields, noise, voxel_volume_mm3)?;
     let unknowns: Vec<(Nuisance, f64)> =
-        protocol.nuisances().into_iter().filter(|(n, _)| *n != Nuisance::DriveZero).collect();
+        forces.protocol.nuisances().into_iter().filter(|(n, _)| *n != Nuisance::DriveZero).collect();
     let mut joint = JointInformation::of_scan(FisherInformation::from_matrix(material, gram)?, unknowns.len());
-    for reading in readings {
+    for reading in forces.readings {
         check_length("a force's sensitivities", reading.sensitivities.len(), scanned.len())?;
         let of_unknown = |(unknown, _): &(Nuisance, f64)| match unknown {
             Nuisance::ForceGain => reading.force_n,

@@ -15,7 +15,7 @@ mod scan_settings;
 mod separation;
 
 pub use continuum::{
-    ForceReading, information_of_protocol, information_over_quadrature, integrate_over_quadrature,
+    ForceReading, ForceReadings, information_of_protocol, information_over_quadrature, integrate_over_quadrature,
     largest_principal_stretch, median_stretch_over_quadrature,
 };
 pub use covariance::{Covariance, Criterion, IDENTIFIABILITY_LIMIT, PromisedSd};

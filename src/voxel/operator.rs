@@ -10,6 +10,9 @@ use rayon::prelude::*;
 /// Voxels that one thread works on at a time.
 const CHUNK: usize = 512;
 
+/// A sample point, mm, with its weight.
+type SamplePoint = ([f64; 3], f64);
+
 /// Sparse operator from nodal fields to voxel averages.
 ///
 /// With sample points X_q and weights w_q (Σ w_q = 1) in the material part of a voxel,
@@ -110,7 +113,7 @@ impl VoxelOperator {
         mesh: &Mesh,
         locator: &Locator,
         place_of: &dyn Fn([f64; 3]) -> ([f64; 3], Tensor),
-        points_of: &dyn Fn(usize, &mut Vec<([f64; 3], f64)>),
+        points_of: &dyn Fn(usize, &mut Vec<SamplePoint>),
     ) -> Result<(), usize> {
         // Place of a key among the current voxel's entries; valid where it is at or after the voxel's first entry.
         let mut place = vec![u32::MAX; 4 * mesh.nodes.len()];
