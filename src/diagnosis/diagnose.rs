@@ -29,7 +29,7 @@ use crate::calibration::{Boundary, Observed};
 use crate::material::Ogden;
 use crate::mesh::MeshOptions;
 use crate::recording::Recording;
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 
 /// Standard deviation of ln κ of the material believed.
 const BELIEVED_LOG_SD: f64 = 0.5;
@@ -48,7 +48,7 @@ const SET_UP_GAINS: f64 = 0.7;
 /// Single causes are given up for the set-up where the first explains less than this part of the deviance, …
 const LEAST_OF_FIRST: f64 = 0.2;
 /// … or where one explains less than this of the part that the one before it did.
-const LEAST_OF_NEXT: f64 = 0.8;
+const LEAST_OF_NEXT: f64 = 1.0;
 
 /// The interior is tested where the misfit beyond noise exceeds this multiple of the allowance (rms).
 const INTERIOR_ABOVE: f64 = 2.0;
@@ -309,24 +309,29 @@ impl<'a> Run<'a> {
             && is_set_up_promising(inference, registry, &findings.current, &scored.candidates)?;
         // What was left of the deviance after each cause so far.
         let lefts = RefCell::new(vec![inference.misfit_beyond_noise(&findings.current)]);
+        let are_given_up = Cell::new(false);
         let is_hopeless = |inference: &Inference, findings: &Findings| {
             let left = left_mm(&findings.current, &inference.metric);
             lefts.borrow_mut().push(inference.misfit_beyond_noise(&findings.current));
             let is_explained = left < (SET_UP_LEAVES * before_mm).max(inference.allowance_mm);
-            is_promising && !is_explained && explain_ever_less(&lefts.borrow())
+            are_given_up.set(is_promising && !is_explained && explain_ever_less(&lefts.borrow()));
+            are_given_up.get()
         };
         if fit_round(inference, findings, &measured, &scored, limits)? {
             add_causes(inference, registry, findings, &measured, limits, &is_hopeless)?;
-            self.leave_out_what_is_not_needed(&measured)?;
         }
-        if is_promising && self.consider_set_up(&measured)? {
-            let num_before = self.findings.current.causes.len();
-            let Run { inference, registry, findings, .. } = self;
+        let is_set_up = is_promising && self.consider_set_up(&measured)?;
+        let num_before = self.findings.current.causes.len();
+        let Run { inference, registry, findings, .. } = self;
+        if is_set_up || are_given_up.get() {
+            // On top of the set-up; or, where single causes were given up for nothing, on with them.
             add_causes(inference, registry, findings, &measured, limits, &|_, _| false)?;
-            if findings.current.causes.len() > num_before {
-                findings.current = simplest_set_up(inference, registry, &measured, findings.current.clone())?;
-                self.name_causes_of_fit()?;
-            }
+        }
+        if is_set_up && findings.current.causes.len() > num_before {
+            findings.current = simplest_set_up(inference, registry, &measured, findings.current.clone())?;
+            self.name_causes_of_fit()?;
+        } else if !is_set_up {
+            self.leave_out_what_is_not_needed(&measured)?;
         }
         Ok(())
     }
