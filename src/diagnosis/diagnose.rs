@@ -45,10 +45,9 @@ const SET_UP_LEAVES: f64 = 0.25;
 /// It is gone on from where it leaves less than this part of what they leave (rms).
 const SET_UP_GAINS: f64 = 0.7;
 
-/// Single causes are given up for the set-up where the first explains less than this part of the deviance, …
+/// Single causes are given up for the set-up where the first explains less than this part of the deviance, or where one
+/// explains a smaller part of what was left than the one before it did.
 const LEAST_OF_FIRST: f64 = 0.2;
-/// … or where one explains less than this of the part that the one before it did.
-const LEAST_OF_NEXT: f64 = 1.0;
 
 /// The interior is tested where the misfit beyond noise exceeds this multiple of the allowance (rms).
 const INTERIOR_ABOVE: f64 = 2.0;
@@ -65,7 +64,7 @@ fn explain_ever_less(lefts: &[f64]) -> bool {
     match shares[..] {
         [] => false,
         [first] => first < LEAST_OF_FIRST,
-        [.., before, last] => last < LEAST_OF_NEXT * before,
+        [.., before, last] => last < before,
     }
 }
 

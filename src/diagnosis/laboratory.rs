@@ -271,7 +271,6 @@ impl<'a> Laboratory<'a> {
     }
 
     /// The tangents of some steps, with the voxel averages and forces of the material's sensitivities.
-    #[allow(clippy::type_complexity)]
     fn tangents<'t>(
         &self,
         at: usize,
@@ -280,7 +279,7 @@ impl<'a> Laboratory<'a> {
         prediction: &'t Prediction,
         with_material: bool,
         steps: &[usize],
-    ) -> Result<Vec<(Tangent<'t>, Vec<(Vec<[f64; 3]>, f64)>)>, DiagnosisError> {
+    ) -> Result<Vec<(Tangent<'t>, Vec<SeenChange>)>, DiagnosisError> {
         let station = &self.stations[at];
         steps
             .par_iter()
