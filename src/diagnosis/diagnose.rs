@@ -20,7 +20,7 @@ use super::options::DiagnosisOptions;
 use super::outcome::Diagnosis;
 use super::prior::{BulkPrior, FitSettings, ShearPrior, shear_modulus};
 use super::registry::Registry;
-use super::rounds::{RoundLimits, add_causes, fit_round, score_round};
+use super::rounds::{Asked, RoundLimits, add_causes, fit_round, score_round};
 use super::set_up::{fit_set_up, is_set_up_promising, simplest_set_up};
 use super::supposed::Supposed;
 use super::thinning::{Needed, named_causes, thinned};
@@ -286,45 +286,48 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Tests, fits and names causes, round by round. Where single causes leave much of the misfit, the set-up as a
-    /// whole is fitted in their place, and rounds go on from that.
+    /// Tests, fits and names causes, round by round. Where the interior test found that the inside fits, causes there
+    /// wait. Where single causes leave much of the misfit, the set-up as a whole is fitted in their place, and rounds
+    /// go on from that.
     fn add_causes(&mut self) -> Result<(), DiagnosisError> {
         let measured = self.measured();
-        let limits = RoundLimits {
-            max_causes: self.options.max_causes,
-            has_load_curve: self.load.is_some(),
-            is_believed: self.options.prior.is_some(),
-        };
-        let Run { inference, registry, findings, observed, .. } = self;
-        if findings.causes.len() >= limits.max_causes {
+        let limits = RoundLimits { max_causes: self.options.max_causes, has_load_curve: self.load.is_some() };
+        if self.findings.causes.len() >= limits.max_causes {
             return Ok(());
         }
-        let scored = score_round(inference, registry, findings, limits)?;
+        let at_boundary = self.registry.clone().without_inside();
+        let everything = Asked { registry: self.registry, with_terms: self.options.prior.is_none() };
+        let does_inside_wait = self.interior.as_ref().is_some_and(InteriorTest::inside_fits);
+        let first = if does_inside_wait { Asked { registry: &at_boundary, with_terms: false } } else { everything };
+        let Run { inference, findings, observed, .. } = self;
+        let scored = score_round(inference, first, findings, limits)?;
         let left_mm =
             |fitted: &CauseFit, metric: &Metric| leftover(observed, &fitted.residual, metric).structured_rms_mm;
         let before_mm = left_mm(&findings.current, &inference.metric);
         // What is no more than a mesh's needs no set-up.
         let is_promising = before_mm > inference.allowance_mm
-            && is_set_up_promising(inference, registry, &findings.current, &scored.candidates)?;
+            && is_set_up_promising(inference, first.registry, &findings.current, &scored.candidates)?;
         // What was left of the deviance after each cause so far.
         let lefts = RefCell::new(vec![inference.misfit_beyond_noise(&findings.current)]);
         let are_given_up = Cell::new(false);
-        let is_hopeless = |inference: &Inference, findings: &Findings| {
+        let to_ask = |inference: &Inference, findings: &Findings| {
             let left = left_mm(&findings.current, &inference.metric);
             lefts.borrow_mut().push(inference.misfit_beyond_noise(&findings.current));
             let is_explained = left < (SET_UP_LEAVES * before_mm).max(inference.allowance_mm);
             are_given_up.set(is_promising && !is_explained && explain_ever_less(&lefts.borrow()));
-            are_given_up.get()
+            let asked = if is_explained { everything } else { first };
+            (!are_given_up.get()).then_some(asked)
         };
-        if fit_round(inference, findings, &measured, &scored, limits)? {
-            add_causes(inference, registry, findings, &measured, limits, &is_hopeless)?;
+        if fit_round(inference, findings, &measured, &scored)? {
+            add_causes(inference, findings, &measured, limits, &to_ask)?;
         }
         let is_set_up = is_promising && self.consider_set_up(&measured)?;
         let num_before = self.findings.current.causes.len();
         let Run { inference, registry, findings, .. } = self;
-        if is_set_up || are_given_up.get() {
-            // On top of the set-up; or, where single causes were given up for nothing, on with them.
-            add_causes(inference, registry, findings, &measured, limits, &|_, _| false)?;
+        if is_set_up || does_inside_wait || are_given_up.get() {
+            // On top of the set-up; or, where single causes were given up for nothing or not all were asked, on with
+            // them.
+            add_causes(inference, findings, &measured, limits, &|_, _| Some(everything))?;
         }
         if is_set_up && findings.current.causes.len() > num_before {
             findings.current = simplest_set_up(inference, registry, &measured, findings.current.clone())?;

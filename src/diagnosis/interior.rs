@@ -19,6 +19,8 @@ use serde::{Deserialize, Serialize};
 
 /// A misfit was made at the boundary where the interior test leaves less than this part of it (rms).
 const VANISHES: f64 = 0.4;
+/// The inside fits, so that causes there can wait, where it leaves less than this part.
+const INSIDE_FITS: f64 = 0.2;
 /// It was made inside where the test leaves more than this part (rms).
 const STAYS: f64 = 0.8;
 
@@ -57,6 +59,18 @@ pub struct InteriorTest {
     pub structured_rms_mm: BeforeAfter,
     /// Distance of the planes from the middle of the sample, mm.
     pub plane_mm: f64,
+}
+
+impl InteriorTest {
+    /// The part of the misfit that the test leaves (rms).
+    fn share(&self) -> f64 {
+        self.structured_rms_mm.after / self.structured_rms_mm.before.max(1e-12)
+    }
+
+    /// Whether so little of the misfit was made inside that causes there can wait.
+    pub(super) fn inside_fits(&self) -> bool {
+        self.share() < INSIDE_FITS
+    }
 }
 
 /// Tests the interior of `observed`, of which the nominal model leaves `residual`; `None` where the test cannot be
@@ -112,21 +126,19 @@ fn fitted_inside(
     let fitted = fit_nominal(&mut inside, &measured, start, true)?;
     let before = leftover(part, &restricted(observed, part, residual), &inside.metric);
     let after = leftover(part, &fitted.residual, &inside.metric);
-    let share = after.structured_rms_mm / before.structured_rms_mm.max(1e-12);
-    let origin = if share < VANISHES || after.structured_rms_mm < inference.allowance_mm {
-        MisfitOrigin::SetUp
-    } else if share > STAYS {
-        MisfitOrigin::Inside
-    } else {
-        MisfitOrigin::Both
-    };
     let of = |before: f64, after: f64| BeforeAfter { before, after };
-    Ok(InteriorTest {
-        origin,
+    let mut found = InteriorTest {
+        origin: MisfitOrigin::Both,
         chi2_per_datum: of(before.chi2_per_datum, after.chi2_per_datum),
         structured_rms_mm: of(before.structured_rms_mm, after.structured_rms_mm),
         plane_mm: (0.5 - CUT_PART) * across_mm(observed),
-    })
+    };
+    if found.share() < VANISHES || after.structured_rms_mm < inference.allowance_mm {
+        found.origin = MisfitOrigin::SetUp;
+    } else if found.share() > STAYS {
+        found.origin = MisfitOrigin::Inside;
+    }
+    Ok(found)
 }
 
 /// Extent of the sample across its bonded faces, mm.

@@ -2,7 +2,7 @@
 
 use super::candidate::Candidate;
 use super::cause::{Cause, CauseName};
-use super::causes::{AT_BOUNDARY, REGISTRY};
+use super::causes::{AT_BOUNDARY, INSIDE, REGISTRY};
 use super::entry::{Entry, Origin};
 use super::error::DiagnosisError;
 use super::load_effect::LoadEffect;
@@ -63,6 +63,12 @@ impl Registry {
     /// Without the causes that act where the sample is held: plates, bonds, layers, the outline.
     pub(super) fn without_boundary(mut self) -> Registry {
         self.entries.retain(|e| !AT_BOUNDARY.contains(&e.name));
+        self
+    }
+
+    /// Without the causes that act inside the sample.
+    pub(super) fn without_inside(mut self) -> Registry {
+        self.entries.retain(|e| !INSIDE.contains(&e.name));
         self
     }
 

@@ -54,6 +54,8 @@ pub(super) struct Scored {
     /// Changes of the prediction with the parameters of the fit so far, for fits of further causes; empty where these
     /// are to work them out.
     known: Vec<Trace>,
+    /// Whether a further Ogden term is asked for beside them.
+    with_terms: bool,
 }
 
 /// How far rounds go.
@@ -63,8 +65,15 @@ pub(super) struct RoundLimits {
     pub(super) max_causes: usize,
     /// Whether a load curve was read.
     pub(super) has_load_curve: bool,
-    /// Whether a material is believed, so that its number of terms is stated.
-    pub(super) is_believed: bool,
+}
+
+/// What a round asks for.
+#[derive(Clone, Copy)]
+pub(super) struct Asked<'r> {
+    /// The causes.
+    pub(super) registry: &'r Registry,
+    /// Whether a further Ogden term is asked for beside them.
+    pub(super) with_terms: bool,
 }
 
 /// The first half of a round: tests all suspects to first order.
@@ -73,7 +82,7 @@ pub(super) struct RoundLimits {
 /// [`DiagnosisError`]: the work was cancelled, or the fit so far has no derivatives.
 pub(super) fn score_round(
     inference: &mut Inference,
-    registry: &Registry,
+    asked: Asked,
     findings: &mut Findings,
     limits: RoundLimits,
 ) -> Result<Scored, DiagnosisError> {
@@ -81,7 +90,7 @@ pub(super) fn score_round(
     let round = findings.num_rounds;
     (inference.progress)(&format!("round {round}: testing causes"));
     let scope = RoundScope { has_load_curve: limits.has_load_curve };
-    let RoundScores { candidates, known, maps } = score_suspects(inference, registry, &findings.current, scope)?;
+    let RoundScores { candidates, known, maps } = score_suspects(inference, asked.registry, &findings.current, scope)?;
     if round == 1 {
         findings.maps.extend(maps);
     }
@@ -94,7 +103,7 @@ pub(super) fn score_round(
     }));
     // The nominal model's few parameters are worked out at every step: they change most with the first cause.
     let known = if findings.current.causes.is_empty() { Vec::new() } else { known };
-    Ok(Scored { candidates, known })
+    Ok(Scored { candidates, known, with_terms: asked.with_terms })
 }
 
 /// The second half of a round: fits the leading candidates and names the best, unless a further Ogden term of the
@@ -107,10 +116,9 @@ pub(super) fn fit_round(
     findings: &mut Findings,
     measured: &Trace,
     scored: &Scored,
-    limits: RoundLimits,
 ) -> Result<bool, DiagnosisError> {
     let trials = fit_leading(inference, scored, findings, measured)?;
-    if !limits.is_believed {
+    if scored.with_terms {
         let best = trials.first().map_or(0.0, Trial::counted);
         if let Some((richer, gain)) = further_term(inference, measured, &findings.current)?
             && gain > best
@@ -123,21 +131,22 @@ pub(super) fn fit_round(
     take_best(inference, findings, trials)
 }
 
-/// Adds causes round by round, until no further one is called for, the limits are reached, or `is_hopeless`.
+/// Adds causes round by round, each of those that the next round is `to_ask` for, until no further one is called for,
+/// the limits are reached, or nothing is to be asked any more.
 ///
 /// # Errors
 /// As [`score_round`].
-pub(super) fn add_causes(
+pub(super) fn add_causes<'r>(
     inference: &mut Inference,
-    registry: &Registry,
     findings: &mut Findings,
     measured: &Trace,
     limits: RoundLimits,
-    is_hopeless: &dyn Fn(&Inference, &Findings) -> bool,
+    to_ask: &dyn Fn(&Inference, &Findings) -> Option<Asked<'r>>,
 ) -> Result<(), DiagnosisError> {
-    while findings.causes.len() < limits.max_causes && !is_hopeless(inference, findings) {
-        let scored = score_round(inference, registry, findings, limits)?;
-        if !fit_round(inference, findings, measured, &scored, limits)? {
+    while findings.causes.len() < limits.max_causes {
+        let Some(asked) = to_ask(inference, findings) else { break };
+        let scored = score_round(inference, asked, findings, limits)?;
+        if !fit_round(inference, findings, measured, &scored)? {
             break;
         }
     }
@@ -155,7 +164,7 @@ fn fit_leading(
     findings: &mut Findings,
     measured: &Trace,
 ) -> Result<Vec<Trial>, DiagnosisError> {
-    let Scored { candidates, known } = scored;
+    let Scored { candidates, known, .. } = scored;
     let round = findings.num_rounds;
     let mut trials: Vec<Trial> = Vec::new();
     let least = LEAST_PROMISE * smallest_share(&findings.current.causes) * findings.explained();

@@ -77,3 +77,7 @@ pub(super) const AT_BOUNDARY: &[CauseName] = &[
     layer::ENTRY.name,
     block::ENTRY.name,
 ];
+
+/// The causes that act inside the sample. They say little of a misfit that vanishes once the boundary is as measured.
+pub(super) const INSIDE: &[CauseName] =
+    &[gradient::ENTRY.name, swelling::ENTRY.name, hole::ENTRY.name, fibre::ENTRY.name, inclusion::ENTRY.name];
