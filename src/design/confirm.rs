@@ -10,10 +10,13 @@ use super::study::Study;
 use super::tell_apart::{Imitation, log_separation, state_of};
 use crate::fem::{Equilibrium, ForwardModel};
 use crate::kinematics::principal_stretches;
+use crate::mesh::MeshOptions;
 use crate::sensitivity::{
-    DriveSelection, Evaluation, EvaluationError, EvaluationMaps, EvaluationOptions, MaterialState, evaluate_model,
+    DriveSelection, Evaluation, EvaluationError, EvaluationMaps, EvaluationOptions, MaterialState, Scanned, Scanner,
+    evaluate_scanned,
 };
 use crate::specimen::{LimitMargin, Specimen};
+use crate::voxel::Sampling;
 use serde::{Deserialize, Serialize};
 
 /// A confirmed design.
@@ -102,16 +105,69 @@ pub fn confirm(
     specimen: &Specimen,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Confirmed, EvaluationFailure> {
+    let by_material = by_material(study, specimen, EvaluationOptions::standard(specimen), is_cancelled)?;
+    let responses = responses(study, specimen, &by_material, is_cancelled)?;
+    let largest = |f: fn(&Response) -> f64| responses.iter().map(f).fold(f64::NEG_INFINITY, f64::max).exp();
+    let (force, stretch) = (largest(|r| r.log_force), largest(|r| r.log_stretch));
+    let mut limits = study.limits.check_geometry(specimen, study.scan.voxel_mm);
+    let drive = specimen.drive_mm.last().copied().unwrap_or(0.0);
+    limits.extend(study.limits.check_response(drive, force, stretch));
+    limits.sort_by(|a, b| a.margin_relative.total_cmp(&b.margin_relative));
+    Ok(Confirmed {
+        specimen: specimen.clone(),
+        by_material,
+        responses,
+        objective: 1.0,
+        gains: Vec::new(),
+        is_within_limits: limits.iter().all(|m| m.is_satisfied),
+        limits,
+        volume_mm3: specimen.volume_mm3(),
+        remark: None,
+    })
+}
+
+/// What a design is judged by in the search: the same figures from the same voxels, on a coarser mesh; at the priors'
+/// central values, or at their variants too where the study's budget says so.
+///
+/// # Errors
+/// [`EvaluationFailure`].
+pub fn estimate(
+    study: &Study,
+    specimen: &Specimen,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Evaluated, EvaluationFailure> {
+    specimen.validate().map_err(|e| EvaluationFailure::Geometry { reason: e.to_string() })?;
+    let mesh = MeshOptions::search(specimen);
+    let sampling = Sampling::on_elements_of(mesh.section_size_mm, study.scan.voxel_mm);
+    let options = EvaluationOptions { mesh, sampling, ..EvaluationOptions::standard(specimen) };
+    let by_material = by_material(study, specimen, options, is_cancelled)?;
+    let responses = if study.budget.variants_in_search {
+        responses(study, specimen, &by_material, is_cancelled)?
+    } else {
+        by_material.iter().map(|m| m.response(study)).collect()
+    };
+    Ok(Evaluated { responses, gradients: Vec::new() })
+}
+
+/// Every prior's central values, at the specimen's last drive.
+fn by_material(
+    study: &Study,
+    specimen: &Specimen,
+    options: EvaluationOptions,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Vec<MaterialEvaluation>, EvaluationFailure> {
     let mut by_material: Vec<MaterialEvaluation> = Vec::new();
     let scanned_mm = specimen.drive_mm.last().copied().unwrap_or(0.0);
     let protocol = study.protocol.on_the_way_to(scanned_mm);
-    let options = EvaluationOptions { protocol, ..EvaluationOptions::standard(specimen) };
+    let options = EvaluationOptions { protocol, ..options };
     let mut model = ForwardModel::of_specimen(specimen, &options.mesh)?;
+    let scanner = Scanner::new(specimen, model.mesh(), &study.scan, options.sampling).map_err(|e| failure(e.into()))?;
+    let scanned = Scanned { specimen, scan: &study.scan, scanner: &scanner };
     let mut solved: Vec<(MaterialState, Equilibrium)> = Vec::new();
     for prior in &study.materials {
         let drives = DriveSelection::DriveMm(specimen.drive_mm.clone());
         let (evaluation, maps) =
-            evaluate_model(&mut model, specimen, &prior.material, &study.scan, &drives, &options, is_cancelled)
+            evaluate_scanned(&mut model, &scanned, &prior.material, &drives, &options, is_cancelled)
                 .map_err(failure)?;
         if study.objective.kind == ObjectiveKind::TellApart
             && let Some(state) = maps.equilibria.last()
@@ -137,24 +193,7 @@ pub fn confirm(
         }
         by_material[later].separation_sd = Some(closest);
     }
-    let responses = responses(study, specimen, &by_material, is_cancelled)?;
-    let largest = |f: fn(&Response) -> f64| responses.iter().map(f).fold(f64::NEG_INFINITY, f64::max).exp();
-    let (force, stretch) = (largest(|r| r.log_force), largest(|r| r.log_stretch));
-    let mut limits = study.limits.check_geometry(specimen, study.scan.voxel_mm);
-    let drive = specimen.drive_mm.last().copied().unwrap_or(0.0);
-    limits.extend(study.limits.check_response(drive, force, stretch));
-    limits.sort_by(|a, b| a.margin_relative.total_cmp(&b.margin_relative));
-    Ok(Confirmed {
-        specimen: specimen.clone(),
-        by_material,
-        responses,
-        objective: 1.0,
-        gains: Vec::new(),
-        is_within_limits: limits.iter().all(|m| m.is_satisfied),
-        limits,
-        volume_mm3: specimen.volume_mm3(),
-        remark: None,
-    })
+    Ok(by_material)
 }
 
 /// Responses at every material sample. Those at the central values are the evaluations'; a variant's is the centre's

@@ -38,10 +38,10 @@ impl SearchRun<'_> {
     pub(super) fn confirm_all(
         &self,
         base: &Specimen,
-        reference: &Reference,
         spaces: &[Subspace],
         state: &mut State,
     ) -> Result<(Confirmed, Vec<Confirmed>), SearchError> {
+        let base_specimen = base;
         let study = self.study;
         let finalists = state.finalists(study);
         let specimens: Vec<&Specimen> = std::iter::once(base).chain(finalists.iter().map(|f| &f.specimen)).collect();
@@ -76,9 +76,8 @@ impl SearchRun<'_> {
                 Some(Ok(mut confirmed)) => {
                     confirmed.compare(study, &base);
                     if !confirmed.is_within_limits && finalist.is_within_limits {
-                        let shifts = shifts(&fine, &confirmed, finalist);
                         confirmed.remark = Some(broken_limits(&fine, &confirmed));
-                        broken.push((finalist, shifts, confirmed.objective));
+                        broken.push((finalist, confirmed.judged(&fine).worst_margins, confirmed.objective));
                     }
                     ranked.push(confirmed);
                 }
@@ -90,8 +89,13 @@ impl SearchRun<'_> {
         broken.retain(|(_, _, objective)| *objective > best_kept);
         broken.sort_by(|a, b| b.2.total_cmp(&a.2));
         broken.truncate(MAX_REPAIRS);
-        for (finalist, shifts, objective) in broken {
-            if let Some(mut repaired) = self.repair(finalist, shifts, reference, spaces, state)? {
+        let in_integrals = match broken.is_empty() {
+            true => None,
+            false => Some(self.reference_from(self.evaluated(base_specimen, None), state)?),
+        };
+        for (finalist, margins, objective) in broken {
+            let Some(in_integrals) = &in_integrals else { break };
+            if let Some(mut repaired) = self.repair(finalist, &margins, in_integrals, spaces, state)? {
                 repaired.compare(study, &base);
                 repaired.remark = Some(format!(
                     "Repaired: a design with a gain of {objective:.3} kept every limit on the coarse mesh of the search and broke \
@@ -112,20 +116,25 @@ impl SearchRun<'_> {
         Ok((base, ranked))
     }
 
-    /// Improves a finalist anew with its margins shifted to what the confirmation gave, and confirms where that ends.
-    /// `None` where nothing came of it.
+    /// Improves a finalist anew with the margins of `in_integrals` shifted to those that the confirmation gave, and
+    /// confirms where that ends. `None` where nothing came of it.
     fn repair(
         &self,
         finalist: &Finalist,
-        shifts: Vec<Vec<f64>>,
-        reference: &Reference,
+        confirmed: &[Vec<f64>],
+        in_integrals: &Reference,
         spaces: &[Subspace],
         state: &mut State,
     ) -> Result<Option<Confirmed>, SearchError> {
-        let shifted = reference.with_shifts(shifts);
+        let searched = match self.evaluated(&finalist.specimen, None) {
+            None => return Err(state.stopped(self.study, "repair")),
+            Some(Err(_)) => return Ok(None),
+            Some(Ok(evaluated)) => in_integrals.judge(&evaluated).worst_margins,
+        };
+        let shifted = in_integrals.with_shifts(shifts(confirmed, &searched));
         let (index, start) = &finalist.point;
         let (done, best) = (AtomicUsize::new(0), state.history.last().copied());
-        let on_evaluation = |_: Option<f64>| {
+        let on_evaluation = || {
             let count = done.fetch_add(1, Ordering::Relaxed) + 1;
             let total = REPAIR_EVALUATIONS;
             (self.progress)(&Progress { stage: "repair", done: count.min(total), total, best });
@@ -147,12 +156,11 @@ impl SearchRun<'_> {
     }
 }
 
-/// Confirmed less searched margin of each limit, where it is smaller: the search fidelity's error, as seen at this
-/// design.
-fn shifts(fine: &Reference, confirmed: &Confirmed, finalist: &Finalist) -> Vec<Vec<f64>> {
-    let fine = confirmed.judged(fine).worst_margins;
+/// Confirmed less searched margin of each limit, `[prior][limit]`, where it is smaller: the search's error, as seen at
+/// one design.
+fn shifts(confirmed: &[Vec<f64>], searched: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let of_prior = |(f, c): (&Vec<f64>, &Vec<f64>)| f.iter().zip(c).map(|(f, c)| (f - c).min(0.0)).collect();
-    fine.iter().zip(&finalist.margins).map(of_prior).collect()
+    confirmed.iter().zip(searched).map(of_prior).collect()
 }
 
 /// Which response limits break at confirmation, in words.

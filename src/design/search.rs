@@ -1,6 +1,7 @@
-//! The search: explore every structure with samples, refine the best with gradients, confirm the best of those on a
-//! finer mesh with the scan's own voxels. Deterministic by seed at any number of threads: batches are fixed, every
-//! evaluation depends on its own input alone, results are taken in order.
+//! The search: explore every structure with samples, improve the best by gradients and by an evolution strategy, confirm
+//! the best of those on a finer mesh. What is compared is what the confirmation compares, the scan's own voxels
+//! included; gradients alone are of integrals in their place. Deterministic by seed at any number of threads: batches
+//! are fixed, every evaluation depends on its own input alone, results are taken in order.
 
 use super::candidate::Candidate;
 use super::checkpoint::Checkpoint;
@@ -13,7 +14,7 @@ use super::search_error::SearchError;
 use super::search_run::{Attempt, Progress, ProgressSink, SearchRun};
 use super::space::{Subspace, subspaces};
 use super::state::State;
-use super::structure_problem::{Log, StructureProblem};
+use super::structure_problem::StructureProblem;
 use super::study::Study;
 use super::unfinished::Unfinished;
 use crate::specimen::Specimen;
@@ -85,17 +86,16 @@ impl SearchRun<'_> {
         let report = |stage, done, total, best| (self.progress)(&Progress { stage, done, total, best });
         report("base", 0, 1, None);
         let base_specimen = base_at_drive(study);
-        let base = match self.evaluated(&base_specimen, None) {
-            None => return Err(State::default().stopped(study, "base")),
-            Some(Err(cause)) => return Err(SearchError::Base { cause }),
-            Some(Ok(evaluated)) => evaluated,
-        };
-        let reference = Reference::new(study, self.evaluator.samples(), &base.responses);
-        let spaces = subspaces(study);
         let mut state = State::default();
+        let reference = self.reference_from(self.estimated(&base_specimen), &state)?;
+        let spaces = subspaces(study);
         self.explore(&reference, &spaces, &base_specimen, &mut state)?;
-        self.refine(&reference, &spaces, &mut state)?;
-        let (base, ranked) = self.confirm_all(&base_specimen, &reference, &spaces, &mut state)?;
+        if study.budget.refine > 0 {
+            let in_integrals = self.reference_from(self.evaluated(&base_specimen, None), &state)?;
+            self.refine([&reference, &in_integrals], &spaces, &mut state)?;
+        }
+        self.evolve(&reference, &spaces, &mut state)?;
+        let (base, ranked) = self.confirm_all(&base_specimen, &spaces, &mut state)?;
         Ok(Found {
             base,
             ranked,
@@ -104,6 +104,15 @@ impl SearchRun<'_> {
             num_evaluations: state.num_evaluations,
             candidates: state.candidates,
         })
+    }
+
+    /// Gains over a base with this evaluation.
+    pub(super) fn reference_from(&self, base: Option<Attempt>, state: &State) -> Result<Reference<'_>, SearchError> {
+        match base {
+            None => Err(state.stopped(self.study, "base")),
+            Some(Err(cause)) => Err(SearchError::Base { cause }),
+            Some(Ok(base)) => Ok(Reference::new(self.study, self.evaluator.samples(), &base.responses)),
+        }
     }
 
     fn explore(
@@ -137,7 +146,7 @@ impl SearchRun<'_> {
                     batch.push((index, vector));
                 }
             }
-            self.evaluate_batch(reference, spaces, &std::mem::take(&mut batch), total, state)?;
+            self.evaluate_batch(reference, spaces, ("explore", &std::mem::take(&mut batch), total), state)?;
             let mut order: Vec<usize> = (0..spaces.len()).collect();
             let best = |index: usize| state.best_of_space(index);
             order.sort_by(|a, b| best(*b).total_cmp(&best(*a)).then(a.cmp(b)));
@@ -155,8 +164,7 @@ impl SearchRun<'_> {
         &self,
         reference: &Reference,
         spaces: &[Subspace],
-        batch: &[(usize, Vec<f64>)],
-        total: usize,
+        (stage, batch, total): (&'static str, &[(usize, Vec<f64>)], usize),
         state: &mut State,
     ) -> Result<(), SearchError> {
         let done = AtomicUsize::new(state.num_evaluations);
@@ -166,7 +174,7 @@ impl SearchRun<'_> {
         let results: Vec<Option<Attempt>> = batch
             .par_iter()
             .map(|(space, vector)| {
-                let attempt = self.evaluated(&spaces[*space].specimen(vector), None);
+                let attempt = self.estimated(&spaces[*space].specimen(vector));
                 if let (Some(Ok(evaluated)), Ok(mut best)) = (&attempt, best.lock()) {
                     let judged = reference.judge(evaluated);
                     if judged.margins.iter().all(|m| *m >= 0.0) {
@@ -176,7 +184,7 @@ impl SearchRun<'_> {
                 }
                 let shown = best.lock().ok().and_then(|b| *b);
                 let count = done.fetch_add(1, Ordering::Relaxed) + 1;
-                (self.progress)(&Progress { stage: "explore", done: count.min(total), total, best: shown });
+                (self.progress)(&Progress { stage, done: count.min(total), total, best: shown });
                 attempt
             })
             .collect();
@@ -186,52 +194,44 @@ impl SearchRun<'_> {
             match result {
                 None => was_stopped = true,
                 Some(Ok(evaluated)) => {
-                    state.add((*space, vector), specimen, reference, &reference.judge(&evaluated), "explore");
+                    state.add((*space, vector), specimen, reference, &reference.judge(&evaluated), stage);
                 }
                 Some(Err(cause)) => state.fail(&specimen, &cause),
             }
         }
-        if was_stopped { Err(state.stopped(self.study, "explore")) } else { Ok(()) }
+        if was_stopped { Err(state.stopped(self.study, stage)) } else { Ok(()) }
     }
 
-    fn refine(&self, reference: &Reference, spaces: &[Subspace], state: &mut State) -> Result<(), SearchError> {
+    /// Improves the best designs by the gradients of `in_integrals`, and judges where that ends by `reference`.
+    fn refine(
+        &self,
+        [reference, in_integrals]: [&Reference; 2],
+        spaces: &[Subspace],
+        state: &mut State,
+    ) -> Result<(), SearchError> {
         let budget = self.study.budget;
         let starts = state.starts(budget.refine);
         let total = starts.len() * budget.iterations;
         let done = AtomicUsize::new(0);
-        // Largest gain within the limits seen by any thread, for display only.
-        let best = std::sync::Mutex::new(state.history.last().copied());
-        let on_evaluation = |gain: Option<f64>| {
-            let shown = best.lock().ok().and_then(|mut best| {
-                *best = best.map_or(gain, |b| Some(gain.map_or(b, |g| b.max(g))));
-                *best
-            });
+        let best = state.history.last().copied();
+        let on_evaluation = || {
             let count = done.fetch_add(1, Ordering::Relaxed) + 1;
-            (self.progress)(&Progress { stage: "refine", done: count.min(total), total, best: shown });
+            (self.progress)(&Progress { stage: "refine", done: count.min(total), total, best });
         };
-        let outcomes: Vec<(Log, bool)> = starts
+        let improved: Vec<Option<(usize, Vec<f64>)>> = starts
             .par_iter()
             .map(|(index, start)| {
-                let problem = StructureProblem::new(self, reference, &spaces[*index], &on_evaluation);
+                let problem = StructureProblem::new(self, in_integrals, &spaces[*index], &on_evaluation);
                 let settings = LocalSettings { max_evaluations: budget.iterations, ..LocalSettings::default() };
-                improve(&problem, start, &settings);
-                let was_stopped = problem.was_stopped.load(Ordering::Relaxed);
-                (problem.log.into_inner().unwrap_or_default(), was_stopped)
+                let found = improve(&problem, start, &settings);
+                // A start without an evaluation is left as it is.
+                let end = found.map_or_else(|| start.clone(), |found| found.x);
+                (!problem.was_stopped.load(Ordering::Relaxed)).then_some((*index, end))
             })
             .collect();
-        let mut any_stopped = false;
-        for ((index, _), (log, was_stopped)) in starts.iter().zip(outcomes) {
-            for (vector, judged) in log {
-                match judged {
-                    Some(judged) => {
-                        let specimen = spaces[*index].specimen(&vector);
-                        state.add((*index, &vector), specimen, reference, &judged, "refine");
-                    }
-                    None => state.num_evaluations += 1,
-                }
-            }
-            any_stopped |= was_stopped;
-        }
-        if any_stopped { Err(state.stopped(self.study, "refine")) } else { Ok(()) }
+        state.num_evaluations += done.load(Ordering::Relaxed);
+        let ends: Option<Vec<(usize, Vec<f64>)>> = improved.into_iter().collect();
+        let ends = ends.ok_or_else(|| state.stopped(self.study, "refine"))?;
+        self.evaluate_batch(reference, spaces, ("refine", &ends, total), state)
     }
 }

@@ -1,6 +1,7 @@
 //! What all stages of a search share: the study, its evaluations kept in the checkpoint, and where progress is told.
 
 use super::checkpoint::Checkpoint;
+use super::confirm::estimate;
 use super::evaluation_failure::EvaluationFailure;
 use super::evaluator::{Evaluated, Evaluator};
 use super::space::Subspace;
@@ -11,7 +12,7 @@ use crate::specimen::Specimen;
 /// How far a search is.
 #[derive(Clone, Debug)]
 pub struct Progress {
-    /// `base`, `explore`, `refine`, `confirm`, `repair`, `verify`.
+    /// `base`, `explore`, `refine`, `evolve`, `confirm`, `repair`, `verify`.
     pub stage: &'static str,
     /// Finished in this stage.
     pub done: usize,
@@ -37,8 +38,17 @@ pub(super) struct SearchRun<'a> {
 }
 
 impl SearchRun<'_> {
-    /// The evaluation of a design at search fidelity, with gradients where `subspace` is given: from the checkpoint
-    /// where it is known. `None` where it was cancelled.
+    /// What a design is judged by in the search: from the checkpoint where it is known. `None` where it was cancelled.
+    pub fn estimated(&self, specimen: &Specimen) -> Option<Attempt> {
+        let key = input_hash(&serde_json::json!({ "specimen": specimen, "kind": "estimate" }));
+        self.checkpoint.get_or(&key, || match estimate(self.study, specimen, &|| (self.is_cancelled)()) {
+            Err(EvaluationFailure::Cancelled) => None,
+            other => Some(other),
+        })
+    }
+
+    /// The evaluation of a design in integrals in place of voxels, with gradients where `subspace` is given: from the
+    /// checkpoint where it is known. `None` where it was cancelled.
     pub fn evaluated(&self, specimen: &Specimen, subspace: Option<&Subspace>) -> Option<Attempt> {
         let kind = if subspace.is_some() { "gradient" } else { "value" };
         let key = input_hash(&serde_json::json!({ "specimen": specimen, "kind": kind }));

@@ -14,8 +14,6 @@ pub(super) struct Finalist {
     pub specimen: Specimen,
     /// Structure and vector.
     pub point: (usize, Vec<f64>),
-    /// Least margin of each limit at search fidelity, `[prior][limit]`.
-    pub margins: Vec<Vec<f64>>,
     /// Whether they are kept at search fidelity.
     pub is_within_limits: bool,
 }
@@ -26,8 +24,6 @@ pub(super) struct State {
     pub candidates: Vec<Candidate>,
     /// Structure and vector of each candidate.
     points: Vec<(usize, Vec<f64>)>,
-    /// Least margin of each limit, `[prior][limit]`, of each candidate.
-    margins: Vec<Vec<Vec<f64>>>,
     pub history: Vec<f64>,
     pub failures: Vec<String>,
     pub num_evaluations: usize,
@@ -48,7 +44,6 @@ impl State {
         let best = self.history.last().copied().unwrap_or(0.0);
         self.history.push(if is_within_limits { best.max(objective) } else { best });
         self.points.push((space, vector.to_vec()));
-        self.margins.push(judged.worst_margins.clone());
         self.candidates.push(Candidate {
             specimen,
             objective,
@@ -92,6 +87,18 @@ impl State {
         starts
     }
 
+    /// The best design of each of the `count` best structures, best first, with their merits.
+    pub fn best_of_each(&self, count: usize) -> Vec<(usize, Vec<f64>, f64)> {
+        let mut found: Vec<(usize, Vec<f64>, f64)> = Vec::new();
+        for index in self.order() {
+            let (space, vector) = &self.points[index];
+            if found.len() < count && !found.iter().any(|f| f.0 == *space) {
+                found.push((*space, vector.clone(), self.candidates[index].merit));
+            }
+        }
+        found
+    }
+
     /// Designs to confirm: the best by merit, and the best of every number of holes, so that the report can say where
     /// holes help.
     pub fn finalists(&self, study: &Study) -> Vec<Finalist> {
@@ -120,7 +127,6 @@ impl State {
         let finalist = |index: usize| Finalist {
             specimen: self.candidates[index].specimen.clone(),
             point: self.points[index].clone(),
-            margins: self.margins[index].clone(),
             is_within_limits: self.candidates[index].is_within_limits,
         };
         chosen.into_iter().map(finalist).collect()

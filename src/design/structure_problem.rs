@@ -3,10 +3,9 @@
 use super::aim::Combine;
 use super::explore::geometry_margins;
 use super::local::{LocalModel, LocalProblem};
-use super::objective::{Judged, Reference};
+use super::objective::Reference;
 use super::search_run::SearchRun;
 use super::space::Subspace;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A structure's local problem.
@@ -14,18 +13,13 @@ pub(super) struct StructureProblem<'a> {
     pub search: &'a SearchRun<'a>,
     pub reference: &'a Reference<'a>,
     pub subspace: &'a Subspace,
-    /// Points seen and what they were judged.
-    pub log: Mutex<Log>,
     /// Set when an evaluation was cancelled.
     pub was_stopped: AtomicBool,
-    /// Called after each evaluation with the gain of a design within the limits.
-    pub on_evaluation: &'a (dyn Fn(Option<f64>) + Sync),
+    /// Called after each evaluation.
+    pub on_evaluation: &'a (dyn Fn() + Sync),
 }
 
-/// Points of a refinement and what they were judged.
-pub(super) type Log = Vec<(Vec<f64>, Option<Judged>)>;
-
-/// ln of the factor by which a refinement stays away from force, stretch and guard limits: the search's mesh is coarser
+/// ln of the factor by which an improvement stays away from force, stretch and guard limits: the search's mesh is coarser
 /// than the confirmation's, and a limit that is just met on the one can be broken on the other.
 pub(super) const RESERVE: f64 = 2e-3;
 
@@ -35,10 +29,9 @@ impl<'a> StructureProblem<'a> {
         search: &'a SearchRun<'a>,
         reference: &'a Reference<'a>,
         subspace: &'a Subspace,
-        on_evaluation: &'a (dyn Fn(Option<f64>) + Sync),
+        on_evaluation: &'a (dyn Fn() + Sync),
     ) -> StructureProblem<'a> {
-        let (log, was_stopped) = (Mutex::default(), AtomicBool::new(false));
-        StructureProblem { search, reference, subspace, log, was_stopped, on_evaluation }
+        StructureProblem { search, reference, subspace, was_stopped: AtomicBool::new(false), on_evaluation }
     }
 }
 
@@ -53,11 +46,7 @@ impl LocalProblem for StructureProblem<'_> {
             Some(Err(_)) => None,
             Some(Ok(evaluated)) => Some(self.reference.judge(&evaluated)),
         };
-        let kept = judged.as_ref().filter(|j| j.margins.iter().all(|m| *m >= 0.0));
-        (self.on_evaluation)(kept.map(|j| self.reference.objective(j).exp()));
-        if let Ok(mut log) = self.log.lock() {
-            log.push((x.to_vec(), judged.clone()));
-        }
+        (self.on_evaluation)();
         let judged = judged?;
         // From per-millimetre to per-unit of the scaled variables.
         let scaled = |rows: &[Vec<f64>]| -> Vec<Vec<f64>> {

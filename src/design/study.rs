@@ -2,7 +2,7 @@
 //! what is sought and how hard.
 
 use super::aim::Objective;
-use super::study_limits::{Count, HoleCount, LengthMm};
+use super::study_limits::{Count, CountOrNone, HoleCount, LengthMm};
 use crate::material::Ogden;
 use crate::sensitivity::{Protocol, ScanSettings};
 use crate::specimen::{HoleAxis, ManufacturingLimits, Specimen, TestKind};
@@ -85,12 +85,17 @@ pub struct Budget {
     /// Designs sampled.
     #[schema(value_type = Count)]
     pub explore: usize,
-    /// Designs improved with gradients.
-    #[schema(value_type = Count)]
+    /// Designs improved with gradients, of integrals in place of voxels; 0 for none.
+    #[schema(value_type = CountOrNone)]
     pub refine: usize,
     /// Gradient steps of each.
     #[schema(value_type = Count)]
     pub iterations: usize,
+    /// Designs drawn by the evolution strategy, which improves the best structures on the objective itself; none where
+    /// a budget leaves it out.
+    #[serde(default, skip_serializing_if = "is_none")]
+    #[schema(value_type = CountOrNone, default = 0)]
+    pub evolve: usize,
     /// Designs confirmed on a finer mesh with the scan's voxels.
     #[schema(value_type = Count)]
     pub confirm: usize,
@@ -102,8 +107,13 @@ pub struct Budget {
 
 impl Default for Budget {
     fn default() -> Self {
-        Budget { explore: 160, refine: 6, iterations: 12, confirm: 10, variants_in_search: true }
+        Budget { explore: 160, refine: 0, iterations: 12, evolve: 200, confirm: 10, variants_in_search: true }
     }
+}
+
+/// Budgets without an evolution are written as they were before there was one.
+fn is_none(count: &usize) -> bool {
+    *count == 0
 }
 
 /// The verification by calibration on synthetic noisy scans.

@@ -53,15 +53,16 @@ impl Study {
             names.filter(|n| n != "kappa").collect::<Vec<_>>()
         };
         self.objective.check(&self.materials.iter().map(parameters).collect::<Vec<_>>(), &mut problems);
-        for (part, name, count) in [
-            ("budget", "explore", self.budget.explore),
-            ("budget", "refine", self.budget.refine),
-            ("budget", "iterations", self.budget.iterations),
-            ("budget", "confirm", self.budget.confirm),
-            ("verification", "draws", self.verification.draws),
+        for (part, name, count, least) in [
+            ("budget", "explore", self.budget.explore, 1),
+            ("budget", "refine", self.budget.refine, 0),
+            ("budget", "iterations", self.budget.iterations, 1),
+            ("budget", "evolve", self.budget.evolve, 0),
+            ("budget", "confirm", self.budget.confirm, 1),
+            ("verification", "draws", self.verification.draws, 1),
         ] {
-            if !(1..=MAX_COUNT).contains(&count) {
-                let (field, allowed) = (FieldPath::of(part).name(name), format!("from 1 to {MAX_COUNT}"));
+            if !(least..=MAX_COUNT).contains(&count) {
+                let (field, allowed) = (FieldPath::of(part).name(name), format!("from {least} to {MAX_COUNT}"));
                 problems.push(StudyError::OutOfRange { field, value: count as f64, allowed });
             }
         }

@@ -36,4 +36,6 @@ schema_type! {
     pub(super) LengthMm = number_within(MIN_LENGTH_MM..=MAX_LENGTH_MM);
     /// A number of designs, steps or draws.
     pub(super) Count = integer_within(1..=MAX_COUNT);
+    /// A number of designs that may be none.
+    pub(super) CountOrNone = integer_within(0..=MAX_COUNT);
 }

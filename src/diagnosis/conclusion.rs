@@ -14,8 +14,9 @@ use crate::rate::Verdict;
 /// Causes of a misfit above that limit explain it where they leave less than this part of it (rms), or no more than the
 /// allowance: the right cause leaves a tenth or less, but for the odd debond; another one in its place about a third.
 const EXPLAINED_LEAVES: f64 = 0.25;
-/// Causes of a smaller misfit explain it where they leave less than this part of it (rms).
-const SMALL_LEAVES: f64 = 0.5;
+/// Causes of a smaller misfit explain it where they leave less than this part of it (rms): half of the squares, as much
+/// of which is what the mesh leaves.
+const SMALL_LEAVES: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Causes claim a misfit where one of them moves the sample by more than this part of it (rms).
 const CLAIMS: f64 = 0.5;
 /// Where causes leave more than this part of the squares unexplained, they are not named but listed as tried.

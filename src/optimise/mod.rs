@@ -1,10 +1,11 @@
-//! Least squares and quadratic programmes with linear limits. The room knows nothing of materials, meshes or data.
+//! Least squares, quadratic programmes with linear limits, and a search that needs no derivatives. The room knows nothing of materials, meshes or data.
 //!
 //! * [`descend()`]: the loop of every nonlinear fit. What is fitted is a [`LeastSquares`] problem; how steps are
 //!   shortened and when the loop ends are its [`Rules`].
 //! * [`minimise`]: a fit whose residuals and Jacobian are at hand, with linear limits on its parameters.
 //! * [`limited_step()`]: the least of a quadratic model within linear limits, to rounding.
 //! * [`QuadraticProgramme`]: any convex quadratic programme with linear limits, by an interior-point method (Clarabel).
+//! * [`Evolution`]: covariance matrix adaptation, for objectives that are known by their order alone.
 //! * [`covariance()`]: what a Jacobian says of the parameters.
 //!
 //! Quadratic programmes are solved in two ways. A fit to curves takes thousands of steps in a dozen unknowns from a
@@ -14,6 +15,7 @@
 mod active_set;
 mod covariance;
 mod descend;
+mod evolution;
 mod limit;
 mod limited_step;
 mod quadratic;
@@ -22,6 +24,7 @@ mod rules;
 
 pub use covariance::covariance;
 pub use descend::{Descent, End, LeastSquares, Step, descend};
+pub use evolution::Evolution;
 pub use limit::LinearLimit;
 pub use limited_step::{NoStep, limited_step};
 pub use quadratic::{Precision, QuadraticProgramme, QuadraticSolution, SolverStatus};

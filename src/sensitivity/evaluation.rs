@@ -184,6 +184,34 @@ pub fn evaluate_model(
 ) -> Result<(Evaluation, EvaluationMaps), EvaluationError> {
     check_drives(drives)?;
     let scanner = Scanner::new(specimen, model.mesh(), scan, options.sampling)?;
+    let scanned = Scanned { specimen, scan, scanner: &scanner };
+    evaluate_scanned(model, &scanned, material, drives, options, is_cancelled)
+}
+
+/// A specimen in the scanner: what is the same for every material that it may be made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Scanned<'a> {
+    /// The specimen.
+    pub specimen: &'a Specimen,
+    /// The scan.
+    pub scan: &'a ScanSettings,
+    /// The scan of the specimen on the model's mesh.
+    pub scanner: &'a Scanner,
+}
+
+/// As [`evaluate_model`], where the scanner is prepared too.
+///
+/// # Errors
+/// See [`EvaluationError`].
+pub fn evaluate_scanned(
+    model: &mut ForwardModel,
+    &Scanned { specimen, scan, scanner }: &Scanned,
+    material: &Ogden,
+    drives: &DriveSelection,
+    options: &EvaluationOptions,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<(Evaluation, EvaluationMaps), EvaluationError> {
+    check_drives(drives)?;
     let (equilibria, num_equilibria) = match drives {
         DriveSelection::DriveMm(drives_mm) => {
             let path = model.solve_path(material, drives_mm, &options.solve, is_cancelled)?;
@@ -192,7 +220,7 @@ pub fn evaluate_model(
         }
         DriveSelection::MedianStretch(target) => {
             let (found, count) =
-                solve_for_median(model, specimen, material, &scanner, *target, &options.solve, is_cancelled)?;
+                solve_for_median(model, specimen, material, scanner, *target, &options.solve, is_cancelled)?;
             (vec![found], count)
         }
     };
@@ -246,7 +274,10 @@ pub fn evaluate_model(
         version: env!("CARGO_PKG_VERSION").into(),
         input_hash: hash_of_inputs(specimen, material, scan, drives, options),
     };
-    Ok((evaluation, EvaluationMaps { mask: scanner.mask, drives: maps, equilibria, information, information_by_drive }))
+    Ok((
+        evaluation,
+        EvaluationMaps { mask: scanner.mask.clone(), drives: maps, equilibria, information, information_by_drive },
+    ))
 }
 
 /// How the state of a drive changes with each unknown of the set-up.

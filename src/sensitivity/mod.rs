@@ -22,8 +22,8 @@ pub use covariance::{Covariance, Criterion, IDENTIFIABILITY_LIMIT, PromisedSd};
 pub use drives::DriveSelection;
 pub use error::EvaluationError;
 pub use evaluation::{
-    Evaluation, EvaluationMaps, EvaluationNotes, EvaluationOptions, EvaluationStatistics, ForceStep, evaluate,
-    evaluate_model,
+    Evaluation, EvaluationMaps, EvaluationNotes, EvaluationOptions, EvaluationStatistics, ForceStep, Scanned, evaluate,
+    evaluate_model, evaluate_scanned,
 };
 pub use information::{FisherInformation, InformationError, MeasurementNoise};
 pub use integrated::{IntegratedSensitivity, integrate_over_voxels, parameter_sensitivity, sensitivity_map};
