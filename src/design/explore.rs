@@ -67,7 +67,7 @@ pub fn sample(
 }
 
 /// Smaller holes until the specimen can be made.
-pub(super) fn shrink(
+fn shrink(
     subspace: &Subspace,
     mut vector: Vec<f64>,
     limits: &ManufacturingLimits,

@@ -7,7 +7,6 @@ mod confirm;
 mod entry;
 mod evaluation_failure;
 mod evaluator;
-mod evolve;
 mod explore;
 mod finals;
 mod findings;
@@ -17,6 +16,7 @@ mod inline;
 mod local;
 mod material_samples;
 mod objective;
+mod propose;
 mod response;
 mod result;
 mod search;
@@ -35,6 +35,7 @@ mod study_hash;
 mod study_limits;
 #[cfg(test)]
 mod study_tests;
+mod surrogate;
 mod tell_apart;
 mod unfinished;
 

@@ -1,4 +1,4 @@
-//! The search: explore every structure with samples, improve the best by gradients and by an evolution strategy, confirm
+//! The search: explore every structure with samples, improve the best by gradients and by what is learnt, confirm
 //! the best of those on a finer mesh. What is compared is what the confirmation compares, the scan's own voxels
 //! included; gradients alone are of integrals in their place. Deterministic by seed at any number of threads: batches
 //! are fixed, every evaluation depends on its own input alone, results are taken in order.
@@ -94,7 +94,7 @@ impl SearchRun<'_> {
             let in_integrals = self.reference_from(self.evaluated(&base_specimen, None), &state)?;
             self.refine([&reference, &in_integrals], &spaces, &mut state)?;
         }
-        self.evolve(&reference, &spaces, &mut state)?;
+        self.propose(&reference, &spaces, &mut state)?;
         let (base, ranked) = self.confirm_all(&base_specimen, &spaces, &mut state)?;
         Ok(Found {
             base,

@@ -12,7 +12,7 @@ use crate::specimen::Specimen;
 /// How far a search is.
 #[derive(Clone, Debug)]
 pub struct Progress {
-    /// `base`, `explore`, `refine`, `evolve`, `confirm`, `repair`, `verify`.
+    /// `base`, `explore`, `refine`, `propose`, `confirm`, `repair`, `verify`.
     pub stage: &'static str,
     /// Finished in this stage.
     pub done: usize,

@@ -13,7 +13,7 @@ fn small_study() -> Study {
     let mut study = Study::from_json(&text, &folder).expect("the study is valid");
     study.vary.hole_count = CountRange { min: 0, max: 1 };
     study.materials[0].relative_sd = 0.0;
-    study.budget = Budget { explore: 6, refine: 1, iterations: 3, evolve: 12, confirm: 2, variants_in_search: true };
+    study.budget = Budget { explore: 6, refine: 1, iterations: 3, propose: 12, confirm: 2, variants_in_search: true };
     study
 }
 
@@ -198,7 +198,7 @@ fn random_studies_never_return_what_breaks_a_limit() {
         study.limits.max_holes = Some(draw.below(2));
         study.vary.tests = vec![crate::specimen::TestKind::Uniaxial];
         study.budget =
-            Budget { explore: 4, refine: 1, iterations: 3, evolve: 12, confirm: 2, variants_in_search: true };
+            Budget { explore: 4, refine: 1, iterations: 3, propose: 12, confirm: 2, variants_in_search: true };
         match search(&study, &Checkpoint::in_memory(), &quiet, &|| false) {
             Ok(found) => {
                 num_found += 1;

@@ -24,6 +24,8 @@ pub(super) struct State {
     pub candidates: Vec<Candidate>,
     /// Structure and vector of each candidate.
     points: Vec<(usize, Vec<f64>)>,
+    /// What each candidate was judged.
+    judged: Vec<Judged>,
     pub history: Vec<f64>,
     pub failures: Vec<String>,
     pub num_evaluations: usize,
@@ -44,6 +46,7 @@ impl State {
         let best = self.history.last().copied().unwrap_or(0.0);
         self.history.push(if is_within_limits { best.max(objective) } else { best });
         self.points.push((space, vector.to_vec()));
+        self.judged.push(judged.clone());
         self.candidates.push(Candidate {
             specimen,
             objective,
@@ -87,16 +90,27 @@ impl State {
         starts
     }
 
-    /// The best design of each of the `count` best structures, best first, with their merits.
-    pub fn best_of_each(&self, count: usize) -> Vec<(usize, Vec<f64>, f64)> {
-        let mut found: Vec<(usize, Vec<f64>, f64)> = Vec::new();
+    /// The `count` structures with the best designs, best first.
+    pub fn best_structures(&self, count: usize) -> Vec<usize> {
+        let mut found: Vec<usize> = Vec::new();
         for index in self.order() {
-            let (space, vector) = &self.points[index];
-            if found.len() < count && !found.iter().any(|f| f.0 == *space) {
-                found.push((*space, vector.clone(), self.candidates[index].merit));
+            let space = self.points[index].0;
+            if found.len() < count && !found.contains(&space) {
+                found.push(space);
             }
         }
         found
+    }
+
+    /// The designs of a structure and what they were judged, in order.
+    pub fn seen_of(&self, space: usize) -> Vec<(&Vec<f64>, &Judged)> {
+        let all = self.points.iter().zip(&self.judged);
+        all.filter(|(point, _)| point.0 == space).map(|(point, judged)| (&point.1, judged)).collect()
+    }
+
+    /// What the first design was judged.
+    pub fn first_judged(&self) -> Option<&Judged> {
+        self.judged.first()
     }
 
     /// Designs to confirm: the best by merit, and the best of every number of holes, so that the report can say where

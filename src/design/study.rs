@@ -91,11 +91,11 @@ pub struct Budget {
     /// Gradient steps of each.
     #[schema(value_type = Count)]
     pub iterations: usize,
-    /// Designs drawn by the evolution strategy, which improves the best structures on the objective itself; none where
-    /// a budget leaves it out.
+    /// Designs of the best structures that are proposed by what the designs before have taught; none where a budget
+    /// leaves it out.
     #[serde(default, skip_serializing_if = "is_none")]
     #[schema(value_type = CountOrNone, default = 0)]
-    pub evolve: usize,
+    pub propose: usize,
     /// Designs confirmed on a finer mesh with the scan's voxels.
     #[schema(value_type = Count)]
     pub confirm: usize,
@@ -107,7 +107,7 @@ pub struct Budget {
 
 impl Default for Budget {
     fn default() -> Self {
-        Budget { explore: 160, refine: 0, iterations: 12, evolve: 200, confirm: 10, variants_in_search: true }
+        Budget { explore: 160, refine: 0, iterations: 12, propose: 200, confirm: 10, variants_in_search: true }
     }
 }
 

@@ -57,7 +57,7 @@ impl Study {
             ("budget", "explore", self.budget.explore, 1),
             ("budget", "refine", self.budget.refine, 0),
             ("budget", "iterations", self.budget.iterations, 1),
-            ("budget", "evolve", self.budget.evolve, 0),
+            ("budget", "propose", self.budget.propose, 0),
             ("budget", "confirm", self.budget.confirm, 1),
             ("verification", "draws", self.verification.draws, 1),
         ] {

@@ -36,7 +36,7 @@ impl Request for Study {
             .refine
             .saturating_mul(budget.iterations)
             .saturating_add(budget.explore)
-            .saturating_add(budget.evolve)
+            .saturating_add(budget.propose)
             .saturating_add(budget.confirm)
             .saturating_mul(self.materials.len());
         if evaluations > MAX_EVALUATIONS {
