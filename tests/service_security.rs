@@ -3,7 +3,7 @@
 mod service_common;
 
 use serde_json::json;
-use service_common::{Service, shipped, small_evaluation};
+use service_common::{Service, shipped, small_evaluation, tar_entry};
 
 fn service() -> (tempfile::TempDir, Service) {
     let folder = tempfile::tempdir().unwrap();
@@ -210,22 +210,6 @@ fn answers_carry_protective_headers() {
     }
 }
 
-/// A tar entry with a right checksum.
-fn tar_entry(name: &str, kind: u8, bytes: &[u8]) -> Vec<u8> {
-    let mut header = [0u8; 512];
-    header[..name.len()].copy_from_slice(name.as_bytes());
-    header[124..135].copy_from_slice(format!("{:011o}", bytes.len()).as_bytes());
-    header[148..156].fill(b' ');
-    header[156] = kind;
-    let sum: u64 = header.iter().map(|b| u64::from(*b)).sum();
-    header[148..154].copy_from_slice(format!("{sum:06o}").as_bytes());
-    header[154] = 0;
-    let mut out = header.to_vec();
-    out.extend_from_slice(bytes);
-    out.resize(out.len().div_ceil(512) * 512, 0);
-    out
-}
-
 #[test]
 fn uploads_are_recordings_or_refused() {
     let (_folder, service) = service();
@@ -277,7 +261,7 @@ fn uploads_are_recordings_or_refused() {
     .concat();
     let started = std::time::Instant::now();
     let reply = send(&bomb);
-    assert_eq!((reply.status, reply.cause().as_str()), (422, "unsafe-upload"), "{reply:?}");
+    assert_eq!((reply.status, reply.cause().as_str()), (413, "too-large"), "{reply:?}");
     eprintln!("bomb: {} in {:?}", reply.json()["detail"], started.elapsed());
     assert_eq!(service.get("/v1/recordings").json()["recordings"].as_array().unwrap().len(), 0);
     let reply = service.post("/v1/diagnoses", &json!({ "recording": "../../x" }));

@@ -227,29 +227,32 @@ impl CheckedImport {
         let specimen = self.request.specimen.as_ref().ok_or_else(missing)?;
         let options = self.request.import_options().ok_or_else(missing)?;
         let limits = ReadLimits::default();
+        let memory = limits.memory.begin();
         let first = files.first().ok_or_else(missing)?;
         match self.request.form.ok_or_else(missing)? {
             FileForm::Matlab => {
                 // Positions and masks may lie in files of their own.
                 let mut variables = Vec::new();
                 for (index, path) in files.iter().enumerate() {
-                    let found = mat::read_mat(path, limits.max_values)
-                        .map_err(|e| unfit(&format!("/files/{index}"), path, &e))?;
+                    let found =
+                        mat::read_mat(path, &memory).map_err(|e| unfit(&format!("/files/{index}"), path, &e))?;
                     variables.extend(found);
                 }
-                recording_from_mat(&variables, specimen, &options).map_err(|e| unfit("/files", first, &e))
+                recording_from_mat(&variables, specimen, &options, &memory).map_err(|e| unfit("/files", first, &e))
             }
             FileForm::Points => {
-                let max_points = usize::try_from(limits.max_values / 8).unwrap_or(usize::MAX);
                 let mut steps = Vec::new();
                 for (index, path) in files.iter().enumerate() {
                     let fail = |e: &dyn std::fmt::Display| unfit(&format!("/files/{index}"), path, e);
-                    let bytes = crate::file::read_limited(path, limits.max_file_bytes).map_err(|e| fail(&e))?;
-                    let text = String::from_utf8(bytes).map_err(|e| fail(&e))?;
-                    steps.push(read_points(&text, path, max_points).map_err(|e| fail(&e))?);
+                    let num_bytes = std::fs::metadata(path).map_err(|e| fail(&e))?.len();
+                    memory.take("a table of points", num_bytes).map_err(|e| fail(&e))?;
+                    let text = crate::file::read_text_limited(path, num_bytes).map_err(|e| fail(&e))?;
+                    steps.push(read_points(&text, path, &memory).map_err(|e| fail(&e))?);
+                    memory.give_back(num_bytes);
                 }
                 let voxel = options.voxel_mm_by_index;
-                recording_from_points(&steps, specimen, voxel, &options).map_err(|e| unfit("/files", first, &e))
+                recording_from_points(&steps, specimen, voxel, &options, &memory)
+                    .map_err(|e| unfit("/files", first, &e))
             }
         }
     }

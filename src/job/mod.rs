@@ -47,7 +47,7 @@ mod uniaxial;
 pub use error::{Failure, JobError};
 pub use evaluate::EvaluationRequest;
 pub use kind::{Job, Kind};
-pub use outcome::{File, MediaType, Outcome, OutcomeError, recording_identifier};
+pub use outcome::{File, MediaType, Outcome, OutcomeError, identifier_of_contents, recording_identifier};
 pub use part::{Part, PartKind};
 pub use reference::reference;
 pub use registry::{KINDS, kind_of_collection, kind_of_command, kind_of_part, kind_of_task};

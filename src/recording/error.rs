@@ -1,9 +1,22 @@
 //! Why a recording was not read or written.
 
 use super::nifti::NiftiError;
+use crate::file::MemoryError;
 use crate::specimen::SpecimenError;
 use crate::voxel::VoxelError;
 use std::path::PathBuf;
+
+impl RecordingError {
+    /// The refusal of memory, where that is what ended the reading.
+    pub fn memory(&self) -> Option<&MemoryError> {
+        match self {
+            RecordingError::Memory(error) | RecordingError::Image { source: NiftiError::Memory(error), .. } => {
+                Some(error)
+            }
+            _ => None,
+        }
+    }
+}
 
 /// Why a recording was not read or written.
 #[derive(Debug, thiserror::Error)]
@@ -25,6 +38,9 @@ pub enum RecordingError {
         /// Most bytes.
         limit: u64,
     },
+    /// It would take more memory than reading may.
+    #[error(transparent)]
+    Memory(#[from] MemoryError),
     /// A path does not lead to a file but to a folder, a pipe or a device.
     #[error("{}: {}", path.display(), crate::file::ReadError::NotRegular)]
     NotRegular {

@@ -2,6 +2,7 @@
 
 use super::mat::MatError;
 use super::{Filter, RecordedStep, Recording, RecordingError};
+use crate::file::MemoryError;
 use crate::specimen::Specimen;
 use crate::voxel::{VoxelError, VoxelGrid};
 use std::path::PathBuf;
@@ -28,6 +29,9 @@ pub enum ImportError {
     /// The grid cannot be used.
     #[error(transparent)]
     Voxel(#[from] VoxelError),
+    /// It would take more memory than reading may.
+    #[error(transparent)]
+    Memory(#[from] MemoryError),
     /// A variable is missing.
     #[error("there is no variable {what}; the file holds: {found}")]
     Missing {

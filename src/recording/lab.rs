@@ -8,11 +8,14 @@
 use super::import::{ImportError, ImportOptions, finish};
 use super::mat::MatValue;
 use super::{RecordedStep, Recording};
+use crate::file::ReadingMemory;
 use crate::specimen::Specimen;
 use crate::voxel::VoxelGrid;
 
 /// Names under which a field is looked for, first first.
 const FIELD_NAMES: [&str; 5] = ["U_t", "uicorr", "ui", "U", "u"];
+/// What is kept of a voxel beside its displacements while a recording is put together: flags, region, origin, bytes.
+const VOXEL_BYTES: u64 = 48;
 /// Regions smaller than this part of the largest are specks.
 const SPECK: f64 = 0.2;
 
@@ -30,6 +33,7 @@ pub fn recording_from_mat(
     variables: &[(String, MatValue)],
     specimen: &Specimen,
     options: &ImportOptions,
+    memory: &ReadingMemory,
 ) -> Result<Recording, ImportError> {
     let find = |name: &str| variables.iter().find(|(n, _)| n == name).map(|(_, v)| v);
     let names = || variables.iter().map(|(n, _)| n.clone()).collect::<Vec<_>>().join(", ");
@@ -46,6 +50,7 @@ pub fn recording_from_mat(
         }
     }
     let num_voxels: usize = dims.iter().product();
+    memory.take("the recording", (num_voxels as u64).saturating_mul(VOXEL_BYTES + 24 * steps.len() as u64))?;
     let is_measured = |v: usize| steps.iter().all(|s| s.iter().all(|a| a.values[v].is_finite()));
     let mut mask: Vec<bool> = match find("mask") {
         Some(value) => {

@@ -5,6 +5,7 @@ use super::{Filter, LoadCurve, ReadLimits, RecordingError};
 use crate::specimen::Specimen;
 use crate::voxel::VoxelGrid;
 use std::path::Path;
+use std::sync::Arc;
 
 /// A recording as the scanner gives it. The fields are those of [`super::Recording`].
 #[derive(Clone, Debug)]
@@ -119,7 +120,8 @@ impl RawRecording {
             load: head.load,
             notes: head.json.notes,
         };
-        Ok(ReadRecording { recording, digest: head.files.digest() })
+        let (digest, memory) = head.files.finish();
+        Ok(ReadRecording { recording, digest, memory: Arc::new(memory) })
     }
 
     /// Number of voxels in the mask.

@@ -79,6 +79,8 @@ pub enum TokenError {
 pub struct Caller {
     /// Name of the token; `local` without tokens.
     pub name: String,
+    /// Whose share of the service it takes: the token's, or the address's where there are no tokens.
+    pub share: String,
     /// Role.
     pub role: Role,
     /// Quota of tasks.
@@ -132,11 +134,21 @@ impl Access {
     ///
     /// # Errors
     /// `unauthorized`.
-    pub fn caller(&self, authorization: Option<&str>) -> Result<Caller, Problem> {
+    pub fn caller(&self, authorization: Option<&str>, address: &str) -> Result<Caller, Problem> {
         if !self.is_closed() {
-            return Ok(Caller { name: "local".into(), role: Role::Admin, max_queued_tasks: None, max_elements: None });
+            return Ok(Caller {
+                name: "local".into(),
+                share: address.into(),
+                role: Role::Admin,
+                max_queued_tasks: None,
+                max_elements: None,
+            });
         }
         let refuse = || Problem::new("unauthorized", "send the header Authorization: Bearer TOKEN");
+        let unknown = || {
+            let remedy = "it may be mistyped, replaced or removed; ask whoever runs the service for another one";
+            Problem::new("unauthorized", format!("this token is none of the service's; {remedy}"))
+        };
         let (scheme, secret) = authorization.and_then(|a| a.split_once(' ')).ok_or_else(refuse)?;
         if !scheme.eq_ignore_ascii_case("bearer") {
             return Err(refuse());
@@ -151,9 +163,10 @@ impl Access {
                 found = Some(token);
             }
         }
-        let token = found.ok_or_else(refuse)?;
+        let token = found.ok_or_else(unknown)?;
         Ok(Caller {
             name: token.name.clone(),
+            share: format!("token {}", token.name),
             role: token.role,
             max_queued_tasks: token.max_queued_tasks,
             max_elements: token.max_elements,
@@ -216,12 +229,12 @@ mod tests {
         let secret = add_token(&path, "anna", Role::Submit).unwrap();
         assert!(!std::fs::read_to_string(&path).unwrap().contains(&secret));
         let access = Access::read(&path).unwrap();
-        let caller = access.caller(Some(&format!("Bearer {secret}"))).unwrap();
+        let caller = access.caller(Some(&format!("Bearer {secret}")), "").unwrap();
         assert_eq!((caller.name.as_str(), caller.role), ("anna", Role::Submit));
         assert!(caller.require(Role::Read).is_ok());
         assert_eq!(caller.require(Role::Admin).unwrap_err().status, 403);
         for forged in [None, Some("Bearer "), Some("Bearer lk_0"), Some("Basic x"), Some(secret.as_str())] {
-            assert_eq!(access.caller(forged).unwrap_err().status, 401, "{forged:?}");
+            assert_eq!(access.caller(forged, "").unwrap_err().status, 401, "{forged:?}");
         }
     }
 }

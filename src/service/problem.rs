@@ -1,6 +1,7 @@
 //! Errors as RFC 9457 `application/problem+json`, with a stable `type` per cause and JSON pointers to offending fields.
 
 use crate::field::{FieldError, in_lines};
+use crate::file::MemoryError;
 use crate::job::{Failure, JobError};
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -57,6 +58,7 @@ pub const CATALOGUE: &[(&str, u16, &str)] = &[
     ("not-finished", 409, "The job has no result yet"),
     ("wrong-state", 409, "The job's state does not allow this"),
     ("key-reused", 409, "The Idempotency-Key was used with another request"),
+    ("too-slow", 408, "The body came too slowly"),
     ("too-large", 413, "The body is too large"),
     ("unsupported-media-type", 415, "The content type is not supported"),
     ("invalid-input", 422, "The input is not valid"),
@@ -69,12 +71,21 @@ pub const CATALOGUE: &[(&str, u16, &str)] = &[
     ("internal", 500, "The service failed"),
     ("worker-lost", 500, "The task ended its worker too often"),
     ("version-changed", 500, "The program changed while the job was unfinished"),
+    ("busy", 503, "The service has no memory left for this now"),
     ("storage", 503, "The storage does not answer"),
     ("shutting-down", 503, "The service is shutting down"),
     ("timeout", 504, "The request took too long"),
 ];
 
+/// The cause for which the same request may succeed once others have ended.
+pub const BUSY: &str = "busy";
+
 impl Problem {
+    /// Whether it has the cause of this name.
+    pub fn is(&self, name: &str) -> bool {
+        self.kind.strip_prefix("urn:lambdak:problem:") == Some(name)
+    }
+
     /// A problem of the catalogue.
     pub fn new(name: &'static str, detail: impl Into<String>) -> Self {
         let (_, status, title) =
@@ -104,6 +115,16 @@ impl Problem {
     /// As JSON text, for the storage.
     pub fn to_json(&self) -> String {
         serde_json::to_string(self).unwrap_or_default()
+    }
+}
+
+impl From<MemoryError> for Problem {
+    fn from(error: MemoryError) -> Self {
+        match error {
+            MemoryError::TooMuch { .. } => Problem::new("too-large", error.to_string()),
+            MemoryError::Stopped => Problem::new("timeout", error.to_string()),
+            _ => Problem::new(BUSY, error.to_string()).after(5),
+        }
     }
 }
 

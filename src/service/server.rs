@@ -7,7 +7,8 @@ use super::limits::Limits;
 use super::log;
 use super::metrics::Metrics;
 use super::problem::Problem;
-use super::router::router;
+use super::quota::Quota;
+use super::router::{Peer, router};
 use super::runner::{self, WorkerSettings};
 use super::signal::Signal;
 use super::store::{Store, StoreError};
@@ -20,6 +21,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 use tokio::sync::{Semaphore, watch};
+use tower::ServiceExt;
 
 /// Settings of the service.
 #[derive(Clone, Debug)]
@@ -178,10 +180,14 @@ pub fn serve(options: &ServeOptions, on_ready: &dyn Fn(SocketAddr)) -> Result<()
         metrics: Metrics::default(),
         signal: signal.clone(),
         stopping: stopping.clone(),
-        requests: Semaphore::new(options.limits.max_requests),
+        requests: quota("requests in work", options.limits.max_requests),
+        bodies: quota("bodies coming in", options.limits.max_bodies),
+        upload_bodies: quota("uploads coming in", options.limits.max_upload_bodies),
+        streams: quota("event streams", options.limits.max_streams),
         quick: Semaphore::new(2),
+        uploads: Arc::new(Semaphore::new(1)),
     });
-    let head_time = options.limits.head_time;
+    let limits = options.limits;
     let slots_signal = signal.clone();
     let result = runtime.block_on(async move {
         let listener = tokio::net::TcpListener::from_std(listener).map_err(fail)?;
@@ -191,7 +197,7 @@ pub fn serve(options: &ServeOptions, on_ready: &dyn Fn(SocketAddr)) -> Result<()
             &serde_json::json!({ "address": listen.to_string(), "version": crate::provenance::VERSION }),
         );
         on_ready(listen);
-        accept(listener, router(app), head_time, || {
+        accept(listener, router(app), &limits, || {
             // Streams end; running tasks keep their checkpoints and go back into the queue.
             let _ = stop.send(true);
             slots_signal.stop();
@@ -209,12 +215,17 @@ pub fn serve(options: &ServeOptions, on_ready: &dyn Fn(SocketAddr)) -> Result<()
     result
 }
 
-async fn accept(listener: tokio::net::TcpListener, router: axum::Router, head_time: Duration, on_stop: impl Fn()) {
+fn quota(what: &'static str, [max, of_caller]: [usize; 2]) -> Arc<Quota> {
+    Quota::new(what, max, of_caller)
+}
+
+/// Takes connections until the service is told to stop. Their number is bounded for each address, so that one cannot
+/// hold them all.
+async fn accept(listener: tokio::net::TcpListener, router: axum::Router, limits: &Limits, on_stop: impl Fn()) {
     let graceful = GracefulShutdown::new();
     let mut http = hyper::server::conn::http1::Builder::new();
-    http.timer(TokioTimer::new()).header_read_timeout(head_time).max_headers(64).max_buf_size(64 << 10);
-    // More connections than requests and streams together are nobody's need.
-    let connections = Arc::new(Semaphore::new(4096));
+    http.timer(TokioTimer::new()).header_read_timeout(limits.head_time).max_headers(64).max_buf_size(64 << 10);
+    let connections = quota("connections", limits.max_connections);
     let mut stopped = std::pin::pin!(interrupted());
     let mut end: Option<tokio::time::Instant> = None;
     loop {
@@ -228,17 +239,23 @@ async fn accept(listener: tokio::net::TcpListener, router: axum::Router, head_ti
             }
             () = tokio::time::sleep_until(end.unwrap_or_else(tokio::time::Instant::now)), if end.is_some() => break,
         };
-        let Ok((socket, _)) = accepted else {
+        let Ok((socket, peer)) = accepted else {
             // Out of file descriptors, say: connections end and free some.
             tokio::time::sleep(Duration::from_millis(50)).await;
             continue;
         };
-        let Ok(permit) = connections.clone().try_acquire_owned() else { continue };
+        let address = peer.ip().to_string();
+        let Ok(entered) = connections.enter(&address) else { continue };
         let _ = socket.set_nodelay(true);
-        let service = TowerToHyperService::new(router.clone());
+        let peer = Peer(address.into());
+        let named = router.clone().map_request(move |mut request: hyper::Request<hyper::body::Incoming>| {
+            request.extensions_mut().insert(peer.clone());
+            request.map(axum::body::Body::new)
+        });
+        let service = TowerToHyperService::new(named);
         let connection = graceful.watch(http.serve_connection(TokioIo::new(socket), service));
         tokio::spawn(async move {
-            let _permit = permit;
+            let _entered = entered;
             let _ = connection.await;
         });
     }

@@ -5,6 +5,7 @@ use crate::service::access::{Caller, Role};
 use crate::service::app::App;
 use crate::service::hub::Watched;
 use crate::service::problem::Problem;
+use crate::service::quota::Entered;
 use crate::service::store::JobFilter;
 use crate::service::view::{JobEvent, JobList, JobState, JobView};
 use axum::Json;
@@ -16,7 +17,6 @@ use futures_util::stream;
 use serde::Deserialize;
 use std::convert::Infallible;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 use utoipa::IntoParams;
 
@@ -114,6 +114,7 @@ pub(super) async fn cancel(
     Extension(caller): Extension<Caller>,
     Path(id): Path<String>,
 ) -> Result<Json<JobView>, Problem> {
+    let _entered = app.enter(&caller)?;
     let job = find(&app, &id).await?;
     check_owner(&caller, &job)?;
     if job.state.has_ended() && job.state != JobState::Cancelled {
@@ -134,6 +135,7 @@ pub(super) async fn resume(
     Extension(caller): Extension<Caller>,
     Path(id): Path<String>,
 ) -> Result<Json<JobView>, Problem> {
+    let _entered = app.enter(&caller)?;
     let job = find(&app, &id).await?;
     check_owner(&caller, &job)?;
     let key = id.clone();
@@ -144,15 +146,6 @@ pub(super) async fn resume(
     Ok(Json(find(&app, &id).await?))
 }
 
-/// Counts a stream for as long as it lives.
-struct StreamGuard(App);
-
-impl Drop for StreamGuard {
-    fn drop(&mut self) {
-        self.0.metrics.streams.fetch_sub(1, Ordering::Relaxed);
-    }
-}
-
 struct Following {
     job: String,
     watched: Watched,
@@ -160,7 +153,7 @@ struct Following {
     first: Option<Arc<JobView>>,
     has_ended: bool,
     stopping: tokio::sync::watch::Receiver<bool>,
-    _guard: StreamGuard,
+    _entered: Entered,
 }
 
 /// The job's changes as server-sent events `job`, each a whole job; ends when the job has. Poll `/v1/jobs/{id}` instead
@@ -169,12 +162,12 @@ struct Following {
     (status = 200, description = "Events", body = JobEvent, content_type = "text/event-stream"),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "jobs")]
-pub(super) async fn events(State(app): State<App>, Path(id): Path<String>) -> Result<Response, Problem> {
-    if app.metrics.streams.fetch_add(1, Ordering::Relaxed) >= app.limits.max_streams as i64 {
-        app.metrics.streams.fetch_sub(1, Ordering::Relaxed);
-        return Err(Problem::new("too-many-requests", "too many event streams; poll the job instead").after(5));
-    }
-    let guard = StreamGuard(app.clone());
+pub(super) async fn events(
+    State(app): State<App>,
+    Extension(caller): Extension<Caller>,
+    Path(id): Path<String>,
+) -> Result<Response, Problem> {
+    let entered = app.streams.enter(&caller.share)?;
     // Subscribed before it is read: no change is missed between.
     let watched = app.hub.subscribe(&id);
     let first = find(&app, &id).await?;
@@ -185,7 +178,7 @@ pub(super) async fn events(State(app): State<App>, Path(id): Path<String>) -> Re
         first: Some(Arc::new(first)),
         has_ended: false,
         stopping: app.stopping.clone(),
-        _guard: guard,
+        _entered: entered,
     };
     let events = stream::unfold(start, next_event);
     let keep_alive = KeepAlive::new().interval(Duration::from_secs(15)).text("still here");

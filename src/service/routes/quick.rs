@@ -1,17 +1,15 @@
 //! What answers at once: checking and drawing a specimen, its cost, the shipped files, who is asking.
 
-use super::submit::json_body;
 use crate::field::FieldError;
 use crate::job::defaults;
 use crate::mesh::{MeshSize, mesh_specimen};
 use crate::service::access::{Caller, Role};
 use crate::service::app::App;
+use crate::service::body::receive_json;
 use crate::service::problem::{FieldProblem, Problem};
 use crate::specimen::{LimitMargin, ManufacturingLimits, Specimen, to_svg};
 use axum::Json;
-use axum::body::Bytes;
-use axum::extract::{Extension, State};
-use axum::http::HeaderMap;
+use axum::extract::{Extension, Request, State};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -156,12 +154,15 @@ fn check(request: &CheckRequest) -> Result<Checked, Problem> {
 ), tag = "quick")]
 pub(super) async fn check_specimen(
     State(app): State<App>,
-    headers: HeaderMap,
-    body: Bytes,
+    Extension(caller): Extension<Caller>,
+    request: Request,
 ) -> Result<Json<Checked>, Problem> {
-    let value = json_body(&headers, &body)?;
-    let request: CheckRequest = crate::field::read(&value).map_err(|e| Problem::invalid(vec![e]))?;
-    Ok(Json(app.compute(move || check(&request)).await?))
+    let body = receive_json(&app, request).await?;
+    let work = app.compute(move || {
+        let request: CheckRequest = crate::field::read(&body.value).map_err(|e| Problem::invalid(vec![e]))?;
+        check(&request)
+    });
+    Ok(Json(app.answer(&caller, app.limits.request_time, work).await?))
 }
 
 /// The specimens, materials and studies that the program ships.

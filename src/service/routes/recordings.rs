@@ -1,18 +1,20 @@
 //! Recordings: upload, list.
 
+use crate::file::StopFlag;
+use crate::job::ScratchFolder;
+use crate::recording::ReadLimits;
 use crate::service::access::{Caller, Role};
 use crate::service::app::App;
+use crate::service::body::receive_file;
 use crate::service::problem::Problem;
 use crate::service::recordings;
-use crate::service::store::{NewUpload, Store, UploadRow};
+use crate::service::store::{Store, UploadRow};
 use axum::Json;
-use axum::body::Body;
-use axum::extract::{Extension, Path, State};
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::extract::{Extension, Path, Request, State};
+use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use http_body_util::BodyExt;
 use serde::Serialize;
-use std::io::{Seek, SeekFrom, Write};
+use std::fs::File;
 use utoipa::ToSchema;
 
 /// A recording.
@@ -78,11 +80,14 @@ pub(super) async fn get(State(app): State<App>, Path(id): Path<String>) -> Resul
 pub(super) async fn upload(
     State(app): State<App>,
     Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
-    body: Body,
+    request: Request,
 ) -> Result<Response, Problem> {
     caller.require(Role::Submit)?;
-    if !headers.get(header::CONTENT_TYPE).is_some_and(|t| t == "application/x-tar" || t == "application/octet-stream") {
+    if !request
+        .headers()
+        .get(header::CONTENT_TYPE)
+        .is_some_and(|t| t == "application/x-tar" || t == "application/octet-stream")
+    {
         return Err(Problem::new("unsupported-media-type", "send the recording's folder as application/x-tar"));
     }
     let max = app.limits.max_upload_bytes;
@@ -90,46 +95,36 @@ pub(super) async fn upload(
     if usize::try_from(kept).unwrap_or(0) + max > app.limits.max_uploads_bytes {
         return Err(Problem::new("quota", "the recordings fill the service's space").after(3600));
     }
-    let file = receive(body, max).await?;
+    let file = receive_file(&app, request).await?;
+    app.answer(&caller, app.limits.upload_time, keep(&app, &caller, file)).await
+}
+
+/// Keeps an upload whose body has come.
+async fn keep(app: &App, caller: &Caller, file: File) -> Result<Response, Problem> {
+    let max = app.limits.max_upload_bytes;
     let owner = caller.name.clone();
-    let upload = app.compute(move || checked(file, max, owner)).await?;
-    let id = upload.id.clone();
-    let row = app
-        .with_store(move |store| {
-            store.put_upload(&upload)?;
-            store.upload(&id)
-        })
-        .await?;
+    let store = app.store.clone();
+    let row = app.read_upload(move |stop| keep_upload(&store, file, owner, (max, stop))).await?;
     let row = row.ok_or_else(|| Problem::new("internal", "the recording was not kept"))?;
     let location = format!("/v1/recordings/{}", row.id);
     Ok((StatusCode::CREATED, [(header::LOCATION, location)], Json(RecordingView::from(row))).into_response())
 }
 
-/// Streams the body into a file without a name, so that memory does not hold it.
-async fn receive(mut body: Body, max: usize) -> Result<std::fs::File, Problem> {
-    let failed = |e: std::io::Error| Problem::new("internal", format!("scratch: {e}"));
-    let name = crate::service::access::random_hex::<8>().map_err(|e| Problem::new("internal", e.to_string()))?;
-    let path = std::env::temp_dir().join(format!("lambdak-upload-{name}"));
-    let mut file = std::fs::OpenOptions::new().read(true).write(true).create_new(true).open(&path).map_err(failed)?;
-    let _ = std::fs::remove_file(&path);
-    let mut length = 0;
-    while let Some(frame) = body.frame().await {
-        let frame = frame.map_err(|_| Problem::new("invalid-parameter", "the body ended too early"))?;
-        let Ok(data) = frame.into_data() else { continue };
-        length += data.len();
-        if length > max {
-            return Err(Problem::new("too-large", format!("a recording has at most {max} bytes")));
-        }
-        file = tokio::task::spawn_blocking(move || file.write_all(&data).map(|()| file))
-            .await
-            .map_err(|_| Problem::new("internal", "scratch"))?
-            .map_err(failed)?;
-    }
-    file.seek(SeekFrom::Start(0)).map_err(failed)?;
-    Ok(file)
-}
-
-fn checked(file: std::fs::File, max: usize, owner: String) -> Result<NewUpload, Problem> {
-    let files = recordings::unpack(std::io::BufReader::new(file), max)?;
-    recordings::upload_of(files, owner)
+/// Takes the tar file apart, reads the recording, and keeps it.
+fn keep_upload(
+    store: &Store,
+    file: std::fs::File,
+    owner: String,
+    (max, stop): (usize, StopFlag),
+) -> Result<Option<UploadRow>, Problem> {
+    let scratch = ScratchFolder::new().map_err(recordings::scratch_failed)?;
+    let names = recordings::unpack(std::io::BufReader::new(file), scratch.path(), max)?;
+    let mut limits = ReadLimits::upload();
+    limits.memory.stop = stop;
+    let upload = recordings::upload_of(scratch.path(), names, owner, &limits)?;
+    // A file is held by its reader, by the statement and by the database when it is stored.
+    let memory = limits.memory.begin();
+    memory.take("the upload's largest file", 3 * upload.files.iter().map(|f| f.num_bytes).max().unwrap_or(0))?;
+    store.put_upload(&upload)?;
+    Ok(store.upload(&upload.id)?)
 }

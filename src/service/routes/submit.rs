@@ -4,14 +4,14 @@ use crate::field::FieldError;
 use crate::job::{Job, KINDS, Kind};
 use crate::service::access::{Caller, Role, random_hex};
 use crate::service::app::App;
+use crate::service::body::{JsonBody, receive_json};
 use crate::service::problem::Problem;
 use crate::service::store::{Idempotency, NewJob, Submitted, sha256_hex};
 use crate::service::task::tasks_of;
 use crate::service::view::JobView;
 use crate::specimen::Specimen;
 use axum::Router;
-use axum::body::Bytes;
-use axum::extract::{Extension, State};
+use axum::extract::{Extension, Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::post;
@@ -19,31 +19,21 @@ use serde::Deserialize;
 use serde_json::json;
 use utoipa::openapi::{OpenApi, Paths};
 
-/// Reads a JSON body.
-pub(super) fn json_body(headers: &HeaderMap, body: &[u8]) -> Result<serde_json::Value, Problem> {
-    let media_type = headers.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or_default();
-    let essence = media_type.split(';').next().unwrap_or_default().trim();
-    if !essence.eq_ignore_ascii_case("application/json") {
-        return Err(Problem::new("unsupported-media-type", "send the body as Content-Type: application/json"));
-    }
-    serde_json::from_slice(body).map_err(|e| Problem::new("invalid-json", e.to_string()))
+async fn receive(app: App, caller: Caller, request: Request, kind: &'static Kind) -> Result<Response, Problem> {
+    // Before the body: whoever may not submit need not send it.
+    caller.require(Role::Submit)?;
+    let body = receive_json(&app, request).await?;
+    app.answer(&caller, app.limits.request_time, submit(&app, &caller, body, kind)).await
 }
 
-async fn submit(
-    app: App,
-    caller: Caller,
-    headers: HeaderMap,
-    body: Bytes,
-    kind: &'static Kind,
-) -> Result<Response, Problem> {
-    caller.require(Role::Submit)?;
-    let value = json_body(&headers, &body)?;
-    let key = idempotency_key(&headers)?;
+async fn submit(app: &App, caller: &Caller, body: JsonBody, kind: &'static Kind) -> Result<Response, Problem> {
+    let key = idempotency_key(&body.headers)?;
+    let value = body.value;
     let max_elements = caller.max_elements.unwrap_or(usize::MAX).min(app.limits.max_elements);
     let canonical = value.to_string();
     // The request is read once; from here on it is typed.
     let job = app.compute(move || kind.job(&value).map_err(Problem::invalid)).await?;
-    let specimens = specimens_of(&app, &job).await?;
+    let specimens = specimens_of(app, &job).await?;
     let (title, tasks, has_gather) = app
         .compute(move || {
             job.check_size(&specimens, max_elements).map_err(|e| Problem::from(crate::job::JobError::TooBig(e)))?;
@@ -113,10 +103,9 @@ async fn specimens_of(app: &App, job: &Job) -> Result<Vec<Specimen>, Problem> {
 /// The addresses of all kinds.
 pub(super) fn router() -> Router<App> {
     KINDS.iter().fold(Router::new(), |router, kind| {
-        let handler = move |State(app): State<App>,
-                            Extension(caller): Extension<Caller>,
-                            headers: HeaderMap,
-                            body: Bytes| submit(app, caller, headers, body, kind);
+        let handler = move |State(app): State<App>, Extension(caller): Extension<Caller>, request: Request| {
+            receive(app, caller, request, kind)
+        };
         router.route(&format!("/v1/{}", kind.collection), post(handler))
     })
 }

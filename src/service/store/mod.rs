@@ -18,7 +18,7 @@ pub use database::{Database, Row, Transaction, Value};
 pub use error::StoreError;
 pub use jobs::{ArtefactRow, Idempotency, JobFilter, JobRow, NewJob, NewTask, Submitted, TaskRow};
 pub use tasks::{Claimed, Finished, TaskResult};
-pub use uploads::{NewUpload, UploadRow};
+pub use uploads::{NewUpload, UploadFile, UploadRow};
 
 use crate::provenance::VERSION;
 use sha2::{Digest, Sha256};
@@ -158,11 +158,11 @@ impl Store {
 }
 
 /// Keeps bytes; equal ones once.
-fn put_blob(t: &mut Transaction, bytes: &[u8]) -> Result<String, StoreError> {
-    let sha = sha256_hex(bytes);
+fn put_blob(t: &mut Transaction, bytes: Vec<u8>) -> Result<String, StoreError> {
+    let (sha, length) = (sha256_hex(&bytes), bytes.len());
     t.execute(
         "INSERT INTO blobs (sha, bytes, num_bytes) VALUES ($1, $2, $3) ON CONFLICT DO NOTHING",
-        &[(&sha).into(), bytes.to_vec().into(), bytes.len().into()],
+        &[(&sha).into(), bytes.into(), length.into()],
     )?;
     Ok(sha)
 }

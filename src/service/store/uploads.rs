@@ -1,6 +1,7 @@
 //! Uploaded recordings: their files as blobs. A name from outside is a column's value, never a path.
 
 use super::{Store, StoreError, put_blob};
+use std::path::PathBuf;
 
 /// An upload to keep.
 #[derive(Clone, Debug)]
@@ -13,8 +14,21 @@ pub struct NewUpload {
     pub title: String,
     /// Summary, JSON.
     pub manifest: String,
-    /// Name and bytes.
-    pub files: Vec<(String, Vec<u8>)>,
+    /// Its files.
+    pub files: Vec<UploadFile>,
+}
+
+/// A file of an upload to keep: it is read when it is stored, one at a time.
+#[derive(Clone, Debug)]
+pub struct UploadFile {
+    /// Name.
+    pub name: String,
+    /// Where it lies until then.
+    pub path: PathBuf,
+    /// Length.
+    pub num_bytes: u64,
+    /// SHA-256 of its content, hexadecimal.
+    pub sha: String,
 }
 
 /// An upload as stored.
@@ -39,7 +53,7 @@ impl Store {
     /// [`StoreError`].
     pub fn put_upload(&self, upload: &NewUpload) -> Result<(), StoreError> {
         self.database.transact(&|t| {
-            let total: usize = upload.files.iter().map(|f| f.1.len()).sum();
+            let total: u64 = upload.files.iter().map(|f| f.num_bytes).sum();
             let made = t.execute(
                 "INSERT INTO uploads (id, owner, title, manifest, num_bytes, created_ms) \
                  VALUES ($1, $2, $3, $4, $5, {now}) ON CONFLICT DO NOTHING",
@@ -48,17 +62,19 @@ impl Store {
                     (&upload.owner).into(),
                     (&upload.title).into(),
                     (&upload.manifest).into(),
-                    total.into(),
+                    (total as usize).into(),
                 ],
             )?;
             if made == 0 {
                 return Ok(());
             }
-            for (name, bytes) in &upload.files {
+            for UploadFile { name, path, .. } in &upload.files {
+                let bytes = std::fs::read(path).map_err(|source| StoreError::Folder { path: path.clone(), source })?;
+                let length = bytes.len();
                 let sha = put_blob(t, bytes)?;
                 t.execute(
                     "INSERT INTO upload_files (upload_id, name, sha, num_bytes) VALUES ($1, $2, $3, $4)",
-                    &[(&upload.id).into(), name.into(), sha.into(), bytes.len().into()],
+                    &[(&upload.id).into(), name.into(), sha.into(), length.into()],
                 )?;
             }
             Ok(())
@@ -88,16 +104,26 @@ impl Store {
         Ok(rows.first().map(upload_of))
     }
 
-    /// An upload's files: name and bytes.
+    /// Names of an upload's files.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn upload_files(&self, id: &str) -> Result<Vec<(String, Vec<u8>)>, StoreError> {
+    pub fn upload_file_names(&self, id: &str) -> Result<Vec<String>, StoreError> {
+        let rows =
+            self.database.read("SELECT name FROM upload_files WHERE upload_id = $1 ORDER BY name", &[id.into()])?;
+        Ok(rows.iter().map(|r| r.text(0)).collect())
+    }
+
+    /// Bytes of one of an upload's files; empty where there is none of the name.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn upload_file(&self, id: &str, name: &str) -> Result<Vec<u8>, StoreError> {
         let rows = self.database.read(
-            "SELECT f.name, b.bytes FROM upload_files f JOIN blobs b ON b.sha = f.sha WHERE f.upload_id = $1 ORDER BY f.name",
-            &[id.into()],
+            "SELECT b.bytes FROM upload_files f JOIN blobs b ON b.sha = f.sha WHERE f.upload_id = $1 AND f.name = $2",
+            &[id.into(), name.into()],
         )?;
-        Ok(rows.iter().map(|r| (r.text(0), r.blob(1))).collect())
+        Ok(rows.first().map(|r| r.blob(0)).unwrap_or_default())
     }
 
     /// Length of all uploads, bytes.
