@@ -250,7 +250,7 @@ fn uploads_are_recordings_or_refused() {
     let packed = packed.finish().unwrap();
     assert!(packed.len() < 1 << 20);
     let recording = json!({
-        "schema": "mru-recording/1", "id": "bomb", "specimen": shipped("solid-shear.json"), "mask": "mask.nii.gz",
+        "schema": "mru-recording/1", "id": "bomb", "specimen": shipped("solid-shear.json"), "mask": "mask.nii.gz", "acquisition": { "voxel_mm": [1.0, 1.0, 1.0] },
         "steps": [{ "drive_mm": 1.0, "force_n": null, "displacement": "u_1.nii.gz" }],
     });
     let bomb = [
@@ -266,4 +266,56 @@ fn uploads_are_recordings_or_refused() {
     assert_eq!(service.get("/v1/recordings").json()["recordings"].as_array().unwrap().len(), 0);
     let reply = service.post("/v1/diagnoses", &json!({ "recording": "../../x" }));
     assert_eq!(reply.json()["errors"][0]["pointer"], "/recording");
+}
+
+/// Browsers that do not say Sec-Fetch-Site name the page's origin; a cancel needs no body, and so no leave to post.
+#[test]
+fn pages_of_other_origins_cancel_and_delete_nothing() {
+    let (_folder, service) = service();
+    let job = service.submit("evaluations", &small_evaluation(1.0));
+    let cancel = format!("{job}/cancel");
+    for origin in ["https://evil.example", "null", "http://127.0.0.1:1"] {
+        for (method, path) in [("POST", &cancel), ("DELETE", &job)] {
+            let reply = service.call(method, path, &[("origin", origin)], b"");
+            assert_eq!((reply.status, reply.cause().as_str()), (403, "forbidden"), "{origin} {method}");
+        }
+    }
+    let reply =
+        service.call("POST", &cancel, &[("origin", "https://evil.example"), ("sec-fetch-site", "cross-site")], b"");
+    assert_eq!(reply.status, 403);
+    assert_eq!(service.get(&job).json()["state"], "queued");
+    let own = format!("http://{}", service.address);
+    assert_eq!(service.call("POST", &cancel, &[("origin", &own)], b"").status, 200);
+}
+
+#[test]
+fn names_and_numbers_are_fit_to_be_shown() {
+    let (_folder, service) = service();
+    let mut body = small_evaluation(1.0);
+    body["specimen"]["name"] = json!("block\u{202e}gnp.\u{200b}exe");
+    let job = service.submit("evaluations", &body);
+    assert_eq!(service.get(&job).json()["title"], "blockgnp.exe");
+    body["specimen"]["block"]["length_mm"] = json!(1e308);
+    let reply = service.post("/v1/evaluations", &body);
+    let text = String::from_utf8_lossy(&reply.body).into_owned();
+    assert!(reply.status == 422 && text.contains("1e308") && !text.contains("00000000000000000000000"), "{text}");
+}
+
+#[test]
+fn a_wrong_token_is_told_from_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let tokens = folder.path().join("tokens.json");
+    let tokens = tokens.to_str().unwrap();
+    let made =
+        service_common::lambdak().args(["serve", "--tokens", tokens, "--add-token", "anna:read"]).output().unwrap();
+    assert!(made.status.success());
+    let mut service = Service::start(&folder.path().join("data"), &["--slots", "0", "--tokens", tokens]);
+    let detail = |service: &Service| {
+        let reply = service.get("/v1/jobs");
+        assert_eq!((reply.status, reply.cause().as_str()), (401, "unauthorized"));
+        reply.json()["detail"].as_str().unwrap().to_string()
+    };
+    assert!(detail(&service).contains("send the header"));
+    service.token = Some("lk_wrong".into());
+    assert!(detail(&service).contains("this token is none of the service's"));
 }

@@ -200,6 +200,10 @@ impl Request for EvaluationListRequest {
     const COLLECTION: &'static str = "sweeps";
     const ABOUT: &'static str = "Many evaluations: a list, or one that is varied; a table of what each would tell.";
 
+    fn example() -> serde_json::Value {
+        serde_json::json!({ "name": "diameters", "base": EvaluationRequest::example(), "vary": [{ "pointer": "/specimen/holes/0/diameter_mm", "values": [3.0, 4.0] }] })
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let mut errors = Vec::new();
         let mut evaluations = Vec::new();
@@ -227,6 +231,17 @@ struct CheckedList {
 impl Run for CheckedList {
     fn title(&self) -> String {
         self.request.name.clone().unwrap_or_else(|| "sweep".into())
+    }
+
+    /// From the first, the middle and the last evaluation: to mesh ten thousand specimens would take minutes.
+    fn estimated_seconds(&self) -> Option<f64> {
+        let count = self.evaluations.len();
+        let of = |index: usize| {
+            let request = crate::field::read::<EvaluationRequest>(&self.evaluations[index]).ok()?;
+            request.checked().ok()?.estimated_seconds()
+        };
+        let found: Vec<f64> = [0, count / 2, count.checked_sub(1)?].into_iter().filter_map(of).collect();
+        (!found.is_empty()).then(|| count as f64 * found.iter().sum::<f64>() / found.len() as f64)
     }
 
     fn parts(&self) -> Vec<Part> {

@@ -112,3 +112,27 @@ fn poor_files_are_typed_errors() {
     let error = recording_from_mat(&variables("v5.mat"), &specimen(), &options, &memory()).unwrap_err();
     assert!(matches!(error, ImportError::Drives { found: 1, num_steps: 2 }));
 }
+
+/// Displacements whose order is not that of the indices; positions that are the specimen's own.
+#[test]
+fn components_and_positions_may_be_stated() {
+    let options = |components: Option<&str>, origin| ImportOptions {
+        components: components.and_then(ImportOptions::parse_axes),
+        origin,
+        drive_mm: vec![1.0, 2.0],
+        ..ImportOptions::default()
+    };
+    let read =
+        |name: &str, options: &ImportOptions| recording_from_mat(&variables(name), &specimen(), options, &memory());
+    let by_index = read("positions.mat", &options(None, GridOrigin::MaskCenter)).unwrap();
+    let stated = read("positions.mat", &options(Some("z,-x,y"), GridOrigin::MaskCenter)).unwrap();
+    let (a, b) = (by_index.steps[1].displacement[7], stated.steps[1].displacement[7]);
+    // Along the indices they are y, z, x.
+    assert_eq!([b[2], b[0], b[1]], [a[1], -a[2], a[0]]);
+    let placed = read("positions.mat", &options(None, GridOrigin::Positions)).unwrap();
+    // X begins at zero along every index.
+    assert!(placed.grid.origin_mm.iter().all(|x| x.abs() < 1e-12), "{:?}", placed.grid.origin_mm);
+    assert!((by_index.grid.origin_mm[0] + 2.0 * 5.08).abs() < 1e-12);
+    let without = read("v5.mat", &options(None, GridOrigin::Positions)).unwrap_err();
+    assert!(matches!(without, ImportError::Missing { .. }), "{without}");
+}

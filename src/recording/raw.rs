@@ -73,7 +73,7 @@ impl RawRecording {
             ));
         }
         for (n, step) in head.json.steps.iter().enumerate() {
-            check_step(n, step)?;
+            check_step(n, step, &head.specimen)?;
             let Some(raw) = &step.raw else {
                 return Err(RecordingError::NotRaw { step: n + 1 });
             };

@@ -95,7 +95,7 @@ impl Recording {
         let num_voxels = head.mask.iter().filter(|m| **m).count();
         let mut steps = Vec::with_capacity(head.json.steps.len());
         for (n, step) in head.json.steps.iter().enumerate() {
-            check_step(n, step)?;
+            check_step(n, step, &head.specimen)?;
             let Some(name) = &step.displacement else {
                 return Err(RecordingError::Raw { step: n + 1 });
             };
@@ -123,6 +123,7 @@ impl Recording {
             load: head.load,
             notes: head.json.notes,
         };
+        recording.check_plate_motion()?;
         let (digest, memory) = head.files.finish();
         Ok(ReadRecording { recording, digest, memory: Arc::new(memory) })
     }
@@ -166,6 +167,10 @@ impl<'a> Head<'a> {
             Ok(grid) => grid?,
             Err(source) => return Err(RecordingError::Image { path: files.path(&json.mask)?, source }),
         };
+        let (stated_mm, found_mm) = (json.acquisition.voxel_mm, grid.voxel_mm);
+        if (0..3).any(|a| !((stated_mm[a] / found_mm[a] - 1.0).abs() <= GRID_TOLERANCE)) {
+            return Err(RecordingError::VoxelMismatch { stated_mm, found_mm });
+        }
         let mut mask: Vec<bool> = files.memory().list("the mask", mask_image.values.len() as u64)?;
         mask.extend(mask_image.values.iter().map(|v| *v > 0.5));
         files.memory().give_back_values::<f64>(mask_image.values.len());
@@ -191,12 +196,18 @@ impl<'a> Head<'a> {
     }
 }
 
-pub(super) fn check_step(n: usize, step: &StepJson) -> Result<(), RecordingError> {
+pub(super) fn check_step(n: usize, step: &StepJson, specimen: &Specimen) -> Result<(), RecordingError> {
+    let limit_mm = specimen.max_supported_drive_mm();
+    if !(step.drive_mm > 0.0 && step.drive_mm <= limit_mm) {
+        return Err(RecordingError::Drive { step: n, drive_mm: step.drive_mm, limit_mm });
+    }
+    if step.displacement.is_some() && step.raw.is_some() {
+        return Err(RecordingError::TwoKinds { step: n });
+    }
     let finite = |name: &str, value: f64| {
         let name = format!("steps[{n}].{name}");
         if value.is_finite() { Ok(()) } else { Err(RecordingError::Value { name, value, requirement: "finite" }) }
     };
-    finite("drive_mm", step.drive_mm)?;
     step.force_n.map_or(Ok(()), |f| finite("force_n", f))?;
     step.force_sd_n.map_or(Ok(()), |sd| positive(&format!("steps[{n}].force_sd_n"), sd))?;
     if let Some([start, end]) = step.window_s

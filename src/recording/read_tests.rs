@@ -78,6 +78,13 @@ fn bad_files_are_typed_errors() {
     assert!(matches!(edit("mru-recording/1", "mru-recording/9"), RecordingError::Json(_)));
     assert!(matches!(edit("\"force_n\"", "\"farce_n\""), RecordingError::Json(_)));
     assert!(matches!(edit("0.02", "-0.02"), RecordingError::Value { .. }));
+    for drive in ["0.0", "-2.5", "1e9"] {
+        let refused = edit("\"drive_mm\": 2.5", &format!("\"drive_mm\": {drive}"));
+        assert!(matches!(refused, RecordingError::Drive { step: 0, .. }), "{drive}: {refused}");
+    }
+    assert!(matches!(edit("0.1875", "0.2"), RecordingError::VoxelMismatch { .. }));
+    let raw = r#""raw": {"phase": ["a", "b", "c"], "magnitude": "m", "mm_per_radian": [1, 1, 1]}, "displacement""#;
+    assert!(matches!(edit("\"displacement\"", raw), RecordingError::TwoKinds { step: 0 }));
 }
 
 #[test]
@@ -229,6 +236,18 @@ fn raw_recordings_round_trip() {
     scaled.steps[0].mm_per_radian[2] = 0.0;
     scaled.write(folder.path()).unwrap();
     assert!(matches!(RawRecording::read(folder.path(), &ReadLimits::default()), Err(RecordingError::Value { .. })));
+}
+
+/// What says where the data begin is a number of bytes, or the image is refused.
+#[test]
+fn data_begin_at_a_whole_number_of_bytes() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/import/float64_big.nii");
+    let mut plain = std::fs::read(file).unwrap();
+    for offset in [f32::NAN, f32::INFINITY, -352.0, 100.0, 352.5, 1e9] {
+        plain[108..112].copy_from_slice(&offset.to_be_bytes());
+        let refused = Image::read(&plain[..], &numbers(1000)).unwrap_err();
+        assert!(matches!(refused, NiftiError::Offset { .. }), "{offset}: {refused}");
+    }
 }
 
 /// Units, components and a stream that expands without end are refused with little memory.

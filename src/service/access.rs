@@ -34,6 +34,9 @@ pub struct Token {
     /// Most elements of a mesh.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_elements: Option<usize>,
+    /// Most bytes of recordings kept.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_recordings_bytes: Option<u64>,
 }
 
 /// The file of tokens (`tokens/1`).
@@ -87,6 +90,8 @@ pub struct Caller {
     pub max_queued_tasks: Option<usize>,
     /// Quota of size.
     pub max_elements: Option<usize>,
+    /// Quota of recordings.
+    pub max_recordings_bytes: Option<u64>,
 }
 
 impl Caller {
@@ -97,6 +102,18 @@ impl Caller {
             return Ok(());
         }
         Err(Problem::new("forbidden", format!("the token {} has role {:?}; this needs {role:?}", self.name, self.role)))
+    }
+}
+
+impl Caller {
+    /// # Errors
+    /// `forbidden` where somebody else's `what` is to be changed by no admin.
+    pub fn require_owner(&self, owner: &str, what: &str) -> Result<(), Problem> {
+        self.require(Role::Submit)?;
+        if owner == self.name || self.role == Role::Admin {
+            return Ok(());
+        }
+        Err(Problem::new("forbidden", format!("the {what} is {owner}'s; only {owner} or an admin may change it")))
     }
 }
 
@@ -142,6 +159,7 @@ impl Access {
                 role: Role::Admin,
                 max_queued_tasks: None,
                 max_elements: None,
+                max_recordings_bytes: None,
             });
         }
         let refuse = || Problem::new("unauthorized", "send the header Authorization: Bearer TOKEN");
@@ -170,6 +188,7 @@ impl Access {
             role: token.role,
             max_queued_tasks: token.max_queued_tasks,
             max_elements: token.max_elements,
+            max_recordings_bytes: token.max_recordings_bytes,
         })
     }
 }
@@ -206,6 +225,7 @@ pub fn add_token(path: &Path, name: &str, role: Role) -> Result<String, TokenErr
         sha256: sha256_hex(secret.as_bytes()),
         max_queued_tasks: None,
         max_elements: None,
+        max_recordings_bytes: None,
     });
     let text = serde_json::to_string_pretty(&file).unwrap_or_default();
     let fail = |source| TokenError::Io { path: path.into(), source };

@@ -11,7 +11,7 @@ use super::store::{Store, StoreError};
 use crate::file::StopFlag;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio::sync::{Semaphore, watch};
 
 /// What all requests share.
@@ -42,6 +42,8 @@ pub struct Shared {
     pub quick: Semaphore,
     /// One permit per upload that is read.
     pub uploads: Arc<Semaphore>,
+    /// What was found last of the storage, and when.
+    pub ready: tokio::sync::Mutex<Option<(Instant, Result<(), Problem>)>>,
     /// Host names by which the service may be called; empty for any (then tokens are needed).
     pub hosts: Vec<String>,
 }

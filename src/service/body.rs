@@ -17,6 +17,31 @@ use std::io::{Seek, SeekFrom, Write};
 use std::sync::Arc;
 use tokio::time::Instant;
 
+/// What is read, at most, of a body that is refused, and for how long.
+const REFUSED_BYTES: usize = 8 << 20;
+const REFUSED_TIME: std::time::Duration = std::time::Duration::from_secs(3);
+
+/// Bodies that are refused at a time and still read for a moment.
+static REFUSED: tokio::sync::Semaphore = tokio::sync::Semaphore::const_new(64);
+
+/// Reads on for a moment what nobody wants: a connection that ends with unread bytes is reset, and the answer with it.
+pub fn let_run_out(mut body: Body) {
+    let Ok(permit) = REFUSED.try_acquire() else { return };
+    tokio::spawn(async move {
+        let _permit = permit;
+        let mut left = REFUSED_BYTES;
+        let read = async {
+            while let Some(Ok(frame)) = body.frame().await {
+                left = left.saturating_sub(frame.data_ref().map_or(0, |data| data.len()));
+                if left == 0 {
+                    break;
+                }
+            }
+        };
+        let _ = tokio::time::timeout(REFUSED_TIME, read).await;
+    });
+}
+
 /// A JSON body with the memory that it holds.
 pub struct JsonBody {
     /// The body.
@@ -40,12 +65,20 @@ struct Incoming<'a> {
 impl<'a> Incoming<'a> {
     fn new(request: Request, limits: &'a Limits, quota: &Arc<Quota>, max_bytes: usize) -> Result<Self, Problem> {
         let promised = request.headers().get(header::CONTENT_LENGTH).and_then(|v| v.to_str().ok()?.parse().ok());
-        if promised.is_some_and(|length: usize| length > max_bytes) {
-            return Err(too_long(max_bytes));
-        }
         let caller = request.extensions().get::<Caller>().map(|c| c.share.clone()).unwrap_or_default();
-        let _entered = quota.enter(&caller)?;
-        Ok(Incoming { body: request.into_body(), limits, begin: Instant::now(), num_bytes: 0, max_bytes, _entered })
+        let body = request.into_body();
+        let entered = if promised.is_some_and(|length: usize| length > max_bytes) {
+            Err(too_long(max_bytes))
+        } else {
+            quota.enter(&caller).map_err(Problem::from)
+        };
+        match entered {
+            Ok(_entered) => Ok(Incoming { body, limits, begin: Instant::now(), num_bytes: 0, max_bytes, _entered }),
+            Err(problem) => {
+                let_run_out(body);
+                Err(problem)
+            }
+        }
     }
 
     /// The next bytes; none at the end.
@@ -88,6 +121,7 @@ pub async fn receive_json(app: &App, request: Request) -> Result<JsonBody, Probl
     let media_type = headers.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or_default();
     let essence = media_type.split(';').next().unwrap_or_default().trim();
     if !essence.eq_ignore_ascii_case("application/json") {
+        let_run_out(request.into_body());
         return Err(Problem::new("unsupported-media-type", "send the body as Content-Type: application/json"));
     }
     let max_bytes = app.limits.max_body_bytes;

@@ -35,6 +35,8 @@ pub struct Limits {
     pub head_time: Duration,
     /// Most elements of a mesh.
     pub max_elements: usize,
+    /// Most time that a job may be estimated to take on one processor; and after which a task that still runs ends.
+    pub max_job_time: Duration,
 }
 
 impl Default for Limits {
@@ -55,6 +57,7 @@ impl Default for Limits {
             upload_time: Duration::from_secs(600),
             head_time: Duration::from_secs(10),
             max_elements: 20_000,
+            max_job_time: Duration::from_secs(4 * 3600),
         }
     }
 }

@@ -63,6 +63,8 @@ pub const CATALOGUE: &[(&str, u16, &str)] = &[
     ("unsupported-media-type", 415, "The content type is not supported"),
     ("invalid-input", 422, "The input is not valid"),
     ("too-big-a-problem", 422, "The problem is larger than allowed"),
+    ("too-costly", 422, "The job is estimated to take longer than allowed"),
+    ("time-limit", 422, "The task ran for as long as a task may"),
     ("no-solution", 422, "The computation found no solution"),
     ("unsafe-upload", 422, "The upload is not a safe recording"),
     ("queue-full", 429, "The queue is full"),
@@ -74,6 +76,7 @@ pub const CATALOGUE: &[(&str, u16, &str)] = &[
     ("busy", 503, "The service has no memory left for this now"),
     ("storage", 503, "The storage does not answer"),
     ("shutting-down", 503, "The service is shutting down"),
+    ("no-space", 507, "The space for recordings is used up"),
     ("timeout", 504, "The request took too long"),
 ];
 

@@ -6,6 +6,7 @@
 
 use super::problem::{BUSY, Problem};
 use super::store::{NewUpload, Store, UploadFile};
+use crate::field::{printable, with_short_numbers};
 use crate::file::digest_of_file;
 use crate::job::{InputFile, JobError, Progress, ScratchFolder, Surroundings, identifier_of_contents};
 use crate::recording::{RawRecording, ReadLimits, ReadRecording, Recording, RecordingError};
@@ -25,7 +26,7 @@ const MEMORY_PAUSE: Duration = Duration::from_secs(1);
 const BLOCK: usize = 512;
 
 fn unsafe_upload(detail: impl Into<String>) -> Problem {
-    Problem::new("unsafe-upload", detail)
+    Problem::new("unsafe-upload", with_short_numbers(&detail.into()))
 }
 
 /// A file's own name: letters, digits, `.`, `_`, `-`, not starting with a dot, at most 100.
@@ -38,7 +39,7 @@ fn plain_name(name: &str) -> Result<String, Problem> {
     if is_plain && !climbs {
         return Ok(last.into());
     }
-    let shown: String = name.chars().filter(|c| !c.is_control()).take(60).collect();
+    let shown = printable(name, 60);
     Err(unsafe_upload(format!("the name {shown:?} is not plain; use letters, digits, dots, hyphens and underscores")))
 }
 
@@ -178,23 +179,66 @@ pub fn upload_of(
     Ok(NewUpload {
         id: identifier_of_contents(contents),
         owner,
-        title: title.chars().filter(|c| !c.is_control()).take(200).collect(),
+        title: printable(&title, 200),
         manifest: manifest.to_string(),
         files,
     })
 }
 
+/// Space for recordings, bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct Space {
+    /// Of all owners together.
+    pub all: u64,
+    /// Of one owner; as much as of all without it.
+    pub of_owner: Option<u64>,
+}
+
+/// Whether `length` more bytes fit beside the recordings that are kept; where not, what could be deleted.
+///
+/// # Errors
+/// `no-space`.
+pub fn check_space(store: &Store, owner: &str, length: u64, space: Space) -> Result<(), Problem> {
+    let held = |owner: &str| -> Result<u64, Problem> { Ok(store.uploaded_bytes(owner)?.unsigned_abs()) };
+    let of_all = (held("")?, space.all, "recordings hold");
+    let of_owner = match space.of_owner {
+        Some(most) => (held(owner)?, most, "your recordings hold"),
+        None => of_all,
+    };
+    let full = [of_owner, of_all].into_iter().find(|(kept, most, _)| kept.saturating_add(length) > *most);
+    let Some((kept, most, whose)) = full else { return Ok(()) };
+    let own = store.largest_uploads(owner, 5)?;
+    let megabytes = |bytes: u64| bytes as f64 / 1e6;
+    let list: Vec<String> = own
+        .iter()
+        .map(|row| format!("{} ({:?}, {:.1} MB)", row.id, row.title, megabytes(row.num_bytes.unsigned_abs())))
+        .collect();
+    let which = if list.is_empty() {
+        "none of them is yours: ask their owners, or whoever runs the service".to_string()
+    } else {
+        format!("your largest are {}", list.join(", "))
+    };
+    Err(Problem::new(
+        "no-space",
+        format!(
+            "{:.1} MB more do not fit: {whose} {:.1} of {:.1} MB. Delete what is no longer needed (DELETE \
+             /v1/recordings/ID); {which}",
+            megabytes(length),
+            megabytes(kept),
+            megabytes(most)
+        ),
+    ))
+}
+
 /// Keeps the recording that job `job` made. Its identifier is a hash of its content.
 ///
 /// # Errors
-/// `quota` where recordings fill the service's space.
+/// `no-space` where recordings fill the service's space.
 pub fn keep(store: &Store, job: &str, files: BTreeMap<String, Vec<u8>>) -> Result<String, Problem> {
-    let length: usize = files.values().map(Vec::len).sum();
-    let kept = usize::try_from(store.uploaded_bytes()?).unwrap_or(0);
-    if kept + length > super::limits::Limits::default().max_uploads_bytes {
-        return Err(Problem::new("quota", "the recordings fill the service's space"));
-    }
     let owner = store.job(job)?.map(|row| row.owner).unwrap_or_default();
+    let length = files.values().map(|bytes| bytes.len() as u64).sum();
+    let all = super::limits::Limits::default().max_uploads_bytes as u64;
+    check_space(store, &owner, length, Space { all, of_owner: None })?;
     let scratch = ScratchFolder::new().map_err(scratch_failed)?;
     for (name, bytes) in &files {
         std::fs::write(scratch.path().join(name), bytes).map_err(scratch_failed)?;

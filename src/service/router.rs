@@ -2,6 +2,7 @@
 
 use super::access::{Caller, random_hex};
 use super::app::App;
+use super::body::let_run_out;
 use super::problem::Problem;
 use super::{log, routes};
 use axum::Router;
@@ -50,7 +51,10 @@ async fn guard(State(app): State<App>, mut request: Request, next: Next) -> Resp
     let caller = check(&app, request.headers(), &method, if is_page { None } else { Some(&address) });
     let mut name = String::new();
     let answer = match caller {
-        Err(problem) => problem.into_response(),
+        Err(problem) => {
+            let_run_out(request.into_body());
+            problem.into_response()
+        }
         Ok(caller) => {
             name.clone_from(&caller.name);
             request.extensions_mut().insert(caller.clone());
@@ -72,6 +76,7 @@ async fn run(app: &App, request: Request, next: Next, caller: &Caller, is_page: 
         return next.run(request).await;
     }
     if *app.stopping.borrow() {
+        let_run_out(request.into_body());
         return Problem::new("shutting-down", "the service is shutting down; try again").after(5).into_response();
     }
     if *request.method() == Method::POST {
@@ -100,7 +105,13 @@ fn check(app: &App, headers: &HeaderMap, method: &Method, address: Option<&str>)
     }
     let text = |name: &str| headers.get(name).and_then(|v| v.to_str().ok());
     let is_reading = matches!(*method, Method::GET | Method::HEAD | Method::OPTIONS);
-    if !is_reading && text("sec-fetch-site").is_some_and(|site| !matches!(site, "same-origin" | "none")) {
+    // Browsers that do not say where a page comes from in Sec-Fetch-Site name its origin.
+    let is_foreign = match (text("sec-fetch-site"), text("origin")) {
+        (Some(site), _) => !matches!(site, "same-origin" | "none"),
+        (None, Some(origin)) => origin.split_once("://").map(|(_, name)| name) != host,
+        (None, None) => false,
+    };
+    if !is_reading && is_foreign {
         return Err(Problem::new("forbidden", "pages of other origins may not change anything here"));
     }
     match address {
@@ -110,6 +121,7 @@ fn check(app: &App, headers: &HeaderMap, method: &Method, address: Option<&str>)
             role: super::access::Role::Read,
             max_queued_tasks: None,
             max_elements: None,
+            max_recordings_bytes: None,
         }),
         Some(address) => app.access.caller(text("authorization"), address),
     }

@@ -12,6 +12,7 @@ use super::router::{Peer, router};
 use super::runner::{self, WorkerSettings};
 use super::signal::Signal;
 use super::store::{Store, StoreError};
+use crate::job::ScratchFolder;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
 use hyper_util::service::TowerToHyperService;
@@ -40,6 +41,8 @@ pub struct ServeOptions {
     pub limits: Limits,
     /// How long a lease lasts.
     pub lease: Duration,
+    /// Ended jobs and recordings older than this are deleted; never without it.
+    pub keep: Option<Duration>,
 }
 
 /// Settings of a worker.
@@ -93,6 +96,8 @@ pub enum ServeError {
 
 /// How long a service that was told to stop still answers that it is not ready, so that a load balancer hears of it.
 const DRAIN: Duration = Duration::from_secs(1);
+/// How often old jobs and recordings are looked for.
+const DELETION_PERIOD: Duration = Duration::from_secs(600);
 /// How long open requests may take to end at shutdown.
 const GRACE: Duration = Duration::from_secs(10);
 
@@ -105,11 +110,8 @@ fn runtime() -> Result<tokio::runtime::Runtime, ServeError> {
         .map_err(|source| ServeError::System { what: "threads", source })
 }
 
-fn scratch() -> Result<PathBuf, ServeError> {
-    let name = random_hex::<8>()?;
-    let path = std::env::temp_dir().join(format!("lambdak-{name}"));
-    std::fs::create_dir(&path).map_err(|source| ServeError::System { what: "a folder for checkpoints", source })?;
-    Ok(path)
+fn scratch() -> Result<ScratchFolder, ServeError> {
+    ScratchFolder::new().map_err(|source| ServeError::System { what: "a folder for checkpoints", source })
 }
 
 /// Resolves at SIGINT or SIGTERM.
@@ -166,7 +168,8 @@ pub fn serve(options: &ServeOptions, on_ready: &dyn Fn(SocketAddr)) -> Result<()
         Vec::new()
     } else {
         let name = format!("service-{}", random_hex::<4>()?);
-        let settings = WorkerSettings { name, slots: options.slots, lease: options.lease, scratch: scratch.clone() };
+        let settings =
+            WorkerSettings { name, slots: options.slots, lease: options.lease, scratch: scratch.path().into() };
         runner::start(&store, &settings, &signal)
     };
     let (stop, stopping) = watch::channel(false);
@@ -186,11 +189,15 @@ pub fn serve(options: &ServeOptions, on_ready: &dyn Fn(SocketAddr)) -> Result<()
         streams: quota("event streams", options.limits.max_streams),
         quick: Semaphore::new(2),
         uploads: Arc::new(Semaphore::new(1)),
+        ready: tokio::sync::Mutex::default(),
     });
     let limits = options.limits;
     let slots_signal = signal.clone();
     let result = runtime.block_on(async move {
         let listener = tokio::net::TcpListener::from_std(listener).map_err(fail)?;
+        if let Some(keep) = options.keep {
+            tokio::spawn(delete_old(store.clone(), keep));
+        }
         tokio::spawn(hub::run(hub, store, stopping));
         log::info(
             "listening",
@@ -209,10 +216,27 @@ pub fn serve(options: &ServeOptions, on_ready: &dyn Fn(SocketAddr)) -> Result<()
     for slot in slots {
         let _ = slot.join();
     }
-    let _ = std::fs::remove_dir_all(scratch);
+    drop(scratch);
     runtime.shutdown_timeout(Duration::from_secs(2));
     log::info("stopped", &serde_json::json!({}));
     result
+}
+
+/// Deletes what is older than `keep`, again and again.
+async fn delete_old(store: Arc<Store>, keep: Duration) {
+    let keep_ms = i64::try_from(keep.as_millis()).unwrap_or(i64::MAX);
+    loop {
+        let store = store.clone();
+        match tokio::task::spawn_blocking(move || store.delete_older_than(keep_ms)).await {
+            Ok(Ok([0, 0])) => {}
+            Ok(Ok([jobs, recordings])) => {
+                log::info("deleted", &serde_json::json!({ "jobs": jobs, "recordings": recordings }));
+            }
+            Ok(Err(error)) => log::error("deletion", &error.to_string()),
+            Err(_) => return,
+        }
+        tokio::time::sleep(DELETION_PERIOD).await;
+    }
 }
 
 fn quota(what: &'static str, [max, of_caller]: [usize; 2]) -> Arc<Quota> {
@@ -281,7 +305,7 @@ pub fn work(options: &WorkerOptions) -> Result<(), ServeError> {
         "worker",
         &serde_json::json!({ "name": name, "slots": options.slots, "version": crate::provenance::VERSION }),
     );
-    let settings = WorkerSettings { name, slots: options.slots, lease: options.lease, scratch: scratch.clone() };
+    let settings = WorkerSettings { name, slots: options.slots, lease: options.lease, scratch: scratch.path().into() };
     let slots = runner::start(&store, &settings, &signal);
     let other = runtime.block_on(async {
         let mut stopped = std::pin::pin!(interrupted());
@@ -316,7 +340,7 @@ pub fn work(options: &WorkerOptions) -> Result<(), ServeError> {
     for slot in slots {
         let _ = slot.join();
     }
-    let _ = std::fs::remove_dir_all(scratch);
+    drop(scratch);
     match other {
         Some(error) => Err(error.into()),
         None => Ok(()),

@@ -1,16 +1,16 @@
 //! Jobs: list, look, cancel, resume, follow.
 
 use crate::job::kind_of_collection;
-use crate::service::access::{Caller, Role};
+use crate::service::access::Caller;
 use crate::service::app::App;
 use crate::service::hub::Watched;
 use crate::service::problem::Problem;
 use crate::service::quota::Entered;
-use crate::service::store::JobFilter;
+use crate::service::store::{JobFilter, Removed};
 use crate::service::view::{JobEvent, JobList, JobState, JobView};
 use axum::Json;
 use axum::extract::{Extension, Path, Query, State};
-use axum::http::header;
+use axum::http::{StatusCode, header};
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use futures_util::stream;
@@ -39,7 +39,7 @@ pub(super) struct ListQuery {
 }
 
 /// Jobs, newest first.
-#[utoipa::path(get, path = "/v1/jobs", params(ListQuery), responses(
+#[utoipa::path(get, path = "/v1/jobs", operation_id = "list_jobs", params(ListQuery), responses(
     (status = 200, description = "Jobs", body = JobList),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "jobs")]
@@ -88,7 +88,7 @@ pub(super) async fn find(app: &App, id: &str) -> Result<JobView, Problem> {
 }
 
 /// One job.
-#[utoipa::path(get, path = "/v1/jobs/{id}", params(("id" = String, Path, description = "Identifier")), responses(
+#[utoipa::path(get, path = "/v1/jobs/{id}", operation_id = "get_job", params(("id" = String, Path, description = "Identifier")), responses(
     (status = 200, description = "The job", body = JobView),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "jobs")]
@@ -96,16 +96,26 @@ pub(super) async fn get(State(app): State<App>, Path(id): Path<String>) -> Resul
     Ok(Json(find(&app, &id).await?))
 }
 
-fn check_owner(caller: &Caller, job: &JobView) -> Result<(), Problem> {
-    caller.require(Role::Submit)?;
-    if job.owner == caller.name || caller.role == Role::Admin {
-        return Ok(());
+/// Delete a job that has ended, with its results and files.
+#[utoipa::path(delete, path = "/v1/jobs/{id}", operation_id = "delete_job", params(("id" = String, Path, description = "Identifier")), responses(
+    (status = 204, description = "It is gone"),
+    (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
+), tag = "jobs")]
+pub(super) async fn delete(
+    State(app): State<App>,
+    Extension(caller): Extension<Caller>,
+    Path(id): Path<String>,
+) -> Result<StatusCode, Problem> {
+    caller.require_owner(&find(&app, &id).await?.owner, "job")?;
+    match app.with_store(move |store| store.delete_job(&id)).await? {
+        Removed::Gone => Ok(StatusCode::NO_CONTENT),
+        Removed::Missing => Err(Problem::new("not-found", "there is no such job")),
+        Removed::InUse => Err(Problem::new("wrong-state", "the job has not ended; cancel it first")),
     }
-    Err(Problem::new("forbidden", format!("the job is {}'s; only {} or an admin may change it", job.owner, job.owner)))
 }
 
 /// Cancel a job; what its search has found so far is kept for a resume.
-#[utoipa::path(post, path = "/v1/jobs/{id}/cancel", params(("id" = String, Path, description = "Identifier")), responses(
+#[utoipa::path(post, path = "/v1/jobs/{id}/cancel", operation_id = "cancel_job", params(("id" = String, Path, description = "Identifier")), responses(
     (status = 200, description = "The job", body = JobView),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "jobs")]
@@ -116,7 +126,7 @@ pub(super) async fn cancel(
 ) -> Result<Json<JobView>, Problem> {
     let _entered = app.enter(&caller)?;
     let job = find(&app, &id).await?;
-    check_owner(&caller, &job)?;
+    caller.require_owner(&job.owner, "job")?;
     if job.state.has_ended() && job.state != JobState::Cancelled {
         return Err(Problem::new("wrong-state", "the job has ended; there is nothing to cancel"));
     }
@@ -126,7 +136,7 @@ pub(super) async fn cancel(
 }
 
 /// Put a failed or cancelled job back into the queue; it goes on where it was.
-#[utoipa::path(post, path = "/v1/jobs/{id}/resume", params(("id" = String, Path, description = "Identifier")), responses(
+#[utoipa::path(post, path = "/v1/jobs/{id}/resume", operation_id = "resume_job", params(("id" = String, Path, description = "Identifier")), responses(
     (status = 200, description = "The job", body = JobView),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "jobs")]
@@ -137,7 +147,7 @@ pub(super) async fn resume(
 ) -> Result<Json<JobView>, Problem> {
     let _entered = app.enter(&caller)?;
     let job = find(&app, &id).await?;
-    check_owner(&caller, &job)?;
+    caller.require_owner(&job.owner, "job")?;
     let key = id.clone();
     if !app.with_store(move |store| store.resume(&key)).await? {
         return Err(Problem::new("wrong-state", "only failed and cancelled jobs can be resumed"));
@@ -158,7 +168,7 @@ struct Following {
 
 /// The job's changes as server-sent events `job`, each a whole job; ends when the job has. Poll `/v1/jobs/{id}` instead
 /// where streams do not pass.
-#[utoipa::path(get, path = "/v1/jobs/{id}/events", params(("id" = String, Path, description = "Identifier")), responses(
+#[utoipa::path(get, path = "/v1/jobs/{id}/events", operation_id = "follow_job", params(("id" = String, Path, description = "Identifier")), responses(
     (status = 200, description = "Events", body = JobEvent, content_type = "text/event-stream"),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "jobs")]

@@ -36,6 +36,8 @@ pub struct UploadFile {
 pub struct UploadRow {
     /// Identifier.
     pub id: String,
+    /// Name of the token that uploaded it, or whose job made it.
+    pub owner: String,
     /// For lists.
     pub title: String,
     /// Summary, JSON.
@@ -87,7 +89,7 @@ impl Store {
     /// [`StoreError`].
     pub fn uploads(&self, limit: usize) -> Result<Vec<UploadRow>, StoreError> {
         let rows = self.database.read(
-            "SELECT id, title, manifest, num_bytes, created_ms FROM uploads ORDER BY created_ms DESC, id LIMIT $1",
+            "SELECT id, title, manifest, num_bytes, created_ms, owner FROM uploads ORDER BY created_ms DESC, id LIMIT $1",
             &[limit.into()],
         )?;
         Ok(rows.iter().map(upload_of).collect())
@@ -98,9 +100,10 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn upload(&self, id: &str) -> Result<Option<UploadRow>, StoreError> {
-        let rows = self
-            .database
-            .read("SELECT id, title, manifest, num_bytes, created_ms FROM uploads WHERE id = $1", &[id.into()])?;
+        let rows = self.database.read(
+            "SELECT id, title, manifest, num_bytes, created_ms, owner FROM uploads WHERE id = $1",
+            &[id.into()],
+        )?;
         Ok(rows.first().map(upload_of))
     }
 
@@ -126,17 +129,40 @@ impl Store {
         Ok(rows.first().map(|r| r.blob(0)).unwrap_or_default())
     }
 
-    /// Length of all uploads, bytes.
+    /// An owner's largest uploads; anybody's where `owner` is empty.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn uploaded_bytes(&self) -> Result<i64, StoreError> {
+    pub fn largest_uploads(&self, owner: &str, limit: usize) -> Result<Vec<UploadRow>, StoreError> {
+        let rows = self.database.read(
+            "SELECT id, title, '', num_bytes, created_ms, owner FROM uploads WHERE ($1 = '' OR owner = $1) \
+             ORDER BY num_bytes DESC, created_ms LIMIT $2",
+            &[owner.into(), limit.into()],
+        )?;
+        Ok(rows.iter().map(upload_of).collect())
+    }
+
+    /// Length of all uploads of an owner, bytes; of everybody's where `owner` is empty.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn uploaded_bytes(&self, owner: &str) -> Result<i64, StoreError> {
         // SUM of BIGINT is NUMERIC on PostgreSQL.
-        let rows = self.database.read("SELECT CAST(COALESCE(SUM(num_bytes), 0) AS BIGINT) FROM uploads", &[])?;
+        let rows = self.database.read(
+            "SELECT CAST(COALESCE(SUM(num_bytes), 0) AS BIGINT) FROM uploads WHERE $1 = '' OR owner = $1",
+            &[owner.into()],
+        )?;
         Ok(rows.first().map_or(0, |r| r.int(0)))
     }
 }
 
 fn upload_of(r: &super::Row) -> UploadRow {
-    UploadRow { id: r.text(0), title: r.text(1), manifest: r.text(2), num_bytes: r.int(3), created_ms: r.int(4) }
+    UploadRow {
+        owner: r.text(5),
+        id: r.text(0),
+        title: r.text(1),
+        manifest: r.text(2),
+        num_bytes: r.int(3),
+        created_ms: r.int(4),
+    }
 }
