@@ -62,6 +62,13 @@ fn sizes_are_bounded() {
     let axis = json!({ "pointer": "/drive_mm/0", "values": values });
     let sweep = json!({ "base": small_evaluation(1.0), "vary": [axis, axis, axis, axis, axis, axis, axis, axis] });
     assert_eq!(service.post("/v1/sweeps", &sweep).cause(), "invalid-input");
+    // A base of a thousand drives, ten thousand times.
+    let mut large = small_evaluation(1.0);
+    large["drive_mm"] = (1..=1000).map(|n| json!(0.002 * f64::from(n))).collect();
+    let values: Vec<f64> = (1..=10_000).map(|n| 0.0002 * f64::from(n)).collect();
+    let sweep = json!({ "base": large, "vary": [{ "pointer": "/drive_mm/0", "values": values }] });
+    let reply = service.post("/v1/sweeps", &sweep);
+    assert_eq!((reply.status, reply.json()["errors"][0]["pointer"].as_str()), (422, Some("/base")));
 }
 
 #[test]
@@ -243,6 +250,11 @@ fn uploads_are_recordings_or_refused() {
     header[70..72].copy_from_slice(&16i16.to_le_bytes());
     header[72..74].copy_from_slice(&32i16.to_le_bytes());
     header[108..112].copy_from_slice(&352f32.to_le_bytes());
+    header[123] = 2;
+    header[254..256].copy_from_slice(&1i16.to_le_bytes());
+    for at in [280, 300, 320] {
+        header[at..at + 4].copy_from_slice(&1f32.to_le_bytes());
+    }
     header[344..348].copy_from_slice(b"n+1\0");
     header.resize(50 << 20, 0);
     let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());

@@ -1,7 +1,7 @@
 //! What reading may take of memory: a limit for each reading, and one for all readings of a process together.
 //!
-//! A few kilobytes can promise, and expand to, gigabytes. So every reader asks here before it allocates what the size of
-//! its input does not bound, and gives back what it no longer holds. All limits stand in this file.
+//! A few kilobytes can promise, and expand to, gigabytes. So every reader asks here before it allocates what the size
+//! of its input does not bound, and gives back what it no longer holds. All limits stand in this file.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

@@ -1,7 +1,7 @@
 //! Temporary folders that only this user can open, and that do not outlive the process, however it ends.
 //!
-//! All folders of a process lie in one that it holds locked. A process that crashed holds nothing any more: the next one
-//! that needs a folder removes what it left.
+//! All folders of a process lie in one that it holds locked. A process that crashed holds nothing any more: the next
+//! one that needs a folder removes what it left.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};

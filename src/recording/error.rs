@@ -1,7 +1,7 @@
 //! Why a recording was not read or written.
 
 use super::nifti::NiftiError;
-use super::plates::PlateFault;
+use super::plate_fault::PlateFault;
 use crate::file::MemoryError;
 use crate::specimen::SpecimenError;
 use crate::voxel::VoxelError;

@@ -1,7 +1,7 @@
 //! Whether the displacements next to the plates are those of the drive: a wrong unit, sign or order of components shows
 //! there at once, and nowhere later.
 
-use super::{Recording, RecordingError};
+use super::{PlateFault, Recording, RecordingError};
 use crate::specimen::TestKind;
 
 /// Ratios of plate motion and drive within these bounds are taken as one: mounts give way, and lines to the plates err.
@@ -12,31 +12,6 @@ const REACH: f64 = 0.15;
 const SMALL: f64 = 0.02;
 /// A component below this part of the drive does not follow it.
 const STILL: f64 = 0.2;
-
-/// What is wrong with displacements whose plates do not move as the drive.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum PlateFault {
-    /// A thousandth of what they should be.
-    #[error("the displacements seem to be in metres; store them in mm (on import: --unit m)")]
-    Metres,
-    /// A thousand times what they should be.
-    #[error("the displacements seem to be in micrometres; store them in mm (on import: --unit um)")]
-    Micrometres,
-    /// The plate moves backwards.
-    #[error(
-        "the sign of the x component seems to be flipped; x points in the direction of the drive (on import: --axes, such as -y,z,-x)"
-    )]
-    Sign,
-    /// Another component than x follows the drive.
-    #[error(
-        "component {component} follows the drive, where x should: the components seem to be permuted; store them as x, y, z (on import: --components)"
-    )]
-    Permuted {
-        /// `y` or `z`.
-        component: char,
-    },
-}
 
 impl Recording {
     /// Compares the motion of the plates in every step, where its voxels reach both, with the drive.

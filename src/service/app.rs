@@ -8,6 +8,7 @@ use super::problem::Problem;
 use super::quota::{Entered, Full, Quota};
 use super::signal::Signal;
 use super::store::{Store, StoreError};
+use super::turns::Turns;
 use crate::file::StopFlag;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -38,8 +39,8 @@ pub struct Shared {
     pub upload_bodies: Arc<Quota>,
     /// Event streams.
     pub streams: Arc<Quota>,
-    /// One permit per quick computation (meshing, drawing); numerics never run on the readers' threads.
-    pub quick: Semaphore,
+    /// Turns for quick computations (parsing, meshing, drawing); numerics never run on the readers' threads.
+    pub quick: Turns,
     /// One permit per upload that is read.
     pub uploads: Arc<Semaphore>,
     /// What was found last of the storage, and when.
@@ -112,8 +113,8 @@ impl Shared {
         tokio::time::timeout(time, work).await.unwrap_or_else(timeout)
     }
 
-    /// Reads an upload on a blocking thread, one at a time. When the caller has left, the flag that `work` is given says
-    /// so, and it ends at its next look.
+    /// Reads an upload on a blocking thread, one at a time. When the caller has left, the flag that `work` is given
+    /// says so, and it ends at its next look.
     ///
     /// # Errors
     /// What `work` returns.
@@ -137,16 +138,22 @@ impl Shared {
         })
     }
 
-    /// Runs a quick computation on a blocking thread, few at a time.
+    /// Runs a quick computation of a caller on a blocking thread, few at a time, one of each caller.
     ///
     /// # Errors
     /// What `work` returns.
     pub async fn compute<T: Send + 'static>(
         self: &Arc<Self>,
+        share: &str,
         work: impl FnOnce() -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
-        let _permit = self.quick.acquire().await.map_err(|_| Problem::new("shutting-down", "try again later"))?;
-        match tokio::task::spawn_blocking(work).await {
+        let turn = self.quick.take(share).await.ok_or_else(|| Problem::new("shutting-down", "try again later"))?;
+        let counted = move || {
+            // Held until the work has really ended, whether or not somebody waits for it.
+            let _turn = turn;
+            work()
+        };
+        match tokio::task::spawn_blocking(counted).await {
             Ok(result) => result,
             Err(_) => Err(Problem::new("internal", "the request ended with a programming error; please report it")),
         }

@@ -65,7 +65,7 @@ struct Incoming<'a> {
 impl<'a> Incoming<'a> {
     fn new(request: Request, limits: &'a Limits, quota: &Arc<Quota>, max_bytes: usize) -> Result<Self, Problem> {
         let promised = request.headers().get(header::CONTENT_LENGTH).and_then(|v| v.to_str().ok()?.parse().ok());
-        let caller = request.extensions().get::<Caller>().map(|c| c.share.clone()).unwrap_or_default();
+        let caller = share_of(&request);
         let body = request.into_body();
         let entered = if promised.is_some_and(|length: usize| length > max_bytes) {
             Err(too_long(max_bytes))
@@ -108,6 +108,10 @@ impl<'a> Incoming<'a> {
     }
 }
 
+fn share_of(request: &Request) -> String {
+    request.extensions().get::<Caller>().map(|caller| caller.share.clone()).unwrap_or_default()
+}
+
 fn too_long(max_bytes: usize) -> Problem {
     Problem::new("too-large", format!("the body has more than {max_bytes} bytes, the most that is taken here"))
 }
@@ -125,6 +129,7 @@ pub async fn receive_json(app: &App, request: Request) -> Result<JsonBody, Probl
         return Err(Problem::new("unsupported-media-type", "send the body as Content-Type: application/json"));
     }
     let max_bytes = app.limits.max_body_bytes;
+    let share = share_of(&request);
     let mut incoming = Incoming::new(request, &app.limits, &app.bodies, max_bytes)?;
     // A list that grows holds its old place beside the new one.
     let received = MemoryLimit::body(3 * max_bytes as u64).begin();
@@ -134,7 +139,7 @@ pub async fn receive_json(app: &App, request: Request) -> Result<JsonBody, Probl
         bytes.extend_from_slice(&data);
     }
     drop(incoming);
-    app.compute(move || {
+    app.compute(&share, move || {
         let memory = MemoryLimit::service_json().begin();
         // The request is held as it came, in its canonical form, and as what is stored of its tasks.
         memory.take("the body's values", json_bytes(&bytes).saturating_mul(3))?;

@@ -46,7 +46,7 @@ impl Default for Limits {
             max_upload_bytes: 512 << 20,
             max_uploads_bytes: 8 << 30,
             max_connections: [4096, 2048],
-            max_requests: [512, 128],
+            max_requests: [512, 256],
             max_bodies: [256, 16],
             max_upload_bodies: [16, 2],
             max_streams: [1024, 256],

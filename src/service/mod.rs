@@ -28,6 +28,7 @@ mod server;
 mod signal;
 pub mod store;
 mod task;
+mod turns;
 mod view;
 
 pub use routes::open_api;

@@ -1,8 +1,9 @@
 //! Uploaded recordings: a tar file taken apart into a scratch folder, checked by the library's reader, then kept as
 //! blobs.
 //!
-//! Only regular files with plain names are taken; folders before a name are dropped, links and devices refused. What the
-//! files may unpack to is bounded by the memory of a reading; the tar file and its entries are never held as a whole.
+//! Only regular files with plain names are taken; folders before a name are dropped, links and devices refused. What
+//! the files may unpack to is bounded by the memory of a reading; the tar file and its entries are never held as a
+//! whole.
 
 use super::problem::{BUSY, Problem};
 use super::store::{NewUpload, Store, UploadFile};
@@ -163,7 +164,8 @@ pub fn upload_of(
             let r = read.recording;
             let steps: Vec<_> = r.steps.iter().map(|s| force(s.drive_mm, s.force_n)).collect();
             let manifest = json!({
-                "specimen": r.specimen, "shape": r.grid.shape, "voxel_mm": r.grid.voxel_mm, "is_raw": true, "steps": steps,
+                "specimen": r.specimen, "shape": r.grid.shape, "voxel_mm": r.grid.voxel_mm,
+                "num_voxels": r.num_voxels(), "is_raw": true, "steps": steps,
             });
             (r.id, manifest)
         }

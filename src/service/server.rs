@@ -12,6 +12,7 @@ use super::router::{Peer, router};
 use super::runner::{self, WorkerSettings};
 use super::signal::Signal;
 use super::store::{Store, StoreError};
+use super::turns::Turns;
 use crate::job::ScratchFolder;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
@@ -187,7 +188,7 @@ pub fn serve(options: &ServeOptions, on_ready: &dyn Fn(SocketAddr)) -> Result<()
         bodies: quota("bodies coming in", options.limits.max_bodies),
         upload_bodies: quota("uploads coming in", options.limits.max_upload_bodies),
         streams: quota("event streams", options.limits.max_streams),
-        quick: Semaphore::new(2),
+        quick: Turns::new(2),
         uploads: Arc::new(Semaphore::new(1)),
         ready: tokio::sync::Mutex::default(),
     });

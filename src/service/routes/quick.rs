@@ -208,7 +208,7 @@ pub(super) async fn check_specimen(
 ) -> Result<Json<Checked>, Problem> {
     let body = receive_json(&app, request).await?;
     let most_seconds = app.limits.max_job_time.as_secs_f64();
-    let work = app.compute(move || {
+    let work = app.compute(&caller.share, move || {
         let request: CheckRequest = crate::field::read(&body.value).map_err(|e| Problem::invalid(vec![e]))?;
         check(&request, most_seconds)
     });

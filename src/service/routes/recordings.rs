@@ -47,9 +47,10 @@ pub(super) struct RecordingSummary {
     /// Edges of a voxel, mm.
     #[schema(min_items = 3, max_items = 3)]
     voxel_mm: [f64; 3],
-    /// Voxels of the mask; left out for raw phases.
-    num_voxels: Option<usize>,
-    /// Whether it holds raw phases.
+    /// Voxels of the mask.
+    num_voxels: usize,
+    /// Whether it holds raw phases; left out where it does not.
+    #[schema(nullable = false)]
     is_raw: Option<bool>,
     /// Drives and forces.
     steps: Vec<StepSummary>,
@@ -154,7 +155,8 @@ pub(super) async fn upload(
     // Before the body: where there is no space at all nobody need send it.
     let promised = request.headers().get(header::CONTENT_LENGTH).and_then(|v| v.to_str().ok()?.parse().ok());
     let (store, owner, space) = (app.store.clone(), caller.name.clone(), space_of(&app, &caller));
-    let space = app.compute(move || recordings::check_space(&store, &owner, promised.unwrap_or(0), space)).await;
+    let space =
+        app.compute(&caller.share, move || recordings::check_space(&store, &owner, promised.unwrap_or(0), space)).await;
     if let Err(problem) = space {
         let_run_out(request.into_body());
         return Err(problem);

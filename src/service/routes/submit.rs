@@ -44,11 +44,11 @@ async fn submit(
     let max_elements = caller.max_elements.unwrap_or(usize::MAX).min(app.limits.max_elements);
     let canonical = value.to_string();
     // The request is read once; from here on it is typed.
-    let job = app.compute(move || kind.job(&value).map_err(Problem::invalid)).await?;
+    let job = app.compute(&caller.share, move || kind.job(&value).map_err(Problem::invalid)).await?;
     let specimens = specimens_of(app, &job).await?;
     let most_seconds = app.limits.max_job_time.as_secs_f64();
     let (title, tasks, has_gather, estimated_seconds) = app
-        .compute(move || {
+        .compute(&caller.share, move || {
             job.check_size(&specimens, max_elements).map_err(|e| Problem::from(crate::job::JobError::TooBig(e)))?;
             let estimated_seconds = job.estimated_seconds();
             check_cost(estimated_seconds, most_seconds)?;
