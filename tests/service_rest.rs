@@ -535,6 +535,22 @@ fn costs_are_shown_and_limited() {
     assert_eq!((unknown.status, unknown.cause().as_str()), (400, "invalid-parameter"));
 }
 
+/// A task that still runs when its time is up ends with a problem, and its job can be resumed for as long again.
+#[test]
+fn a_task_ends_when_its_time_is_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &["--slots", "1", "--max-job-hours", "0.0003"]);
+    let proof = json!({ "per_cause": 0, "unknown": 0, "controls": 50, "only": ["none"], "mesh_factor": 4.0 });
+    let begin = std::time::Instant::now();
+    let job = service.submit("proofs", &proof);
+    let view = service.wait(&job, LONG);
+    assert_eq!(view["state"], "failed", "{view}");
+    assert!(view["problem"]["type"].as_str().unwrap().ends_with(":time-limit"), "{view}");
+    eprintln!("a task of 1.1 s ended after {:.1} s", begin.elapsed().as_secs_f64());
+    assert_eq!(service.call("POST", &format!("{job}/resume"), &[], b"").json()["state"], "queued");
+    service.wait(&job, LONG);
+}
+
 #[test]
 fn ten_thousand_points_are_queued_at_once() {
     let folder = tempfile::tempdir().unwrap();

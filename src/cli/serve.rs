@@ -55,12 +55,12 @@ pub(super) fn default_slots(slots: Option<usize>) -> Result<usize, CliError> {
     }
 }
 
-/// From a minute to a year.
+/// From a second to a year.
 fn job_time(hours: f64) -> Result<Duration, CliError> {
-    if (1.0 / 60.0..=8766.0).contains(&hours) {
+    if (1.0 / 3600.0..=8766.0).contains(&hours) {
         return Ok(Duration::from_secs_f64(3600.0 * hours));
     }
-    let message = format!("{hours} hours is not from a minute (0.0167) to a year (8766)");
+    let message = format!("{hours} hours is not from a second (0.000278) to a year (8766)");
     Err(CliError::Option { option: "max-job-hours", message })
 }
 

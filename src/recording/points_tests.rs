@@ -88,7 +88,7 @@ fn poor_tables_are_typed_errors() {
         assert!(matches!(read_points(text, path(), &memory(2000)), Err(ImportError::Table { .. })), "{text}");
     }
     let many = "x,y,z,ux,uy,uz\n".to_string() + &"1,2,3,4,5,6\n".repeat(11);
-    assert!(matches!(read_points(&many, path(), &memory(2000)), Err(ImportError::Memory(_))));
+    assert!(matches!(read_points(&many, path(), &memory(1000)), Err(ImportError::Memory(_))));
     let one = read_points("x,y,z,ux,uy,uz\n1,2,3,4,5,6\n", path(), &memory(2000)).unwrap();
     let read = |steps: &[Vec<DisplacementPoint>]| {
         recording_from_points(steps, &specimen(), None, &ImportOptions::default(), &memory(1 << 26)).unwrap_err()

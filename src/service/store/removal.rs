@@ -114,7 +114,7 @@ fn remove_job(t: &mut Transaction, id: &str) -> Result<Removed, StoreError> {
 fn remove_upload(t: &mut Transaction, id: &str) -> Result<Removed, StoreError> {
     let blobs = t.query("SELECT DISTINCT sha FROM upload_files WHERE upload_id = $1", &[id.into()])?;
     let readers = t.query(
-        "SELECT 1 FROM jobs WHERE state IN ('queued', 'running') AND body LIKE '%' || $1 || '%' LIMIT 1",
+        "SELECT 1 FROM jobs WHERE state IN ('queued', 'running') AND body LIKE '%' || CAST($1 AS TEXT) || '%' LIMIT 1",
         &[id.into()],
     )?;
     let is_there = !t.query("SELECT 1 FROM uploads WHERE id = $1", &[id.into()])?.is_empty();
@@ -147,4 +147,86 @@ fn drop_unused(t: &mut Transaction, blobs: &[Row]) -> Result<(), StoreError> {
         )?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::service::store::{NewJob, NewTask, NewUpload, Submitted, TaskResult, UploadFile, sha256_hex};
+    use std::path::Path;
+
+    fn upload(folder: &Path, id: &str, contents: [&str; 2]) -> NewUpload {
+        let file = |(index, content): (usize, &str)| {
+            let (name, path) = (format!("file-{index}"), folder.join(format!("{id}-{index}")));
+            std::fs::write(&path, content).expect("written");
+            UploadFile { name, path, num_bytes: content.len() as u64, sha: sha256_hex(content.as_bytes()) }
+        };
+        NewUpload {
+            id: id.into(),
+            owner: "anna".into(),
+            title: id.into(),
+            manifest: "{}".into(),
+            files: contents.into_iter().enumerate().map(file).collect(),
+        }
+    }
+
+    fn submit(store: &Store, id: &str, body: &str, key: &str) {
+        let tasks = vec![NewTask { input: "{}".into(), cache_key: key.into() }];
+        let (id, body) = (id.to_string(), body.to_string());
+        let (kind, owner, title) = ("evaluations".into(), "anna".into(), id.clone());
+        let job = NewJob { id, kind, owner, title, body, tasks, has_gather: false };
+        assert_eq!(store.submit(&job, None, 100, None).expect("submitted"), Submitted::New);
+    }
+
+    fn finish(store: &Store, text: &str) {
+        let task = store.claim("worker", 60_000, "").expect("the storage answers").expect("a task");
+        let artefacts = vec![("table.csv".into(), "text/csv".into(), b"shared".to_vec())];
+        store.finish(&task, "worker", &TaskResult { result: text.into(), artefacts }).expect("stored");
+    }
+
+    fn has(store: &Store, content: &str) -> bool {
+        store.blob(&sha256_hex(content.as_bytes())).expect("the storage answers").is_some()
+    }
+
+    #[test]
+    fn what_is_deleted_takes_its_bytes_with_it_and_no_others() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let store = Store::open_folder(&folder.path().join("data")).expect("a store");
+        for (id, contents) in [("one", ["only one", "both"]), ("two", ["only two", "both"])] {
+            store.put_upload(&upload(folder.path(), id, contents)).expect("kept");
+        }
+        submit(&store, "first", "reads two", "key");
+        assert_eq!(store.delete_job("first").expect("an answer"), Removed::InUse);
+        assert_eq!(store.delete_upload("two").expect("an answer"), Removed::InUse, "an unfinished job reads it");
+        assert_eq!(store.delete_upload("one").expect("an answer"), Removed::Gone);
+        assert_eq!(store.delete_upload("one").expect("an answer"), Removed::Missing);
+        assert_eq!([has(&store, "only one"), has(&store, "both"), has(&store, "only two")], [false, true, true]);
+        finish(&store, "the result");
+        // Answered from what is known of the first, it refers to the same bytes.
+        submit(&store, "second", "reads two", "key");
+        assert_eq!(store.delete_job("first").expect("an answer"), Removed::Gone);
+        assert!(has(&store, "the result") && has(&store, "shared"));
+        assert_eq!(store.artefacts("second").expect("an answer").len(), 1);
+        assert_eq!(store.delete_job("second").expect("an answer"), Removed::Gone);
+        assert!(!has(&store, "the result") && !has(&store, "shared"));
+        // What was known went with it: the same is computed again.
+        submit(&store, "third", "reads nothing", "key");
+        assert!(store.claim("worker", 60_000, "").expect("the storage answers").is_some());
+    }
+
+    #[test]
+    fn what_is_old_and_has_ended_is_deleted() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let store = Store::open_folder(&folder.path().join("data")).expect("a store");
+        store.put_upload(&upload(folder.path(), "free", ["a", "b"])).expect("kept");
+        store.put_upload(&upload(folder.path(), "read", ["c", "d"])).expect("kept");
+        submit(&store, "ended", "{}", "");
+        finish(&store, "done");
+        submit(&store, "waiting", "read", "");
+        assert_eq!(store.delete_older_than(3_600_000).expect("an answer"), [0, 0], "nothing is an hour old");
+        // Everything is older than an hour from now.
+        assert_eq!(store.delete_older_than(-3_600_000).expect("an answer"), [1, 1]);
+        assert!(store.job("waiting").expect("an answer").is_some());
+        assert_eq!(store.uploads(10).expect("an answer").len(), 1);
+    }
 }
