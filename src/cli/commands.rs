@@ -67,6 +67,8 @@ const IMPORT: &[Flag] = &[
     Flag::of("drive", "drive_mm"),
     Flag::of("unit", "unit"),
     Flag::of("axes", "axes"),
+    Flag::of("components", "components"),
+    Flag::of("origin", "origin"),
     Flag::of("voxel", "voxel_mm"),
     Flag::of("region", "region"),
     Flag::of("filter", "filter"),

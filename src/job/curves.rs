@@ -57,6 +57,10 @@ impl Request for CurvesRequest {
     const COLLECTION: &'static str = "curve-fits";
     const ABOUT: &'static str = "Ogden terms fitted to curves of several homogeneous tests together.";
 
+    fn example() -> serde_json::Value {
+        serde_json::json!({ "curves": [{ "test": "uniaxial", "csv": super::defaults::example_curve() }], "fit": { "max_terms": 1 } })
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let (mut fitted, mut kept_back, mut errors) = (Vec::new(), Vec::new(), Vec::new());
         for (index, entry) in self.curves.iter().enumerate() {

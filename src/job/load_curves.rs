@@ -62,6 +62,10 @@ impl Request for LoadCurvesRequest {
     const COLLECTION: &'static str = "load-curve-diagnoses";
     const ABOUT: &'static str = "What an elastic material leaves out of load curves of homogeneous tests.";
 
+    fn example() -> serde_json::Value {
+        serde_json::json!({ "curves": [{ "test": "uniaxial", "name": "pull", "csv": super::defaults::example_history() }] })
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let (mut curves, mut errors) = (Vec::new(), Vec::new());
         for (index, entry) in self.curves.iter().enumerate() {

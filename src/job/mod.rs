@@ -11,6 +11,7 @@
 
 mod calibrate;
 mod compare;
+mod cost;
 mod curve_files;
 mod curves;
 pub mod defaults;
@@ -29,6 +30,7 @@ mod outcome;
 mod paper_tables;
 mod part;
 mod proof;
+mod quick_response;
 mod reference;
 mod registry;
 mod request;
@@ -44,11 +46,13 @@ mod sweep;
 mod sweep_task;
 mod uniaxial;
 
+pub use cost::seconds_per_drive;
 pub use error::{Failure, JobError};
 pub use evaluate::EvaluationRequest;
 pub use kind::{Job, Kind};
-pub use outcome::{File, MediaType, Outcome, OutcomeError, recording_identifier};
+pub use outcome::{File, MediaType, Outcome, OutcomeError, identifier_of_contents, recording_identifier};
 pub use part::{Part, PartKind};
+pub use quick_response::{NoResponse, QuickResponse, quick_response};
 pub use reference::reference;
 pub use registry::{KINDS, kind_of_collection, kind_of_command, kind_of_part, kind_of_task};
 pub use request::{Context, InputForm, InputUse, Request, Run};

@@ -56,6 +56,15 @@ fn cell(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     #[test]
+    fn every_example_is_a_request_that_can_be_run() {
+        for kind in &super::KINDS {
+            let example = kind.example();
+            let found = kind.job(&example);
+            assert!(found.is_ok(), "{}: {:?}", kind.command, found.err());
+        }
+    }
+
+    #[test]
     fn the_page_is_current() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/requests.md");
         let text = super::reference();

@@ -1,7 +1,7 @@
 //! Solve: forces and fields of a specimen at its drives.
 
 use super::subject::{check_mesh, driven, model_of};
-use super::{Context, JobError, Outcome, Request, Run, defaults, summary};
+use super::{Context, JobError, Outcome, Request, Run, cost, defaults, summary};
 use crate::fem::{Equilibrium, QuadraturePoint, SolveOptions, SolveResult};
 use crate::field::FieldError;
 use crate::kinematics::decompose;
@@ -45,6 +45,10 @@ impl Request for SolveRequest {
     const COLLECTION: &'static str = "solves";
     const ABOUT: &'static str = "Forces and fields of a specimen at its drives, by finite elements.";
 
+    fn example() -> serde_json::Value {
+        serde_json::json!({ "specimen": defaults::two_hole_shear(), "drive_mm": [2.0], "mesh": "search" })
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let mut errors = Vec::new();
         let specimen = driven(&self.specimen, self.drive_mm.as_ref(), &mut errors);
@@ -60,6 +64,12 @@ impl Run for CheckedSolve {
 
     fn check_size(&self, _: &[Specimen], max_elements: usize) -> Result<(), FieldError> {
         check_mesh(&self.specimen, self.request.mesh, "/mesh", max_elements)
+    }
+
+    fn estimated_seconds(&self) -> Option<f64> {
+        let mut mesh = self.request.mesh.options(&self.specimen);
+        mesh.use_mirror &= !self.request.is_whole;
+        cost::seconds(&self.specimen, &mesh, None, self.specimen.drive_mm.len())
     }
 
     fn run(&self, context: &Context) -> Result<Outcome, JobError> {

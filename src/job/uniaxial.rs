@@ -81,6 +81,10 @@ impl Request for UniaxialRequest {
     const ABOUT: &'static str =
         "The traditional route: one uniaxial curve, of a strip or a dumb-bell, fitted with Ogden terms.";
 
+    fn example() -> serde_json::Value {
+        serde_json::json!({ "csv": super::defaults::example_curve(), "fit": { "max_terms": 1 } })
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let mut errors: Vec<FieldError> =
             self.specimen.field_errors().into_iter().map(|e| e.below("/specimen")).collect();
