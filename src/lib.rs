@@ -3,8 +3,8 @@
 //! The rooms stand on one another in this order; a room uses only those before it:
 //! [`field`], [`file`](mod@file), [`provenance`], [`optimise`] → [`specimen`] → [`mesh`], [`material`] → [`fem`] →
 //! [`kinematics`], [`homogeneous`], [`rate`], [`voxel`] → [`sensitivity`] → [`recording`], [`acquisition`] →
-//! [`calibration`] → [`diagnosis`], [`design`] → [`proof`] → [`sweep`] → [`slurm`], [`report`] → [`compare`] → [`job`]
-//! → [`service`] → [`cli`].
+//! [`calibration`] → [`diagnosis`], [`design`] → [`proof`] → [`sweep`] → [`slurm`], [`report`], [`export`] →
+//! [`compare`] → [`job`] → [`service`] → [`cli`].
 //!
 //! One unit system inside: lengths mm, moduli and stresses kPa, times s. Stress × area is then
 //! kPa·mm² = 10⁻³ N; forces cross every public boundary in N.
@@ -15,6 +15,7 @@ pub mod cli;
 pub mod compare;
 pub mod design;
 pub mod diagnosis;
+pub mod export;
 pub mod fem;
 pub mod field;
 pub mod file;

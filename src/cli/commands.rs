@@ -25,11 +25,30 @@ pub(super) static COMMANDS: &[JobCommand] = &[
     JobCommand { name: "prove-diagnosis", arguments: of_nothing, flags: PROOF, fill: proof },
 ];
 
+/// What `lambdak export` writes: each with the word after `export`.
+pub(super) static EXPORTS: &[(&str, JobCommand)] = &[
+    (
+        "material",
+        JobCommand { name: "export-material", arguments: of_material, flags: EXPORT_MATERIAL, fill: exported_material },
+    ),
+    ("model", JobCommand { name: "export-model", arguments: of_specimen, flags: EXPORT_MODEL, fill: specimen }),
+];
+const EXPORT_MODEL: &[Flag] = &[
+    Flag::read("material", "material", JsonFile),
+    Flag::of("drive", "drive_mm"),
+    Flag::of("mesh", "mesh"),
+    Flag::of("full", "is_whole"),
+    Flag::of("format", "formats"),
+];
+
+const EXPORT_MATERIAL: &[Flag] =
+    &[Flag::of("format", "formats"), Flag::of("stress-unit", "stress_unit"), Flag::of("name", "name")];
 const SOLVE: &[Flag] = &[
     Flag::read("material", "material", JsonFile),
     Flag::of("drive", "drive_mm"),
     Flag::of("mesh", "mesh"),
     Flag::of("full", "is_whole"),
+    Flag::of("fields", "fields"),
 ];
 const EVALUATE: &[Flag] = &[
     Flag::read("material", "material", JsonFile),
@@ -165,6 +184,17 @@ fn paper_tables(_: &ArgMatches, _: &mut Asked) -> Result<PathBuf, CliError> {
 
 fn proof(_: &ArgMatches, _: &mut Asked) -> Result<PathBuf, CliError> {
     Ok("two-hole-shear".into())
+}
+
+fn of_material(command: Command) -> Command {
+    command.arg(Arg::new("MATERIAL").help("Material file (ogden/1), such as the material.json of a fit").required(true))
+}
+
+fn exported_material(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliError> {
+    let path = PathBuf::from(value(matches, "MATERIAL"));
+    asked.set("material", read_json(&path)?, path.display().to_string());
+    asked.set("name", stem(&path), path.display().to_string());
+    Ok(path)
 }
 
 fn of_specimen(command: Command) -> Command {

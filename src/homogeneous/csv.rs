@@ -18,7 +18,7 @@ use super::deformation::HomogeneousTest;
 /// Most rows that are read: a day at ten readings a second.
 const MAX_ROWS: usize = 1_000_000;
 
-/// Unit of a stress column whose name does not say it.
+/// A unit of stress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, utoipa::ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum StressUnit {
@@ -31,11 +31,21 @@ pub enum StressUnit {
 }
 
 impl StressUnit {
-    fn in_kpa(self) -> f64 {
+    /// One of it in kPa.
+    pub fn in_kpa(self) -> f64 {
         match self {
             StressUnit::Pa => 1e-3,
             StressUnit::KPa => 1.0,
             StressUnit::MPa => 1e3,
+        }
+    }
+
+    /// Its symbol.
+    pub fn symbol(self) -> &'static str {
+        match self {
+            StressUnit::Pa => "Pa",
+            StressUnit::KPa => "kPa",
+            StressUnit::MPa => "MPa",
         }
     }
 }

@@ -26,7 +26,7 @@ pub use csv::{CsvCurve, CsvError, CsvOptions, StressUnit, read_csv};
 pub use curve::{Curve, CurveError, CurveMatch};
 pub use deformation::{Deformation, HomogeneousTest, incompressible_derivative, incompressible_stress};
 pub use dumbbell::{DumbbellError, DumbbellFit, DumbbellOptions, GaugePoint, fit_dumbbell, gauge_stretches};
-pub use fit::{TermFit, fit_terms, matches_of, material_of, model_stress};
+pub use fit::{BULK_OVER_SHEAR, TermFit, fit_terms, fitted_material, matches_of, material_of, model_stress};
 pub use fit_options::{CurveFitError, CurveFitOptions};
 pub use loading_path::is_stable;
 pub use result::{CurveFit, CurveFitSequence, CurveParameter, Interval, fit_curves};

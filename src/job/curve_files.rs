@@ -1,8 +1,12 @@
 //! Curves as requests hold them: the text of a CSV file, and how its columns are understood.
 
-use super::JobError;
+use super::{JobError, Outcome};
 use crate::field::FieldError;
-use crate::homogeneous::{CsvCurve, CsvOptions, Curve, CurveFitOptions, HomogeneousTest, StressUnit, read_csv};
+use crate::homogeneous::{
+    BULK_OVER_SHEAR, CsvCurve, CsvOptions, Curve, CurveFitOptions, HomogeneousTest, StressUnit, read_csv,
+};
+use crate::material::{MaterialError, Ogden};
+use crate::report::plain_number;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -140,6 +144,22 @@ impl CurveFitSettings {
             min_alpha_gap: self.min_alpha_gap,
             ..CurveFitOptions::default()
         }
+    }
+}
+
+/// Adds a fit's `material.json`, and says in the summary what its bulk modulus is where none was held.
+pub(super) fn add_material(outcome: &mut Outcome, material: &Result<Ogden, MaterialError>, is_bulk_held: bool) {
+    outcome.summary += &match material {
+        Ok(_) if is_bulk_held => String::new(),
+        Ok(material) => format!(
+            "\nmaterial.json holds a bulk modulus of {} kPa, {BULK_OVER_SHEAR} times the initial shear modulus: the data \
+             do not determine it\n",
+            plain_number(material.bulk_kpa, 4)
+        ),
+        Err(error) => format!("\nno material.json: {error}\n"),
+    };
+    if let Ok(material) = material {
+        outcome.add("material.json", material.to_json());
     }
 }
 

@@ -1,11 +1,12 @@
 //! Curves: joint fits to homogeneous tests, and the prediction of a test kept back.
 
-use super::curve_files::{CurveColumns, CurveFitSettings, TestCurve, fit_failed};
+use super::curve_files::{CurveColumns, CurveFitSettings, TestCurve, add_material, fit_failed};
 use super::{Context, JobError, Outcome, Request, Run, summary};
 use crate::field::FieldError;
 use crate::homogeneous::{
     Curve, CurveFit, CurveFitSequence, CurveMatch, CurveParameter, Interval, fit_curves, matches_of,
 };
+use crate::material::Ogden;
 use crate::provenance::VERSION;
 use crate::report::fit_picture;
 use serde::{Deserialize, Serialize};
@@ -44,6 +45,10 @@ struct CurvesResult<'a> {
     chi2_per_datum: f64,
     fits: &'a CurveFitSequence,
     kept_back: Vec<CurveMatch>,
+    /// The fit that is used as `ogden/1`; none where its parameters are beyond what a material may hold.
+    material: Option<Ogden>,
+    /// Whether the material's bulk modulus was held in the fit; else it only stands for the incompressible limit.
+    is_bulk_held: bool,
 }
 
 struct CheckedCurves {
@@ -93,6 +98,7 @@ impl Run for CheckedCurves {
         };
         let predicted = matches_of(&used.terms(), used.bulk_kpa, &self.kept_back)
             .ok_or_else(|| fit_failed(&"the fitted material has no response in a state kept back"))?;
+        let material = used.material();
         let result = CurvesResult {
             schema: "curves/1",
             version: VERSION,
@@ -103,9 +109,12 @@ impl Run for CheckedCurves {
             chi2_per_datum: used.chi2_per_datum,
             fits: &sequence,
             kept_back: predicted,
+            material: material.as_ref().ok().cloned(),
+            is_bulk_held: used.bulk_kpa.is_some(),
         };
         let text = summary::curves(&sequence, used, &result.kept_back);
         let mut outcome = Outcome::new("curves.json", &result, text)?;
+        add_material(&mut outcome, &material, result.is_bulk_held);
         let all: Vec<(&Curve, bool)> =
             self.fitted.iter().map(|c| (c, false)).chain(self.kept_back.iter().map(|c| (c, true))).collect();
         let mut fits: Vec<&CurveFit> = vec![used];

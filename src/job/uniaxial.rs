@@ -1,12 +1,13 @@
 //! Uniaxial: the traditional route, one curve of a strip or a dumb-bell fitted with Ogden terms.
 
-use super::curve_files::{CurveColumns, CurveFitSettings, fit_failed, unfit};
+use super::curve_files::{CurveColumns, CurveFitSettings, add_material, fit_failed, unfit};
 use super::{Context, JobError, Outcome, Progress, Request, Run, defaults, summary};
 use crate::field::FieldError;
 use crate::homogeneous::{
     CsvCurve, Curve, CurveFit, CurveFitSequence, CurveParameter, DumbbellFit, DumbbellOptions, HomogeneousTest,
     Interval, fit_curves, fit_dumbbell,
 };
+use crate::material::Ogden;
 use crate::mesh::MeshSize;
 use crate::provenance::VERSION;
 use crate::report::fit_picture;
@@ -61,6 +62,10 @@ struct UniaxialResult<'a> {
     chi2_per_datum: f64,
     fits: &'a [CurveFitSequence],
     conversion: Option<&'a DumbbellFit>,
+    /// The chosen fit as `ogden/1`; none where its parameters are beyond what a material may hold.
+    material: Option<Ogden>,
+    /// Whether the material's bulk modulus was held in the fit; else it only stands for the incompressible limit.
+    is_bulk_held: bool,
 }
 
 struct CheckedUniaxial {
@@ -144,6 +149,7 @@ impl Run for CheckedUniaxial {
         let Fits { families, curve, conversion } =
             if self.csv.is_displacement { self.of_dumbbell(context)? } else { self.of_strip()? };
         let chosen = families[0].chosen();
+        let material = chosen.material();
         let result = UniaxialResult {
             schema: "uniaxial/1",
             version: VERSION,
@@ -154,9 +160,12 @@ impl Run for CheckedUniaxial {
             chi2_per_datum: chosen.chi2_per_datum,
             fits: &families,
             conversion: conversion.as_ref(),
+            material: material.as_ref().ok().cloned(),
+            is_bulk_held: chosen.bulk_kpa.is_some(),
         };
         let text = summary::uniaxial(&self.title(), &families, conversion.as_ref());
         let mut outcome = Outcome::new("uniaxial.json", &result, text)?;
+        add_material(&mut outcome, &material, result.is_bulk_held);
         for (family, name) in families.iter().zip(["fits", "fits-neo-hookean"]) {
             let mut fits: Vec<&CurveFit> = vec![family.chosen()];
             fits.extend(family.fits.iter().filter(|f| f.num_terms != family.chosen().num_terms));

@@ -1,0 +1,164 @@
+//! Exported materials and models, run in CalculiX: an independent code with elements of its own.
+//!
+//! Without `ccx` (Debian and Ubuntu: `apt-get install calculix-ccx`) every test is ignored.
+
+#[path = "common/prerequisites.rs"]
+mod prerequisites;
+
+use lambdak::export::{MaterialFormat, Origin, material_card};
+use lambdak::fem::{ForwardModel, SolveOptions};
+use lambdak::homogeneous::{HomogeneousTest, StressUnit, respond};
+use lambdak::material::{Ogden, OgdenTerm};
+use lambdak::mesh::MeshOptions;
+use lambdak::specimen::Specimen;
+use prerequisites::Missing;
+use std::path::Path;
+use std::process::Command;
+
+fn ogden(bulk_kpa: f64, terms: &[(f64, f64)]) -> Ogden {
+    Ogden { bulk_kpa, terms: terms.iter().map(|&(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha }).collect() }
+}
+
+/// Runs the input file `name.inp` of `folder`, and gives time and total force (N) of each increment.
+fn run(folder: &Path, name: &str) -> Vec<(f64, [f64; 3])> {
+    let output = Command::new("ccx").env("OMP_NUM_THREADS", "1").current_dir(folder).arg(name).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success() && !said.contains("*ERROR"), "{said}");
+    let printed = std::fs::read_to_string(folder.join(name).with_extension("dat")).unwrap();
+    let lines: Vec<&str> = printed.lines().filter(|l| !l.trim().is_empty()).collect();
+    let number = |word: &str| word.parse::<f64>().unwrap();
+    let pair = |pair: &[&str]| {
+        let force: Vec<f64> = pair[1].split_whitespace().map(number).collect();
+        (number(pair[0].split_whitespace().last().unwrap()), [force[0], force[1], force[2]])
+    };
+    lines.chunks(2).map(pair).collect()
+}
+
+/// The forces at the ends of the steps, which end at the times 1, 2, …
+fn at_ends(found: &[(f64, [f64; 3])], num_steps: usize) -> Vec<[f64; 3]> {
+    let at = |step: usize| found.iter().find(|(t, _)| (t - step as f64).abs() < 1e-6).expect("the step ends").1;
+    (1..=num_steps).map(at).collect()
+}
+
+/// A cube of 1 mm of one quadratic element, pulled to `stretches` with free sides.
+fn cube(card: &str, stretches: &[f64]) -> String {
+    // Corners of the bottom, of the top, middles of the bottom's edges, of the top's, of the uprights.
+    let corners = [[0, 0], [2, 0], [2, 2], [0, 2]];
+    let middles = [[1, 0], [2, 1], [1, 2], [0, 1]];
+    let levels = [(corners, 0), (corners, 2), (middles, 0), (middles, 2), (corners, 1)];
+    let nodes: Vec<[i32; 3]> = levels.iter().flat_map(|(xy, z)| xy.map(|[x, y]| [x, y, *z])).collect();
+    let mut text = String::from("*NODE, NSET=ALL\n");
+    for (n, x) in nodes.iter().enumerate() {
+        let [x, y, z] = x.map(|c| 0.5 * f64::from(c));
+        text += &format!("{}, {x}, {y}, {z}\n", n + 1);
+    }
+    text += "*ELEMENT, TYPE=C3D20, ELSET=SPECIMEN\n1, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15,\n16, 17, 18, 19, 20\n";
+    for (name, axis, place) in [("X0", 0, 0), ("Y0", 1, 0), ("Z0", 2, 0), ("X1", 0, 2)] {
+        text += &format!("*NSET, NSET={name}\n");
+        for n in (0..20).filter(|&n| nodes[n][axis] == place) {
+            text += &format!("{},\n", n + 1);
+        }
+    }
+    text += card;
+    text += "*SOLID SECTION, ELSET=SPECIMEN, MATERIAL=cube\n*BOUNDARY\nX0, 1, 1\nY0, 2, 2\nZ0, 3, 3\n";
+    for stretch in stretches {
+        // A residual of 1e-8 of the mean force instead of half a per cent.
+        text += "*STEP, NLGEOM, INC=500\n*STATIC\n0.1, 1.0, 1.0e-5, 0.2\n*CONTROLS, PARAMETERS=FIELD\n1.0e-8, 1.0e-8\n";
+        text += &format!("*BOUNDARY\nX1, 1, 1, {}\n*NODE PRINT, NSET=X1, TOTALS=ONLY\nRF\n*END STEP\n", stretch - 1.0);
+    }
+    text
+}
+
+/// Nominal stresses of one, two and three terms in uniaxial tension. CalculiX' volumetric energy is κ/2 (J − 1)²: the
+/// stress differs by the shear stiffness times 3/2 (p/κ)², and seven digits are printed.
+fn a_card_gives_our_stresses() -> Result<(), Missing> {
+    prerequisites::calculix()?;
+    let folder = tempfile::tempdir().unwrap();
+    let materials = [
+        ogden(2173.0, &[(17.0, 1.91)]),
+        ogden(2200.0, &[(16.0, 1.9), (0.35, 8.0)]),
+        ogden(900.0, &[(12.0, 2.5), (-3.0, -2.0), (0.5, 5.0)]),
+    ];
+    let stretches = [1.2, 1.6, 2.0];
+    for (index, material) in materials.iter().enumerate() {
+        let name = format!("cube-{index}");
+        let origin = Origin { name: "cube", version: "0", input_hash: "0" };
+        let card = material_card(material, MaterialFormat::Calculix, StressUnit::MPa, &origin).unwrap();
+        std::fs::write(folder.path().join(format!("{name}.inp")), cube(&card, &stretches)).unwrap();
+        let forces = at_ends(&run(folder.path(), &name), stretches.len());
+        for (stretch, force) in stretches.iter().zip(forces) {
+            let ours = respond(material, &HomogeneousTest::Uniaxial.at(*stretch)).unwrap().nominal_stress_kpa[0];
+            // N on 1 mm² are MPa.
+            let theirs = 1e3 * force[0];
+            let volume = 1.5 * (stretch * ours / (3.0 * material.bulk_kpa)).powi(2);
+            let allowed = 1e-6 + 3.0 * volume;
+            println!("{name} at {stretch}: {ours:.5} and {theirs:.5} kPa (allowed {allowed:.1e} of it)");
+            assert!((theirs / ours - 1.0).abs() < allowed, "{name} {stretch}: {ours} {theirs}");
+        }
+    }
+    Ok(())
+}
+
+/// A specimen, its material, element size and drives.
+struct Case {
+    specimen: &'static str,
+    material: Ogden,
+    mesh_factor: f64,
+    drives_mm: [f64; 2],
+}
+
+/// Forces of whole specimens, written by the command. The bulk modulus is twenty times the shear modulus: elements
+/// without a pressure of their own grow too stiff beyond that. What is allowed is the error of the mesh, taken from two
+/// of our own: the one that is exported, and one of half the element size.
+fn forces_are_ours() -> Result<(), Missing> {
+    prerequisites::calculix()?;
+    let soft = ogden(20.0 * 16.235, &[(17.0, 1.91)]);
+    let two = ogden(330.0, &[(16.0, 1.9), (0.35, 4.0)]);
+    let cases = [
+        Case { specimen: "two-hole-shear.json", material: soft.clone(), mesh_factor: 2.0, drives_mm: [2.0, 4.0] },
+        Case { specimen: "uniaxial-bar.json", material: two, mesh_factor: 2.0, drives_mm: [4.0, 8.0] },
+        Case { specimen: "iso37-type4.json", material: soft, mesh_factor: 2.0, drives_mm: [1.5, 3.0] },
+    ];
+    for case in &cases {
+        let folder = tempfile::tempdir().unwrap();
+        let geometry = Path::new(env!("CARGO_MANIFEST_DIR")).join("geometries").join(case.specimen);
+        let material = folder.path().join("soft.json");
+        std::fs::write(&material, case.material.to_json()).unwrap();
+        let drives = case.drives_mm.map(|d| d.to_string()).join(",");
+        let output = Command::new(env!("CARGO_BIN_EXE_lambdak"))
+            .args(["export", "model", "--format", "calculix", "--mesh", &case.mesh_factor.to_string()])
+            .args(["--drive", &drives, "--out", "model", "--material"])
+            .args([&material, &geometry])
+            .current_dir(folder.path())
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let text = std::fs::read_to_string(folder.path().join("model/export-model.json")).unwrap();
+        let result: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let multiplier = result["reaction_multiplier"].as_f64().unwrap();
+        let found = at_ends(&run(&folder.path().join("model"), "model-calculix"), 2);
+
+        let specimen = Specimen::from_json(&std::fs::read_to_string(&geometry).unwrap()).unwrap();
+        let forces = |factor: f64| {
+            let mut model = ForwardModel::of_specimen(&specimen, &MeshOptions::scaled(&specimen, factor)).unwrap();
+            let path = model.solve_path(&case.material, &case.drives_mm, &SolveOptions::default(), &|| false).unwrap();
+            path.iter().map(|e| e.force_n).collect::<Vec<f64>>()
+        };
+        let (same, finer) = (forces(case.mesh_factor), forces(0.5 * case.mesh_factor));
+        for (step, drive) in case.drives_mm.iter().enumerate() {
+            let theirs = multiplier * found[step][0];
+            let mesh_error = (same[step] / finer[step] - 1.0).abs();
+            println!(
+                "{} at {drive} mm: ours {:.5} N, finer {:.5} N, CalculiX {theirs:.5} N: {:+.3} % (mesh {:.3} %)",
+                case.specimen,
+                same[step],
+                finer[step],
+                100.0 * (theirs / finer[step] - 1.0),
+                100.0 * mesh_error
+            );
+        }
+    }
+    Ok(())
+}
+
+prerequisites::test_binary!(a_card_gives_our_stresses, forces_are_ours);
