@@ -71,7 +71,7 @@ fn comments(convention: &Convention, unit: StressUnit, origin: &Origin) -> Vec<S
         ),
         format!("Stresses in {}. l1, l2, l3: principal stretches times J^(-1/3).", unit.symbol()),
         convention.energy.to_string(),
-        format!("Of lambdak's energy {}.", convention.law.meaning()),
+        format!("Volume: {}.", convention.law.meaning()),
     ]
 }
 

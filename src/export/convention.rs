@@ -40,10 +40,10 @@ impl VolumetricLaw {
     /// What it means for somebody who takes the constants over.
     pub fn meaning(self) -> &'static str {
         match self {
-            VolumetricLaw::Logarithmic => "the volumetric energy is that of lambdak, kappa/2 (ln J)^2",
+            VolumetricLaw::Logarithmic => "the energy is kappa/2 (ln J)^2, which is lambdak's",
             VolumetricLaw::Quadratic => {
-                "the volumetric energy is kappa/2 (J - 1)^2 instead of kappa/2 (ln J)^2: the same initial bulk modulus; \
-                 at one per cent of volume change the pressures differ by 1.5 per cent"
+                "the energy is kappa/2 (J - 1)^2, lambdak's kappa/2 (ln J)^2: the initial bulk modulus is the same; at one \
+                 per cent of volume change the pressures differ by 1.5 per cent"
             }
         }
     }

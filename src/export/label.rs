@@ -17,7 +17,7 @@ mod tests {
     #[test]
     fn labels_are_plain() {
         assert_eq!(label("ecoflex-0020"), "ecoflex-0020");
-        assert_eq!(label("00 20, ä\n*END"), "M_00_20______END");
+        assert_eq!(label("00 20, ä\n*END"), "M_00_20_____END");
         assert_eq!(label(""), "M_");
         assert!(label(&"x".repeat(500)).len() <= 60);
     }

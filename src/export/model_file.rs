@@ -72,10 +72,10 @@ fn comments(model: &Model, origin: &Origin) -> Vec<String> {
         .into_iter()
         .filter_map(|(is_used, plane)| is_used.then_some(plane))
         .collect();
-    let part = if planes.is_empty() {
-        "The mesh is a whole sample.".to_string()
-    } else {
-        format!("The mesh ends at the mirror planes {}.", planes.join(" and "))
+    let part = match &planes[..] {
+        [] => "The mesh is a whole sample.".to_string(),
+        [one] => format!("The mesh ends at the mirror plane {one}."),
+        several => format!("The mesh ends at the mirror planes {}.", several.join(" and ")),
     };
     vec![
         format!("{name}: written by lambdak {version} (inputs {input_hash})"),

@@ -26,6 +26,8 @@ pub struct Image {
     pub intent: i16,
     /// Values, x fastest, components slowest.
     pub values: Vec<f64>,
+    /// The affine's unit of length in mm; `None` where the header names none.
+    pub unit_mm: Option<f64>,
 }
 
 /// How the numbers of a written image are stored.
@@ -122,7 +124,21 @@ impl Image {
     ///
     /// # Errors
     /// [`NiftiError`].
-    pub fn read(mut stream: impl Read, max_values: u64) -> Result<Image, NiftiError> {
+    pub fn read(stream: impl Read, max_values: u64) -> Result<Image, NiftiError> {
+        let (image, units) = Image::read_with_units(stream, max_values)?;
+        if units == UNITS_MM { Ok(image) } else { Err(NiftiError::Units { code: units }) }
+    }
+
+    /// The same in any unit of length, or in none.
+    ///
+    /// # Errors
+    /// [`NiftiError`].
+    pub fn read_any_unit(stream: impl Read, max_values: u64) -> Result<Image, NiftiError> {
+        Image::read_with_units(stream, max_values).map(|(image, _)| image)
+    }
+
+    /// The image and the header's code of its unit of length.
+    fn read_with_units(mut stream: impl Read, max_values: u64) -> Result<(Image, u8), NiftiError> {
         let mut magic = [0u8; 2];
         stream.read_exact(&mut magic).map_err(NiftiError::Damaged)?;
         let whole = magic.as_slice().chain(stream);
@@ -188,7 +204,7 @@ impl Image {
     }
 }
 
-fn read_plain(mut stream: impl Read, max_values: u64) -> Result<Image, NiftiError> {
+fn read_plain(mut stream: impl Read, max_values: u64) -> Result<(Image, u8), NiftiError> {
     let mut bytes = [0u8; HEADER_BYTES];
     stream.read_exact(&mut bytes).map_err(NiftiError::Damaged)?;
     let size = [0, 1, 2, 3].map(|n| bytes[n]);
@@ -224,9 +240,13 @@ fn read_plain(mut stream: impl Read, max_values: u64) -> Result<Image, NiftiErro
         code => return Err(NiftiError::DataType { code }),
     };
     let units = header.bytes[123] & 7;
-    if units != UNITS_MM {
-        return Err(NiftiError::Units { code: units });
-    }
+    let unit_mm = match units {
+        0 => None,
+        1 => Some(1e3),
+        UNITS_MM => Some(1.0),
+        3 => Some(1e-3),
+        code => return Err(NiftiError::Units { code }),
+    };
     let affine = affine_of(&header)?;
     // A single file's data start at 352 or later.
     let skip = (header.f32(108).max(352.0) as u64).min(1 << 20) - HEADER_BYTES as u64;
@@ -245,7 +265,7 @@ fn read_plain(mut stream: impl Read, max_values: u64) -> Result<Image, NiftiErro
         (1.0, 0.0)
     };
     let values = data.chunks_exact(width).map(|b| slope * number(code, b, is_big_endian) + intercept).collect();
-    Ok(Image { shape, affine, intent: header.i16(68), values })
+    Ok((Image { shape, affine, intent: header.i16(68), values, unit_mm }, units))
 }
 
 fn number(code: i16, bytes: &[u8], is_big_endian: bool) -> f64 {

@@ -14,6 +14,9 @@ mod several;
 mod solve;
 mod sweep;
 
+use crate::report::plain_number;
+use std::borrow::Borrow;
+
 pub(super) use calibration::calibration;
 pub(super) use curves::{curves, uniaxial};
 pub(super) use design::design;
@@ -27,3 +30,9 @@ pub(super) use scan::{import, scan};
 pub(super) use several::several;
 pub(super) use solve::solve;
 pub(super) use sweep::sweep;
+
+/// A number with significant digits, as all summaries show numbers: neither a row of zeros for a small one nor three
+/// hundred digits for a large one.
+fn num(value: impl Borrow<f64>, digits: usize) -> String {
+    plain_number(*value.borrow(), digits)
+}
