@@ -209,6 +209,7 @@ fn add_files(outcome: &mut Outcome, prefix: &str, found: &Diagnosis, result: &Di
         }
     }
     outcome.add_pictures(diagnosis_pictures(found).into_iter().map(|(name, svg)| (format!("{prefix}{name}"), svg)));
+    outcome.add(format!("{prefix}material.json"), result.material.to_json());
     outcome.add(format!("{prefix}report.html"), diagnosis_report(found, result).to_html());
     Ok(())
 }

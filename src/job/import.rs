@@ -7,10 +7,11 @@ use super::{Context, JobError, Outcome, Request, Run, summary};
 use crate::acquisition::unwrap::{Method, UnwrapOptions};
 use crate::acquisition::{Anchor, ReconstructOptions, StepReport, reconstruct};
 use crate::field::FieldError;
+use crate::file::ReadingMemory;
 use crate::provenance::VERSION;
 use crate::recording::{
-    Filter, GridOrigin, ImportOptions, LoadCurve, ReadLimits, Recording, mat, read_points, recording_from_mat,
-    recording_from_points, write_vectors,
+    Filter, GridOrigin, Image, ImportOptions, LoadCurve, NamedImage, ReadLimits, Recording, VectorFrame,
+    axes_of_affine, mat, read_points, recording_from_images, recording_from_mat, recording_from_points, write_vectors,
 };
 use crate::report::displacement_picture;
 use crate::specimen::Specimen;
@@ -49,6 +50,8 @@ pub enum FileForm {
     Matlab,
     /// Point clouds as CSV, one file per drive.
     Points,
+    /// NIfTI images with a displacement per voxel, and one with the mask.
+    Nifti,
 }
 
 /// Body of an import: a `recording` of raw phases, or `files`.
@@ -58,7 +61,7 @@ pub struct ImportRequest {
     /// A recording of raw phases.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording: Option<String>,
-    /// MATLAB files, or point clouds (one per drive), in place of a recording.
+    /// MATLAB files, point clouds (one per drive), or NIfTI images, in place of a recording.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 1000)]
     pub files: Vec<String>,
@@ -80,10 +83,12 @@ pub struct ImportRequest {
     #[serde(default)]
     #[schema(default = LengthUnit::default)]
     pub unit: LengthUnit,
-    /// Axes along the indices of MATLAB arrays, such as y,z,x or -y,z,-x. Displacement i is the one along index i.
-    #[serde(default = "axes")]
-    #[schema(max_length = 16, default = axes)]
-    pub axes: String,
+    /// Axes along the indices of MATLAB arrays and images, such as y,z,x or -y,z,-x. Displacement i of MATLAB arrays is
+    /// the one along index i. Where it is left out, y,z,x for MATLAB, and for images the axes that their affine leads
+    /// to.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(max_length = 16)]
+    pub axes: Option<String>,
     /// Axes of the three displacement arrays of MATLAB files, such as x,y,z, where they do not follow the indices.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(max_length = 16)]
@@ -92,6 +97,10 @@ pub struct ImportRequest {
     #[serde(default)]
     #[schema(default = GridOrigin::default)]
     pub origin: GridOrigin,
+    /// Frame of the vectors in images; where it is left out, lps for those of the intent 1007, which ITK and ANTs write,
+    /// and ras for others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vectors: Option<VectorFrame>,
     /// Voxel size in mm: along the indices of MATLAB arrays, or x,y,z to average points in.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(min_items = 3, max_items = 3)]
@@ -126,10 +135,6 @@ pub struct ImportRequest {
     pub anchor: Anchor,
 }
 
-fn axes() -> String {
-    "y,z,x".into()
-}
-
 /// A recording, the standard deviations of its voxels, and how its phases were unwrapped.
 type Imported = (Recording, Vec<Vec<[f64; 3]>>, Vec<StepReport>);
 
@@ -156,8 +161,8 @@ impl ImportRequest {
         for error in self.specimen.iter().flat_map(Specimen::field_errors) {
             errors.push(error.below("/specimen"));
         }
-        for (pointer, axes) in [("/axes", Some(&self.axes)), ("/components", self.components.as_ref())] {
-            if let Some(axes) = axes.filter(|axes| ImportOptions::parse_axes(axes).is_none()) {
+        for (pointer, axes) in [("/axes", &self.axes), ("/components", &self.components)] {
+            if let Some(axes) = axes.as_ref().filter(|axes| ImportOptions::parse_axes(axes).is_none()) {
                 let allowed = "x, y and z once each, such as y,z,x or -y,z,-x";
                 errors.push(FieldError::new(pointer, format!("{axes:?}"), allowed));
             }
@@ -172,10 +177,14 @@ impl ImportRequest {
     }
 
     fn import_options(&self) -> Option<ImportOptions> {
+        let default = ImportOptions::default();
         Some(ImportOptions {
             id: self.name.clone().unwrap_or_else(|| "imported".into()),
             unit_mm: self.unit.in_mm(),
-            axes: ImportOptions::parse_axes(&self.axes)?,
+            axes: match &self.axes {
+                Some(axes) => ImportOptions::parse_axes(axes)?,
+                None => default.axes,
+            },
             components: self.components.as_ref().and_then(|text| ImportOptions::parse_axes(text)),
             origin: self.origin,
             voxel_mm_by_index: self.voxel_mm,
@@ -190,7 +199,7 @@ impl ImportRequest {
 impl Request for ImportRequest {
     const COMMAND: &'static str = "import";
     const COLLECTION: &'static str = "imports";
-    const ABOUT: &'static str = "Raw phases, MATLAB files or point clouds as a recording of displacements.";
+    const ABOUT: &'static str = "Raw phases, MATLAB files, point clouds or images as a recording of displacements.";
 
     fn example() -> serde_json::Value {
         serde_json::json!({ "recording": super::defaults::EXAMPLE_RECORDING, "filter": "hamming2" })
@@ -240,6 +249,16 @@ impl CheckedImport {
         Ok((found.recording, found.sd_mm, found.steps))
     }
 
+    fn read_images(&self, files: &[PathBuf], memory: &ReadingMemory) -> Result<Vec<NamedImage>, JobError> {
+        let read = |(index, path): (usize, &PathBuf)| {
+            let fail = |e: &dyn std::fmt::Display| unfit(&format!("/files/{index}"), path, e);
+            let file = crate::file::open_regular(path).map_err(|e| fail(&e))?;
+            let image = Image::read_any_unit(file, memory).map_err(|e| fail(&e))?;
+            Ok(NamedImage { path: path.clone(), image })
+        };
+        files.iter().enumerate().map(read).collect()
+    }
+
     fn read_files(&self, files: &[PathBuf]) -> Result<Recording, JobError> {
         let missing = || JobError::Internal("a checked import has a specimen and a form".into());
         let specimen = self.request.specimen.as_ref().ok_or_else(missing)?;
@@ -257,6 +276,16 @@ impl CheckedImport {
                     variables.extend(found);
                 }
                 recording_from_mat(&variables, specimen, &options, &memory).map_err(|e| unfit("/files", first, &e))
+            }
+            FileForm::Nifti => {
+                let images = self.read_images(files, &memory)?;
+                let unfit = |e: &dyn std::fmt::Display| unfit("/files", first, e);
+                let axes = match (&self.request.axes, images.first()) {
+                    (None, Some(image)) => axes_of_affine(image).map_err(|e| unfit(&e))?,
+                    _ => options.axes,
+                };
+                let options = ImportOptions { axes, ..options };
+                recording_from_images(&images, specimen, self.request.vectors, &options, &memory).map_err(|e| unfit(&e))
             }
             FileForm::Points => {
                 let mut steps = Vec::new();

@@ -1,6 +1,6 @@
 //! Load curves: what an elastic material leaves out of load curves of homogeneous tests, without a recording.
 
-use super::curve_files::{CurveColumns, TestCurve, needs_stress_and_stretch, unfit};
+use super::curve_files::{CurveColumns, TestCurve, add_material, needs_stress_and_stretch, unfit};
 use super::{Context, JobError, Outcome, Request, Run, summary};
 use crate::field::FieldError;
 use crate::provenance::VERSION;
@@ -90,6 +90,7 @@ impl Run for CheckedLoadCurves {
             .map_err(|e| context.failed(&e))?;
         let result = LoadCurvesResult { verdict: &verdict, version: VERSION, input_hash: &context.input_hash };
         let mut outcome = Outcome::new("diagnosis.json", &result, summary::load_curves(&verdict))?;
+        add_material(&mut outcome, &verdict.material.material(), false);
         outcome.add_pictures(load_curve_pictures(&verdict));
         Ok(outcome)
     }

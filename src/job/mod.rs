@@ -22,6 +22,8 @@ mod error;
 mod evaluate;
 mod evaluation_list;
 mod evaluation_table;
+mod export_material;
+mod export_model;
 mod import;
 mod import_result;
 mod kind;

@@ -27,6 +27,8 @@ pub enum MediaType {
     Dxf,
     /// STL solid.
     Stl,
+    /// Plain text.
+    Text,
     /// Markdown.
     Markdown,
     /// XML.
@@ -48,6 +50,7 @@ impl MediaType {
             MediaType::Vtu | MediaType::Xml => "application/xml",
             MediaType::Dxf => "image/vnd.dxf",
             MediaType::Stl => "model/stl",
+            MediaType::Text => "text/plain",
             MediaType::Markdown => "text/markdown",
             MediaType::Binary => "application/octet-stream",
         }
@@ -63,9 +66,10 @@ impl MediaType {
             Some("parquet") => MediaType::Parquet,
             Some("gz") => MediaType::Nifti,
             Some("vtu") => MediaType::Vtu,
-            Some("xml") => MediaType::Xml,
+            Some("xml" | "feb" | "pvd") => MediaType::Xml,
             Some("dxf") => MediaType::Dxf,
             Some("stl") => MediaType::Stl,
+            Some("inp" | "txt") => MediaType::Text,
             Some("md") => MediaType::Markdown,
             _ => MediaType::Binary,
         }

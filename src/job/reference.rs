@@ -39,6 +39,9 @@ fn value_in_words(field: &RequestField) -> String {
         FieldForm::Boolean => "true or false".into(),
         FieldForm::Text => "text".into(),
         FieldForm::Choice(words) => words.iter().map(|w| format!("`{w}`")).collect::<Vec<_>>().join(", "),
+        FieldForm::Choices(words) => {
+            format!("list of {}", words.iter().map(|w| format!("`{w}`")).collect::<Vec<_>>().join(", "))
+        }
         FieldForm::Tuple(count) => format!("{count} numbers"),
         FieldForm::Numbers => "list of numbers".into(),
         FieldForm::Texts => "list of texts".into(),

@@ -2,6 +2,7 @@
 
 mod error;
 mod folder;
+mod images;
 mod import;
 mod lab;
 mod limits;
@@ -16,6 +17,7 @@ mod read;
 mod write;
 
 pub use error::RecordingError;
+pub use images::{NamedImage, VectorFrame, axes_of_affine, recording_from_images};
 pub use import::{GridOrigin, ImportError, ImportOptions, IndexAxis};
 pub use lab::recording_from_mat;
 pub use limits::ReadLimits;

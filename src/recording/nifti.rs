@@ -31,6 +31,8 @@ pub struct Image {
     pub intent: i16,
     /// Values, x fastest, components slowest.
     pub values: Vec<f64>,
+    /// The affine's unit of length in mm; `None` where the header names none.
+    pub unit_mm: Option<f64>,
 }
 
 /// How the numbers of a written image are stored.
@@ -128,7 +130,21 @@ impl Image {
     ///
     /// # Errors
     /// [`NiftiError`].
-    pub fn read(mut stream: impl Read, memory: &ReadingMemory) -> Result<Image, NiftiError> {
+    pub fn read(stream: impl Read, memory: &ReadingMemory) -> Result<Image, NiftiError> {
+        let (image, units) = Image::read_with_units(stream, memory)?;
+        if units == UNITS_MM { Ok(image) } else { Err(NiftiError::Units { code: units }) }
+    }
+
+    /// The same in any unit of length, or in none.
+    ///
+    /// # Errors
+    /// [`NiftiError`].
+    pub fn read_any_unit(stream: impl Read, memory: &ReadingMemory) -> Result<Image, NiftiError> {
+        Image::read_with_units(stream, memory).map(|(image, _)| image)
+    }
+
+    /// The image and the header's code of its unit of length.
+    fn read_with_units(mut stream: impl Read, memory: &ReadingMemory) -> Result<(Image, u8), NiftiError> {
         let mut magic = [0u8; 2];
         stream.read_exact(&mut magic).map_err(NiftiError::Damaged)?;
         let whole = magic.as_slice().chain(stream);
@@ -190,7 +206,7 @@ impl Image {
     }
 }
 
-fn read_plain(mut stream: impl Read, memory: &ReadingMemory) -> Result<Image, NiftiError> {
+fn read_plain(mut stream: impl Read, memory: &ReadingMemory) -> Result<(Image, u8), NiftiError> {
     let mut bytes = [0u8; HEADER_BYTES];
     stream.read_exact(&mut bytes).map_err(NiftiError::Damaged)?;
     let size = [0, 1, 2, 3].map(|n| bytes[n]);
@@ -222,9 +238,13 @@ fn read_plain(mut stream: impl Read, memory: &ReadingMemory) -> Result<Image, Ni
         code => return Err(NiftiError::DataType { code }),
     };
     let units = header.bytes[123] & 7;
-    if units != UNITS_MM {
-        return Err(NiftiError::Units { code: units });
-    }
+    let unit_mm = match units {
+        0 => None,
+        1 => Some(1e3),
+        UNITS_MM => Some(1.0),
+        3 => Some(1e-3),
+        code => return Err(NiftiError::Units { code }),
+    };
     let affine = affine_of(&header)?;
     // Some programs write 0 for "right after the header".
     let offset = if header.f32(108) == 0.0 { (HEADER_BYTES + 4) as f64 } else { header.f32(108) };
@@ -252,7 +272,7 @@ fn read_plain(mut stream: impl Read, memory: &ReadingMemory) -> Result<Image, Ni
         })?;
         values.extend(bytes.chunks_exact(width).map(|b| slope * number(code, b, is_big_endian) + intercept));
     }
-    Ok(Image { shape, affine, intent: header.i16(68), values })
+    Ok((Image { shape, affine, intent: header.i16(68), values, unit_mm }, units))
 }
 
 fn number(code: i16, bytes: &[u8], is_big_endian: bool) -> f64 {

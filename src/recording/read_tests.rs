@@ -123,6 +123,7 @@ fn bombs_are_refused() {
         affine: [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]],
         intent: 0,
         values: vec![0.0; 1 << 20],
+        unit_mm: Some(1.0),
     };
     let mut file = Vec::new();
     image(1000).write_gz(&mut file, Samples::Uint8).unwrap();
