@@ -3,9 +3,11 @@
 mod path;
 mod read;
 pub mod schema;
+mod text;
 
 pub use path::FieldPath;
 pub use read::read;
+pub use text::{printable, with_short_numbers};
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -27,13 +29,18 @@ pub struct FieldError {
 impl FieldError {
     /// The field at `pointer` holds `value`; it must be `allowed`.
     pub fn new(pointer: impl Into<String>, value: impl std::fmt::Display, allowed: impl Into<String>) -> FieldError {
-        FieldError { pointer: pointer.into(), value: value.to_string(), allowed: allowed.into(), remedy: String::new() }
+        FieldError {
+            pointer: pointer.into(),
+            value: with_short_numbers(&value.to_string()),
+            allowed: with_short_numbers(&allowed.into()),
+            remedy: String::new(),
+        }
     }
 
     /// With what to change.
     #[must_use]
     pub fn remedy(self, remedy: impl Into<String>) -> FieldError {
-        FieldError { remedy: remedy.into(), ..self }
+        FieldError { remedy: with_short_numbers(&remedy.into()), ..self }
     }
 
     /// Below another field: `prefix` comes before the pointer.

@@ -4,6 +4,10 @@
 //! (those of `/proc`) is not what they hold. So the kind is checked before and after opening, and the limit while
 //! reading.
 
+mod memory;
+
+pub use memory::{MemoryError, MemoryLimit, MemoryPool, ReadingMemory, StopFlag, json_bytes};
+
 use sha2::{Digest, Sha256};
 use std::fs::{self, File};
 use std::io::{self, Read};
@@ -22,6 +26,9 @@ pub enum ReadError {
         /// Most bytes.
         limit: u64,
     },
+    /// What it holds would take more memory than reading may.
+    #[error(transparent)]
+    Memory(#[from] MemoryError),
     /// What the system said.
     #[error(transparent)]
     Io(#[from] io::Error),
@@ -68,6 +75,18 @@ pub fn read_limited(path: &Path, max_bytes: u64) -> Result<Vec<u8>, ReadError> {
 pub fn read_text_limited(path: &Path, max_bytes: u64) -> Result<String, ReadError> {
     let no_text = |_| io::Error::new(io::ErrorKind::InvalidData, "the file holds no UTF-8 text");
     Ok(String::from_utf8(read_limited(path, max_bytes)?).map_err(no_text)?)
+}
+
+/// The JSON text of a regular file of at most `max_bytes`, whose values fit in the memory of a command's reading.
+///
+/// # Errors
+/// [`ReadError`]; [`io::ErrorKind::InvalidData`] where the content is not UTF-8.
+pub fn read_json_text(path: &Path, max_bytes: u64) -> Result<String, ReadError> {
+    let memory = MemoryLimit::command().begin();
+    memory.take("the file", fs::metadata(path)?.len().min(max_bytes))?;
+    let text = read_text_limited(path, max_bytes)?;
+    memory.take("the file's JSON", json_bytes(text.as_bytes()))?;
+    Ok(text)
 }
 
 /// SHA-256 of the content of a regular file, hexadecimal. The file is not held in memory.

@@ -1,6 +1,7 @@
 //! `lambdak uniaxial` and `lambdak curves` as a user runs them.
 
 use lambdak::homogeneous::{HomogeneousTest, ShearTerm, incompressible_stress};
+use lambdak::material::Ogden;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -56,6 +57,46 @@ fn curves_predict_what_is_kept_back() {
     assert_eq!((value["schema"].as_str(), value["num_terms"].as_u64()), (Some("curves/1"), Some(2)));
     // The ripple is 0.14 % rms.
     assert!(value["kept_back"][0]["relative_rms_error"].as_f64().unwrap() < 0.01);
+}
+
+/// A file with a preamble, units in brackets, decimal commas, an empty cell and a way back: all of that is said, the
+/// first branch alone is fitted, and `material.json` is the fit.
+#[test]
+fn what_was_read_and_left_out_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let terms = [ShearTerm { modulus_kpa: 28.0, alpha: 2.0 }];
+    let row = |stretch: f64, part: f64| {
+        let stress = part * incompressible_stress(&terms, &HomogeneousTest::Uniaxial.at(stretch));
+        format!("{};{}\n", 100.0 * (stretch - 1.0), stress / 1e3).replace('.', ",")
+    };
+    let mut text = String::from("Probe;A 7\nDicke;2,0\nDehnung [%];Spannung [MPa]\n");
+    text += &(0..=40).map(|i| row(1.0 + 0.025 * f64::from(i), 1.0)).collect::<String>();
+    text += "101;\n";
+    text += &(0..40).rev().map(|i| row(1.0 + 0.025 * f64::from(i), 0.8)).collect::<String>();
+    std::fs::write(folder.path().join("zug.csv"), text).unwrap();
+    let output = run(folder.path(), &["uniaxial", "zug.csv", "--terms", "1"]);
+    let shown = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    for words in [
+        "Spannung [MPa] over Dehnung [%], 41 rows",
+        "2 lines before the header skipped",
+        "1 rows without a number left out",
+        "turns at 2.000: 40 rows",
+        "material.json holds a bulk modulus of",
+    ] {
+        assert!(shown.contains(words), "{words}: {shown}");
+    }
+    let written = std::fs::read_to_string(folder.path().join("results/zug/uniaxial/material.json")).unwrap();
+    let material = Ogden::from_json(&written).unwrap();
+    // Half of 28 kPa, from numbers with all their digits.
+    assert!((material.initial_shear_modulus_kpa() - 14.0).abs() < 1e-3, "{written}");
+    assert!((material.bulk_kpa - 14e3).abs() < 1.0, "{written}");
+    // Both ways together lie between.
+    let both = run(folder.path(), &["uniaxial", "zug.csv", "--terms", "1", "--all-branches", "--json"]);
+    let value: serde_json::Value = serde_json::from_slice(&both.stdout).unwrap();
+    let modulus = value["initial_shear_modulus_kpa"]["value"].as_f64().unwrap();
+    assert!(modulus > 11.2 && modulus < 13.9, "{modulus}");
+    assert_eq!(value["files"][0]["num_rows"], 81);
 }
 
 #[test]

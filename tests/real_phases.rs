@@ -14,7 +14,7 @@ fn real_phases_give_the_published_displacements() -> Result<(), Missing> {
         let path = prerequisites::real_data(&format!("mru/{name}"))?;
         let raw = RawRecording::read(&path.join("recording-raw.json"), &ReadLimits::default()).unwrap();
         let reliable = std::fs::File::open(path.join("mask_reliable.nii.gz")).unwrap();
-        let reliable = Image::read(reliable, 1 << 20).unwrap().values;
+        let reliable = Image::read(reliable, &lambdak::file::MemoryLimit::command().begin()).unwrap().values;
         let published = Recording::read(&path, &ReadLimits::default()).unwrap();
         let methods = [unwrap::Method::Margin, unwrap::Method::SecondDifference, unwrap::Method::LeastSquares];
         for (method, needs_agreement) in methods.iter().flat_map(|m| [(*m, false), (*m, true)]) {

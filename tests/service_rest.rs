@@ -20,6 +20,50 @@ fn openapi_document_is_current() {
     assert!(kept == text, "api/openapi.json is not what the code says; LAMBDAK_WRITE_OPENAPI=1 writes it");
     let document: Value = serde_json::from_str(&text).unwrap();
     assert!(document["openapi"].as_str().unwrap().starts_with("3.1"));
+    let mut names = Vec::new();
+    for (path, item) in document["paths"].as_object().unwrap() {
+        for (method, operation) in item.as_object().unwrap() {
+            names.push(operation["operationId"].as_str().unwrap_or_else(|| panic!("{method} {path}")).to_string());
+            for (media_type, content) in operation["requestBody"]["content"].as_object().into_iter().flatten() {
+                let is_binary = content["schema"]["$ref"] == "#/components/schemas/Binary";
+                assert!(is_binary || content.get("example").is_some(), "{method} {path} {media_type}");
+            }
+        }
+    }
+    let count = names.len();
+    names.sort();
+    names.dedup();
+    assert_eq!(names.len(), count, "an operationId is there twice");
+    assert_eq!(document["components"]["schemas"]["Binary"]["format"], "binary");
+    let mut bare = Vec::new();
+    find_bare_objects(&document, "", &mut bare);
+    // Results of other programs' versions are compared as they are.
+    bare.retain(|path| !path.contains("/ComparedPair/"));
+    assert!(bare.is_empty(), "objects without fields: {bare:?}");
+}
+
+/// Schemas of objects of which nothing is said.
+fn find_bare_objects(value: &Value, path: &str, found: &mut Vec<String>) {
+    match value {
+        Value::Object(fields) => {
+            let says = ["properties", "additionalProperties", "allOf", "oneOf"].iter().any(|k| fields.contains_key(*k));
+            if fields.get("type") == Some(&json!("object")) && !says {
+                found.push(path.into());
+            }
+            for (name, value) in fields {
+                // Examples are no schemas.
+                if name != "example" && name != "default" {
+                    find_bare_objects(value, &format!("{path}/{name}"), found);
+                }
+            }
+        }
+        Value::Array(items) => {
+            for (index, value) in items.iter().enumerate() {
+                find_bare_objects(value, &format!("{path}/{index}"), found);
+            }
+        }
+        _ => {}
+    }
 }
 
 #[test]
@@ -462,4 +506,181 @@ fn a_check_answers_at_once() {
     broken["specimen"]["holes"][0]["diameter_mm"] = json!(9.0);
     let found = service.post("/v1/specimens/check", &broken).json();
     assert_eq!(found["is_valid"], false);
+}
+
+/// A specimen with so many holes and drives that its evaluation takes hours is refused with the estimate, and a dry run
+/// tells what a job would take.
+#[test]
+fn costs_are_shown_and_limited() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &["--slots", "0", "--max-job-hours", "0.1"]);
+    let mut costly = small_evaluation(1.0);
+    costly["specimen"] = shipped("two-hole-shear.json");
+    costly["mesh"] = json!("standard");
+    costly["drive_mm"] = (1..=1000).map(|n| json!(0.005 * f64::from(n))).collect();
+    let refused = service.post("/v1/evaluations", &costly);
+    assert_eq!((refused.status, refused.cause().as_str()), (422, "too-costly"));
+    let detail = refused.json()["detail"].as_str().unwrap().to_string();
+    assert!(detail.contains("limit: 0.1 h") && detail.contains("--max-job-hours"), "{detail}");
+    let estimate = service.post("/v1/evaluations?dry_run=true", &small_evaluation(1.0));
+    assert_eq!(estimate.status, 200);
+    let estimate = estimate.json();
+    assert_eq!((&estimate["num_tasks"], &estimate["most_seconds"]), (&json!(1), &json!(360.0)));
+    let seconds = estimate["estimated_seconds"].as_f64().unwrap();
+    assert!((0.001..10.0).contains(&seconds), "{seconds}");
+    assert_eq!(service.get("/v1/jobs").json()["jobs"].as_array().unwrap().len(), 0, "a dry run starts nothing");
+    let cost = service.post("/v1/specimens/check", &json!({ "specimen": costly["specimen"] })).json()["cost"].clone();
+    assert!(cost["seconds"].as_f64().unwrap() > 0.0 && cost["most_seconds"] == 360.0, "{cost}");
+    let unknown = service.post("/v1/evaluations?dryrun=true", &small_evaluation(1.0));
+    assert_eq!((unknown.status, unknown.cause().as_str()), (400, "invalid-parameter"));
+}
+
+/// A task that still runs when its time is up ends with a problem, and its job can be resumed for as long again.
+#[test]
+fn a_task_ends_when_its_time_is_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &["--slots", "1", "--max-job-hours", "0.0003"]);
+    let proof = json!({ "per_cause": 0, "unknown": 0, "controls": 50, "only": ["none"], "mesh_factor": 4.0 });
+    let begin = std::time::Instant::now();
+    let job = service.submit("proofs", &proof);
+    let view = service.wait(&job, LONG);
+    assert_eq!(view["state"], "failed", "{view}");
+    assert!(view["problem"]["type"].as_str().unwrap().ends_with(":time-limit"), "{view}");
+    eprintln!("a task of 1.1 s ended after {:.1} s", begin.elapsed().as_secs_f64());
+    assert_eq!(service.call("POST", &format!("{job}/resume"), &[], b"").json()["state"], "queued");
+    service.wait(&job, LONG);
+}
+
+#[test]
+fn ten_thousand_points_are_queued_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &["--slots", "0"]);
+    let begin = std::time::Instant::now();
+    let job = service.submit("sweeps", &small_sweep(10_000));
+    let seconds = begin.elapsed().as_secs_f64();
+    eprintln!("10,000 points were queued in {seconds:.2} s");
+    assert_eq!(service.get(&job).json()["num_tasks"], 10_000);
+    // A second on a machine of its own; tests share theirs, and are less optimised.
+    assert!(seconds < 5.0, "{seconds}");
+}
+
+#[test]
+fn jobs_and_recordings_can_be_deleted() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &[]);
+    let scan = json!({
+        "specimen": shipped("solid-shear.json"), "drive_mm": [1.0], "mesh": 5.0, "voxel_mm": [2.0, 1.0, 2.0],
+        "mm_per_radian": [2.0, 2.0, 2.0], "noise_sd_mm": [0.01, 0.01, 0.01],
+    });
+    let job = service.submit("scans", &scan);
+    assert_eq!(service.wait(&job, LONG)["state"], "succeeded");
+    let recording = service.get(&format!("{job}/result")).json()["recording"].as_str().unwrap().to_string();
+    let recording = format!("/v1/recordings/{recording}");
+    let delete = |path: &str| service.call("DELETE", path, &[], b"");
+    let artefacts = service.get(&format!("{job}/artefacts")).json();
+    assert_eq!(delete(&job).status, 204);
+    assert_eq!(delete(&job).cause(), "not-found");
+    assert_eq!(service.get(&job).cause(), "not-found");
+    for artefact in artefacts["artefacts"].as_array().unwrap() {
+        assert_eq!(service.get(artefact["href"].as_str().unwrap()).status, 404);
+    }
+    // The recording that it made is a thing of its own, with all its files.
+    assert_eq!(service.get(&recording).status, 200);
+    let same = service.submit("scans", &scan);
+    assert_eq!(service.wait(&same, LONG)["state"], "succeeded", "what was deleted is computed again");
+    assert_eq!(delete(&recording).status, 204);
+    assert_eq!(service.get(&recording).cause(), "not-found");
+    assert_eq!(service.get("/v1/recordings").json()["recordings"], json!([]));
+}
+
+#[test]
+fn what_is_in_use_or_somebody_elses_is_not_deleted() {
+    let folder = tempfile::tempdir().unwrap();
+    let tokens = folder.path().join("tokens.json");
+    let tokens = tokens.to_str().unwrap();
+    let token = |name: &str| {
+        let made = lambdak().args(["serve", "--tokens", tokens, "--add-token", name]).output().unwrap();
+        String::from_utf8(made.stdout).unwrap().trim().to_string()
+    };
+    let [anna, ben, reader] = ["anna:submit", "ben:submit", "cleo:read"].map(token);
+    let mut service = Service::start(&folder.path().join("data"), &["--slots", "0", "--tokens", tokens]);
+    service.token = Some(anna.clone());
+    let job = service.submit("evaluations", &small_evaluation(1.0));
+    let mut delete = |token: &str, path: &str| {
+        service.token = Some(token.into());
+        let reply = service.call("DELETE", path, &[], b"");
+        if reply.status == 204 { "gone".into() } else { reply.cause() }
+    };
+    assert_eq!(delete(&anna, &job), "wrong-state", "it has not ended");
+    assert_eq!(delete(&ben, &job), "forbidden");
+    assert_eq!(delete(&reader, &job), "forbidden");
+    service.token = Some(anna.clone());
+    assert_eq!(service.call("POST", &format!("{job}/cancel"), &[], b"").status, 200);
+    assert_eq!(service.call("DELETE", &job, &[], b"").status, 204);
+}
+
+/// Where a token's space is full, the answer names what could go, and nobody is told to come back.
+#[test]
+fn a_full_space_names_what_to_delete() {
+    let folder = tempfile::tempdir().unwrap();
+    let tokens = folder.path().join("tokens.json");
+    let made =
+        lambdak().args(["serve", "--tokens"]).arg(&tokens).args(["--add-token", "anna:submit"]).output().unwrap();
+    let secret = String::from_utf8(made.stdout).unwrap().trim().to_string();
+    let mut file: Value = serde_json::from_str(&std::fs::read_to_string(&tokens).unwrap()).unwrap();
+    file["tokens"][0]["max_recordings_bytes"] = json!(100);
+    std::fs::write(&tokens, file.to_string()).unwrap();
+    let mut service = Service::start(&folder.path().join("data"), &["--tokens", tokens.to_str().unwrap()]);
+    service.token = Some(secret);
+    let scan = json!({
+        "specimen": shipped("solid-shear.json"), "drive_mm": [1.0], "mesh": 5.0, "voxel_mm": [2.0, 1.0, 2.0],
+        "mm_per_radian": [2.0, 2.0, 2.0], "noise_sd_mm": [0.01, 0.01, 0.01],
+    });
+    let job = service.submit("scans", &scan);
+    assert_eq!(service.wait(&job, LONG)["state"], "succeeded");
+    let kept = service.get(&format!("{job}/result")).json()["recording"].as_str().unwrap().to_string();
+    let reply = service.call("POST", "/v1/recordings", &[("content-type", "application/x-tar")], &[0; 1024]);
+    assert_eq!((reply.status, reply.cause().as_str()), (507, "no-space"));
+    assert!(reply.header("retry-after").is_none());
+    let detail = reply.json()["detail"].as_str().unwrap().to_string();
+    assert!(detail.contains("DELETE /v1/recordings/ID") && detail.contains(&kept), "{detail}");
+}
+
+/// The check says which limits it has checked, and solves for force and stretch where it is given a material.
+#[test]
+fn a_check_says_what_it_checked() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &["--slots", "0"]);
+    let mut specimen = shipped("two-hole-shear.json");
+    specimen["drive_mm"] = json!([5.0, 9.0]);
+    let mut limits = shipped("studies/two-hole-shear.json")["limits"].clone();
+    limits["max_drive_mm"] = json!(7.0);
+    limits["max_force_n"] = json!(200.0);
+    limits["max_local_stretch"] = json!(1.5);
+    let body = json!({ "specimen": specimen, "limits": limits });
+    let found = service.post("/v1/specimens/check", &body).json();
+    assert_eq!(found["is_valid"], false, "{found}");
+    let margin = |found: &Value, name: &str| {
+        found["margins"].as_array().unwrap().iter().find(|m| m["name"] == name).cloned().unwrap_or_default()
+    };
+    assert_eq!(margin(&found, "max_drive_mm")["value"], 9.0);
+    assert_eq!(margin(&found, "max_drive_mm")["is_satisfied"], false);
+    let names = |list: &Value| -> Vec<String> {
+        list.as_array().unwrap().iter().map(|u| u["name"].as_str().unwrap().to_string()).collect()
+    };
+    assert_eq!(names(&found["unchecked"]), ["max_force_n", "max_local_stretch"]);
+    let mut with_material = body;
+    with_material["material"] = shipped("materials/ecoflex-0020.json");
+    with_material["specimen"]["drive_mm"] = json!([5.0, 6.0]);
+    let begin = std::time::Instant::now();
+    let found = service.post("/v1/specimens/check", &with_material).json();
+    eprintln!("solved for the check in {:.2} s", begin.elapsed().as_secs_f64());
+    assert_eq!(found["unchecked"], json!([]));
+    let force = margin(&found, "max_force_n")["value"].as_f64().unwrap();
+    assert!((1.0..100.0).contains(&force), "{force}");
+    assert!(margin(&found, "max_local_stretch")["value"].as_f64().unwrap() > 1.5);
+    assert_eq!(
+        (&found["is_valid"], &margin(&found, "max_local_stretch")["is_satisfied"]),
+        (&json!(false), &json!(false))
+    );
 }

@@ -3,7 +3,7 @@
 mod service_common;
 
 use serde_json::json;
-use service_common::{Service, shipped, small_evaluation};
+use service_common::{Service, shipped, small_evaluation, tar_entry};
 
 fn service() -> (tempfile::TempDir, Service) {
     let folder = tempfile::tempdir().unwrap();
@@ -62,6 +62,13 @@ fn sizes_are_bounded() {
     let axis = json!({ "pointer": "/drive_mm/0", "values": values });
     let sweep = json!({ "base": small_evaluation(1.0), "vary": [axis, axis, axis, axis, axis, axis, axis, axis] });
     assert_eq!(service.post("/v1/sweeps", &sweep).cause(), "invalid-input");
+    // A base of a thousand drives, ten thousand times.
+    let mut large = small_evaluation(1.0);
+    large["drive_mm"] = (1..=1000).map(|n| json!(0.002 * f64::from(n))).collect();
+    let values: Vec<f64> = (1..=10_000).map(|n| 0.0002 * f64::from(n)).collect();
+    let sweep = json!({ "base": large, "vary": [{ "pointer": "/drive_mm/0", "values": values }] });
+    let reply = service.post("/v1/sweeps", &sweep);
+    assert_eq!((reply.status, reply.json()["errors"][0]["pointer"].as_str()), (422, Some("/base")));
 }
 
 #[test]
@@ -210,22 +217,6 @@ fn answers_carry_protective_headers() {
     }
 }
 
-/// A tar entry with a right checksum.
-fn tar_entry(name: &str, kind: u8, bytes: &[u8]) -> Vec<u8> {
-    let mut header = [0u8; 512];
-    header[..name.len()].copy_from_slice(name.as_bytes());
-    header[124..135].copy_from_slice(format!("{:011o}", bytes.len()).as_bytes());
-    header[148..156].fill(b' ');
-    header[156] = kind;
-    let sum: u64 = header.iter().map(|b| u64::from(*b)).sum();
-    header[148..154].copy_from_slice(format!("{sum:06o}").as_bytes());
-    header[154] = 0;
-    let mut out = header.to_vec();
-    out.extend_from_slice(bytes);
-    out.resize(out.len().div_ceil(512) * 512, 0);
-    out
-}
-
 #[test]
 fn uploads_are_recordings_or_refused() {
     let (_folder, service) = service();
@@ -259,6 +250,11 @@ fn uploads_are_recordings_or_refused() {
     header[70..72].copy_from_slice(&16i16.to_le_bytes());
     header[72..74].copy_from_slice(&32i16.to_le_bytes());
     header[108..112].copy_from_slice(&352f32.to_le_bytes());
+    header[123] = 2;
+    header[254..256].copy_from_slice(&1i16.to_le_bytes());
+    for at in [280, 300, 320] {
+        header[at..at + 4].copy_from_slice(&1f32.to_le_bytes());
+    }
     header[344..348].copy_from_slice(b"n+1\0");
     header.resize(50 << 20, 0);
     let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
@@ -266,7 +262,7 @@ fn uploads_are_recordings_or_refused() {
     let packed = packed.finish().unwrap();
     assert!(packed.len() < 1 << 20);
     let recording = json!({
-        "schema": "mru-recording/1", "id": "bomb", "specimen": shipped("solid-shear.json"), "mask": "mask.nii.gz",
+        "schema": "mru-recording/1", "id": "bomb", "specimen": shipped("solid-shear.json"), "mask": "mask.nii.gz", "acquisition": { "voxel_mm": [1.0, 1.0, 1.0] },
         "steps": [{ "drive_mm": 1.0, "force_n": null, "displacement": "u_1.nii.gz" }],
     });
     let bomb = [
@@ -277,9 +273,61 @@ fn uploads_are_recordings_or_refused() {
     .concat();
     let started = std::time::Instant::now();
     let reply = send(&bomb);
-    assert_eq!((reply.status, reply.cause().as_str()), (422, "unsafe-upload"), "{reply:?}");
+    assert_eq!((reply.status, reply.cause().as_str()), (413, "too-large"), "{reply:?}");
     eprintln!("bomb: {} in {:?}", reply.json()["detail"], started.elapsed());
     assert_eq!(service.get("/v1/recordings").json()["recordings"].as_array().unwrap().len(), 0);
     let reply = service.post("/v1/diagnoses", &json!({ "recording": "../../x" }));
     assert_eq!(reply.json()["errors"][0]["pointer"], "/recording");
+}
+
+/// Browsers that do not say Sec-Fetch-Site name the page's origin; a cancel needs no body, and so no leave to post.
+#[test]
+fn pages_of_other_origins_cancel_and_delete_nothing() {
+    let (_folder, service) = service();
+    let job = service.submit("evaluations", &small_evaluation(1.0));
+    let cancel = format!("{job}/cancel");
+    for origin in ["https://evil.example", "null", "http://127.0.0.1:1"] {
+        for (method, path) in [("POST", &cancel), ("DELETE", &job)] {
+            let reply = service.call(method, path, &[("origin", origin)], b"");
+            assert_eq!((reply.status, reply.cause().as_str()), (403, "forbidden"), "{origin} {method}");
+        }
+    }
+    let reply =
+        service.call("POST", &cancel, &[("origin", "https://evil.example"), ("sec-fetch-site", "cross-site")], b"");
+    assert_eq!(reply.status, 403);
+    assert_eq!(service.get(&job).json()["state"], "queued");
+    let own = format!("http://{}", service.address);
+    assert_eq!(service.call("POST", &cancel, &[("origin", &own)], b"").status, 200);
+}
+
+#[test]
+fn names_and_numbers_are_fit_to_be_shown() {
+    let (_folder, service) = service();
+    let mut body = small_evaluation(1.0);
+    body["specimen"]["name"] = json!("block\u{202e}gnp.\u{200b}exe");
+    let job = service.submit("evaluations", &body);
+    assert_eq!(service.get(&job).json()["title"], "blockgnp.exe");
+    body["specimen"]["block"]["length_mm"] = json!(1e308);
+    let reply = service.post("/v1/evaluations", &body);
+    let text = String::from_utf8_lossy(&reply.body).into_owned();
+    assert!(reply.status == 422 && text.contains("1e308") && !text.contains("00000000000000000000000"), "{text}");
+}
+
+#[test]
+fn a_wrong_token_is_told_from_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let tokens = folder.path().join("tokens.json");
+    let tokens = tokens.to_str().unwrap();
+    let made =
+        service_common::lambdak().args(["serve", "--tokens", tokens, "--add-token", "anna:read"]).output().unwrap();
+    assert!(made.status.success());
+    let mut service = Service::start(&folder.path().join("data"), &["--slots", "0", "--tokens", tokens]);
+    let detail = |service: &Service| {
+        let reply = service.get("/v1/jobs");
+        assert_eq!((reply.status, reply.cause().as_str()), (401, "unauthorized"));
+        reply.json()["detail"].as_str().unwrap().to_string()
+    };
+    assert!(detail(&service).contains("send the header"));
+    service.token = Some("lk_wrong".into());
+    assert!(detail(&service).contains("this token is none of the service's"));
 }

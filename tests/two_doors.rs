@@ -115,6 +115,8 @@ fn requests(evaluation: &Value, scans: [(&Path, &str); 2]) -> Vec<Asked> {
             json!({ "curves": [{ "test": "uniaxial", "csv": curve(false) }], "fit": { "max_terms": 1 } }),
         ),
         Asked::alike("uniaxial", json!({ "csv": curve(false), "fit": { "max_terms": 1 } })),
+        Asked::alike("export-material", json!({ "material": shipped("materials/ecoflex-0020-two-term.json") })),
+        Asked::alike("export-model", json!({ "specimen": shipped("solid-shear.json"), "mesh": 4.0 })),
         Asked::alike("design", small_study()),
         Asked::alike("sweep", small_sweep_study()),
         Asked::alike("compare", json!({ "pairs": [{ "name": "same", "base": evaluation, "current": evaluation }] })),

@@ -22,6 +22,10 @@ class ProblemError(Exception):
         self.pointers = [error["pointer"] for error in problem.get("errors", [])]
 
 
+# A request that is told to come back later than this is not tried again: the caller decides.
+LONGEST_WAIT_S = 30.0
+
+
 class Client:
     """The service at `base`, with a token where it needs one."""
 
@@ -29,7 +33,7 @@ class Client:
         self.base, self.token, self.timeout_s = base.rstrip("/"), token, timeout_s
 
     def request(self, method, path, body=None, headers=None, raw=None):
-        """Bytes and headers of an answer; waits and tries again when told to (429, 503)."""
+        """Bytes and headers of an answer; waits and tries again when told to come back soon (429, 503)."""
         headers = dict(headers or {})
         if self.token:
             headers["authorization"] = f"Bearer {self.token}"
@@ -48,8 +52,9 @@ class Client:
                     problem = json.loads(text)
                 except ValueError:
                     problem = {"title": error.reason, "detail": text.decode(errors="replace")}
-                if error.code in (429, 503) and attempt < 5:
-                    time.sleep(float(error.headers.get("retry-after", 1)))
+                wait = float(error.headers.get("retry-after") or "inf")
+                if error.code in (429, 503) and attempt < 5 and wait <= LONGEST_WAIT_S:
+                    time.sleep(wait)
                     continue
                 raise ProblemError(problem) from None
 
@@ -98,6 +103,9 @@ class Client:
     def scan(self, specimen, material, **more):
         """A synthetic scan; its result's `recording` is the identifier of the recording it made."""
         return self.submit("scans", {"specimen": specimen, "material": material, **more})
+
+    def delete_recording(self, id):
+        self.request("DELETE", f"/v1/recordings/{id}")
 
     def recording(self, id):
         return self.get(f"/v1/recordings/{id}")
@@ -159,6 +167,10 @@ class Job:
 
     def cancel(self):
         return self.client.post(f"/v1/jobs/{self.id}/cancel")
+
+    def delete(self):
+        """Deletes the job, once it has ended, with its results."""
+        self.client.request("DELETE", f"/v1/jobs/{self.id}")
 
     def resume(self):
         return self.client.post(f"/v1/jobs/{self.id}/resume")

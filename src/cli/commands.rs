@@ -25,11 +25,30 @@ pub(super) static COMMANDS: &[JobCommand] = &[
     JobCommand { name: "prove-diagnosis", arguments: of_nothing, flags: PROOF, fill: proof },
 ];
 
+/// What `lambdak export` writes: each with the word after `export`.
+pub(super) static EXPORTS: &[(&str, JobCommand)] = &[
+    (
+        "material",
+        JobCommand { name: "export-material", arguments: of_material, flags: EXPORT_MATERIAL, fill: exported_material },
+    ),
+    ("model", JobCommand { name: "export-model", arguments: of_specimen, flags: EXPORT_MODEL, fill: specimen }),
+];
+const EXPORT_MODEL: &[Flag] = &[
+    Flag::read("material", "material", JsonFile),
+    Flag::of("drive", "drive_mm"),
+    Flag::of("mesh", "mesh"),
+    Flag::of("full", "is_whole"),
+    Flag::of("format", "formats"),
+];
+
+const EXPORT_MATERIAL: &[Flag] =
+    &[Flag::of("format", "formats"), Flag::of("stress-unit", "stress_unit"), Flag::of("name", "name")];
 const SOLVE: &[Flag] = &[
     Flag::read("material", "material", JsonFile),
     Flag::of("drive", "drive_mm"),
     Flag::of("mesh", "mesh"),
     Flag::of("full", "is_whole"),
+    Flag::of("fields", "fields"),
 ];
 const EVALUATE: &[Flag] = &[
     Flag::read("material", "material", JsonFile),
@@ -67,6 +86,9 @@ const IMPORT: &[Flag] = &[
     Flag::of("drive", "drive_mm"),
     Flag::of("unit", "unit"),
     Flag::of("axes", "axes"),
+    Flag::of("components", "components"),
+    Flag::of("origin", "origin"),
+    Flag::of("vectors", "vectors"),
     Flag::of("voxel", "voxel_mm"),
     Flag::of("region", "region"),
     Flag::of("filter", "filter"),
@@ -107,10 +129,11 @@ const COLUMNS: [Flag; 5] = [
     Flag::of("area", "columns/area_mm2"),
 ];
 /// Options of fits to curves.
-const FITS: [Flag; 3] = [
+const FITS: [Flag; 4] = [
     Flag::of("terms", "fit/max_terms"),
     Flag::of("bulk", "fit/bulk_kpa"),
     Flag::of("min-alpha-gap", "fit/min_alpha_gap"),
+    Flag::of("all-branches", "fit/has_all_branches"),
 ];
 const CURVES: &[Flag] = &[
     Flag::of("neo-hookean", "has_neo_hookean_term"),
@@ -123,6 +146,7 @@ const CURVES: &[Flag] = &[
     FITS[0],
     FITS[1],
     FITS[2],
+    FITS[3],
 ];
 const UNIAXIAL: &[Flag] = &[
     Flag::read("specimen", "specimen", JsonFile),
@@ -135,6 +159,7 @@ const UNIAXIAL: &[Flag] = &[
     FITS[0],
     FITS[1],
     FITS[2],
+    FITS[3],
 ];
 const PAPER_TABLES: &[Flag] = &[
     Flag::of("noise", "noise_sd_mm"),
@@ -167,6 +192,17 @@ fn proof(_: &ArgMatches, _: &mut Asked) -> Result<PathBuf, CliError> {
     Ok("two-hole-shear".into())
 }
 
+fn of_material(command: Command) -> Command {
+    command.arg(Arg::new("MATERIAL").help("Material file (ogden/1), such as the material.json of a fit").required(true))
+}
+
+fn exported_material(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliError> {
+    let path = PathBuf::from(value(matches, "MATERIAL"));
+    asked.set("material", read_json(&path)?, path.display().to_string());
+    asked.set("name", stem(&path), path.display().to_string());
+    Ok(path)
+}
+
 fn of_specimen(command: Command) -> Command {
     command.arg(Arg::new("SPECIMEN").help("Specimen file (specimen/1)").required(true))
 }
@@ -189,16 +225,20 @@ fn stem(path: &Path) -> String {
 }
 
 fn of_files(command: Command) -> Command {
-    let help = "A raw recording (folder or JSON file), MATLAB files (.mat), or point clouds (.csv, one per drive)";
+    let help = "A raw recording (folder or JSON file), MATLAB files (.mat), point clouds (.csv, one per drive), or NIfTI images \
+                (.nii, .nii.gz)";
     command.arg(files("FILE", "FILE", help))
 }
 
 fn imported(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliError> {
     let names = values(matches, "FILE");
     let first = PathBuf::from(names.first().cloned().unwrap_or_default());
-    let form = match first.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
+    let ending = |name: &Path| name.extension().and_then(|e| e.to_str()).map(str::to_lowercase);
+    let form = match ending(&first).as_deref() {
         Some("mat") => Some("matlab"),
         Some("csv") => Some("points"),
+        Some("nii") => Some("nifti"),
+        Some("gz") if ending(Path::new(&stem(&first))).as_deref() == Some("nii") => Some("nifti"),
         _ => None,
     };
     match (form, names.get(1)) {
@@ -208,7 +248,8 @@ fn imported(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliError
             asked.set("files", names, "FILE");
         }
         (None, Some(second)) => {
-            let message = "only one recording at a time; MATLAB files and point clouds alone may be several".into();
+            let message =
+                "only one recording at a time; MATLAB files, point clouds and images alone may be several".into();
             return Err(CliError::Input { path: second.into(), message });
         }
         (None, None) => asked.set("recording", names[0].clone(), first.display().to_string()),

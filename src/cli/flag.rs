@@ -62,7 +62,7 @@ impl Flag {
         if !field.range.is_empty() {
             help += &format!(" ({})", field.range);
         }
-        if let FieldForm::Choice(words) = &field.form {
+        if let FieldForm::Choice(words) | FieldForm::Choices(words) = &field.form {
             help += &format!(" ({})", words.iter().map(|w| kebab(w)).collect::<Vec<_>>().join(", "));
         }
         match &field.default {
@@ -77,7 +77,7 @@ impl Flag {
             (Written::JsonFile | Written::TextFile, _) => "FILE",
             (Written::MeshFactor, _) => "SIZE",
             (_, FieldForm::Tuple(_)) => "X,Y,Z",
-            (_, FieldForm::Numbers | FieldForm::Texts) => "LIST",
+            (_, FieldForm::Numbers | FieldForm::Texts | FieldForm::Choices(_)) => "LIST",
             (_, FieldForm::Number | FieldForm::Integer) => "NUMBER",
             _ => "VALUE",
         };
@@ -143,6 +143,12 @@ impl Flag {
         number.map(Value::Number).ok_or_else(|| self.wrong(text, &format!("a number{range}")))
     }
 
+    fn word(self, words: &[String], text: &str) -> Result<Value, CliError> {
+        let word = words.iter().find(|w| **w == text || kebab(w) == text.to_lowercase());
+        let all = || words.iter().map(|w| kebab(w)).collect::<Vec<_>>().join(" or ");
+        Ok(word.ok_or_else(|| self.wrong(text, &all()))?.clone().into())
+    }
+
     fn value(self, field: &RequestField, text: &str) -> Result<Value, CliError> {
         let list = |text: &str| -> Result<Vec<Value>, CliError> {
             text.split(',').map(|part| self.number(part, field)).collect()
@@ -159,10 +165,10 @@ impl Flag {
             }
             FieldForm::Numbers => list(text)?.into(),
             FieldForm::Texts => text.split(',').map(|t| Value::from(t.trim())).collect::<Vec<_>>().into(),
-            FieldForm::Choice(words) => {
-                let word = words.iter().find(|w| **w == text || kebab(w) == text.to_lowercase());
-                let all = || words.iter().map(|w| kebab(w)).collect::<Vec<_>>().join(" or ");
-                word.ok_or_else(|| self.wrong(text, &all()))?.clone().into()
+            FieldForm::Choice(words) => self.word(words, text)?,
+            FieldForm::Choices(words) => {
+                let found = text.split(',').map(|t| self.word(words, t.trim()));
+                found.collect::<Result<Vec<Value>, CliError>>()?.into()
             }
             FieldForm::Boolean | FieldForm::Text | FieldForm::Objects | FieldForm::Other => text.into(),
         })

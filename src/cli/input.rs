@@ -1,7 +1,7 @@
 //! Reading what the commands are given.
 
 use super::error::CliError;
-use crate::file::{ReadError, read_limited};
+use crate::file::{ReadError, read_json_text, read_limited};
 use serde_json::Value;
 use std::path::Path;
 
@@ -27,7 +27,12 @@ pub fn read_text(path: &Path) -> Result<String, CliError> {
 /// # Errors
 /// [`CliError::Input`].
 pub fn read_json(path: &Path) -> Result<Value, CliError> {
-    let text = read_text(path)?;
+    let bad = |message: String| CliError::Input { path: path.into(), message };
+    let text = read_json_text(path, MAX_FILE_BYTES).map_err(|e| match e {
+        ReadError::Io(source) if source.kind() == std::io::ErrorKind::InvalidData => bad(source.to_string()),
+        ReadError::Io(source) => CliError::Read { path: path.into(), source },
+        other => bad(other.to_string()),
+    })?;
     serde_json::from_str(&text).map_err(|e| CliError::Input { path: path.into(), message: format!("not JSON: {e}") })
 }
 

@@ -29,6 +29,9 @@ use std::process::ExitCode;
 
 pub use error::CliError;
 
+/// The command whose second word says what is written for other programs.
+const EXPORT: &str = "export";
+
 /// Name, version and exit codes.
 fn program() -> Command {
     let codes = "Exit codes: 0 done, 1 worse (compare), 2 bad input, 3 no solution found, 4 a file cannot be written, \
@@ -40,7 +43,13 @@ fn program() -> Command {
         .subcommand_required(true)
         .arg_required_else_help(true);
     let job = commands::COMMANDS.iter().map(job_command::JobCommand::clap);
+    let exports = commands::EXPORTS.iter().map(|(word, command)| command.clap().name(*word));
     let own = [
+        Command::new(EXPORT)
+            .about("Materials and models for other programs")
+            .subcommand_required(true)
+            .arg_required_else_help(true)
+            .subcommands(exports),
         of_kind(design::DesignArguments::augment_args(Command::new("design"))),
         of_kind(sweep::SweepArguments::augment_args(Command::new("sweep"))),
         compare::clap(),
@@ -112,6 +121,13 @@ fn run_command(name: &str, matches: &ArgMatches) -> Result<(), CliError> {
         "sweep" => sweep::run(&read(matches)?),
         "run" => run::run(&read(matches)?),
         compare::COMMAND => compare::run(matches),
+        EXPORT => {
+            let (word, matches) = matches.subcommand().unwrap_or((name, matches));
+            match commands::EXPORTS.iter().find(|(w, _)| *w == word) {
+                Some((_, command)) => command.run(matches),
+                None => Err(CliError::Numerics(format!("no export {word}"))),
+            }
+        }
         _ => match commands::COMMANDS.iter().find(|c| c.name == name) {
             Some(command) => command.run(matches),
             None => Err(CliError::Numerics(format!("no command {name}"))),

@@ -35,6 +35,12 @@ pub(super) struct ServeArguments {
     /// Seconds after which a silent worker's task is given to another.
     #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u64).range(2..=3600))]
     lease_s: u64,
+    /// Most hours of one processor that a job may be estimated to take, and of a clock that one task may run.
+    #[arg(long, default_value_t = 4.0, value_name = "HOURS")]
+    max_job_hours: f64,
+    /// Delete ended jobs and recordings after so many days [default: never].
+    #[arg(long, value_name = "DAYS", value_parser = clap::value_parser!(u64).range(1..=36500))]
+    keep: Option<u64>,
     /// Most tasks queued or running.
     #[arg(long, default_value_t = 50_000)]
     max_queued: usize,
@@ -47,6 +53,15 @@ pub(super) fn default_slots(slots: Option<usize>) -> Result<usize, CliError> {
         Some(n) if n <= 256 => Ok(n),
         Some(n) => Err(CliError::Option { option: "slots", message: format!("{n} is not from 0 to 256") }),
     }
+}
+
+/// From a second to a year.
+fn job_time(hours: f64) -> Result<Duration, CliError> {
+    if (1.0 / 3600.0..=8766.0).contains(&hours) {
+        return Ok(Duration::from_secs_f64(3600.0 * hours));
+    }
+    let message = format!("{hours} hours is not from a second (0.000278) to a year (8766)");
+    Err(CliError::Option { option: "max-job-hours", message })
 }
 
 pub(super) fn service_error(error: ServeError) -> CliError {
@@ -70,8 +85,13 @@ pub(super) fn run(a: &ServeArguments) -> Result<(), CliError> {
         database: a.database.clone(),
         tokens: a.tokens.clone(),
         slots: default_slots(a.slots)?,
-        limits: Limits { max_queued_tasks: a.max_queued, ..Limits::default() },
+        limits: Limits {
+            max_queued_tasks: a.max_queued,
+            max_job_time: job_time(a.max_job_hours)?,
+            ..Limits::default()
+        },
         lease: Duration::from_secs(a.lease_s),
+        keep: a.keep.map(|days| Duration::from_secs(86400 * days)),
     };
     serve(&options, &|address| {
         let _ = super::output::print(&format!("http://{address}/\n"));

@@ -3,7 +3,7 @@
 use super::error::CompareError;
 use super::figure::{Direction, Figure};
 use crate::design::DesignResult;
-use crate::file::{ReadError, read_text_limited};
+use crate::file::{ReadError, read_json_text};
 use crate::sensitivity::Evaluation;
 use crate::sweep::{SweepCell, SweepResult};
 use serde::Deserialize;
@@ -34,7 +34,7 @@ pub struct Subject {
 /// [`CompareError::Read`], [`CompareError::NotAResult`].
 pub fn read(path: &Path) -> Result<Subject, CompareError> {
     let not = |message: String| CompareError::NotAResult { path: path.into(), message };
-    let text = read_text_limited(path, MAX_BYTES).map_err(|error| match error {
+    let text = read_json_text(path, MAX_BYTES).map_err(|error| match error {
         ReadError::Io(error) => CompareError::Read { path: path.into(), message: error.to_string() },
         other => not(other.to_string()),
     })?;

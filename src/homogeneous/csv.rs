@@ -1,44 +1,28 @@
-//! Reading curves from CSV text: columns by name, units from the names.
+//! Reading curves as test machines write them: columns and units by their names.
 //!
-//! The first line that is neither empty nor a comment (`#`) is the header. Names are compared in lower case.
+//! The header is the first line that names a drive and a stress; what stands before it is skipped and counted, and so
+//! are empty lines and comments (`#`). Cells are parted by semicolons, tabs, commas or blanks; with the first two, and
+//! in quotation marks, numbers may have decimal commas. Upper and lower case, blanks and underscores are alike. Units
+//! end the name (`Load [N]`, `Weg/mm`, `force_n`) or stand in a line below the header.
 //!
 //! | What | Column names, in order of preference |
 //! |---|---|
-//! | time, s | `time_s`, `time`, `t` |
+//! | time (s) | `time`, `t`, `Zeit` |
 //! | stretch | `stretch`, `lambda` |
-//! | shear | `shear_strain`, `shear`, `gamma` (simple shear; else as strain), `stretch` |
-//! | strain (stretch − 1) | `engineering_strain`, `nominal_strain`, `strain` |
-//! | displacement, mm (needs a length) | `displacement_mm`, `extension_mm`, `drive_mm`, `compression_mm` (turned) |
-//! | nominal stress | `nominal_stress`, `engineering_stress`, `shear_nominal_stress`, `p11` (shear: `p12`), `stress` |
-//! | | each with or without `_pa`, `_kpa`, `_mpa` |
-//! | force, N (needs an area) | `force_n`, `load_n` (turned where the drive is a compression) |
+//! | shear | `shear strain`, `shear`, `gamma` (simple shear; else as strain), `stretch` |
+//! | strain (stretch − 1; a fraction or per cent) | `engineering strain`, `nominal strain`, `strain`, `Dehnung`, other strains |
+//! | displacement (needs a length) | `displacement`, `extension`, `drive`, `compression` (turned), `Weg`, crosshead and such |
+//! | nominal stress | `nominal stress`, `engineering stress`, `shear nominal stress`, `p11` (shear: `p12`), `stress`, `Spannung` |
+//! | force (needs an area) | `force`, `load`, `Kraft` (turned where the drive is a compression) |
+//!
+//! True and logarithmic quantities and rates are passed over. Of several columns that fit equally well none is taken:
+//! one has to be named.
 
+use super::csv_columns::{DriveKind, Found, StressKind, drive_column, headers, stress_column, time_column};
+use super::csv_error::CsvError;
+use super::csv_text::TextTable;
 use super::deformation::HomogeneousTest;
-
-/// Most rows that are read: a day at ten readings a second.
-const MAX_ROWS: usize = 1_000_000;
-
-/// Unit of a stress column whose name does not say it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, utoipa::ToSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum StressUnit {
-    /// Pa.
-    Pa,
-    /// kPa.
-    KPa,
-    /// MPa.
-    MPa,
-}
-
-impl StressUnit {
-    fn in_kpa(self) -> f64 {
-        match self {
-            StressUnit::Pa => 1e-3,
-            StressUnit::KPa => 1.0,
-            StressUnit::MPa => 1e3,
-        }
-    }
-}
+use super::stress_unit::StressUnit;
 
 /// What the reader is told beyond the file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -70,72 +54,21 @@ pub struct CsvCurve {
     pub is_force: bool,
     /// Rows left out because a number was missing (empty or NaN).
     pub num_left_out: usize,
+    /// How the file was understood.
+    pub reading: CsvReading,
 }
 
-/// Why a CSV is refused.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum CsvError {
-    /// No header or no rows.
-    #[error("the file has no {what}; the first line names the columns, numbers follow")]
-    Empty {
-        /// What is missing.
-        what: &'static str,
-    },
-    /// A needed column is not there.
-    #[error("no column for the {what} among {found:?}; name it with an option")]
-    NoColumn {
-        /// What is looked for.
-        what: &'static str,
-        /// The header.
-        found: Vec<String>,
-    },
-    /// A cell is not a number.
-    #[error("line {line}: {text:?} is not a number")]
-    NotANumber {
-        /// Line, from 1.
-        line: usize,
-        /// The cell.
-        text: String,
-    },
-    /// A row of another length than the header.
-    #[error("line {line} has {found} cells, the header {expected}")]
-    RowLength {
-        /// Line, from 1.
-        line: usize,
-        /// Cells found.
-        found: usize,
-        /// Cells of the header.
-        expected: usize,
-    },
-    /// The unit of a stress cannot be told.
-    #[error("column {column:?} does not say its unit; end its name in _pa, _kpa or _mpa, or give the unit")]
-    NoUnit {
-        /// The column.
-        column: String,
-    },
-    /// Too many rows.
-    #[error("more than {limit} rows; thin the recording")]
-    TooLong {
-        /// The limit.
-        limit: usize,
-    },
-    /// A length or area that cannot be.
-    #[error("{name} is {value}; it must be positive")]
-    NotPositive {
-        /// Which.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-    },
-}
-
-#[derive(Clone, Copy, PartialEq)]
-enum Kind {
-    Direct,
-    Strain,
-    Displacement,
-    Compression,
+/// How a file was understood.
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct CsvReading {
+    /// The column of the drive, as the header calls it.
+    pub drive_column: String,
+    /// The column of stress or force.
+    pub stress_column: String,
+    /// Lines before the header that were skipped.
+    pub num_preamble_lines: usize,
+    /// Whether decimals follow a comma.
+    pub has_decimal_comma: bool,
 }
 
 /// Reads a curve of `test`.
@@ -158,138 +91,98 @@ pub fn read_csv(text: &str, test: HomogeneousTest, options: &CsvOptions) -> Resu
             return Err(CsvError::NotPositive { name, value });
         }
     }
-    let mut lines = text
-        .trim_start_matches('\u{feff}')
-        .lines()
-        .enumerate()
-        .filter(|(_, l)| !l.trim().is_empty() && !l.trim_start().starts_with('#'));
-    let (_, header) = lines.next().ok_or(CsvError::Empty { what: "header" })?;
-    let separator = if header.contains(';') { ';' } else { ',' };
-    let names: Vec<String> = header.split(separator).map(|n| n.trim().trim_matches('"').to_ascii_lowercase()).collect();
-    let find = |wanted: &[&str]| wanted.iter().find_map(|w| names.iter().position(|n| n == w));
-    let (drive_at, kind) = drive_column(&names, test, options)?;
-    let (stress_at, factor, is_force) = stress_column(&names, test, options)?;
-    let time_at = find(&["time_s", "time", "t"]);
-    let is_shear = test == HomogeneousTest::SimpleShear;
-    let mut curve = CsvCurve {
-        time_s: Vec::new(),
-        drive: Vec::new(),
-        stress: Vec::new(),
-        is_displacement: matches!(kind, Kind::Displacement | Kind::Compression) && options.length_mm.is_none(),
-        is_force: is_force && options.area_mm2.is_none(),
-        num_left_out: 0,
+    let of = |names: &[String], units: &[String]| {
+        let all = headers(names, units);
+        let drive = drive_column(&all, test, options.drive_column.as_deref());
+        let stress = stress_column(&all, test, options.stress_column.as_deref(), options.stress_unit);
+        (drive, stress, time_column(&all))
     };
-    for (index, line) in lines {
-        if curve.drive.len() == MAX_ROWS {
-            return Err(CsvError::TooLong { limit: MAX_ROWS });
-        }
-        let cells: Vec<&str> = line.split(separator).map(str::trim).collect();
-        if cells.len() != names.len() {
-            return Err(CsvError::RowLength { line: index + 1, found: cells.len(), expected: names.len() });
-        }
-        let number = |at: usize| -> Result<f64, CsvError> {
-            if cells[at].is_empty() {
-                return Ok(f64::NAN);
-            }
-            cells[at].parse().map_err(|_| CsvError::NotANumber { line: index + 1, text: cells[at].into() })
+    let is_named = |error: Option<&CsvError>| !matches!(error, Some(CsvError::NoColumn { .. }));
+    let is_header = |cells: &[String]| {
+        let (drive, stress, _) = of(cells, &[]);
+        is_named(drive.as_ref().err()) && is_named(stress.as_ref().err())
+    };
+    let table = TextTable::read(text, &is_header)?;
+    let (drive, stress, time) = of(&table.names, &table.units);
+    let columns = Columns { drive: drive?, stress: stress?, time, is_shear: test == HomogeneousTest::SimpleShear };
+    columns.read(&table, options)
+}
+
+/// The columns that are read.
+struct Columns {
+    drive: Found<DriveKind>,
+    stress: Found<StressKind>,
+    time: Option<(usize, f64)>,
+    is_shear: bool,
+}
+
+impl Columns {
+    fn read(&self, table: &TextTable, options: &CsvOptions) -> Result<CsvCurve, CsvError> {
+        let is_length = matches!(self.drive.kind, DriveKind::Displacement | DriveKind::Compression);
+        let is_force = self.stress.kind == StressKind::Force;
+        // Times of day are no numbers; curves do without.
+        let time = self.time.filter(|(at, _)| table.len() > 0 && table.number(0, *at).is_ok());
+        let mut curve = CsvCurve {
+            time_s: Vec::new(),
+            drive: Vec::new(),
+            stress: Vec::new(),
+            is_displacement: is_length && options.length_mm.is_none(),
+            is_force: is_force && options.area_mm2.is_none(),
+            num_left_out: 0,
+            reading: CsvReading {
+                drive_column: table.names[self.drive.at].clone(),
+                stress_column: table.names[self.stress.at].clone(),
+                num_preamble_lines: table.num_preamble,
+                has_decimal_comma: table.has_decimal_comma,
+            },
         };
-        let (mut drive, mut stress) = (number(drive_at)?, number(stress_at)? * factor);
-        let time = time_at.map(number).transpose()?;
-        if kind == Kind::Compression {
-            drive = -drive;
-            if is_force {
-                stress = -stress;
+        for row in 0..table.len() {
+            let drive = self.drive_of(table.number(row, self.drive.at)?, options.length_mm);
+            let stress = self.stress_of(table.number(row, self.stress.at)?, options.area_mm2);
+            let time = time.map(|(at, factor)| table.number(row, at).map(|t| factor * t)).transpose()?;
+            if !(drive.is_finite() && stress.is_finite() && time.is_none_or(f64::is_finite)) {
+                curve.num_left_out += 1;
+                continue;
+            }
+            curve.drive.push(drive);
+            curve.stress.push(stress);
+            curve.time_s.extend(time);
+        }
+        if curve.drive.is_empty() {
+            return Err(CsvError::Empty { what: "rows" });
+        }
+        Ok(curve)
+    }
+
+    /// Stretch, amount of shear, or displacement in mm where the length is not known.
+    fn drive_of(&self, number: f64, length_mm: Option<f64>) -> f64 {
+        let number = number * self.drive.factor;
+        let of_length = |displacement: f64| match length_mm {
+            Some(length) => displacement / length + if self.is_shear { 0.0 } else { 1.0 },
+            None => displacement,
+        };
+        match self.drive.kind {
+            DriveKind::Direct => number,
+            DriveKind::Strain => 1.0 + number,
+            DriveKind::CompressiveStrain => 1.0 - number,
+            DriveKind::Displacement => of_length(number),
+            DriveKind::Compression => of_length(-number),
+        }
+    }
+
+    /// Nominal stress in kPa, or force in N where the area is not known.
+    fn stress_of(&self, number: f64, area_mm2: Option<f64>) -> f64 {
+        let number = number * self.stress.factor;
+        match self.stress.kind {
+            StressKind::Stress => number,
+            StressKind::CompressiveStress => -number,
+            StressKind::Force => {
+                let is_turned = matches!(self.drive.kind, DriveKind::Compression | DriveKind::CompressiveStrain);
+                let force = if is_turned { -number } else { number };
+                // N/mm² = MPa.
+                area_mm2.map_or(force, |area| 1e3 * force / area)
             }
         }
-        if let (true, Some(length)) = (matches!(kind, Kind::Displacement | Kind::Compression), options.length_mm) {
-            drive = drive / length + if is_shear { 0.0 } else { 1.0 };
-        }
-        if kind == Kind::Strain {
-            drive += 1.0;
-        }
-        if let (true, Some(area)) = (is_force, options.area_mm2) {
-            // N/mm² = MPa.
-            stress *= 1e3 / area;
-        }
-        if !(drive.is_finite() && stress.is_finite() && time.is_none_or(f64::is_finite)) {
-            curve.num_left_out += 1;
-            continue;
-        }
-        curve.drive.push(drive);
-        curve.stress.push(stress);
-        curve.time_s.extend(time);
-    }
-    if curve.drive.is_empty() {
-        return Err(CsvError::Empty { what: "rows" });
-    }
-    Ok(curve)
-}
-
-fn drive_column(names: &[String], test: HomogeneousTest, options: &CsvOptions) -> Result<(usize, Kind), CsvError> {
-    let is_shear = test == HomogeneousTest::SimpleShear;
-    let kind_of = |name: &str| match name {
-        n if n.contains("compression") => Kind::Compression,
-        n if n.ends_with("_mm") => Kind::Displacement,
-        n if n.contains("strain") && !is_shear => Kind::Strain,
-        _ => Kind::Direct,
-    };
-    if let Some(wanted) = &options.drive_column {
-        let name = wanted.to_ascii_lowercase();
-        let at = names.iter().position(|n| *n == name);
-        let missing = CsvError::NoColumn { what: "drive", found: names.to_vec() };
-        return at.map(|at| (at, kind_of(&name))).ok_or(missing);
-    }
-    let wanted: &[&str] = if is_shear {
-        &["shear_strain", "shear", "gamma", "strain", "stretch", "displacement_mm", "drive_mm"]
-    } else {
-        &[
-            "stretch",
-            "lambda",
-            "engineering_strain",
-            "nominal_strain",
-            "strain",
-            "displacement_mm",
-            "extension_mm",
-            "drive_mm",
-            "compression_mm",
-        ]
-    };
-    let at = wanted.iter().find_map(|w| names.iter().position(|n| n == w));
-    at.map(|at| (at, kind_of(&names[at])))
-        .ok_or_else(|| CsvError::NoColumn { what: "stretch, strain or displacement", found: names.to_vec() })
-}
-
-/// Index, factor to kPa (or N), whether it is a force.
-fn stress_column(
-    names: &[String],
-    test: HomogeneousTest,
-    options: &CsvOptions,
-) -> Result<(usize, f64, bool), CsvError> {
-    let unit = |name: &str| {
-        let said = [("_mpa", StressUnit::MPa), ("_kpa", StressUnit::KPa), ("_pa", StressUnit::Pa)]
-            .into_iter()
-            .find(|(end, _)| name.ends_with(end))
-            .map(|(_, u)| u);
-        said.or(options.stress_unit).map(StressUnit::in_kpa).ok_or_else(|| CsvError::NoUnit { column: name.into() })
-    };
-    let answer = |at: usize| {
-        let name = names[at].as_str();
-        if name.ends_with("_n") { Ok((at, 1.0, true)) } else { unit(name).map(|f| (at, f, false)) }
-    };
-    if let Some(wanted) = &options.stress_column {
-        let name = wanted.to_ascii_lowercase();
-        let at = names.iter().position(|n| *n == name);
-        return at.map(answer).unwrap_or(Err(CsvError::NoColumn { what: "stress", found: names.to_vec() }));
-    }
-    let component = if test == HomogeneousTest::SimpleShear { "p12" } else { "p11" };
-    let stems = ["nominal_stress", "engineering_stress", "shear_nominal_stress", component, "stress"];
-    let by_stem = stems.iter().find_map(|stem| {
-        names.iter().position(|n| n.strip_prefix(stem).is_some_and(|rest| matches!(rest, "" | "_pa" | "_kpa" | "_mpa")))
-    });
-    let by_force = || ["force_n", "load_n"].iter().find_map(|w| names.iter().position(|n| n == w));
-    match by_stem.or_else(by_force) {
-        Some(at) => answer(at),
-        None => Err(CsvError::NoColumn { what: "nominal stress or force", found: names.to_vec() }),
     }
 }
 
@@ -325,7 +218,53 @@ mod tests {
         assert!(matches!(read("stretch,p11\n1,2\n", &none), Err(CsvError::NoUnit { .. })));
         assert!(matches!(read("stretch,stress_kpa\n1,x\n", &none), Err(CsvError::NotANumber { line: 2, .. })));
         assert!(matches!(read("stretch,stress_kpa\n1\n", &none), Err(CsvError::RowLength { line: 2, .. })));
+        let ambiguous = read("strain 1 [%],strain 2 [%],stress_kpa\n1,2,3\n", &none);
+        assert!(matches!(ambiguous, Err(CsvError::Ambiguous { .. })), "{ambiguous:?}");
+        let commas = read("strain,stress_kpa\n0,1,2,5\n", &none);
+        assert!(matches!(commas, Err(CsvError::RowLength { line: 2, .. })), "{commas:?}");
+        let thousands = read("strain;stress_kpa\n0,1;1.000,5\n", &none);
+        assert!(matches!(thousands, Err(CsvError::NotANumber { line: 2, .. })), "{thousands:?}");
+        assert!(matches!(read("strain,force\n1,2\n", &none), Err(CsvError::NoUnit { .. })));
         let bad = CsvOptions { area_mm2: Some(-1.0), ..CsvOptions::default() };
         assert!(matches!(read("stretch,stress_kpa\n1,2\n", &bad), Err(CsvError::NotPositive { .. })));
+    }
+
+    /// The same four points as four machines write them.
+    #[test]
+    fn files_of_test_machines_are_read() {
+        let sized = CsvOptions { length_mm: Some(20.0), area_mm2: Some(10.0), ..CsvOptions::default() };
+        let stretch = [1.0, 1.05, 1.1, 1.25];
+        let stress = [0.0, 2.5, 4.8, 10.5];
+        let files = [
+            // German, with a preamble, units below the header and a separator at the end of each row.
+            "Prüfer;M. Muster;\nProbenbreite;12,5;mm\n\nPrüfzeit;Dehnung;Spannung;\ns;%;MPa;\n0;0;0;\n1;5;0,0025;\n2;10;0,0048;\n\
+             3;25;0,0105;\n",
+            // Quoted decimal commas between commas, several channels.
+            "\"Time (s)\",\"Extension (mm)\",\"Tensile strain (Strain 1) (%)\",\"Tensile stress (kPa)\"\n\
+             \"0,0\",\"0,0\",\"0,0\",\"0,0\"\n\"1,0\",\"1,0\",\"5,0\",\"2,5\"\n\"2,0\",\"2,0\",\"10,0\",\"4,8\"\n\
+             \"3,0\",\"5,0\",\"25,0\",\"10,5\"\n",
+            // Tabs, a displacement and a force in other units.
+            "Sample 7\t\nCrosshead [cm]\tForce [mN]\n0\t0\n0,1\t25\n0,2\t48\n0,5\t105\n",
+            // Blanks.
+            "# exported\n  strain   stress_kPa  true_stress_kPa\n 0 0 0\n .05 2.5 9\n .1 4.8 9\n .25 10.5 9\n",
+        ];
+        for (index, text) in files.iter().enumerate() {
+            let curve = read(text, &sized).unwrap_or_else(|e| panic!("file {index}: {e}"));
+            for i in 0..4 {
+                // The factors of units round.
+                assert!((curve.drive[i] - stretch[i]).abs() < 1e-14, "file {index}: {:?}", curve.drive);
+                assert!((curve.stress[i] - stress[i]).abs() < 1e-13, "file {index}: {:?}", curve.stress);
+            }
+        }
+        let german = read(files[0], &sized).unwrap().reading;
+        assert_eq!((german.drive_column.as_str(), german.num_preamble_lines), ("Dehnung", 2));
+        assert!(german.has_decimal_comma);
+    }
+
+    #[test]
+    fn compression_is_turned() {
+        let none = CsvOptions::default();
+        let c = read("Compressive strain [%];Compressive stress [kPa]\n0;0\n10;5\n", &none).unwrap();
+        assert_eq!((c.drive[1], c.stress[1]), (0.9, -5.0));
     }
 }

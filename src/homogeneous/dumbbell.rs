@@ -7,7 +7,7 @@
 
 use super::curve::{Curve, CurveError};
 use super::deformation::HomogeneousTest;
-use super::fit::material_of;
+use super::fit::{BULK_OVER_SHEAR, material_of};
 use super::fit_options::{CurveFitError, CurveFitOptions};
 use super::result::{CurveFitSequence, fit_curves};
 use super::table::{ForceTable, TableError};
@@ -17,8 +17,6 @@ use crate::mesh::MeshOptions;
 use crate::specimen::{Outline, Specimen, dumbbell};
 use serde::{Deserialize, Serialize};
 
-/// κ of the finite elements where none is given, relative to the initial shear modulus: Poisson's ratio 0.4995.
-const BULK_RATIO: f64 = 1000.0;
 /// Half of the gauge's length, mm: well inside the narrow portion (6 mm), where an extensometer would sit.
 const HALF_GAUGE_MM: f64 = 3.0;
 /// Displacements at which the finite elements are solved.
@@ -168,7 +166,7 @@ pub fn fit_dumbbell(
         let curve = Curve::new("uniaxial", HomogeneousTest::Uniaxial, &stretch, &stress)?;
         let sequence = fit_curves(&[curve], &options.fit)?;
         let chosen = sequence.chosen();
-        let bulk_kpa = options.fit.bulk_kpa.unwrap_or(BULK_RATIO * chosen.initial_shear_modulus_kpa.value);
+        let bulk_kpa = options.fit.bulk_kpa.unwrap_or(BULK_OVER_SHEAR * chosen.initial_shear_modulus_kpa.value);
         let conversion = gauge_stretches(&mut model, &chosen.terms(), bulk_kpa, &drives, is_cancelled)?;
         let at: Vec<f64> = std::iter::once(0.0).chain(conversion.iter().map(|c| c.displacement_mm)).collect();
         let gauge: Vec<f64> = std::iter::once(1.0).chain(conversion.iter().map(|c| c.gauge_stretch)).collect();

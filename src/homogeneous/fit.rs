@@ -11,7 +11,7 @@ use super::deformation::{Deformation, incompressible_derivative, incompressible_
 use super::fit_options::{CurveFitError, CurveFitOptions};
 use super::loading_path::is_stable;
 use super::starts::{Start, starts};
-use crate::material::{MAX_TERMS, Ogden, OgdenTerm, ShearTerm};
+use crate::material::{MAX_TERMS, MaterialError, Ogden, OgdenTerm, ShearTerm, initial_shear_modulus_kpa};
 use crate::optimise::{Evaluation, LeastSquaresOptions, LinearLimit, Minimum, minimise};
 use nalgebra::{DMatrix, DVector};
 
@@ -45,6 +45,20 @@ impl TermFit {
 pub fn material_of(terms: &[ShearTerm], bulk_kpa: f64) -> Ogden {
     let terms = terms.iter().map(|t| OgdenTerm { mu_kpa: t.mu_kpa(), alpha: t.alpha }).collect();
     Ogden { bulk_kpa, terms }
+}
+
+/// Bulk modulus over initial shear modulus of the material that stands for a fit of the incompressible limit: a
+/// Poisson's ratio of 0.4995. Stresses of homogeneous tests then differ from the limit's by about a thousandth.
+pub const BULK_OVER_SHEAR: f64 = 1000.0;
+
+/// Fitted terms as a material, which needs a bulk modulus: the held one, else [`BULK_OVER_SHEAR`] times the initial
+/// shear modulus.
+///
+/// # Errors
+/// [`MaterialError`] where a parameter is beyond what a material may hold, such as an exponent near zero.
+pub fn fitted_material(terms: &[ShearTerm], bulk_kpa: Option<f64>) -> Result<Ogden, MaterialError> {
+    let material = material_of(terms, bulk_kpa.unwrap_or(BULK_OVER_SHEAR * initial_shear_modulus_kpa(terms)));
+    material.validate().map(|()| material)
 }
 
 /// Stresses of a model at a curve's states, kPa. `None` where a state has no response.

@@ -5,8 +5,13 @@
 //! * [`fit_dumbbell`]: the traditional route from a dumb-bell's force over grip displacement.
 //! * [`read_csv`]: curves from text.
 
+mod branches;
 mod compressible;
 mod csv;
+mod csv_columns;
+mod csv_error;
+mod csv_text;
+mod csv_unit;
 mod curve;
 mod deformation;
 mod dumbbell;
@@ -18,15 +23,18 @@ mod selection;
 mod stand_in;
 mod starts;
 mod statistics;
+mod stress_unit;
 mod table;
 
 pub use crate::material::ShearTerm;
+pub use branches::Unloading;
 pub use compressible::{HomogeneousError, Response, respond};
-pub use csv::{CsvCurve, CsvError, CsvOptions, StressUnit, read_csv};
+pub use csv::{CsvCurve, CsvOptions, CsvReading, read_csv};
+pub use csv_error::CsvError;
 pub use curve::{Curve, CurveError, CurveMatch};
 pub use deformation::{Deformation, HomogeneousTest, incompressible_derivative, incompressible_stress};
 pub use dumbbell::{DumbbellError, DumbbellFit, DumbbellOptions, GaugePoint, fit_dumbbell, gauge_stretches};
-pub use fit::{TermFit, fit_terms, matches_of, material_of, model_stress};
+pub use fit::{BULK_OVER_SHEAR, TermFit, fit_terms, fitted_material, matches_of, material_of, model_stress};
 pub use fit_options::{CurveFitError, CurveFitOptions};
 pub use loading_path::is_stable;
 pub use result::{CurveFit, CurveFitSequence, CurveParameter, Interval, fit_curves};
@@ -35,4 +43,5 @@ pub use selection::{
 };
 pub use stand_in::{GAUGE_STRETCHES, TRUTH, UniaxialRow, UniaxialStandIn, UniaxialStandInOptions, uniaxial_stand_in};
 pub use statistics::{erf, f_exceedance, t_quantile};
+pub use stress_unit::StressUnit;
 pub use table::{ForceTable, TableError};

@@ -1,11 +1,11 @@
 //! Fits with one to N terms, the choice among them, and what is known of the parameters.
 
 use super::curve::{Curve, CurveMatch};
-use super::fit::{TermFit, fit_terms, matches_of};
+use super::fit::{TermFit, fit_terms, fitted_material, matches_of};
 use super::fit_options::{CurveFitError, CurveFitOptions};
 use super::selection::{Selection, compare, independent_count};
 use super::statistics::t_quantile;
-use crate::material::{ShearTerm, initial_shear_modulus_kpa, smallest_relative_stiffness};
+use crate::material::{MaterialError, Ogden, ShearTerm, initial_shear_modulus_kpa, smallest_relative_stiffness};
 use crate::optimise::covariance;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -78,6 +78,14 @@ impl CurveFit {
             .chunks(2)
             .map(|p| ShearTerm { modulus_kpa: p[0].value * p[1].value, alpha: p[1].value })
             .collect()
+    }
+
+    /// The fit as a material ([`fitted_material`]).
+    ///
+    /// # Errors
+    /// As [`fitted_material`].
+    pub fn material(&self) -> Result<Ogden, MaterialError> {
+        fitted_material(&self.terms(), self.bulk_kpa)
     }
 }
 

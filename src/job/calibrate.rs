@@ -150,6 +150,10 @@ impl Request for CalibrationRequest {
     const COLLECTION: &'static str = "calibrations";
     const ABOUT: &'static str = "The material, from recordings of a specimen, with its uncertainty.";
 
+    fn example() -> serde_json::Value {
+        serde_json::json!({ "recordings": [super::defaults::EXAMPLE_RECORDING], "num_terms": 1, "mesh_factor": 2.0 })
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         Ok(Box::new(self))
     }

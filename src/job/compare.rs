@@ -67,6 +67,10 @@ impl Request for CompareRequest {
     const COLLECTION: &'static str = "comparisons";
     const ABOUT: &'static str = "Whether a result is the same as, better or worse than another one.";
 
+    fn example() -> serde_json::Value {
+        serde_json::json!({ "pairs": [{ "name": "before and after", "base": { "schema": "evaluation/1" }, "current": { "schema": "evaluation/1" } }] })
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let (mut subjects, mut errors) = (Vec::new(), Vec::new());
         for (index, pair) in self.pairs.iter().enumerate() {

@@ -1,8 +1,13 @@
 //! Curves as requests hold them: the text of a CSV file, and how its columns are understood.
 
-use super::JobError;
+use super::{JobError, Outcome};
 use crate::field::FieldError;
-use crate::homogeneous::{CsvCurve, CsvOptions, Curve, CurveFitOptions, HomogeneousTest, StressUnit, read_csv};
+use crate::homogeneous::{
+    BULK_OVER_SHEAR, CsvCurve, CsvOptions, CsvReading, Curve, CurveFitOptions, HomogeneousTest, StressUnit, Unloading,
+    read_csv,
+};
+use crate::material::{MaterialError, Ogden};
+use crate::report::plain_number;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -29,6 +34,57 @@ pub struct CurveColumns {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-6, maximum = 1e12)]
     pub area_mm2: Option<f64>,
+}
+
+/// What was read of a curve's file, and what was left out.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct CurveReport {
+    /// The curve.
+    pub(super) name: String,
+    /// Rows that are used.
+    pub(super) num_rows: usize,
+    /// Rows left out because a number is missing.
+    pub(super) num_incomplete_rows: usize,
+    /// What follows the first loading branch and is left out; none where the test does not go back, or where all
+    /// branches are wanted.
+    pub(super) unloading: Option<Unloading>,
+    /// How the file was understood.
+    #[serde(flatten)]
+    pub(super) reading: CsvReading,
+}
+
+impl CurveReport {
+    /// What a reader of the result should know.
+    fn in_words(&self) -> String {
+        let reading = &self.reading;
+        let mut text = format!("{}: {} over {}", self.name, reading.stress_column, reading.drive_column);
+        let mut said = vec![format!("{} rows", self.num_rows)];
+        if reading.num_preamble_lines > 0 {
+            said.push(format!("{} lines before the header skipped", reading.num_preamble_lines));
+        }
+        if self.num_incomplete_rows > 0 {
+            said.push(format!("{} rows without a number left out", self.num_incomplete_rows));
+        }
+        text += &format!(", {}\n", said.join(", "));
+        if let Some(u) = &self.unloading {
+            text += &format!(
+                "  the test turns at {}: {} rows after that are left out, since an elastic material has one stress for \
+                 each state; the way back gives {} % less work ({BRANCHES} fits all)\n",
+                plain_number(u.turn, 4),
+                u.num_rows,
+                plain_number(100.0 * u.dissipated_part, 3)
+            );
+        }
+        text
+    }
+}
+
+/// How the rows after the first loading branch are kept: option and field.
+const BRANCHES: &str = "--all-branches or fit.has_all_branches";
+
+/// What was read, in words.
+pub(super) fn reports_in_words(reports: &[CurveReport]) -> String {
+    reports.iter().map(CurveReport::in_words).collect::<String>() + "\n"
 }
 
 impl CurveColumns {
@@ -86,15 +142,23 @@ pub(super) fn needs_stress_and_stretch(csv: &CsvCurve, pointer: &str) -> Result<
 }
 
 impl TestCurve {
-    /// The curve of stretch and stress; `pointer` is that of this entry.
+    /// The curve of stretch and stress with what was read; `pointer` is that of this entry.
     ///
     /// # Errors
     /// The field and what is wrong with its content.
-    pub(super) fn curve(&self, columns: &CurveColumns, pointer: &str) -> Result<Curve, FieldError> {
+    pub(super) fn curve(
+        &self,
+        columns: &CurveColumns,
+        fit: &CurveFitSettings,
+        pointer: &str,
+    ) -> Result<(Curve, CurveReport), FieldError> {
         let pointer = format!("{pointer}/csv");
-        let csv = columns.read(&self.csv, self.test, &pointer)?;
+        let mut csv = columns.read(&self.csv, self.test, &pointer)?;
         needs_stress_and_stretch(&csv, &pointer)?;
-        Curve::new(self.test.name(), self.test, &csv.drive, &csv.stress).map_err(|e| unfit(&pointer, &e))
+        let report = fit.elastic_rows(self.name.as_deref().unwrap_or(self.test.name()), &mut csv);
+        let curve =
+            Curve::new(self.test.name(), self.test, &csv.drive, &csv.stress).map_err(|e| unfit(&pointer, &e))?;
+        Ok((curve, report))
     }
 }
 
@@ -115,6 +179,9 @@ pub struct CurveFitSettings {
     #[serde(default = "min_alpha_gap")]
     #[schema(minimum = 0.0, maximum = 40.0, default = min_alpha_gap)]
     pub min_alpha_gap: f64,
+    /// Fit all rows of a test that is unloaded again, instead of its first loading branch.
+    #[serde(default)]
+    pub has_all_branches: bool,
 }
 
 fn max_terms() -> usize {
@@ -127,11 +194,28 @@ fn min_alpha_gap() -> f64 {
 
 impl Default for CurveFitSettings {
     fn default() -> Self {
-        CurveFitSettings { max_terms: max_terms(), bulk_kpa: None, min_alpha_gap: min_alpha_gap() }
+        CurveFitSettings {
+            max_terms: max_terms(),
+            bulk_kpa: None,
+            min_alpha_gap: min_alpha_gap(),
+            has_all_branches: false,
+        }
     }
 }
 
 impl CurveFitSettings {
+    /// The rows that a fit of an elastic material may use, and what is left out.
+    pub(super) fn elastic_rows(&self, name: &str, csv: &mut CsvCurve) -> CurveReport {
+        let unloading = if self.has_all_branches { None } else { csv.take_first_loading() };
+        CurveReport {
+            name: name.into(),
+            num_rows: csv.drive.len(),
+            num_incomplete_rows: csv.num_left_out,
+            unloading,
+            reading: csv.reading.clone(),
+        }
+    }
+
     pub(super) fn options(&self, neo_hookean: bool) -> CurveFitOptions {
         CurveFitOptions {
             max_terms: self.max_terms,
@@ -140,6 +224,22 @@ impl CurveFitSettings {
             min_alpha_gap: self.min_alpha_gap,
             ..CurveFitOptions::default()
         }
+    }
+}
+
+/// Adds a fit's `material.json`, and says in the summary what its bulk modulus is where none was held.
+pub(super) fn add_material(outcome: &mut Outcome, material: &Result<Ogden, MaterialError>, is_bulk_held: bool) {
+    outcome.summary += &match material {
+        Ok(_) if is_bulk_held => String::new(),
+        Ok(material) => format!(
+            "\nmaterial.json holds a bulk modulus of {} kPa, {BULK_OVER_SHEAR} times the initial shear modulus: the data \
+             do not determine it\n",
+            plain_number(material.bulk_kpa, 4)
+        ),
+        Err(error) => format!("\nno material.json: {error}\n"),
+    };
+    if let Ok(material) = material {
+        outcome.add("material.json", material.to_json());
     }
 }
 

@@ -1,11 +1,14 @@
 //! Curves: joint fits to homogeneous tests, and the prediction of a test kept back.
 
-use super::curve_files::{CurveColumns, CurveFitSettings, TestCurve, fit_failed};
+use super::curve_files::{
+    CurveColumns, CurveFitSettings, CurveReport, TestCurve, add_material, fit_failed, reports_in_words,
+};
 use super::{Context, JobError, Outcome, Request, Run, summary};
 use crate::field::FieldError;
 use crate::homogeneous::{
     Curve, CurveFit, CurveFitSequence, CurveMatch, CurveParameter, Interval, fit_curves, matches_of,
 };
+use crate::material::Ogden;
 use crate::provenance::VERSION;
 use crate::report::fit_picture;
 use serde::{Deserialize, Serialize};
@@ -44,12 +47,20 @@ struct CurvesResult<'a> {
     chi2_per_datum: f64,
     fits: &'a CurveFitSequence,
     kept_back: Vec<CurveMatch>,
+    /// The fit that is used as `ogden/1`; none where its parameters are beyond what a material may hold.
+    material: Option<Ogden>,
+    /// Whether the material's bulk modulus was held in the fit; else it only stands for the incompressible limit.
+    is_bulk_held: bool,
+    /// What was read of the files, fitted curves first.
+    files: &'a [CurveReport],
 }
 
 struct CheckedCurves {
     request: CurvesRequest,
     fitted: Vec<Curve>,
     kept_back: Vec<Curve>,
+    /// What was read, fitted curves first.
+    files: Vec<CurveReport>,
 }
 
 impl Request for CurvesRequest {
@@ -57,19 +68,35 @@ impl Request for CurvesRequest {
     const COLLECTION: &'static str = "curve-fits";
     const ABOUT: &'static str = "Ogden terms fitted to curves of several homogeneous tests together.";
 
+    fn example() -> serde_json::Value {
+        serde_json::json!({ "curves": [{ "test": "uniaxial", "csv": super::defaults::example_curve() }], "fit": { "max_terms": 1 } })
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let (mut fitted, mut kept_back, mut errors) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut files, mut kept_files) = (Vec::new(), Vec::new());
         for (index, entry) in self.curves.iter().enumerate() {
-            match entry.curve(&self.columns, &format!("/curves/{index}")) {
-                Ok(curve) if entry.is_kept_back => kept_back.push(curve),
-                Ok(curve) => fitted.push(curve),
+            match entry.curve(&self.columns, &self.fit, &format!("/curves/{index}")) {
+                Ok((curve, report)) if entry.is_kept_back => {
+                    kept_back.push(curve);
+                    kept_files.push(report);
+                }
+                Ok((curve, report)) => {
+                    fitted.push(curve);
+                    files.push(report);
+                }
                 Err(error) => errors.push(error),
             }
         }
         if errors.is_empty() && fitted.is_empty() {
             errors.push(FieldError::new("/curves", "all kept back", "at least one curve that is fitted"));
         }
-        if errors.is_empty() { Ok(Box::new(CheckedCurves { request: self, fitted, kept_back })) } else { Err(errors) }
+        files.append(&mut kept_files);
+        if errors.is_empty() {
+            Ok(Box::new(CheckedCurves { request: self, fitted, kept_back, files }))
+        } else {
+            Err(errors)
+        }
     }
 }
 
@@ -93,6 +120,7 @@ impl Run for CheckedCurves {
         };
         let predicted = matches_of(&used.terms(), used.bulk_kpa, &self.kept_back)
             .ok_or_else(|| fit_failed(&"the fitted material has no response in a state kept back"))?;
+        let material = used.material();
         let result = CurvesResult {
             schema: "curves/1",
             version: VERSION,
@@ -103,9 +131,13 @@ impl Run for CheckedCurves {
             chi2_per_datum: used.chi2_per_datum,
             fits: &sequence,
             kept_back: predicted,
+            material: material.as_ref().ok().cloned(),
+            is_bulk_held: used.bulk_kpa.is_some(),
+            files: &self.files,
         };
-        let text = summary::curves(&sequence, used, &result.kept_back);
+        let text = reports_in_words(&self.files) + &summary::curves(&sequence, used, &result.kept_back);
         let mut outcome = Outcome::new("curves.json", &result, text)?;
+        add_material(&mut outcome, &material, result.is_bulk_held);
         let all: Vec<(&Curve, bool)> =
             self.fitted.iter().map(|c| (c, false)).chain(self.kept_back.iter().map(|c| (c, true))).collect();
         let mut fits: Vec<&CurveFit> = vec![used];

@@ -39,6 +39,35 @@ pub fn force_sd_n() -> f64 {
     0.02
 }
 
+/// The shipped bar.
+pub(super) fn uniaxial_bar() -> Specimen {
+    shipped(Specimen::from_json(include_str!("../../geometries/uniaxial-bar.json")))
+}
+
+/// An identifier as recordings have them, for examples of requests.
+pub(super) const EXAMPLE_RECORDING: &str = "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08";
+
+/// Stretches and nominal stresses of a neo-Hookean strip of 10 kPa, for examples of requests.
+pub(super) fn example_curve() -> String {
+    let row = |stretch: f64| format!("{stretch:.2},{:.3}\n", 10.0 * (stretch - stretch.powi(-2)));
+    (0..15).fold("stretch,nominal_stress_kpa\n".into(), |text, n| text + &row(1.0 + 0.05 * f64::from(n)))
+}
+
+/// The same with times.
+pub(super) fn example_history() -> String {
+    let lines = example_curve();
+    let timed = lines.lines().enumerate().skip(1).map(|(n, line)| format!("{n},{line}\n"));
+    format!("time_s,{}\n{}", lines.lines().next().unwrap_or_default(), timed.collect::<String>())
+}
+
+/// A shipped study with its specimen and one material spelled out, as requests hold them.
+pub(super) fn spelled_out(study: &str, base: &Specimen) -> serde_json::Value {
+    let mut study: serde_json::Value = shipped(serde_json::from_str(study));
+    study["base"] = serde_json::json!(base);
+    study["materials"] = serde_json::json!([{ "name": "Ecoflex 00-20", "material": ecoflex() }]);
+    study
+}
+
 /// Yes.
 pub fn yes() -> bool {
     true

@@ -2,7 +2,7 @@
 
 use super::design_pictures::pictures;
 use super::subject::{add_drawings, check_count, unmeshable};
-use super::{Context, JobError, Outcome, Progress, Request, Run, summary};
+use super::{Context, JobError, Outcome, Progress, Request, Run, cost, summary};
 use crate::calibration::{ParameterSpread, VerifyOptions, verify_in_full};
 use crate::design::{
     Checkpoint, CheckpointError, DesignResult, MaterialVerification, SearchError, Study, Unfinished,
@@ -24,6 +24,13 @@ impl Request for Study {
     const COMMAND: &'static str = "design";
     const COLLECTION: &'static str = "designs";
     const ABOUT: &'static str = "The best specimen under the limits of a study, with the evidence.";
+
+    fn example() -> serde_json::Value {
+        super::defaults::spelled_out(
+            include_str!("../../geometries/studies/two-hole-shear.json"),
+            &super::defaults::two_hole_shear(),
+        )
+    }
 
     fn read(value: &Value) -> Result<Study, Vec<FieldError>> {
         Study::from_request(value)
@@ -61,6 +68,17 @@ impl Run for CheckedStudy {
         let base = &self.0.base;
         let fine = mesh_specimen(base, &MeshOptions::fine(base)).map_err(|e| unmeshable("/base", &e))?;
         check_count(fine.num_elements(), "/base", max_elements)
+    }
+
+    fn estimated_seconds(&self) -> Option<f64> {
+        let (study, budget) = (&self.0, self.0.budget);
+        let num_searched = budget.refine.saturating_mul(budget.iterations).saturating_add(budget.explore);
+        // Every material is a solve of its own.
+        let num_materials = study.materials.len().max(1);
+        let search = cost::seconds(&study.base, &MeshOptions::search(&study.base), None, num_materials)?;
+        let voxel_mm = Some(study.scan.voxel_mm);
+        let confirm = cost::seconds(&study.base, &MeshOptions::standard(&study.base), voxel_mm, num_materials)?;
+        Some(num_searched as f64 * search + budget.confirm as f64 * confirm)
     }
 
     fn run(&self, context: &Context) -> Result<Outcome, JobError> {

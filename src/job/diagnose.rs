@@ -107,6 +107,10 @@ impl Request for DiagnosisRequest {
     const COLLECTION: &'static str = "diagnoses";
     const ABOUT: &'static str = "Where recordings and their model differ, and what physics was left out.";
 
+    fn example() -> serde_json::Value {
+        serde_json::json!({ "recording": super::defaults::EXAMPLE_RECORDING, "material": super::defaults::ecoflex(), "max_causes": 3 })
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let mut errors = Vec::new();
         if self.recording.is_some() != self.recordings.is_empty() {
@@ -205,6 +209,7 @@ fn add_files(outcome: &mut Outcome, prefix: &str, found: &Diagnosis, result: &Di
         }
     }
     outcome.add_pictures(diagnosis_pictures(found).into_iter().map(|(name, svg)| (format!("{prefix}{name}"), svg)));
+    outcome.add(format!("{prefix}material.json"), result.material.to_json());
     outcome.add(format!("{prefix}report.html"), diagnosis_report(found, result).to_html());
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! Evaluate: what a scan of a specimen would see and what it would tell about the material.
 
 use super::subject::{add_drawings, check_mesh, driven, model_of};
-use super::{Context, JobError, Outcome, Request, Run, defaults, summary};
+use super::{Context, JobError, Outcome, Request, Run, cost, defaults, summary};
 use crate::field::FieldError;
 use crate::material::Ogden;
 use crate::mesh::MeshSize;
@@ -14,6 +14,9 @@ use utoipa::ToSchema;
 
 /// Most voxels of a scan: a voxel has several sample points, and more would not fit into a few gigabytes.
 const MAX_VOXELS: usize = 2_000_000;
+
+/// Drives that are solved, about, until one reaches a median stretch.
+const MEDIAN_STRETCH_SOLVES: usize = 6;
 
 /// Body of an evaluation.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
@@ -106,6 +109,10 @@ impl Request for EvaluationRequest {
     const COLLECTION: &'static str = "evaluations";
     const ABOUT: &'static str = "What a scan of a specimen would see, and what it would tell about the material.";
 
+    fn example() -> serde_json::Value {
+        serde_json::json!({ "specimen": defaults::two_hole_shear(), "material": defaults::ecoflex(), "drive_mm": [5.0], "mesh": "search" })
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         Ok(Box::new(self.checked()?))
     }
@@ -127,6 +134,16 @@ impl Run for CheckedEvaluation {
 
     fn check_size(&self, _: &[Specimen], max_elements: usize) -> Result<(), FieldError> {
         check_mesh(&self.request.specimen, self.request.mesh, "/mesh", max_elements)
+    }
+
+    fn estimated_seconds(&self) -> Option<f64> {
+        let num_drives = match &self.drives {
+            DriveSelection::DriveMm(drives) => drives.len(),
+            // The drive is looked for first.
+            DriveSelection::MedianStretch(_) => MEDIAN_STRETCH_SOLVES,
+        };
+        let voxel_mm = Some(self.request.scan.voxel_mm);
+        cost::seconds(&self.request.specimen, &self.options().mesh, voxel_mm, num_drives)
     }
 
     fn equal_work(&self) -> Option<(serde_json::Value, bool)> {

@@ -8,6 +8,7 @@ use super::evaluation_table::{Entry, evaluation_table};
 use super::outcome::to_json;
 use super::{Context, Failure, JobError, Outcome, Part, PartKind, Request, Run};
 use crate::field::FieldError;
+use crate::file::json_bytes;
 use crate::provenance::VERSION;
 use crate::sweep::{latin_hypercube_points, to_parquet};
 use serde::{Deserialize, Serialize};
@@ -16,6 +17,8 @@ use utoipa::ToSchema;
 
 /// Most evaluations of one list.
 const MAX_EVALUATIONS: usize = 10_000;
+/// Memory that all of them may take, bytes: a few characters, repeated ten thousand times, would take gigabytes.
+const MAX_BYTES: u64 = 256 << 20;
 /// Errors that are told at once; a list may have one in every entry.
 const MAX_ERRORS: usize = 50;
 
@@ -154,6 +157,20 @@ fn combined(fields: &[VariedField]) -> Result<Vec<Point>, FieldError> {
     Ok((0..count).map(point).collect())
 }
 
+/// Whether `count` evaluations, each the base with a value of every field, can be held in memory.
+fn check_memory(base: &Value, fields: &[VariedField], count: usize) -> Result<(), FieldError> {
+    let bytes_of = |value: &Value| json_bytes(value.to_string().as_bytes());
+    let largest = |field: &VariedField| field.values.iter().map(bytes_of).max().unwrap_or(0);
+    let each = bytes_of(base) + fields.iter().map(largest).sum::<u64>();
+    let all = each.saturating_mul(count as u64);
+    if all <= MAX_BYTES {
+        return Ok(());
+    }
+    let found = format!("{count} evaluations of {} kB of memory each", each / 1000);
+    let error = FieldError::new("/base", found, format!("at most {} MB together", MAX_BYTES / 1_000_000));
+    Err(error.remedy("try fewer points at a time, or give the base fewer drives"))
+}
+
 /// The evaluation in which `fields` have the values of `point`, and where its content stands.
 fn varied(base: &Value, fields: &[VariedField], point: Point) -> Result<(Origin, Value), FieldError> {
     let mut value = base.clone();
@@ -188,6 +205,7 @@ impl EvaluationListRequest {
                     Some(sample) => sampled(fields, sample)?,
                     None => combined(fields)?,
                 };
+                check_memory(&base, fields, points.len())?;
                 points.into_iter().map(|point| varied(&base, fields, point)).collect()
             }
             _ => Err(FieldError::new("", "neither of the two forms", "either evaluations, or base and vary")),
@@ -199,6 +217,10 @@ impl Request for EvaluationListRequest {
     const COMMAND: &'static str = "evaluate-list";
     const COLLECTION: &'static str = "sweeps";
     const ABOUT: &'static str = "Many evaluations: a list, or one that is varied; a table of what each would tell.";
+
+    fn example() -> serde_json::Value {
+        serde_json::json!({ "name": "diameters", "base": EvaluationRequest::example(), "vary": [{ "pointer": "/specimen/holes/0/diameter_mm", "values": [3.0, 4.0] }] })
+    }
 
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let mut errors = Vec::new();
@@ -227,6 +249,17 @@ struct CheckedList {
 impl Run for CheckedList {
     fn title(&self) -> String {
         self.request.name.clone().unwrap_or_else(|| "sweep".into())
+    }
+
+    /// From the first, the middle and the last evaluation: to mesh ten thousand specimens would take minutes.
+    fn estimated_seconds(&self) -> Option<f64> {
+        let count = self.evaluations.len();
+        let of = |index: usize| {
+            let request = crate::field::read::<EvaluationRequest>(&self.evaluations[index]).ok()?;
+            request.checked().ok()?.estimated_seconds()
+        };
+        let found: Vec<f64> = [0, count / 2, count.checked_sub(1)?].into_iter().filter_map(of).collect();
+        (!found.is_empty()).then(|| count as f64 * found.iter().sum::<f64>() / found.len() as f64)
     }
 
     fn parts(&self) -> Vec<Part> {

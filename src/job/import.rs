@@ -7,10 +7,11 @@ use super::{Context, JobError, Outcome, Request, Run, summary};
 use crate::acquisition::unwrap::{Method, UnwrapOptions};
 use crate::acquisition::{Anchor, ReconstructOptions, StepReport, reconstruct};
 use crate::field::FieldError;
+use crate::file::ReadingMemory;
 use crate::provenance::VERSION;
 use crate::recording::{
-    Filter, ImportOptions, LoadCurve, ReadLimits, Recording, mat, read_points, recording_from_mat,
-    recording_from_points, write_vectors,
+    Filter, GridOrigin, Image, ImportOptions, LoadCurve, NamedImage, ReadLimits, Recording, VectorFrame,
+    axes_of_affine, mat, read_points, recording_from_images, recording_from_mat, recording_from_points, write_vectors,
 };
 use crate::report::displacement_picture;
 use crate::specimen::Specimen;
@@ -49,6 +50,8 @@ pub enum FileForm {
     Matlab,
     /// Point clouds as CSV, one file per drive.
     Points,
+    /// NIfTI images with a displacement per voxel, and one with the mask.
+    Nifti,
 }
 
 /// Body of an import: a `recording` of raw phases, or `files`.
@@ -58,7 +61,7 @@ pub struct ImportRequest {
     /// A recording of raw phases.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording: Option<String>,
-    /// MATLAB files, or point clouds (one per drive), in place of a recording.
+    /// MATLAB files, point clouds (one per drive), or NIfTI images, in place of a recording.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 1000)]
     pub files: Vec<String>,
@@ -80,10 +83,24 @@ pub struct ImportRequest {
     #[serde(default)]
     #[schema(default = LengthUnit::default)]
     pub unit: LengthUnit,
-    /// Axes along the indices of MATLAB arrays, such as y,z,x or -y,z,-x.
-    #[serde(default = "axes")]
-    #[schema(max_length = 16, default = axes)]
-    pub axes: String,
+    /// Axes along the indices of MATLAB arrays and images, such as y,z,x or -y,z,-x. Displacement i of MATLAB arrays is
+    /// the one along index i. Where it is left out, y,z,x for MATLAB, and for images the axes that their affine leads
+    /// to.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(max_length = 16)]
+    pub axes: Option<String>,
+    /// Axes of the three displacement arrays of MATLAB files, such as x,y,z, where they do not follow the indices.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(max_length = 16)]
+    pub components: Option<String>,
+    /// Where the voxels of MATLAB files lie: the mask's box centred on the specimen, or as the positions X say.
+    #[serde(default)]
+    #[schema(default = GridOrigin::default)]
+    pub origin: GridOrigin,
+    /// Frame of the vectors in images; where it is left out, lps for those of the intent 1007, which ITK and ANTs write,
+    /// and ras for others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vectors: Option<VectorFrame>,
     /// Voxel size in mm: along the indices of MATLAB arrays, or x,y,z to average points in.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(min_items = 3, max_items = 3)]
@@ -118,10 +135,6 @@ pub struct ImportRequest {
     pub anchor: Anchor,
 }
 
-fn axes() -> String {
-    "y,z,x".into()
-}
-
 /// A recording, the standard deviations of its voxels, and how its phases were unwrapped.
 type Imported = (Recording, Vec<Vec<[f64; 3]>>, Vec<StepReport>);
 
@@ -148,9 +161,11 @@ impl ImportRequest {
         for error in self.specimen.iter().flat_map(Specimen::field_errors) {
             errors.push(error.below("/specimen"));
         }
-        if ImportOptions::parse_axes(&self.axes).is_none() {
-            let allowed = "x, y and z once each, such as y,z,x or -y,z,-x";
-            errors.push(FieldError::new("/axes", format!("{:?}", self.axes), allowed));
+        for (pointer, axes) in [("/axes", &self.axes), ("/components", &self.components)] {
+            if let Some(axes) = axes.as_ref().filter(|axes| ImportOptions::parse_axes(axes).is_none()) {
+                let allowed = "x, y and z once each, such as y,z,x or -y,z,-x";
+                errors.push(FieldError::new(pointer, format!("{axes:?}"), allowed));
+            }
         }
         for (name, values) in [("voxel_mm", self.voxel_mm), ("noise_sd_mm", self.noise_sd_mm)] {
             for (axis, value) in values.into_iter().flatten().enumerate() {
@@ -162,10 +177,16 @@ impl ImportRequest {
     }
 
     fn import_options(&self) -> Option<ImportOptions> {
+        let default = ImportOptions::default();
         Some(ImportOptions {
             id: self.name.clone().unwrap_or_else(|| "imported".into()),
             unit_mm: self.unit.in_mm(),
-            axes: ImportOptions::parse_axes(&self.axes)?,
+            axes: match &self.axes {
+                Some(axes) => ImportOptions::parse_axes(axes)?,
+                None => default.axes,
+            },
+            components: self.components.as_ref().and_then(|text| ImportOptions::parse_axes(text)),
+            origin: self.origin,
             voxel_mm_by_index: self.voxel_mm,
             region: self.region,
             drive_mm: self.drive_mm.clone(),
@@ -178,7 +199,11 @@ impl ImportRequest {
 impl Request for ImportRequest {
     const COMMAND: &'static str = "import";
     const COLLECTION: &'static str = "imports";
-    const ABOUT: &'static str = "Raw phases, MATLAB files or point clouds as a recording of displacements.";
+    const ABOUT: &'static str = "Raw phases, MATLAB files, point clouds or images as a recording of displacements.";
+
+    fn example() -> serde_json::Value {
+        serde_json::json!({ "recording": super::defaults::EXAMPLE_RECORDING, "filter": "hamming2" })
+    }
 
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let mut errors = Vec::new();
@@ -207,7 +232,7 @@ impl CheckedImport {
         let mut raw = context
             .raw_recordings
             .first()
-            .cloned()
+            .map(|read| read.recording.clone())
             .ok_or_else(|| JobError::Internal("the raw recording was not read".into()))?;
         if let Some(specimen) = &self.request.specimen {
             raw.specimen.clone_from(specimen);
@@ -219,7 +244,19 @@ impl CheckedImport {
         };
         let settings = ReconstructOptions { unwrap, anchor: self.request.anchor, filter: self.request.filter };
         let found = reconstruct(&raw, &settings).map_err(|e| context.failed(&e))?;
+        let named = || FieldError::new("/recording", &raw.id, "phases that move the plates as the drive says");
+        found.recording.check_plate_motion().map_err(|e| named().remedy(e.to_string()))?;
         Ok((found.recording, found.sd_mm, found.steps))
+    }
+
+    fn read_images(&self, files: &[PathBuf], memory: &ReadingMemory) -> Result<Vec<NamedImage>, JobError> {
+        let read = |(index, path): (usize, &PathBuf)| {
+            let fail = |e: &dyn std::fmt::Display| unfit(&format!("/files/{index}"), path, e);
+            let file = crate::file::open_regular(path).map_err(|e| fail(&e))?;
+            let image = Image::read_any_unit(file, memory).map_err(|e| fail(&e))?;
+            Ok(NamedImage { path: path.clone(), image })
+        };
+        files.iter().enumerate().map(read).collect()
     }
 
     fn read_files(&self, files: &[PathBuf]) -> Result<Recording, JobError> {
@@ -227,29 +264,42 @@ impl CheckedImport {
         let specimen = self.request.specimen.as_ref().ok_or_else(missing)?;
         let options = self.request.import_options().ok_or_else(missing)?;
         let limits = ReadLimits::default();
+        let memory = limits.memory.begin();
         let first = files.first().ok_or_else(missing)?;
         match self.request.form.ok_or_else(missing)? {
             FileForm::Matlab => {
                 // Positions and masks may lie in files of their own.
                 let mut variables = Vec::new();
                 for (index, path) in files.iter().enumerate() {
-                    let found = mat::read_mat(path, limits.max_values)
-                        .map_err(|e| unfit(&format!("/files/{index}"), path, &e))?;
+                    let found =
+                        mat::read_mat(path, &memory).map_err(|e| unfit(&format!("/files/{index}"), path, &e))?;
                     variables.extend(found);
                 }
-                recording_from_mat(&variables, specimen, &options).map_err(|e| unfit("/files", first, &e))
+                recording_from_mat(&variables, specimen, &options, &memory).map_err(|e| unfit("/files", first, &e))
+            }
+            FileForm::Nifti => {
+                let images = self.read_images(files, &memory)?;
+                let unfit = |e: &dyn std::fmt::Display| unfit("/files", first, e);
+                let axes = match (&self.request.axes, images.first()) {
+                    (None, Some(image)) => axes_of_affine(image).map_err(|e| unfit(&e))?,
+                    _ => options.axes,
+                };
+                let options = ImportOptions { axes, ..options };
+                recording_from_images(&images, specimen, self.request.vectors, &options, &memory).map_err(|e| unfit(&e))
             }
             FileForm::Points => {
-                let max_points = usize::try_from(limits.max_values / 8).unwrap_or(usize::MAX);
                 let mut steps = Vec::new();
                 for (index, path) in files.iter().enumerate() {
                     let fail = |e: &dyn std::fmt::Display| unfit(&format!("/files/{index}"), path, e);
-                    let bytes = crate::file::read_limited(path, limits.max_file_bytes).map_err(|e| fail(&e))?;
-                    let text = String::from_utf8(bytes).map_err(|e| fail(&e))?;
-                    steps.push(read_points(&text, path, max_points).map_err(|e| fail(&e))?);
+                    let num_bytes = std::fs::metadata(path).map_err(|e| fail(&e))?.len();
+                    memory.take("a table of points", num_bytes).map_err(|e| fail(&e))?;
+                    let text = crate::file::read_text_limited(path, num_bytes).map_err(|e| fail(&e))?;
+                    steps.push(read_points(&text, path, &memory).map_err(|e| fail(&e))?);
+                    memory.give_back(num_bytes);
                 }
                 let voxel = options.voxel_mm_by_index;
-                recording_from_points(&steps, specimen, voxel, &options).map_err(|e| unfit("/files", first, &e))
+                recording_from_points(&steps, specimen, voxel, &options, &memory)
+                    .map_err(|e| unfit("/files", first, &e))
             }
         }
     }

@@ -4,7 +4,7 @@ use super::part::Part;
 use super::request::{Context, InputForm, InputUse, Request, Run};
 use super::schema::{RequestField, RequestSchema};
 use super::{Failure, JobError, Outcome, Surroundings};
-use crate::field::FieldError;
+use crate::field::{FieldError, printable};
 use crate::provenance::{VERSION, input_hash};
 use crate::specimen::Specimen;
 use serde_json::{Value, json};
@@ -28,6 +28,7 @@ pub struct Kind {
     components: fn() -> Vec<(String, RefOr<Schema>)>,
     schema_name: fn() -> Cow<'static, str>,
     checked: fn(&Value) -> Result<Checked, Vec<FieldError>>,
+    example: fn() -> Value,
     cell: OnceLock<RequestSchema>,
 }
 
@@ -57,6 +58,7 @@ impl Kind {
             components: components::<R>,
             schema_name: R::name,
             checked: checked::<R>,
+            example: R::example,
             cell: OnceLock::new(),
         }
     }
@@ -73,6 +75,11 @@ impl Kind {
     /// The schemas of its requests and of everything that they refer to, by name.
     pub fn schemas(&self) -> Vec<(String, RefOr<Schema>)> {
         (self.components)()
+    }
+
+    /// A request that shows what they are like.
+    pub fn example(&self) -> Value {
+        (self.example)()
     }
 
     /// The fields of its requests.
@@ -120,7 +127,7 @@ pub struct Job {
 impl Job {
     /// What the job is called in lists: at most 200 printable characters.
     pub fn title(&self) -> String {
-        self.run.title().chars().filter(|c| !c.is_control()).take(200).collect()
+        printable(&self.run.title(), 200)
     }
 
     /// What it reads beyond the request.
@@ -142,6 +149,11 @@ impl Job {
     /// The field that decides, with the number of elements.
     pub fn check_size(&self, specimens: &[Specimen], max_elements: usize) -> Result<(), FieldError> {
         self.run.check_size(specimens, max_elements)
+    }
+
+    /// About how many processor seconds it takes, where that can be told before it runs.
+    pub fn estimated_seconds(&self) -> Option<f64> {
+        self.run.estimated_seconds()
     }
 
     /// The parts into which the work divides; empty for work that does not divide.
@@ -180,8 +192,9 @@ impl Job {
                 }
                 InputForm::RawPhases => {
                     let read = surroundings.raw_recording(&wanted.name)?;
-                    raw_recordings.push(read.recording);
-                    read.digest
+                    let digest = read.digest.clone();
+                    raw_recordings.push(read);
+                    digest
                 }
                 InputForm::File => {
                     let found = surroundings.file(&wanted.name)?;

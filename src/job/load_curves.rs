@@ -1,6 +1,6 @@
 //! Load curves: what an elastic material leaves out of load curves of homogeneous tests, without a recording.
 
-use super::curve_files::{CurveColumns, TestCurve, needs_stress_and_stretch, unfit};
+use super::curve_files::{CurveColumns, TestCurve, add_material, needs_stress_and_stretch, unfit};
 use super::{Context, JobError, Outcome, Request, Run, summary};
 use crate::field::FieldError;
 use crate::provenance::VERSION;
@@ -62,6 +62,10 @@ impl Request for LoadCurvesRequest {
     const COLLECTION: &'static str = "load-curve-diagnoses";
     const ABOUT: &'static str = "What an elastic material leaves out of load curves of homogeneous tests.";
 
+    fn example() -> serde_json::Value {
+        serde_json::json!({ "curves": [{ "test": "uniaxial", "name": "pull", "csv": super::defaults::example_history() }] })
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let (mut curves, mut errors) = (Vec::new(), Vec::new());
         for (index, entry) in self.curves.iter().enumerate() {
@@ -86,6 +90,7 @@ impl Run for CheckedLoadCurves {
             .map_err(|e| context.failed(&e))?;
         let result = LoadCurvesResult { verdict: &verdict, version: VERSION, input_hash: &context.input_hash };
         let mut outcome = Outcome::new("diagnosis.json", &result, summary::load_curves(&verdict))?;
+        add_material(&mut outcome, &verdict.material.material(), false);
         outcome.add_pictures(load_curve_pictures(&verdict));
         Ok(outcome)
     }

@@ -27,6 +27,8 @@ pub enum MediaType {
     Dxf,
     /// STL solid.
     Stl,
+    /// Plain text.
+    Text,
     /// Markdown.
     Markdown,
     /// XML.
@@ -48,6 +50,7 @@ impl MediaType {
             MediaType::Vtu | MediaType::Xml => "application/xml",
             MediaType::Dxf => "image/vnd.dxf",
             MediaType::Stl => "model/stl",
+            MediaType::Text => "text/plain",
             MediaType::Markdown => "text/markdown",
             MediaType::Binary => "application/octet-stream",
         }
@@ -63,9 +66,10 @@ impl MediaType {
             Some("parquet") => MediaType::Parquet,
             Some("gz") => MediaType::Nifti,
             Some("vtu") => MediaType::Vtu,
-            Some("xml") => MediaType::Xml,
+            Some("xml" | "feb" | "pvd") => MediaType::Xml,
             Some("dxf") => MediaType::Dxf,
             Some("stl") => MediaType::Stl,
+            Some("inp" | "txt") => MediaType::Text,
             Some("md") => MediaType::Markdown,
             _ => MediaType::Binary,
         }
@@ -170,13 +174,22 @@ impl Outcome {
 
 /// Identifier of a recording: SHA-256 of its files' names and contents, hexadecimal.
 pub fn recording_identifier(files: &BTreeMap<String, Vec<u8>>) -> String {
-    let hex = |hash: Sha256| hash.finalize().iter().map(|b| format!("{b:02x}")).collect::<String>();
+    let digests: Vec<String> = files.values().map(|bytes| hex(Sha256::new_with_prefix(bytes))).collect();
+    let contents = files.iter().zip(&digests).map(|((name, b), sha)| (name.as_str(), b.len() as u64, sha.as_str()));
+    identifier_of_contents(contents)
+}
+
+/// The identifier of a recording from name, length and SHA-256 (hexadecimal) of its files, in the order of their names.
+pub fn identifier_of_contents<'a>(files: impl Iterator<Item = (&'a str, u64, &'a str)>) -> String {
     let mut all = Sha256::new();
-    for (name, bytes) in files {
-        let content = hex(Sha256::new_with_prefix(bytes));
-        all.update(format!("{name}\n{}\n{content}\n", bytes.len()).as_bytes());
+    for (name, length, sha) in files {
+        all.update(format!("{name}\n{length}\n{sha}\n").as_bytes());
     }
     hex(all)
+}
+
+fn hex(hash: Sha256) -> String {
+    hash.finalize().iter().map(|b| format!("{b:02x}")).collect()
 }
 
 /// JSON, indented, with a final line break.

@@ -78,6 +78,10 @@ impl Request for PaperTablesRequest {
     const COLLECTION: &'static str = "paper-tables";
     const ABOUT: &'static str = "Tables like the paper's on synthetic stand-ins of its experiments.";
 
+    fn example() -> serde_json::Value {
+        serde_json::json!({ "mesh_factor": 5.0 })
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let errors = self.scan().field_errors();
         if errors.is_empty() { Ok(Box::new(self)) } else { Err(errors) }

@@ -90,6 +90,10 @@ impl Request for ProofRequest {
     const COLLECTION: &'static str = "proofs";
     const ABOUT: &'static str = "Conceal causes in synthetic recordings and score the diagnosis on them.";
 
+    fn example() -> serde_json::Value {
+        serde_json::json!({ "per_cause": 1, "unknown": 0, "controls": 1, "mesh_factor": 4.0 })
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let (mut only, mut errors) = (Vec::new(), Vec::new());
         for (index, name) in self.only.iter().enumerate() {

@@ -39,6 +39,9 @@ fn value_in_words(field: &RequestField) -> String {
         FieldForm::Boolean => "true or false".into(),
         FieldForm::Text => "text".into(),
         FieldForm::Choice(words) => words.iter().map(|w| format!("`{w}`")).collect::<Vec<_>>().join(", "),
+        FieldForm::Choices(words) => {
+            format!("list of {}", words.iter().map(|w| format!("`{w}`")).collect::<Vec<_>>().join(", "))
+        }
         FieldForm::Tuple(count) => format!("{count} numbers"),
         FieldForm::Numbers => "list of numbers".into(),
         FieldForm::Texts => "list of texts".into(),
@@ -55,6 +58,15 @@ fn cell(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    #[test]
+    fn every_example_is_a_request_that_can_be_run() {
+        for kind in &super::KINDS {
+            let example = kind.example();
+            let found = kind.job(&example);
+            assert!(found.is_ok(), "{}: {:?}", kind.command, found.err());
+        }
+    }
+
     #[test]
     fn the_page_is_current() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/requests.md");

@@ -4,7 +4,7 @@ use super::kind::Kind;
 use super::part::PartKind;
 
 /// The kinds that this program runs.
-pub static KINDS: [Kind; 15] = [
+pub static KINDS: [Kind; 17] = [
     Kind::of::<super::solve::SolveRequest>(),
     Kind::of::<super::evaluate::EvaluationRequest>(),
     Kind::of::<super::evaluation_list::EvaluationListRequest>(),
@@ -15,6 +15,8 @@ pub static KINDS: [Kind; 15] = [
     Kind::of::<super::load_curves::LoadCurvesRequest>(),
     Kind::of::<super::curves::CurvesRequest>(),
     Kind::of::<super::uniaxial::UniaxialRequest>(),
+    Kind::of::<super::export_material::ExportMaterialRequest>(),
+    Kind::of::<super::export_model::ExportModelRequest>(),
     Kind::of::<crate::design::Study>(),
     Kind::of::<crate::sweep::SweepStudy>(),
     Kind::of::<super::compare::CompareRequest>(),

@@ -22,6 +22,9 @@ pub trait Request: Serialize + DeserializeOwned + ToSchema + Send + Sync + 'stat
     /// What it does, in one sentence.
     const ABOUT: &'static str;
 
+    /// A request that shows what it is like, for the document of the service.
+    fn example() -> Value;
+
     /// The request in `value`, whose fields fit the schema.
     ///
     /// # Errors
@@ -89,6 +92,11 @@ pub trait Run: Send + Sync {
         Ok(())
     }
 
+    /// About how many processor seconds it takes, where that can be told before it runs. Meshes once.
+    fn estimated_seconds(&self) -> Option<f64> {
+        None
+    }
+
     /// What decides the result, where other requests may have the same: its content, and whether the result is numbers
     /// alone (which those of a request with files answer too). `None` where the request itself is that content.
     fn equal_work(&self) -> Option<(Value, bool)> {
@@ -124,7 +132,7 @@ pub struct Context<'a> {
     /// The recordings of displacements that the request names, in its order.
     pub recordings: Vec<ReadRecording>,
     /// The raw recordings that the request names, in its order.
-    pub raw_recordings: Vec<RawRecording>,
+    pub raw_recordings: Vec<ReadRecording<RawRecording>>,
     /// The files that the request names, in its order.
     pub files: Vec<PathBuf>,
 }

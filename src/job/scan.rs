@@ -180,6 +180,10 @@ impl Request for ScanRequest {
     const ABOUT: &'static str =
         "A synthetic MR-u recording of a specimen: phases with noise, unwrapped, and the loading history.";
 
+    fn example() -> serde_json::Value {
+        serde_json::json!({ "specimen": defaults::two_hole_shear(), "material": defaults::ecoflex(), "snr": [20.0, 20.0, 20.0], "seed": 7 })
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let mut errors = Vec::new();
         let specimen = driven(&self.specimen, self.drive_mm.as_ref(), &mut errors);

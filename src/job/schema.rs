@@ -28,6 +28,8 @@ pub enum FieldForm {
     Text,
     /// One of these words.
     Choice(Vec<String>),
+    /// A list of these words.
+    Choices(Vec<String>),
     /// This many numbers.
     Tuple(u64),
     /// A list of numbers.
@@ -181,7 +183,7 @@ impl RequestSchema {
             let name_of_field = format!("{prefix}{name}");
             fields.push(RequestField {
                 about: text(property).or_else(|| text(inner)).unwrap_or_default(),
-                form: form_of(inner),
+                form: self.form_of(inner),
                 default: property.get("default").or_else(|| inner.get("default")).cloned(),
                 range: range_in_words(inner),
                 is_required: required.contains(&name.as_str()),
@@ -191,6 +193,10 @@ impl RequestSchema {
                 self.collect_fields(&format!("{name_of_field}/"), inner, fields);
             }
         }
+    }
+
+    fn form_of(&self, schema: &Value) -> FieldForm {
+        form_of(schema, schema.get("items").map(|items| self.resolved(items)))
     }
 
     /// The schema of a value that is there, of a field that may be null.
@@ -294,11 +300,20 @@ fn short(limit: f64) -> String {
     if is_plain { limit.to_string() } else { format!("{limit:e}") }
 }
 
-fn form_of(schema: &Value) -> FieldForm {
-    if let Some(words) = schema.get("enum").and_then(Value::as_array) {
-        return FieldForm::Choice(words.iter().filter_map(Value::as_str).map(String::from).collect());
+/// The words of a schema that allows some words alone.
+fn words_of(schema: &Value) -> Option<Vec<String>> {
+    let words = schema.get("enum").and_then(Value::as_array)?;
+    Some(words.iter().filter_map(Value::as_str).map(String::from).collect())
+}
+
+/// The form of a field; `items` is the schema of a list's entries.
+fn form_of(schema: &Value, items: Option<&Value>) -> FieldForm {
+    if let Some(words) = words_of(schema) {
+        return FieldForm::Choice(words);
     }
-    let items = schema.get("items");
+    if let Some(words) = items.and_then(words_of) {
+        return FieldForm::Choices(words);
+    }
     let is_text = |s: &Value| type_names(s).is_some_and(|t| t.contains(&"string"));
     let is_number = |s: &Value| type_names(s).is_some_and(|t| t.contains(&"number") || t.contains(&"integer"));
     match type_names(schema).and_then(|t| t.into_iter().find(|t| *t != "null")) {

@@ -1,16 +1,30 @@
 //! Solve: forces and fields of a specimen at its drives.
 
 use super::subject::{check_mesh, driven, model_of};
-use super::{Context, JobError, Outcome, Request, Run, defaults, summary};
+use super::{Context, JobError, Outcome, Request, Run, cost, defaults, summary};
 use crate::fem::{Equilibrium, QuadraturePoint, SolveOptions, SolveResult};
 use crate::field::FieldError;
 use crate::kinematics::decompose;
 use crate::material::Ogden;
 use crate::mesh::MeshSize;
-use crate::report::{deformed_picture, vtu_of};
+use crate::report::{deformed_picture, pvd, vtu_of};
 use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
+
+/// Most drives whose fields are written: with the standard mesh of a block some megabytes each.
+const MAX_FIELD_DRIVES: usize = 100;
+
+/// At which drives the fields are written for ParaView.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FieldDrives {
+    /// At every drive, as a series.
+    #[default]
+    Every,
+    /// At the last drive.
+    Last,
+}
 
 /// Body of a forward solution.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
@@ -32,6 +46,10 @@ pub struct SolveRequest {
     /// Mesh the whole specimen even where it has mirror planes.
     #[serde(default)]
     pub is_whole: bool,
+    /// Drives at which the fields are written: every one (at most 100), or the last.
+    #[serde(default)]
+    #[schema(default = FieldDrives::default)]
+    pub fields: FieldDrives,
 }
 
 struct CheckedSolve {
@@ -45,10 +63,20 @@ impl Request for SolveRequest {
     const COLLECTION: &'static str = "solves";
     const ABOUT: &'static str = "Forces and fields of a specimen at its drives, by finite elements.";
 
+    fn example() -> serde_json::Value {
+        serde_json::json!({ "specimen": defaults::two_hole_shear(), "drive_mm": [2.0], "mesh": "search" })
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let mut errors = Vec::new();
         let specimen = driven(&self.specimen, self.drive_mm.as_ref(), &mut errors);
         errors.extend(self.material.field_errors().into_iter().map(|e| e.below("/material")));
+        let count = specimen.drive_mm.len();
+        if self.fields == FieldDrives::Every && count > MAX_FIELD_DRIVES {
+            let allowed = format!("last for more than {MAX_FIELD_DRIVES} drives");
+            let error = FieldError::new("/fields", format!("every, and there are {count} drives"), allowed);
+            errors.push(error.remedy("ask for the fields of the last drive, or for fewer drives"));
+        }
         if errors.is_empty() { Ok(Box::new(CheckedSolve { request: self, specimen })) } else { Err(errors) }
     }
 }
@@ -62,6 +90,12 @@ impl Run for CheckedSolve {
         check_mesh(&self.specimen, self.request.mesh, "/mesh", max_elements)
     }
 
+    fn estimated_seconds(&self) -> Option<f64> {
+        let mut mesh = self.request.mesh.options(&self.specimen);
+        mesh.use_mirror &= !self.request.is_whole;
+        cost::seconds(&self.specimen, &mesh, None, self.specimen.drive_mm.len())
+    }
+
     fn run(&self, context: &Context) -> Result<Outcome, JobError> {
         let (specimen, material) = (&self.specimen, &self.request.material);
         let mut options = self.request.mesh.options(specimen);
@@ -69,19 +103,28 @@ impl Run for CheckedSolve {
         let mut model = model_of(specimen, &options, context)?;
         let mut result = SolveResult::new(&model, context.input_hash.clone());
         let mut last: Option<Equilibrium> = None;
+        let (mut fields_of_drives, num_drives) = (Vec::new(), specimen.drive_mm.len());
         for (index, &drive) in specimen.drive_mm.iter().enumerate() {
-            context.step(&format!("solving drive {drive} mm"), index, specimen.drive_mm.len());
+            context.step(&format!("solving drive {drive} mm"), index, num_drives);
             let found = model
                 .solve(material, drive, last.as_ref(), &SolveOptions::default(), &|| context.is_cancelled())
                 .map_err(|e| context.failed(&e))?;
             let fields = model.quadrature_fields(material, &found);
             result.push(&found, extremes(&fields), model.statistics());
+            if self.request.fields == FieldDrives::Every || index + 1 == num_drives {
+                let vtu = vtu_of(&model, material, &found).map_err(|e| context.failed(&e))?;
+                fields_of_drives.push((drive, format!("solution_{}.vtu", index + 1), vtu));
+            }
             last = Some(found);
         }
         let mut outcome = Outcome::new("solve.json", &result, summary::solve(&specimen.name, &result))?;
         if let Some(state) = &last {
-            outcome.add("solution.vtu", vtu_of(&model, material, state).map_err(|e| context.failed(&e))?);
             outcome.add("deformed.svg", deformed_picture(&model, material, state).map_err(|e| context.failed(&e))?);
+        }
+        let series: Vec<(f64, String)> = fields_of_drives.iter().map(|(d, name, _)| (*d, name.clone())).collect();
+        outcome.add("solution.pvd", pvd(&series));
+        for (_, name, vtu) in fields_of_drives {
+            outcome.add(name, vtu);
         }
         Ok(outcome)
     }

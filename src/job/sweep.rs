@@ -14,6 +14,13 @@ impl Request for SweepStudy {
     const COLLECTION: &'static str = "sweep-studies";
     const ABOUT: &'static str = "Many designs evaluated: a table of what each would tell.";
 
+    fn example() -> serde_json::Value {
+        super::defaults::spelled_out(
+            include_str!("../../geometries/sweeps/bar-grid.json"),
+            &super::defaults::uniaxial_bar(),
+        )
+    }
+
     fn read(value: &Value) -> Result<SweepStudy, Vec<FieldError>> {
         SweepStudy::from_request(value)
     }

@@ -29,6 +29,10 @@ impl Request for SweepTaskRequest {
     const COLLECTION: &'static str = "sweep-tasks";
     const ABOUT: &'static str = "One task of a sweep.";
 
+    fn example() -> serde_json::Value {
+        serde_json::json!({ "specimen": super::defaults::two_hole_shear(), "material": super::defaults::ecoflex(), "scan": super::defaults::scan(), "mesh": "search" })
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         Ok(Box::new(self))
     }

@@ -1,12 +1,15 @@
 //! Uniaxial: the traditional route, one curve of a strip or a dumb-bell fitted with Ogden terms.
 
-use super::curve_files::{CurveColumns, CurveFitSettings, fit_failed, unfit};
+use super::curve_files::{
+    CurveColumns, CurveFitSettings, CurveReport, add_material, fit_failed, reports_in_words, unfit,
+};
 use super::{Context, JobError, Outcome, Progress, Request, Run, defaults, summary};
 use crate::field::FieldError;
 use crate::homogeneous::{
     CsvCurve, Curve, CurveFit, CurveFitSequence, CurveParameter, DumbbellFit, DumbbellOptions, HomogeneousTest,
     Interval, fit_curves, fit_dumbbell,
 };
+use crate::material::Ogden;
 use crate::mesh::MeshSize;
 use crate::provenance::VERSION;
 use crate::report::fit_picture;
@@ -61,11 +64,18 @@ struct UniaxialResult<'a> {
     chi2_per_datum: f64,
     fits: &'a [CurveFitSequence],
     conversion: Option<&'a DumbbellFit>,
+    /// The chosen fit as `ogden/1`; none where its parameters are beyond what a material may hold.
+    material: Option<Ogden>,
+    /// Whether the material's bulk modulus was held in the fit; else it only stands for the incompressible limit.
+    is_bulk_held: bool,
+    /// What was read of the file.
+    files: [&'a CurveReport; 1],
 }
 
 struct CheckedUniaxial {
     request: UniaxialRequest,
     csv: CsvCurve,
+    file: CurveReport,
 }
 
 /// The fits of both families (free terms; a neo-Hookean term held), their curve, and what converted the grips.
@@ -81,6 +91,10 @@ impl Request for UniaxialRequest {
     const ABOUT: &'static str =
         "The traditional route: one uniaxial curve, of a strip or a dumb-bell, fitted with Ogden terms.";
 
+    fn example() -> serde_json::Value {
+        serde_json::json!({ "csv": super::defaults::example_curve(), "fit": { "max_terms": 1 } })
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let mut errors: Vec<FieldError> =
             self.specimen.field_errors().into_iter().map(|e| e.below("/specimen")).collect();
@@ -92,7 +106,10 @@ impl Request for UniaxialRequest {
             Ok(csv) if csv.is_force && !csv.is_displacement => {
                 errors.push(unfit("/csv", &"the stress is a force; give area_mm2, or a column of nominal stress"));
             }
-            Ok(csv) if errors.is_empty() => return Ok(Box::new(CheckedUniaxial { request: self, csv })),
+            Ok(mut csv) if errors.is_empty() => {
+                let file = self.fit.elastic_rows(self.name.as_deref().unwrap_or("uniaxial"), &mut csv);
+                return Ok(Box::new(CheckedUniaxial { request: self, csv, file }));
+            }
             Ok(_) => {}
             Err(error) => errors.push(error),
         }
@@ -144,6 +161,7 @@ impl Run for CheckedUniaxial {
         let Fits { families, curve, conversion } =
             if self.csv.is_displacement { self.of_dumbbell(context)? } else { self.of_strip()? };
         let chosen = families[0].chosen();
+        let material = chosen.material();
         let result = UniaxialResult {
             schema: "uniaxial/1",
             version: VERSION,
@@ -154,9 +172,14 @@ impl Run for CheckedUniaxial {
             chi2_per_datum: chosen.chi2_per_datum,
             fits: &families,
             conversion: conversion.as_ref(),
+            material: material.as_ref().ok().cloned(),
+            is_bulk_held: chosen.bulk_kpa.is_some(),
+            files: [&self.file],
         };
-        let text = summary::uniaxial(&self.title(), &families, conversion.as_ref());
+        let text = reports_in_words(std::slice::from_ref(&self.file))
+            + &summary::uniaxial(&self.title(), &families, conversion.as_ref());
         let mut outcome = Outcome::new("uniaxial.json", &result, text)?;
+        add_material(&mut outcome, &material, result.is_bulk_held);
         for (family, name) in families.iter().zip(["fits", "fits-neo-hookean"]) {
             let mut fits: Vec<&CurveFit> = vec![family.chosen()];
             fits.extend(family.fits.iter().filter(|f| f.num_terms != family.chosen().num_terms));

@@ -71,6 +71,24 @@ impl Parameter {
 }
 
 impl Ogden {
+    /// A valid material of a bulk modulus (kPa) and terms (μ in kPa, α).
+    ///
+    /// ```
+    /// use lambdak::material::Ogden;
+    /// let material = Ogden::new(2173.0, [(17.0, 1.91)])?;
+    /// assert_eq!(material.terms[0].alpha, 1.91);
+    /// assert!(Ogden::new(-1.0, [(17.0, 1.91)]).is_err());
+    /// # Ok::<(), lambdak::material::MaterialError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Ogden::validate`].
+    pub fn new(bulk_kpa: f64, terms: impl IntoIterator<Item = (f64, f64)>) -> Result<Ogden, MaterialError> {
+        let terms = terms.into_iter().map(|(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha }).collect();
+        let material = Ogden { bulk_kpa, terms };
+        material.validate().map(|()| material)
+    }
+
     /// κ, μ₁, α₁, μ₂, α₂, …
     pub fn parameters(&self) -> Vec<Parameter> {
         let mut all = vec![Parameter::Kappa];

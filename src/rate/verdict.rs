@@ -1,6 +1,7 @@
 //! What an analysis of load curves says.
 
-use crate::homogeneous::{CurveMatch, Interval};
+use crate::homogeneous::{CurveMatch, Interval, ShearTerm, fitted_material};
+use crate::material::{MaterialError, Ogden};
 use serde::{Deserialize, Serialize};
 
 /// How the search for what a model leaves out ended, be it of load curves or of a whole recording.
@@ -130,6 +131,17 @@ pub struct CurveMaterial {
     pub parameters: Vec<CauseParameter>,
     /// ½ Σ μα, kPa.
     pub initial_shear_modulus_kpa: Interval,
+}
+
+impl CurveMaterial {
+    /// The estimate as a material ([`fitted_material`]).
+    ///
+    /// # Errors
+    /// As [`fitted_material`].
+    pub fn material(&self) -> Result<Ogden, MaterialError> {
+        let term = |p: &[CauseParameter]| ShearTerm { modulus_kpa: p[0].value * p[1].value, alpha: p[1].value };
+        fitted_material(&self.parameters.chunks_exact(2).map(term).collect::<Vec<_>>(), None)
+    }
 }
 
 /// A number without and with the named causes.

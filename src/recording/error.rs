@@ -1,9 +1,23 @@
 //! Why a recording was not read or written.
 
 use super::nifti::NiftiError;
+use super::plate_fault::PlateFault;
+use crate::file::MemoryError;
 use crate::specimen::SpecimenError;
 use crate::voxel::VoxelError;
 use std::path::PathBuf;
+
+impl RecordingError {
+    /// The refusal of memory, where that is what ended the reading.
+    pub fn memory(&self) -> Option<&MemoryError> {
+        match self {
+            RecordingError::Memory(error) | RecordingError::Image { source: NiftiError::Memory(error), .. } => {
+                Some(error)
+            }
+            _ => None,
+        }
+    }
+}
 
 /// Why a recording was not read or written.
 #[derive(Debug, thiserror::Error)]
@@ -25,6 +39,9 @@ pub enum RecordingError {
         /// Most bytes.
         limit: u64,
     },
+    /// It would take more memory than reading may.
+    #[error(transparent)]
+    Memory(#[from] MemoryError),
     /// A path does not lead to a file but to a folder, a pipe or a device.
     #[error("{}: {}", path.display(), crate::file::ReadError::NotRegular)]
     NotRegular {
@@ -84,6 +101,48 @@ pub enum RecordingError {
         value: f64,
         /// What it must be.
         requirement: &'static str,
+    },
+    /// The plates do not move as the drive says.
+    #[error(
+        "step {step}: the driven plate moves by {found_mm:.4?} mm (x, y, z) against the other one, the drive is {drive_mm} mm; {fault}"
+    )]
+    PlateMotion {
+        /// Which step, from 1.
+        step: usize,
+        /// Its drive, mm.
+        drive_mm: f64,
+        /// Motion found, mm.
+        found_mm: [f64; 3],
+        /// What it looks like.
+        fault: PlateFault,
+    },
+    /// The voxel in `recording.json` is not that of the images.
+    #[error(
+        "recording.json: acquisition.voxel_mm is {stated_mm:?}, the images' affine has voxels of {found_mm:.4?} mm; correct the one that is wrong"
+    )]
+    VoxelMismatch {
+        /// In `recording.json`, mm.
+        stated_mm: [f64; 3],
+        /// In the mask's affine, mm.
+        found_mm: [f64; 3],
+    },
+    /// A drive is no drive of the specimen.
+    #[error(
+        "steps[{step}].drive_mm is {drive_mm}; it must be above 0 and at most {limit_mm:.4} mm, the largest that is supported for this specimen"
+    )]
+    Drive {
+        /// Which step, from 0 as in `recording.json`.
+        step: usize,
+        /// Its drive, mm.
+        drive_mm: f64,
+        /// Largest, mm.
+        limit_mm: f64,
+    },
+    /// A step holds displacements and raw phases.
+    #[error("steps[{step}] has displacement and raw; give the one that was recorded, or make two recordings")]
+    TwoKinds {
+        /// Which step, from 0 as in `recording.json`.
+        step: usize,
     },
     /// A load curve cannot be read.
     #[error("{}: line {line}: {message}", path.display())]

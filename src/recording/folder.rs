@@ -2,16 +2,20 @@
 
 use super::nifti::Image;
 use super::{ReadLimits, RecordingError};
-use crate::file::{ReadError, open_regular};
+use crate::file::{ReadError, ReadingMemory, json_bytes, open_regular};
 use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::io::{self, BufReader, Read, Take};
 use std::path::{Path, PathBuf};
 
+/// Texts are read in pieces of so many bytes.
+const TEXT_PIECE: u64 = 1 << 18;
+
 /// Reads files of one folder, in whatever order they are asked for; the digest depends on that order.
 pub(super) struct FolderReader<'a> {
     folder: PathBuf,
     limits: &'a ReadLimits,
+    memory: ReadingMemory,
     digest: Sha256,
 }
 
@@ -34,7 +38,7 @@ impl Read for HashedFile {
 impl<'a> FolderReader<'a> {
     /// A reader of files in `folder`; nothing is read yet.
     pub(super) fn new(folder: &Path, limits: &'a ReadLimits) -> Self {
-        FolderReader { folder: folder.into(), limits, digest: Sha256::new() }
+        FolderReader { folder: folder.into(), limits, memory: limits.memory.begin(), digest: Sha256::new() }
     }
 
     /// The path of a file, whose name is a plain one.
@@ -46,16 +50,38 @@ impl<'a> FolderReader<'a> {
         if is_plain { Ok(self.folder.join(name)) } else { Err(RecordingError::FileName { name: name.into() }) }
     }
 
-    /// The text of a file.
+    /// The memory of everything that is read from the folder.
+    pub(super) fn memory(&self) -> &ReadingMemory {
+        &self.memory
+    }
+
+    /// The text of a file. Its memory is taken piece by piece and kept taken.
     ///
     /// # Errors
     /// [`RecordingError`].
     pub(super) fn text(&mut self, name: &str) -> Result<String, RecordingError> {
-        self.read(name, |path, file| {
-            let mut text = String::new();
-            file.read_to_string(&mut text).map_err(|source| RecordingError::File { path: path.into(), source })?;
-            Ok(text)
+        self.read(name, |path, file, memory| {
+            let fail = |source| RecordingError::File { path: path.into(), source };
+            let mut bytes = Vec::new();
+            loop {
+                // A list that grows holds its old place beside the new one.
+                memory.take("a text file", 3 * TEXT_PIECE)?;
+                if (file.by_ref().take(TEXT_PIECE).read_to_end(&mut bytes).map_err(fail)? as u64) < TEXT_PIECE {
+                    break;
+                }
+            }
+            String::from_utf8(bytes).map_err(|e| fail(io::Error::new(io::ErrorKind::InvalidData, e.utf8_error())))
         })
+    }
+
+    /// The text of a JSON file whose values fit in the reading's memory.
+    ///
+    /// # Errors
+    /// [`RecordingError`].
+    pub(super) fn json_text(&mut self, name: &str) -> Result<String, RecordingError> {
+        let text = self.text(name)?;
+        self.memory.take("a JSON file", json_bytes(text.as_bytes()))?;
+        Ok(text)
     }
 
     /// An image.
@@ -63,16 +89,15 @@ impl<'a> FolderReader<'a> {
     /// # Errors
     /// [`RecordingError`].
     pub(super) fn image(&mut self, name: &str) -> Result<Image, RecordingError> {
-        let max_values = self.limits.max_values;
-        self.read(name, |path, file| {
-            Image::read(file, max_values).map_err(|source| RecordingError::Image { path: path.into(), source })
+        self.read(name, |path, file, memory| {
+            Image::read(file, memory).map_err(|source| RecordingError::Image { path: path.into(), source })
         })
     }
 
     fn read<T>(
         &mut self,
         name: &str,
-        parse: impl FnOnce(&Path, &mut HashedFile) -> Result<T, RecordingError>,
+        parse: impl FnOnce(&Path, &mut HashedFile, &ReadingMemory) -> Result<T, RecordingError>,
     ) -> Result<T, RecordingError> {
         let path = self.path(name)?;
         let fail = |source| RecordingError::File { path: path.clone(), source };
@@ -83,7 +108,7 @@ impl<'a> FolderReader<'a> {
             Err(_) => return Err(RecordingError::NotRegular { path }),
         };
         let mut file = HashedFile { file, digest: Sha256::new(), num_bytes: 0 };
-        let parsed = parse(&path, &mut file);
+        let parsed = parse(&path, &mut file, &self.memory);
         // What stands behind an image's data belongs to the file, too.
         let rest = io::copy(&mut file, &mut io::sink());
         if file.num_bytes > limit {
@@ -97,8 +122,8 @@ impl<'a> FolderReader<'a> {
         Ok(parsed)
     }
 
-    /// SHA-256 over name and content of every file that was read, hexadecimal.
-    pub(super) fn digest(self) -> String {
-        self.digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+    /// SHA-256 over name and content of every file that was read, hexadecimal, and the memory that what was read holds.
+    pub(super) fn finish(self) -> (String, ReadingMemory) {
+        (self.digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect(), self.memory)
     }
 }

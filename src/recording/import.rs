@@ -2,6 +2,7 @@
 
 use super::mat::MatError;
 use super::{Filter, RecordedStep, Recording, RecordingError};
+use crate::file::MemoryError;
 use crate::specimen::Specimen;
 use crate::voxel::{VoxelError, VoxelGrid};
 use std::path::PathBuf;
@@ -28,6 +29,9 @@ pub enum ImportError {
     /// The grid cannot be used.
     #[error(transparent)]
     Voxel(#[from] VoxelError),
+    /// It would take more memory than reading may.
+    #[error(transparent)]
+    Memory(#[from] MemoryError),
     /// A variable is missing.
     #[error("there is no variable {what}; the file holds: {found}")]
     Missing {
@@ -104,6 +108,17 @@ pub struct IndexAxis {
     pub is_reversed: bool,
 }
 
+/// Where the voxels of a MATLAB file lie in the specimen's frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, utoipa::ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum GridOrigin {
+    /// The mask's box is centred on the specimen: the scanner's frame is not the specimen's.
+    #[default]
+    MaskCenter,
+    /// Where `X` says: its frame is the specimen's.
+    Positions,
+}
+
 /// How to read foreign files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImportOptions {
@@ -113,6 +128,10 @@ pub struct ImportOptions {
     pub unit_mm: f64,
     /// Axis of each array index (MATLAB files). MR-u laboratories: thickness, width, length = y, z, x.
     pub axes: [IndexAxis; 3],
+    /// Axis of each of the three displacement arrays (MATLAB files); without it, array i is along the axis of index i.
+    pub components: Option<[IndexAxis; 3]>,
+    /// Where a MATLAB file's voxels lie.
+    pub origin: GridOrigin,
     /// Voxel's edges along the array's indices, mm, instead of the file's.
     pub voxel_mm_by_index: Option<[f64; 3]>,
     /// Which region of the mask, from 1, counted along the thickness.
@@ -132,6 +151,8 @@ impl Default for ImportOptions {
             id: "imported".into(),
             unit_mm: 1.0,
             axes: [axis(1), axis(2), axis(0)],
+            components: None,
+            origin: GridOrigin::default(),
             voxel_mm_by_index: None,
             region: None,
             drive_mm: vec![],
@@ -183,7 +204,7 @@ pub(super) fn finish(
             return Err(RecordingError::NoDisplacement { step: n + 1, num_voxels }.into());
         }
     }
-    Ok(Recording {
+    let recording = Recording {
         id: options.id.clone(),
         specimen: specimen.clone(),
         grid,
@@ -193,5 +214,7 @@ pub(super) fn finish(
         filter: options.filter,
         load: None,
         notes: Some(notes),
-    })
+    };
+    recording.check_plate_motion()?;
+    Ok(recording)
 }

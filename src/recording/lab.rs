@@ -3,16 +3,20 @@
 //! `U_t` is a cell per step of a cell of three arrays (or an array with the component as fourth and the step as fifth
 //! index); `mask` is one in material, zero or NaN elsewhere; `X` holds three arrays of positions, `osc` the voxel's
 //! edges along the array's three indices; `prescribedU` the drives. Which index runs along which axis is the
-//! laboratory's choice ([`ImportOptions::axes`]); component i of the displacement is the one along the array's index i.
+//! laboratory's choice ([`ImportOptions::axes`]); component i of the displacement is the one along the array's index i
+//! unless [`ImportOptions::components`] says otherwise.
 
-use super::import::{ImportError, ImportOptions, finish};
+use super::import::{GridOrigin, ImportError, ImportOptions, IndexAxis, finish};
 use super::mat::MatValue;
 use super::{RecordedStep, Recording};
+use crate::file::ReadingMemory;
 use crate::specimen::Specimen;
 use crate::voxel::VoxelGrid;
 
 /// Names under which a field is looked for, first first.
 const FIELD_NAMES: [&str; 5] = ["U_t", "uicorr", "ui", "U", "u"];
+/// What is kept of a voxel beside its displacements while a recording is put together: flags, region, origin, bytes.
+const VOXEL_BYTES: u64 = 48;
 /// Regions smaller than this part of the largest are specks.
 const SPECK: f64 = 0.2;
 
@@ -30,6 +34,7 @@ pub fn recording_from_mat(
     variables: &[(String, MatValue)],
     specimen: &Specimen,
     options: &ImportOptions,
+    memory: &ReadingMemory,
 ) -> Result<Recording, ImportError> {
     let find = |name: &str| variables.iter().find(|(n, _)| n == name).map(|(_, v)| v);
     let names = || variables.iter().map(|(n, _)| n.clone()).collect::<Vec<_>>().join(", ");
@@ -46,6 +51,7 @@ pub fn recording_from_mat(
         }
     }
     let num_voxels: usize = dims.iter().product();
+    memory.take("the recording", (num_voxels as u64).saturating_mul(VOXEL_BYTES + 24 * steps.len() as u64))?;
     let is_measured = |v: usize| steps.iter().all(|s| s.iter().all(|a| a.values[v].is_finite()));
     let mut mask: Vec<bool> = match find("mask") {
         Some(value) => {
@@ -80,7 +86,16 @@ pub fn recording_from_mat(
     let index_of = [0, 1, 2].map(|axis| options.axes.iter().position(|a| a.axis == axis).unwrap_or(axis));
     let shape = index_of.map(|i| high[i] - low[i]);
     let voxel = index_of.map(|i| edges[i].abs());
-    let origin = [0, 1, 2].map(|a| -0.5 * (shape[a] as f64 - 1.0) * voxel[a]);
+    let positions_mm = match find("X") {
+        Some(x) => Some(box_center(x, dims, (low, high), options)?),
+        None => None,
+    };
+    let center = match (options.origin, positions_mm) {
+        (GridOrigin::MaskCenter, _) => [0.0; 3],
+        (GridOrigin::Positions, Some(center)) => center,
+        (GridOrigin::Positions, None) => return Err(ImportError::Missing { what: "X (positions)", found: names() }),
+    };
+    let origin = [0, 1, 2].map(|a| center[a] - 0.5 * (shape[a] as f64 - 1.0) * voxel[a]);
     let grid = VoxelGrid::new(origin, voxel, shape)?;
     let source: Vec<usize> = (0..grid.num_voxels())
         .map(|v| {
@@ -101,13 +116,14 @@ pub fn recording_from_mat(
         _ if options.drive_mm.is_empty() && specimen.drive_mm.len() == steps.len() => specimen.drive_mm.clone(),
         _ => return Err(ImportError::Drives { found: options.drive_mm.len(), num_steps: steps.len() }),
     };
+    let components = options.components.unwrap_or(options.axes);
     let recorded = steps
         .iter()
         .zip(&drives)
         .map(|(arrays, &drive_mm)| {
             let value = |v: usize, axis: usize| {
-                let i = index_of[axis];
-                let sign = if options.axes[i].is_reversed { -1.0 } else { 1.0 };
+                let i = components.iter().position(|c| c.axis == axis).unwrap_or(axis);
+                let sign = if components[i].is_reversed { -1.0 } else { 1.0 };
                 if flags[v] { sign * arrays[i].values[source[v]] * options.unit_mm } else { f64::NAN }
             };
             RecordedStep {
@@ -123,7 +139,8 @@ pub fn recording_from_mat(
     let ignored: Vec<&str> = variables.iter().map(|(n, _)| n.as_str()).filter(|n| !used.contains(n)).collect();
     let notes = serde_json::json!({
         "imported": { "field": field_name, "ignored_variables": ignored, "voxel_mm_by_index": edges, "region": options.region,
-            "origin": "the mask's box is centred on the specimen" },
+            "origin": options.origin, "center_of_positions_mm": positions_mm, "axes": words(options.axes),
+            "components": words(components) },
     });
     finish(specimen, grid, flags, recorded, options, notes)
 }
@@ -184,6 +201,35 @@ fn spacing_from_osc(value: &MatValue) -> Result<[f64; 3], ImportError> {
         Some((_, &[a, b, c])) if [a, b, c].iter().all(|e| e.is_finite() && e.abs() > 0.0) => Ok([a, b, c]),
         _ => Err(layout("it must hold three spacings that are not zero".into())),
     }
+}
+
+/// Centre of the mask's box in the specimen's axes by the positions in `X`, mm. Which of its three arrays runs along an
+/// index is seen from which changes along it.
+fn box_center(
+    value: &MatValue,
+    dims: [usize; 3],
+    (low, high): ([usize; 3], [usize; 3]),
+    options: &ImportOptions,
+) -> Result<[f64; 3], ImportError> {
+    let mut center = [0.0; 3];
+    for (i, stride) in [1, dims[0], dims[0] * dims[1]].into_iter().enumerate() {
+        let mut along = (0.0f64, 0.0);
+        for member in value.members().unwrap_or_default() {
+            let array = array_of(member, "X")?;
+            let step = if dims[i] > 1 { array.values[stride] - array.values[0] } else { 0.0 };
+            if step.abs() > along.0.abs() {
+                along = (step, array.values[0] + 0.5 * step * (low[i] + high[i] - 1) as f64);
+            }
+        }
+        let IndexAxis { axis, is_reversed } = options.axes[i];
+        center[axis] = if is_reversed { -along.1 } else { along.1 } * options.unit_mm;
+    }
+    Ok(center)
+}
+
+/// Axes as they are given, such as `-y,z,x`.
+fn words(axes: [IndexAxis; 3]) -> String {
+    axes.map(|a| format!("{}{}", if a.is_reversed { "-" } else { "" }, ["x", "y", "z"][a.axis])).join(",")
 }
 
 /// Spacing along each index: whichever of the three position arrays changes along it.

@@ -2,6 +2,10 @@ use super::super::mat::read_mat;
 use super::*;
 use std::path::PathBuf;
 
+fn memory() -> crate::file::ReadingMemory {
+    crate::file::MemoryLimit::command().begin()
+}
+
 fn specimen() -> Specimen {
     let specimen = Specimen::from_json(include_str!("../../geometries/two-hole-shear.json")).unwrap();
     Specimen { holes: vec![], drive_mm: vec![2.5, 5.0], ..specimen }
@@ -9,14 +13,14 @@ fn specimen() -> Specimen {
 
 fn variables(name: &str) -> Vec<(String, MatValue)> {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/import").join(name);
-    read_mat(&path, 100_000).unwrap()
+    read_mat(&path, &memory()).unwrap()
 }
 
 /// Indices (thickness, width, length) become (y, z, x), components likewise.
 #[test]
 fn laboratory_fields_become_recordings() {
     for name in ["v5.mat", "v7.mat", "v73.mat"] {
-        let r = recording_from_mat(&variables(name), &specimen(), &ImportOptions::default()).unwrap();
+        let r = recording_from_mat(&variables(name), &specimen(), &ImportOptions::default(), &memory()).unwrap();
         assert_eq!(r.grid.shape, [5, 6, 4], "{name}");
         assert_eq!(r.grid.voxel_mm, [5.08, 1.0666, 4.775]);
         assert!((r.grid.origin_mm[1] + 2.5 * 1.0666).abs() < 1e-12);
@@ -48,7 +52,7 @@ fn positions_units_and_signs_are_heeded() {
         drive_mm: vec![1.0, 2.0],
         ..ImportOptions::default()
     };
-    let r = recording_from_mat(&variables("positions.mat"), &specimen(), &options).unwrap();
+    let r = recording_from_mat(&variables("positions.mat"), &specimen(), &options, &memory()).unwrap();
     assert!((0..3).all(|a| (r.grid.voxel_mm[a] - [5.08, 1.0666, 4.775][a]).abs() < 1e-12));
     assert_eq!(r.num_voxels(), 120);
     for v in 0..120 {
@@ -58,7 +62,7 @@ fn positions_units_and_signs_are_heeded() {
         assert!((u[0] + 0.05 * i + 0.003 * k + 2.0).abs() < 1e-14 && (u[1] + 0.01 * i + 0.2).abs() < 1e-14);
     }
     let small = ImportOptions { unit_mm: 1e-3, ..options };
-    let error = recording_from_mat(&variables("positions.mat"), &specimen(), &small).unwrap_err();
+    let error = recording_from_mat(&variables("positions.mat"), &specimen(), &small, &memory()).unwrap_err();
     assert!(matches!(error, ImportError::Extent { .. }), "{error}");
     for bad in ["x,y", "x,y,y", "x,y,w", ""] {
         assert!(ImportOptions::parse_axes(bad).is_none());
@@ -69,7 +73,12 @@ fn positions_units_and_signs_are_heeded() {
 fn one_block_of_two_is_chosen() {
     let one = Specimen { drive_mm: vec![5.0], ..specimen() };
     let read = |region| {
-        recording_from_mat(&variables("two_blocks.mat"), &one, &ImportOptions { region, ..ImportOptions::default() })
+        recording_from_mat(
+            &variables("two_blocks.mat"),
+            &one,
+            &ImportOptions { region, ..ImportOptions::default() },
+            &memory(),
+        )
     };
     assert!(matches!(read(None).unwrap_err(), ImportError::Regions { num_regions: 2, asked: None }));
     assert!(matches!(read(Some(3)).unwrap_err(), ImportError::Regions { num_regions: 2, asked: Some(3) }));
@@ -82,7 +91,9 @@ fn one_block_of_two_is_chosen() {
 
 #[test]
 fn poor_files_are_typed_errors() {
-    let read = |v: &[(String, MatValue)]| recording_from_mat(v, &specimen(), &ImportOptions::default()).unwrap_err();
+    let read = |v: &[(String, MatValue)]| {
+        recording_from_mat(v, &specimen(), &ImportOptions::default(), &memory()).unwrap_err()
+    };
     assert!(matches!(read(&[]), ImportError::Missing { what: "U_t", .. }));
     let without = |name: &str| -> Vec<_> { variables("v5.mat").into_iter().filter(|(n, _)| n != name).collect() };
     assert!(matches!(read(&without("osc")), ImportError::Missing { .. }));
@@ -98,6 +109,30 @@ fn poor_files_are_typed_errors() {
     let zeros = MatValue::Numeric { dims: vec![6, 4, 5], values: vec![0.0; 120], imaginary: None };
     assert!(matches!(read(&with("mask", zeros)), ImportError::EmptyMask));
     let options = ImportOptions { drive_mm: vec![1.0], ..ImportOptions::default() };
-    let error = recording_from_mat(&variables("v5.mat"), &specimen(), &options).unwrap_err();
+    let error = recording_from_mat(&variables("v5.mat"), &specimen(), &options, &memory()).unwrap_err();
     assert!(matches!(error, ImportError::Drives { found: 1, num_steps: 2 }));
+}
+
+/// Displacements whose order is not that of the indices; positions that are the specimen's own.
+#[test]
+fn components_and_positions_may_be_stated() {
+    let options = |components: Option<&str>, origin| ImportOptions {
+        components: components.and_then(ImportOptions::parse_axes),
+        origin,
+        drive_mm: vec![1.0, 2.0],
+        ..ImportOptions::default()
+    };
+    let read =
+        |name: &str, options: &ImportOptions| recording_from_mat(&variables(name), &specimen(), options, &memory());
+    let by_index = read("positions.mat", &options(None, GridOrigin::MaskCenter)).unwrap();
+    let stated = read("positions.mat", &options(Some("z,-x,y"), GridOrigin::MaskCenter)).unwrap();
+    let (a, b) = (by_index.steps[1].displacement[7], stated.steps[1].displacement[7]);
+    // Along the indices they are y, z, x.
+    assert_eq!([b[2], b[0], b[1]], [a[1], -a[2], a[0]]);
+    let placed = read("positions.mat", &options(None, GridOrigin::Positions)).unwrap();
+    // X begins at zero along every index.
+    assert!(placed.grid.origin_mm.iter().all(|x| x.abs() < 1e-12), "{:?}", placed.grid.origin_mm);
+    assert!((by_index.grid.origin_mm[0] + 2.0 * 5.08).abs() < 1e-12);
+    let without = read("v5.mat", &options(None, GridOrigin::Positions)).unwrap_err();
+    assert!(matches!(without, ImportError::Missing { .. }), "{without}");
 }

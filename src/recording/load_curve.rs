@@ -3,6 +3,11 @@
 use super::RecordingError;
 use std::path::Path;
 
+/// The beginning of a text, for a message.
+pub(super) fn shortened(text: &str) -> String {
+    text.chars().take(60).collect()
+}
+
 /// Drive and force over time; times do not decrease.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LoadCurve {
@@ -24,19 +29,23 @@ impl LoadCurve {
         let mut lines = text.lines().enumerate();
         let header = lines.next().map(|(_, l)| l.trim().trim_start_matches('\u{feff}').to_string()).unwrap_or_default();
         if header.split(',').map(str::trim).ne(["time_s", "drive_mm", "force_n"]) {
-            return Err(fail(1, format!("the header is '{header}'; it must be time_s,drive_mm,force_n")));
+            return Err(fail(1, format!("the header is '{}'; it must be time_s,drive_mm,force_n", shortened(&header))));
         }
         let mut curve = LoadCurve::default();
         for (n, line) in lines {
             if line.trim().is_empty() {
                 continue;
             }
-            let numbers: Vec<Option<f64>> = line.split(',').map(|s| s.trim().parse().ok()).collect();
-            let [Some(time), Some(drive), Some(force)] = numbers[..] else {
-                return Err(fail(n + 1, format!("'{line}' is not three numbers")));
+            // One more than needed, so that a fourth is seen; a line of a million commas makes no list of a million.
+            let mut numbers = [None; 4];
+            for (number, text) in numbers.iter_mut().zip(line.split(',')) {
+                *number = Some(text.trim().parse().ok());
+            }
+            let [Some(Some(time)), Some(Some(drive)), Some(Some(force)), None] = numbers else {
+                return Err(fail(n + 1, format!("'{}' is not three numbers", shortened(line))));
             };
             if ![time, drive, force].iter().all(|x: &f64| x.is_finite()) {
-                return Err(fail(n + 1, format!("'{line}' has a number that is not finite")));
+                return Err(fail(n + 1, format!("'{}' has a number that is not finite", shortened(line))));
             }
             if curve.time_s.last().is_some_and(|last| time < *last) {
                 return Err(fail(n + 1, format!("time {time} s comes before the line above it")));

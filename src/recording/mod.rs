@@ -2,23 +2,28 @@
 
 mod error;
 mod folder;
+mod images;
 mod import;
 mod lab;
 mod limits;
 mod load_curve;
 pub mod mat;
 mod nifti;
+mod plate_fault;
+mod plates;
 mod points;
 mod raw;
 mod read;
 mod write;
 
 pub use error::RecordingError;
-pub use import::{ImportError, ImportOptions, IndexAxis};
+pub use images::{NamedImage, VectorFrame, axes_of_affine, recording_from_images};
+pub use import::{GridOrigin, ImportError, ImportOptions, IndexAxis};
 pub use lab::recording_from_mat;
 pub use limits::ReadLimits;
 pub use load_curve::LoadCurve;
 pub use nifti::{Image, NiftiError, Samples};
+pub use plate_fault::PlateFault;
 pub use points::{DisplacementPoint, read_points, recording_from_points};
 pub use raw::{RawRecording, RawStep};
 pub use read::ReadRecording;

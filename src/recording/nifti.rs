@@ -1,8 +1,9 @@
 //! NIfTI-1 images, one file, plain or gzip (`.nii`, `.nii.gz`).
 //!
-//! Reading is bounded: what a compressed file expands to is limited by what its header promises, and that by the
-//! caller.
+//! Reading is bounded: what a compressed file expands to is limited by what its header promises, and that by the memory
+//! that the caller allows. Numbers are decoded piece by piece; the file's own bytes are never held as a whole.
 
+use crate::file::{MemoryError, ReadingMemory};
 use flate2::Compression;
 use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
@@ -14,6 +15,10 @@ pub const INTENT_DISPLACEMENT: i16 = 1006;
 const UNITS_MM: u8 = 2;
 const FLOAT32: i16 = 16;
 const UINT8: i16 = 2;
+/// Headers may be followed by extensions up to here, bytes.
+const MAX_OFFSET: f64 = 1048576.0;
+/// Numbers that are decoded at a time.
+const PIECE: usize = 1 << 14;
 
 /// An image: numbers on a grid.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +31,8 @@ pub struct Image {
     pub intent: i16,
     /// Values, x fastest, components slowest.
     pub values: Vec<f64>,
+    /// The affine's unit of length in mm; `None` where the header names none.
+    pub unit_mm: Option<f64>,
 }
 
 /// How the numbers of a written image are stored.
@@ -59,13 +66,14 @@ pub enum NiftiError {
         /// The header's `dim`.
         dim: [i16; 8],
     },
-    /// More numbers than allowed.
-    #[error("the header promises {values} numbers (limit: {limit})")]
-    TooLarge {
-        /// Numbers promised.
-        values: u64,
-        /// The limit.
-        limit: u64,
+    /// More numbers than memory is allowed for.
+    #[error("the header promises more numbers than may be read: {0}")]
+    Memory(#[from] MemoryError),
+    /// The data begin at no place in the file.
+    #[error("vox_offset is {offset}; data begin at a whole number of bytes from 352 to {MAX_OFFSET}")]
+    Offset {
+        /// The header's `vox_offset`.
+        offset: f64,
     },
     /// Wrong intent.
     #[error("the intent is {found}; displacements have 1006")]
@@ -118,19 +126,29 @@ impl Header {
 }
 
 impl Image {
-    /// Reads an image of at most `max_values` numbers from a plain or gzip stream.
+    /// Reads an image from a plain or gzip stream into memory taken from `memory`.
     ///
     /// # Errors
     /// [`NiftiError`].
-    pub fn read(mut stream: impl Read, max_values: u64) -> Result<Image, NiftiError> {
+    pub fn read(stream: impl Read, memory: &ReadingMemory) -> Result<Image, NiftiError> {
+        let (image, units) = Image::read_with_units(stream, memory)?;
+        if units == UNITS_MM { Ok(image) } else { Err(NiftiError::Units { code: units }) }
+    }
+
+    /// The same in any unit of length, or in none.
+    ///
+    /// # Errors
+    /// [`NiftiError`].
+    pub fn read_any_unit(stream: impl Read, memory: &ReadingMemory) -> Result<Image, NiftiError> {
+        Image::read_with_units(stream, memory).map(|(image, _)| image)
+    }
+
+    /// The image and the header's code of its unit of length.
+    fn read_with_units(mut stream: impl Read, memory: &ReadingMemory) -> Result<(Image, u8), NiftiError> {
         let mut magic = [0u8; 2];
         stream.read_exact(&mut magic).map_err(NiftiError::Damaged)?;
         let whole = magic.as_slice().chain(stream);
-        if magic == [0x1f, 0x8b] {
-            read_plain(GzDecoder::new(whole), max_values)
-        } else {
-            read_plain(whole, max_values)
-        }
+        if magic == [0x1f, 0x8b] { read_plain(GzDecoder::new(whole), memory) } else { read_plain(whole, memory) }
     }
 
     /// Writes the image, compressed.
@@ -188,7 +206,7 @@ impl Image {
     }
 }
 
-fn read_plain(mut stream: impl Read, max_values: u64) -> Result<Image, NiftiError> {
+fn read_plain(mut stream: impl Read, memory: &ReadingMemory) -> Result<(Image, u8), NiftiError> {
     let mut bytes = [0u8; HEADER_BYTES];
     stream.read_exact(&mut bytes).map_err(NiftiError::Damaged)?;
     let size = [0, 1, 2, 3].map(|n| bytes[n]);
@@ -209,12 +227,8 @@ fn read_plain(mut stream: impl Read, max_values: u64) -> Result<Image, NiftiErro
     for (n, size) in shape.iter_mut().enumerate().take(num_dims as usize) {
         *size = dim[n + 1] as usize;
     }
-    // Five numbers below 2¹⁵ fit in 128 bits.
-    let product: u128 = shape.iter().map(|&n| n as u128).product();
-    if product > u128::from(max_values) {
-        return Err(NiftiError::TooLarge { values: product.min(u128::from(u64::MAX)) as u64, limit: max_values });
-    }
-    let num_values = product as usize;
+    // Five numbers below 2¹⁵ may not fit in 64 bits; what does not is far above any limit.
+    let num_values = shape.iter().fold(1u64, |product, &n| product.saturating_mul(n as u64));
     let code = header.i16(70);
     let width = match code {
         2 => 1,
@@ -224,19 +238,21 @@ fn read_plain(mut stream: impl Read, max_values: u64) -> Result<Image, NiftiErro
         code => return Err(NiftiError::DataType { code }),
     };
     let units = header.bytes[123] & 7;
-    if units != UNITS_MM {
-        return Err(NiftiError::Units { code: units });
-    }
+    let unit_mm = match units {
+        0 => None,
+        1 => Some(1e3),
+        UNITS_MM => Some(1.0),
+        3 => Some(1e-3),
+        code => return Err(NiftiError::Units { code }),
+    };
     let affine = affine_of(&header)?;
-    // A single file's data start at 352 or later.
-    let skip = (header.f32(108).max(352.0) as u64).min(1 << 20) - HEADER_BYTES as u64;
-    io::copy(&mut stream.by_ref().take(skip), &mut io::sink()).map_err(NiftiError::Damaged)?;
-    let mut data = Vec::new();
-    stream.take((num_values * width) as u64).read_to_end(&mut data).map_err(NiftiError::Damaged)?;
-    if data.len() < num_values * width {
-        let message = format!("{} of {} bytes of data", data.len(), num_values * width);
-        return Err(NiftiError::Damaged(io::Error::new(io::ErrorKind::UnexpectedEof, message)));
+    // Some programs write 0 for "right after the header".
+    let offset = if header.f32(108) == 0.0 { (HEADER_BYTES + 4) as f64 } else { header.f32(108) };
+    if !(offset >= (HEADER_BYTES + 4) as f64 && offset <= MAX_OFFSET && offset.fract() == 0.0) {
+        return Err(NiftiError::Offset { offset });
     }
+    let skip = offset as u64 - HEADER_BYTES as u64;
+    io::copy(&mut stream.by_ref().take(skip), &mut io::sink()).map_err(NiftiError::Damaged)?;
     // A slope of zero or NaN means none.
     let (slope, intercept) = (header.f32(112), header.f32(116));
     let (slope, intercept) = if slope.is_finite() && slope.abs() > 0.0 {
@@ -244,8 +260,19 @@ fn read_plain(mut stream: impl Read, max_values: u64) -> Result<Image, NiftiErro
     } else {
         (1.0, 0.0)
     };
-    let values = data.chunks_exact(width).map(|b| slope * number(code, b, is_big_endian) + intercept).collect();
-    Ok(Image { shape, affine, intent: header.i16(68), values })
+    let mut values: Vec<f64> = memory.list("an image", num_values)?;
+    let num_values = num_values as usize;
+    let mut piece = vec![0u8; PIECE * width];
+    while values.len() < num_values {
+        memory.check()?;
+        let bytes = &mut piece[..width * PIECE.min(num_values - values.len())];
+        stream.read_exact(bytes).map_err(|error| {
+            let message = format!("{error} after {} of {num_values} numbers", values.len());
+            NiftiError::Damaged(io::Error::new(error.kind(), message))
+        })?;
+        values.extend(bytes.chunks_exact(width).map(|b| slope * number(code, b, is_big_endian) + intercept));
+    }
+    Ok((Image { shape, affine, intent: header.i16(68), values, unit_mm }, units))
 }
 
 fn number(code: i16, bytes: &[u8], is_big_endian: bool) -> f64 {

@@ -3,12 +3,18 @@
 
 use super::import::{ImportError, ImportOptions, finish};
 use super::{RecordedStep, Recording};
+use crate::file::ReadingMemory;
 use crate::specimen::Specimen;
 use crate::voxel::VoxelGrid;
 use std::path::Path;
 
 /// Positions of one grid plane agree to this part of the spacing.
 const PLANE_TOLERANCE: f64 = 0.02;
+
+/// What a voxel takes beside its displacements while points are averaged: four sums and a flag, bytes.
+const VOXEL_BYTES: u64 = 33;
+/// More columns than any table of points has.
+const MAX_COLUMNS: usize = 64;
 
 /// A grid with more voxels per point than this is none: scattered points have planes of their own.
 const SPARSEST: f64 = 20.0;
@@ -30,10 +36,13 @@ pub struct DisplacementPoint {
 ///
 /// # Errors
 /// [`ImportError::Table`].
-pub fn read_points(text: &str, path: &Path, max_points: usize) -> Result<Vec<DisplacementPoint>, ImportError> {
+pub fn read_points(text: &str, path: &Path, memory: &ReadingMemory) -> Result<Vec<DisplacementPoint>, ImportError> {
     let fail = |line: usize, message: String| ImportError::Table { path: path.into(), line, message };
     let mut lines = text.lines().enumerate();
     let header = lines.next().map_or("", |(_, l)| l.trim().trim_start_matches('\u{feff}'));
+    if header.split(',').nth(MAX_COLUMNS).is_some() {
+        return Err(fail(1, format!("more than {MAX_COLUMNS} columns; x,y,z,ux,uy,uz,w,sd are known")));
+    }
     let names: Vec<String> = header
         .split(',')
         .map(|n| {
@@ -58,10 +67,9 @@ pub fn read_points(text: &str, path: &Path, max_points: usize) -> Result<Vec<Dis
         if line.trim().is_empty() {
             continue;
         }
-        if points.len() == max_points {
-            return Err(fail(n + 1, format!("more than {max_points} points")));
-        }
-        let fields: Vec<&str> = line.split(',').map(str::trim).collect();
+        // A list that grows holds its old place beside the new one.
+        memory.take_values::<[DisplacementPoint; 2]>("the points", 1)?;
+        let fields: Vec<&str> = line.split(',').take(names.len()).map(str::trim).collect();
         let number = |column: usize| -> Result<f64, ImportError> {
             match fields.get(column) {
                 Some(&("" | "nan" | "NaN")) => Ok(f64::NAN),
@@ -100,6 +108,7 @@ pub fn recording_from_points(
     specimen: &Specimen,
     voxel_mm: Option<[f64; 3]>,
     options: &ImportOptions,
+    memory: &ReadingMemory,
 ) -> Result<Recording, ImportError> {
     let drives = match options.drive_mm.len() {
         n if n == steps.len() => &options.drive_mm,
@@ -109,8 +118,14 @@ pub fn recording_from_points(
     let all = || steps.iter().flatten().map(|p| p.position.map(|x| x * options.unit_mm));
     let grid = match voxel_mm {
         Some(voxel) => VoxelGrid::covering(specimen, voxel)?,
-        None => regular_grid(all)?,
+        None => {
+            let num_points = steps.iter().map(Vec::len).sum::<usize>();
+            memory.take_values::<f64>("the points' planes", num_points as u64)?;
+            regular_grid(all)?
+        }
     };
+    let bytes = VOXEL_BYTES + 24 * steps.len() as u64;
+    memory.take("the recording", (grid.num_voxels() as u64).saturating_mul(bytes))?;
     let index = |position: [f64; 3]| -> Option<usize> {
         let mut n = [0; 3];
         for a in 0..3 {

@@ -1,5 +1,9 @@
 use super::*;
 
+fn memory(bytes: u64) -> crate::file::ReadingMemory {
+    crate::file::MemoryLimit::body(bytes).begin()
+}
+
 fn specimen() -> Specimen {
     let specimen = Specimen::from_json(include_str!("../../geometries/two-hole-shear.json")).unwrap();
     Specimen { holes: vec![], drive_mm: vec![5.0], ..specimen }
@@ -27,9 +31,9 @@ fn points_on_a_grid_become_voxels() {
     }
     lines.rotate_left(117);
     let text = format!("x_mm,y_mm,z_mm,ux_mm,uy_mm,uz_mm,sd\n{}\n", lines.join("\n"));
-    let points = read_points(&text, path(), 1000).unwrap();
+    let points = read_points(&text, path(), &memory(1 << 20)).unwrap();
     assert_eq!(points.len(), 319);
-    let r = recording_from_points(&[points], &specimen(), None, &ImportOptions::default()).unwrap();
+    let r = recording_from_points(&[points], &specimen(), None, &ImportOptions::default(), &memory(1 << 26)).unwrap();
     assert_eq!(r.grid.shape, [10, 8, 4]);
     assert_eq!(r.num_voxels(), 319);
     // A root mean square of 319 equal numbers.
@@ -51,9 +55,16 @@ fn scattered_points_are_averaged() {
         text +=
             &format!("{x},{y},{z},{},0,0,{}\n", if n % 2 == 0 { 1.0 } else { 4.0 }, if n % 2 == 0 { 2.0 } else { 1.0 });
     }
-    let points = read_points(&text, path(), 10_000).unwrap();
-    let read =
-        |voxel| recording_from_points(std::slice::from_ref(&points), &specimen(), voxel, &ImportOptions::default());
+    let points = read_points(&text, path(), &memory(1 << 23)).unwrap();
+    let read = |voxel| {
+        recording_from_points(
+            std::slice::from_ref(&points),
+            &specimen(),
+            voxel,
+            &ImportOptions::default(),
+            &memory(1 << 26),
+        )
+    };
     assert!(matches!(read(None).unwrap_err(), ImportError::NoGrid { .. }));
     let r = read(Some([6.35, 3.2, 9.55])).unwrap();
     assert_eq!(r.num_voxels(), 16);
@@ -74,13 +85,13 @@ fn poor_tables_are_typed_errors() {
         "x,y,z,ux,uy,uz\nnan,2,3,4,5,6\n",
         "x,y,z,ux,uy,uz,w\n1,2,3,4,5,6,-1\n",
     ] {
-        assert!(matches!(read_points(text, path(), 10), Err(ImportError::Table { .. })), "{text}");
+        assert!(matches!(read_points(text, path(), &memory(2000)), Err(ImportError::Table { .. })), "{text}");
     }
     let many = "x,y,z,ux,uy,uz\n".to_string() + &"1,2,3,4,5,6\n".repeat(11);
-    assert!(matches!(read_points(&many, path(), 10), Err(ImportError::Table { line: 12, .. })));
-    let one = read_points("x,y,z,ux,uy,uz\n1,2,3,4,5,6\n", path(), 10).unwrap();
+    assert!(matches!(read_points(&many, path(), &memory(1000)), Err(ImportError::Memory(_))));
+    let one = read_points("x,y,z,ux,uy,uz\n1,2,3,4,5,6\n", path(), &memory(2000)).unwrap();
     let read = |steps: &[Vec<DisplacementPoint>]| {
-        recording_from_points(steps, &specimen(), None, &ImportOptions::default()).unwrap_err()
+        recording_from_points(steps, &specimen(), None, &ImportOptions::default(), &memory(1 << 26)).unwrap_err()
     };
     assert!(matches!(read(std::slice::from_ref(&one)), ImportError::NoGrid { .. }));
     assert!(matches!(read(&[one.clone(), one]), ImportError::Drives { .. }));

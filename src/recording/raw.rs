@@ -5,6 +5,7 @@ use super::{Filter, LoadCurve, ReadLimits, RecordingError};
 use crate::specimen::Specimen;
 use crate::voxel::VoxelGrid;
 use std::path::Path;
+use std::sync::Arc;
 
 /// A recording as the scanner gives it. The fields are those of [`super::Recording`].
 #[derive(Clone, Debug)]
@@ -72,7 +73,7 @@ impl RawRecording {
             ));
         }
         for (n, step) in head.json.steps.iter().enumerate() {
-            check_step(n, step)?;
+            check_step(n, step, &head.specimen)?;
             let Some(raw) = &step.raw else {
                 return Err(RecordingError::NotRaw { step: n + 1 });
             };
@@ -119,7 +120,8 @@ impl RawRecording {
             load: head.load,
             notes: head.json.notes,
         };
-        Ok(ReadRecording { recording, digest: head.files.digest() })
+        let (digest, memory) = head.files.finish();
+        Ok(ReadRecording { recording, digest, memory: Arc::new(memory) })
     }
 
     /// Number of voxels in the mask.

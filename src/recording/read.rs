@@ -3,10 +3,12 @@
 use super::folder::FolderReader;
 use super::nifti::{INTENT_DISPLACEMENT, Image, NiftiError};
 use super::{Filter, LoadCurve, ReadLimits, RecordedStep, Recording, RecordingError};
+use crate::file::ReadingMemory;
 use crate::specimen::Specimen;
 use crate::voxel::VoxelGrid;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use std::sync::Arc;
 
 /// The schema that this version reads and writes.
 pub const SCHEMA: &str = "mru-recording/1";
@@ -70,6 +72,8 @@ pub struct ReadRecording<T = Recording> {
     /// SHA-256, hexadecimal, over name and content of every file that was read: `recording.json`, mask, load curve and
     /// images. Other files of the folder do not enter.
     pub digest: String,
+    /// The memory that it holds, given back when all copies of this are dropped.
+    pub memory: Arc<ReadingMemory>,
 }
 
 impl Recording {
@@ -91,7 +95,7 @@ impl Recording {
         let num_voxels = head.mask.iter().filter(|m| **m).count();
         let mut steps = Vec::with_capacity(head.json.steps.len());
         for (n, step) in head.json.steps.iter().enumerate() {
-            check_step(n, step)?;
+            check_step(n, step, &head.specimen)?;
             let Some(name) = &step.displacement else {
                 return Err(RecordingError::Raw { step: n + 1 });
             };
@@ -119,7 +123,9 @@ impl Recording {
             load: head.load,
             notes: head.json.notes,
         };
-        Ok(ReadRecording { recording, digest: head.files.digest() })
+        recording.check_plate_motion()?;
+        let (digest, memory) = head.files.finish();
+        Ok(ReadRecording { recording, digest, memory: Arc::new(memory) })
     }
 }
 
@@ -142,7 +148,7 @@ impl<'a> Head<'a> {
             (path, "recording.json".to_string())
         };
         let mut files = FolderReader::new(folder, limits);
-        let text = files.text(&name)?;
+        let text = files.json_text(&name)?;
         let json: RecordingJson = serde_json::from_str(&text).map_err(|e| RecordingError::Json(e.to_string()))?;
         if json.schema != SCHEMA {
             return Err(RecordingError::Json(format!("schema is '{}'; this version reads {SCHEMA}", json.schema)));
@@ -161,7 +167,14 @@ impl<'a> Head<'a> {
             Ok(grid) => grid?,
             Err(source) => return Err(RecordingError::Image { path: files.path(&json.mask)?, source }),
         };
-        let mask: Vec<bool> = mask_image.values.iter().map(|v| *v > 0.5).collect();
+        let (stated_mm, found_mm) = (json.acquisition.voxel_mm, grid.voxel_mm);
+        if (0..3).any(|a| !((stated_mm[a] / found_mm[a] - 1.0).abs() <= GRID_TOLERANCE)) {
+            return Err(RecordingError::VoxelMismatch { stated_mm, found_mm });
+        }
+        let mut mask: Vec<bool> = files.memory().list("the mask", mask_image.values.len() as u64)?;
+        mask.extend(mask_image.values.iter().map(|v| *v > 0.5));
+        files.memory().give_back_values::<f64>(mask_image.values.len());
+        drop(mask_image);
         if !mask.contains(&true) {
             return Err(RecordingError::EmptyMask);
         }
@@ -172,18 +185,29 @@ impl<'a> Head<'a> {
         }
         let load = match &json.load {
             None => None,
-            Some(name) => Some(LoadCurve::from_csv(&files.text(name)?, &files.path(name)?)?),
+            Some(name) => {
+                let text = files.text(name)?;
+                // Three numbers stand in six characters at least, and a list that grows is there twice.
+                files.memory().take("the load curve", 8 * text.len() as u64)?;
+                Some(LoadCurve::from_csv(&text, &files.path(name)?)?)
+            }
         };
         Ok(Head { files, json, specimen, grid, mask, load })
     }
 }
 
-pub(super) fn check_step(n: usize, step: &StepJson) -> Result<(), RecordingError> {
+pub(super) fn check_step(n: usize, step: &StepJson, specimen: &Specimen) -> Result<(), RecordingError> {
+    let limit_mm = specimen.max_supported_drive_mm();
+    if !(step.drive_mm > 0.0 && step.drive_mm <= limit_mm) {
+        return Err(RecordingError::Drive { step: n, drive_mm: step.drive_mm, limit_mm });
+    }
+    if step.displacement.is_some() && step.raw.is_some() {
+        return Err(RecordingError::TwoKinds { step: n });
+    }
     let finite = |name: &str, value: f64| {
         let name = format!("steps[{n}].{name}");
         if value.is_finite() { Ok(()) } else { Err(RecordingError::Value { name, value, requirement: "finite" }) }
     };
-    finite("drive_mm", step.drive_mm)?;
     step.force_n.map_or(Ok(()), |f| finite("force_n", f))?;
     step.force_sd_n.map_or(Ok(()), |sd| positive(&format!("steps[{n}].force_sd_n"), sd))?;
     if let Some([start, end]) = step.window_s
@@ -261,7 +285,10 @@ fn read_displacement(
     }
     check_grid(&path, &image, [1, 3], expected)?;
     let n = expected.num_voxels();
-    Ok((0..n).map(|v| [0, 1, 2].map(|c| image.values[v + c * n])).collect())
+    let mut displacement: Vec<[f64; 3]> = files.memory().list("a displacement", n as u64)?;
+    displacement.extend((0..n).map(|v| [0, 1, 2].map(|c| image.values[v + c * n])));
+    files.memory().give_back_values::<f64>(image.values.len());
+    Ok(displacement)
 }
 
 #[cfg(test)]

@@ -1,5 +1,11 @@
 use super::*;
+use crate::file::{MemoryError, MemoryLimit};
 use crate::recording::{RawRecording, RawStep, Samples};
+
+/// Memory for so many numbers.
+fn numbers(count: u64) -> crate::file::ReadingMemory {
+    MemoryLimit::body(8 * count).begin()
+}
 
 fn specimen() -> Specimen {
     Specimen::from_json(include_str!("../../geometries/two-hole-shear.json")).unwrap()
@@ -72,6 +78,13 @@ fn bad_files_are_typed_errors() {
     assert!(matches!(edit("mru-recording/1", "mru-recording/9"), RecordingError::Json(_)));
     assert!(matches!(edit("\"force_n\"", "\"farce_n\""), RecordingError::Json(_)));
     assert!(matches!(edit("0.02", "-0.02"), RecordingError::Value { .. }));
+    for drive in ["0.0", "-2.5", "1e9"] {
+        let refused = edit("\"drive_mm\": 2.5", &format!("\"drive_mm\": {drive}"));
+        assert!(matches!(refused, RecordingError::Drive { step: 0, .. }), "{drive}: {refused}");
+    }
+    assert!(matches!(edit("0.1875", "0.2"), RecordingError::VoxelMismatch { .. }));
+    let raw = r#""raw": {"phase": ["a", "b", "c"], "magnitude": "m", "mm_per_radian": [1, 1, 1]}, "displacement""#;
+    assert!(matches!(edit("\"displacement\"", raw), RecordingError::TwoKinds { step: 0 }));
 }
 
 #[test]
@@ -86,7 +99,7 @@ fn bad_images_are_typed_errors() {
         image.write_gz(std::fs::File::create(&path).unwrap(), Samples::Float32).unwrap();
         read(folder.path()).unwrap_err()
     };
-    let good = Image::read(&whole[..], 1000).unwrap();
+    let good = Image::read(&whole[..], &numbers(1000)).unwrap();
     let intent = rewrite(&Image { intent: 0, ..good.clone() });
     assert!(matches!(intent, RecordingError::Image { source: NiftiError::Intent { found: 0 }, .. }), "{intent}");
     let mut turned = good.clone();
@@ -110,13 +123,15 @@ fn bombs_are_refused() {
         affine: [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]],
         intent: 0,
         values: vec![0.0; 1 << 20],
+        unit_mm: Some(1.0),
     };
     let mut file = Vec::new();
     image(1000).write_gz(&mut file, Samples::Uint8).unwrap();
     // A megabyte of zeros after the thousand promised: read as a thousand.
-    assert_eq!(Image::read(&file[..], 1000).unwrap().values.len(), 1000);
-    let error = Image::read(&file[..], 999).unwrap_err();
-    assert!(matches!(error, NiftiError::TooLarge { values: 1000, limit: 999 }), "{error}");
+    assert_eq!(Image::read(&file[..], &numbers(1000)).unwrap().values.len(), 1000);
+    let error = Image::read(&file[..], &numbers(999)).unwrap_err();
+    let too_much = MemoryError::TooMuch { what: "an image", wanted_bytes: 8000, limit_bytes: 7992 };
+    assert!(matches!(&error, NiftiError::Memory(found) if *found == too_much), "{error}");
 }
 
 #[test]
@@ -142,7 +157,7 @@ fn load_curves_are_checked() {
 #[test]
 fn images_of_nibabel_are_read() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/import");
-    let image = |name: &str| Image::read(std::fs::File::open(folder.join(name)).unwrap(), 1000).unwrap();
+    let image = |name: &str| Image::read(std::fs::File::open(folder.join(name)).unwrap(), &numbers(1000)).unwrap();
     for name in ["float64_big.nii", "uint8.nii.gz", "float32_qform.nii.gz", "int16_scaled.nii.gz"] {
         let found = image(name);
         assert_eq!(found.shape, [3, 4, 2, 1, 1], "{name}");
@@ -177,7 +192,7 @@ fn raw_recordings_round_trip() {
         RawRecording::read(folder.path(), &ReadLimits::default()),
         Err(RecordingError::NotRaw { step: 1 })
     ));
-    let numbers = |f: f64| (0..n).map(|v| f * (v as f64 - 11.0) / 16.0).collect::<Vec<f64>>();
+    let values = |f: f64| (0..n).map(|v| f * (v as f64 - 11.0) / 16.0).collect::<Vec<f64>>();
     let raw = RawRecording {
         id: "raw".into(),
         specimen: recording.specimen.clone(),
@@ -188,7 +203,7 @@ fn raw_recordings_round_trip() {
             force_n: None,
             force_sd_n: None,
             window_s: None,
-            phase: [numbers(1.0), numbers(-0.5), numbers(0.25)],
+            phase: [values(1.0), values(-0.5), values(0.25)],
             magnitude: (0..n).map(|v| v as f64).collect(),
             mm_per_radian: [0.1, 0.2, 0.3],
         }],
@@ -224,6 +239,18 @@ fn raw_recordings_round_trip() {
     assert!(matches!(RawRecording::read(folder.path(), &ReadLimits::default()), Err(RecordingError::Value { .. })));
 }
 
+/// What says where the data begin is a number of bytes, or the image is refused.
+#[test]
+fn data_begin_at_a_whole_number_of_bytes() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/import/float64_big.nii");
+    let mut plain = std::fs::read(file).unwrap();
+    for offset in [f32::NAN, f32::INFINITY, -352.0, 100.0, 352.5, 1e9] {
+        plain[108..112].copy_from_slice(&offset.to_be_bytes());
+        let refused = Image::read(&plain[..], &numbers(1000)).unwrap_err();
+        assert!(matches!(refused, NiftiError::Offset { .. }), "{offset}: {refused}");
+    }
+}
+
 /// Units, components and a stream that expands without end are refused with little memory.
 #[test]
 fn wrong_units_shapes_and_endless_streams_are_refused() {
@@ -233,7 +260,7 @@ fn wrong_units_shapes_and_endless_streams_are_refused() {
     let file = std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/import/float64_big.nii")).unwrap();
     plain.extend_from_slice(&file);
     plain[123] = 1;
-    assert!(matches!(Image::read(&plain[..], 1000), Err(NiftiError::Units { code: 1 })));
+    assert!(matches!(Image::read(&plain[..], &numbers(1000)), Err(NiftiError::Units { code: 1 })));
     // A header that promises 32767³ numbers, followed by 64 MiB of zeros in 64 kB of gzip.
     let mut huge = file;
     for at in [42, 44, 46] {
@@ -245,11 +272,11 @@ fn wrong_units_shapes_and_endless_streams_are_refused() {
         bomb.write_all(&[0; 1 << 20]).unwrap();
     }
     let bomb = bomb.finish().unwrap();
-    let limit = ReadLimits::default().max_values;
-    assert!(matches!(Image::read(&bomb[..], limit), Err(NiftiError::TooLarge { .. })));
+    let memory = MemoryLimit::command().begin();
+    assert!(matches!(Image::read(&bomb[..], &memory), Err(NiftiError::Memory(MemoryError::TooMuch { .. }))));
     let (folder, _) = written();
     let mask = std::fs::read(folder.path().join("mask.nii.gz")).unwrap();
-    let whole = Image::read(&mask[..], 1000).unwrap();
+    let whole = Image::read(&mask[..], &numbers(1000)).unwrap();
     let path = folder.path().join("u_1.nii.gz");
     let scalar = Image { intent: 1006, ..whole };
     scalar.write_gz(std::fs::File::create(path).unwrap(), Samples::Float32).unwrap();

@@ -162,7 +162,7 @@ fn write_image(
         affine[a][a] = grid.voxel_mm[a];
         affine[a][3] = grid.origin_mm[a];
     }
-    let image = Image { shape: [nx, ny, nz, 1, components], affine, intent: intent as i16, values };
+    let image = Image { shape: [nx, ny, nz, 1, components], affine, intent: intent as i16, values, unit_mm: Some(1.0) };
     let result = fs::File::create(&path).and_then(|file| image.write_gz(BufWriter::new(file), samples));
     result.map_err(|source| RecordingError::File { path, source })
 }

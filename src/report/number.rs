@@ -12,19 +12,49 @@ pub fn significant(value: f64, digits: usize) -> String {
     if value.abs() < f64::MIN_POSITIVE {
         return "0".into();
     }
-    let digits = digits.clamp(1, 15);
-    // Rust's exponent form rounds first, so 9.999 to two digits counts as 10.
-    let rounded = format!("{:.*e}", digits - 1, value);
-    let (mantissa, exponent) = rounded.split_once('e').unwrap_or((&rounded, "0"));
-    let exponent: i32 = exponent.parse().unwrap_or(0);
-    if (-3..6).contains(&exponent) {
+    match Rounded::of(value, digits) {
+        Rounded::Plain(text) => group_thousands(&text),
+        Rounded::Power(mantissa, exponent) => format!("{} × 10{}", minus(&mantissa), superscript(exponent)),
+    }
+}
+
+/// The same for terminals and files that programs read: `-0.0123`, `123000`, `1.5e-5`, `nan`, `inf`.
+pub fn plain_number(value: f64, digits: usize) -> String {
+    if !value.is_finite() {
+        return value.to_string().to_lowercase();
+    }
+    if value.abs() < f64::MIN_POSITIVE {
+        return "0".into();
+    }
+    match Rounded::of(value, digits) {
+        Rounded::Plain(text) => text,
+        Rounded::Power(mantissa, exponent) => format!("{mantissa}e{exponent}"),
+    }
+}
+
+/// A finite number that is not zero, rounded to significant digits.
+enum Rounded {
+    /// Between 10⁻³ and 10⁶: its digits.
+    Plain(String),
+    /// Beyond: mantissa and exponent of ten.
+    Power(String, i32),
+}
+
+impl Rounded {
+    fn of(value: f64, digits: usize) -> Rounded {
+        let digits = digits.clamp(1, 15);
+        // Rust's exponent form rounds first, so 9.999 to two digits counts as 10.
+        let rounded = format!("{:.*e}", digits - 1, value);
+        let (mantissa, exponent) = rounded.split_once('e').unwrap_or((&rounded, "0"));
+        let exponent: i32 = exponent.parse().unwrap_or(0);
+        if !(-3..6).contains(&exponent) {
+            return Rounded::Power(mantissa.into(), exponent);
+        }
         let decimals = usize::try_from(digits as i32 - 1 - exponent).unwrap_or(0);
         // Digits before the point beyond the significant ones become zeros.
         let scale = 10f64.powi((exponent + 1 - digits as i32).max(0));
         let shown = if scale > 1.0 { (value / scale).round() * scale } else { value };
-        group_thousands(&format!("{shown:.decimals$}"))
-    } else {
-        format!("{} × 10{}", minus(mantissa), superscript(exponent))
+        Rounded::Plain(format!("{shown:.decimals$}"))
     }
 }
 
@@ -125,6 +155,17 @@ mod tests {
             (f64::NEG_INFINITY, 3, "−∞"),
         ] {
             assert_eq!(significant(value, digits), text);
+        }
+        for (value, digits, text) in [
+            (-0.01234, 3, "-0.0123"),
+            (123_456.0, 3, "123000"),
+            (2.6e-14, 5, "2.6000e-14"),
+            (1e300, 3, "1.00e300"),
+            (0.0, 4, "0"),
+            (f64::NAN, 3, "nan"),
+            (f64::NEG_INFINITY, 3, "-inf"),
+        ] {
+            assert_eq!(plain_number(value, digits), text);
         }
         assert_eq!(fixed(-0.001, 2), "0.00");
         assert_eq!(signed_percent(0.0312), "+3.1 %");

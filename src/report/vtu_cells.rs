@@ -17,7 +17,7 @@ pub(super) fn cell_type(kind: ElementKind) -> u8 {
 /// VTK's order: corners (bottom, then top, around), middles of the bottom's edges, of the top's, of the uprights, then
 /// centres of faces (hexahedron: −ξ, +ξ, −η, +η, −ζ, +ζ; wedge: its three quadrilaterals), then the centre. VTK has no
 /// wedge with nodes in the triangles' centres: the prism's three bubble nodes are not shown.
-pub(super) fn nodes_in_vtk_order(kind: ElementKind) -> &'static [usize] {
+pub fn nodes_in_vtk_order(kind: ElementKind) -> &'static [usize] {
     match kind {
         ElementKind::Hex27 => &[
             0, 2, 8, 6, 18, 20, 26, 24, // corners

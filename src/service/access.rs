@@ -34,6 +34,9 @@ pub struct Token {
     /// Most elements of a mesh.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_elements: Option<usize>,
+    /// Most bytes of recordings kept.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_recordings_bytes: Option<u64>,
 }
 
 /// The file of tokens (`tokens/1`).
@@ -79,12 +82,16 @@ pub enum TokenError {
 pub struct Caller {
     /// Name of the token; `local` without tokens.
     pub name: String,
+    /// Whose share of the service it takes: the token's, or the address's where there are no tokens.
+    pub share: String,
     /// Role.
     pub role: Role,
     /// Quota of tasks.
     pub max_queued_tasks: Option<usize>,
     /// Quota of size.
     pub max_elements: Option<usize>,
+    /// Quota of recordings.
+    pub max_recordings_bytes: Option<u64>,
 }
 
 impl Caller {
@@ -95,6 +102,18 @@ impl Caller {
             return Ok(());
         }
         Err(Problem::new("forbidden", format!("the token {} has role {:?}; this needs {role:?}", self.name, self.role)))
+    }
+}
+
+impl Caller {
+    /// # Errors
+    /// `forbidden` where somebody else's `what` is to be changed by no admin.
+    pub fn require_owner(&self, owner: &str, what: &str) -> Result<(), Problem> {
+        self.require(Role::Submit)?;
+        if owner == self.name || self.role == Role::Admin {
+            return Ok(());
+        }
+        Err(Problem::new("forbidden", format!("the {what} is {owner}'s; only {owner} or an admin may change it")))
     }
 }
 
@@ -132,11 +151,22 @@ impl Access {
     ///
     /// # Errors
     /// `unauthorized`.
-    pub fn caller(&self, authorization: Option<&str>) -> Result<Caller, Problem> {
+    pub fn caller(&self, authorization: Option<&str>, address: &str) -> Result<Caller, Problem> {
         if !self.is_closed() {
-            return Ok(Caller { name: "local".into(), role: Role::Admin, max_queued_tasks: None, max_elements: None });
+            return Ok(Caller {
+                name: "local".into(),
+                share: address.into(),
+                role: Role::Admin,
+                max_queued_tasks: None,
+                max_elements: None,
+                max_recordings_bytes: None,
+            });
         }
         let refuse = || Problem::new("unauthorized", "send the header Authorization: Bearer TOKEN");
+        let unknown = || {
+            let remedy = "it may be mistyped, replaced or removed; ask whoever runs the service for another one";
+            Problem::new("unauthorized", format!("this token is none of the service's; {remedy}"))
+        };
         let (scheme, secret) = authorization.and_then(|a| a.split_once(' ')).ok_or_else(refuse)?;
         if !scheme.eq_ignore_ascii_case("bearer") {
             return Err(refuse());
@@ -151,12 +181,14 @@ impl Access {
                 found = Some(token);
             }
         }
-        let token = found.ok_or_else(refuse)?;
+        let token = found.ok_or_else(unknown)?;
         Ok(Caller {
             name: token.name.clone(),
+            share: format!("token {}", token.name),
             role: token.role,
             max_queued_tasks: token.max_queued_tasks,
             max_elements: token.max_elements,
+            max_recordings_bytes: token.max_recordings_bytes,
         })
     }
 }
@@ -193,6 +225,7 @@ pub fn add_token(path: &Path, name: &str, role: Role) -> Result<String, TokenErr
         sha256: sha256_hex(secret.as_bytes()),
         max_queued_tasks: None,
         max_elements: None,
+        max_recordings_bytes: None,
     });
     let text = serde_json::to_string_pretty(&file).unwrap_or_default();
     let fail = |source| TokenError::Io { path: path.into(), source };
@@ -216,12 +249,12 @@ mod tests {
         let secret = add_token(&path, "anna", Role::Submit).unwrap();
         assert!(!std::fs::read_to_string(&path).unwrap().contains(&secret));
         let access = Access::read(&path).unwrap();
-        let caller = access.caller(Some(&format!("Bearer {secret}"))).unwrap();
+        let caller = access.caller(Some(&format!("Bearer {secret}")), "").unwrap();
         assert_eq!((caller.name.as_str(), caller.role), ("anna", Role::Submit));
         assert!(caller.require(Role::Read).is_ok());
         assert_eq!(caller.require(Role::Admin).unwrap_err().status, 403);
         for forged in [None, Some("Bearer "), Some("Bearer lk_0"), Some("Basic x"), Some(secret.as_str())] {
-            assert_eq!(access.caller(forged).unwrap_err().status, 401, "{forged:?}");
+            assert_eq!(access.caller(forged, "").unwrap_err().status, 401, "{forged:?}");
         }
     }
 }

@@ -4,7 +4,7 @@ use super::signal::Signal;
 use super::store::Store;
 use std::collections::BTreeMap;
 use std::fmt::Write;
-use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// Method, route, status.
@@ -15,10 +15,6 @@ type RequestKind = (String, String, u16);
 pub struct Metrics {
     /// Requests and their seconds by (method, route, status).
     requests: Mutex<BTreeMap<RequestKind, (u64, f64)>>,
-    /// Requests in work.
-    pub in_flight: AtomicI64,
-    /// Open event streams.
-    pub streams: AtomicI64,
     /// Requests turned away because of too many at a time.
     pub turned_away: AtomicU64,
 }
@@ -32,8 +28,8 @@ impl Metrics {
         entry.1 += seconds;
     }
 
-    /// The text.
-    pub fn to_text(&self, store: &Store, signal: &Signal) -> String {
+    /// The text; `now` holds name, help and value of what is counted at this moment.
+    pub fn to_text(&self, store: &Store, signal: &Signal, now: [(&'static str, &'static str, usize); 4]) -> String {
         let mut text = String::new();
         let head = |text: &mut String, name: &str, kind: &str, help: &str| {
             let _ = writeln!(text, "# HELP {name} {help}\n# TYPE {name} {kind}");
@@ -58,13 +54,9 @@ impl Metrics {
             let _ = writeln!(text, "{name} {value}");
         };
         let int = |a: &AtomicU64| a.load(Ordering::Relaxed) as f64;
-        single(
-            "lambdak_requests_in_flight",
-            "gauge",
-            "Requests in work.",
-            self.in_flight.load(Ordering::Relaxed) as f64,
-        );
-        single("lambdak_streams", "gauge", "Open event streams.", self.streams.load(Ordering::Relaxed) as f64);
+        for (name, help, count) in now {
+            single(name, "gauge", help, count as f64);
+        }
         single("lambdak_turned_away_total", "counter", "Requests refused as too many.", int(&self.turned_away));
         single("lambdak_tasks_finished_total", "counter", "Tasks finished by this process.", int(&signal.finished));
         single("lambdak_tasks_failed_total", "counter", "Tasks failed in this process.", int(&signal.failed));

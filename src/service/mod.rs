@@ -13,11 +13,13 @@
 
 pub mod access;
 pub mod app;
+mod body;
 mod hub;
 pub mod limits;
 mod log;
 mod metrics;
 pub mod problem;
+mod quota;
 mod recordings;
 mod router;
 mod routes;
@@ -26,6 +28,7 @@ mod server;
 mod signal;
 pub mod store;
 mod task;
+mod turns;
 mod view;
 
 pub use routes::open_api;

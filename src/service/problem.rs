@@ -1,6 +1,7 @@
 //! Errors as RFC 9457 `application/problem+json`, with a stable `type` per cause and JSON pointers to offending fields.
 
 use crate::field::{FieldError, in_lines};
+use crate::file::MemoryError;
 use crate::job::{Failure, JobError};
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -57,10 +58,13 @@ pub const CATALOGUE: &[(&str, u16, &str)] = &[
     ("not-finished", 409, "The job has no result yet"),
     ("wrong-state", 409, "The job's state does not allow this"),
     ("key-reused", 409, "The Idempotency-Key was used with another request"),
+    ("too-slow", 408, "The body came too slowly"),
     ("too-large", 413, "The body is too large"),
     ("unsupported-media-type", 415, "The content type is not supported"),
     ("invalid-input", 422, "The input is not valid"),
     ("too-big-a-problem", 422, "The problem is larger than allowed"),
+    ("too-costly", 422, "The job is estimated to take longer than allowed"),
+    ("time-limit", 422, "The task ran for as long as a task may"),
     ("no-solution", 422, "The computation found no solution"),
     ("unsafe-upload", 422, "The upload is not a safe recording"),
     ("queue-full", 429, "The queue is full"),
@@ -69,12 +73,22 @@ pub const CATALOGUE: &[(&str, u16, &str)] = &[
     ("internal", 500, "The service failed"),
     ("worker-lost", 500, "The task ended its worker too often"),
     ("version-changed", 500, "The program changed while the job was unfinished"),
+    ("busy", 503, "The service has no memory left for this now"),
     ("storage", 503, "The storage does not answer"),
     ("shutting-down", 503, "The service is shutting down"),
+    ("no-space", 507, "The space for recordings is used up"),
     ("timeout", 504, "The request took too long"),
 ];
 
+/// The cause for which the same request may succeed once others have ended.
+pub const BUSY: &str = "busy";
+
 impl Problem {
+    /// Whether it has the cause of this name.
+    pub fn is(&self, name: &str) -> bool {
+        self.kind.strip_prefix("urn:lambdak:problem:") == Some(name)
+    }
+
     /// A problem of the catalogue.
     pub fn new(name: &'static str, detail: impl Into<String>) -> Self {
         let (_, status, title) =
@@ -104,6 +118,16 @@ impl Problem {
     /// As JSON text, for the storage.
     pub fn to_json(&self) -> String {
         serde_json::to_string(self).unwrap_or_default()
+    }
+}
+
+impl From<MemoryError> for Problem {
+    fn from(error: MemoryError) -> Self {
+        match error {
+            MemoryError::TooMuch { .. } => Problem::new("too-large", error.to_string()),
+            MemoryError::Stopped => Problem::new("timeout", error.to_string()),
+            _ => Problem::new(BUSY, error.to_string()).after(5),
+        }
     }
 }
 

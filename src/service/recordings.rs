@@ -1,28 +1,33 @@
-//! Uploaded recordings: a tar file taken apart with bounds, checked by the library's reader, then kept as blobs.
+//! Uploaded recordings: a tar file taken apart into a scratch folder, checked by the library's reader, then kept as
+//! blobs.
 //!
-//! Only regular files with plain names are taken; folders before a name are dropped, links and devices refused. The
-//! compressed images inside are bounded in what they may unpack to.
+//! Only regular files with plain names are taken; folders before a name are dropped, links and devices refused. What
+//! the files may unpack to is bounded by the memory of a reading; the tar file and its entries are never held as a
+//! whole.
 
-use super::problem::Problem;
-use super::store::{NewUpload, Store};
-use crate::job::{InputFile, JobError, Progress, ScratchFolder, Surroundings, recording_identifier};
+use super::problem::{BUSY, Problem};
+use super::store::{NewUpload, Store, UploadFile};
+use crate::field::{printable, with_short_numbers};
+use crate::file::digest_of_file;
+use crate::job::{InputFile, JobError, Progress, ScratchFolder, Surroundings, identifier_of_contents};
 use crate::recording::{RawRecording, ReadLimits, ReadRecording, Recording, RecordingError};
 use serde_json::json;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 /// Most files of a recording.
 const MAX_FILES: usize = 2000;
+/// How long a task waits for memory that other readings hold, and how often it looks.
+const MEMORY_WAIT: Duration = Duration::from_secs(600);
+const MEMORY_PAUSE: Duration = Duration::from_secs(1);
 /// Length of a tar block, bytes.
 const BLOCK: usize = 512;
 
-/// What an upload may take.
-pub const LIMITS: ReadLimits = ReadLimits { max_file_bytes: 256 << 20, max_values: 40_000_000, max_steps: 200 };
-
 fn unsafe_upload(detail: impl Into<String>) -> Problem {
-    Problem::new("unsafe-upload", detail)
+    Problem::new("unsafe-upload", with_short_numbers(&detail.into()))
 }
 
 /// A file's own name: letters, digits, `.`, `_`, `-`, not starting with a dot, at most 100.
@@ -35,7 +40,7 @@ fn plain_name(name: &str) -> Result<String, Problem> {
     if is_plain && !climbs {
         return Ok(last.into());
     }
-    let shown: String = name.chars().filter(|c| !c.is_control()).take(60).collect();
+    let shown = printable(name, 60);
     Err(unsafe_upload(format!("the name {shown:?} is not plain; use letters, digits, dots, hyphens and underscores")))
 }
 
@@ -44,13 +49,12 @@ fn text_of(field: &[u8]) -> String {
     String::from_utf8_lossy(&field[..end]).into_owned()
 }
 
-/// Takes a tar file apart.
+/// Takes a tar file apart into `folder`; the names of its files.
 ///
 /// # Errors
-/// `unsafe-upload`.
-pub fn unpack(mut stream: impl Read, max_bytes: usize) -> Result<BTreeMap<String, Vec<u8>>, Problem> {
-    let cut = |_| unsafe_upload("the tar file ends in the middle of an entry");
-    let mut files = BTreeMap::new();
+/// `unsafe-upload`, `too-large`.
+pub fn unpack(mut stream: impl Read, folder: &Path, max_bytes: usize) -> Result<BTreeSet<String>, Problem> {
+    let mut files = BTreeSet::new();
     let mut total = 0usize;
     loop {
         let mut header = [0u8; BLOCK];
@@ -70,31 +74,32 @@ pub fn unpack(mut stream: impl Read, max_bytes: usize) -> Result<BTreeMap<String
             return Err(unsafe_upload("the body is not a tar file: a header's checksum is wrong"));
         }
         let length = octal(&header[124..136]).ok_or_else(|| unsafe_upload("an entry has no length"))?;
-        let length = usize::try_from(length).unwrap_or(usize::MAX);
+        let length = usize::try_from(length).unwrap_or(usize::MAX / 2);
         total = total.saturating_add(length);
         if total > max_bytes {
             return Err(Problem::new("too-large", format!("the files hold more than {max_bytes} bytes")));
         }
-        let mut bytes = Vec::new();
-        let padded = length.div_ceil(BLOCK) * BLOCK;
-        let read = stream.by_ref().take(padded as u64).read_to_end(&mut bytes).map_err(cut)?;
-        if read < padded {
-            return Err(unsafe_upload("the tar file ends in the middle of an entry"));
-        }
-        bytes.truncate(length);
-        match header[156] {
+        let mut sink: Box<dyn std::io::Write> = match header[156] {
             b'0' | 0 => {
                 let name = plain_name(&text_of(&header[0..100]))?;
-                if files.insert(name.clone(), bytes).is_some() {
+                if !files.insert(name.clone()) {
                     return Err(unsafe_upload(format!("{name} is there twice")));
                 }
                 if files.len() > MAX_FILES {
                     return Err(unsafe_upload(format!("more than {MAX_FILES} files")));
                 }
+                Box::new(std::fs::File::create_new(folder.join(name)).map_err(scratch_failed)?)
             }
             // Folders and extended headers hold nothing that is needed.
-            b'5' | b'x' | b'g' => {}
+            b'5' | b'x' | b'g' => Box::new(std::io::sink()),
             _ => return Err(unsafe_upload("links and devices are refused")),
+        };
+        let padding = (length.div_ceil(BLOCK) * BLOCK - length) as u64;
+        let read = std::io::copy(&mut stream.by_ref().take(length as u64), &mut sink).map_err(scratch_failed)?;
+        let skipped =
+            std::io::copy(&mut stream.by_ref().take(padding), &mut std::io::sink()).map_err(scratch_failed)?;
+        if read < length as u64 || skipped < padding {
+            return Err(unsafe_upload("the tar file ends in the middle of an entry"));
         }
     }
     Ok(files)
@@ -106,37 +111,46 @@ enum Uploaded {
     RawPhases(Box<ReadRecording<RawRecording>>),
 }
 
-/// Reads a recording from its files.
+/// What the scratch folder said.
+pub fn scratch_failed(error: std::io::Error) -> Problem {
+    super::log::error("scratch", &error.to_string());
+    Problem::new("internal", "the service's scratch folder cannot be written; tell whoever runs the service")
+}
+
+/// Reads a recording from a folder of its files.
 ///
 /// # Errors
-/// `unsafe-upload` with what the reader says.
-fn read(files: &BTreeMap<String, Vec<u8>>) -> Result<Uploaded, Problem> {
-    let failed = |e: std::io::Error| Problem::new("internal", format!("scratch: {e}"));
-    let scratch = ScratchFolder::new().map_err(failed)?;
-    for (name, bytes) in files {
-        std::fs::write(scratch.path().join(name), bytes).map_err(failed)?;
-    }
-    let found = match Recording::read_with_digest(scratch.path(), &LIMITS) {
+/// `unsafe-upload` with what the reader says; `busy` where other readings hold the memory.
+fn read(folder: &Path, limits: &ReadLimits) -> Result<Uploaded, Problem> {
+    let found = match Recording::read_with_digest(folder, limits) {
         Ok(read) => Ok(Uploaded::Displacements(Box::new(read))),
         Err(RecordingError::Raw { .. }) => {
-            RawRecording::read_with_digest(scratch.path(), &LIMITS).map(|read| Uploaded::RawPhases(Box::new(read)))
+            RawRecording::read_with_digest(folder, limits).map(|read| Uploaded::RawPhases(Box::new(read)))
         }
         Err(error) => Err(error),
     };
     found.map_err(|e| {
         // The reader names files by their path here, which is nobody's business.
-        let message = e.to_string().replace(&format!("{}/", scratch.path().display()), "");
-        unsafe_upload(message)
+        let message = e.to_string().replace(&format!("{}/", folder.display()), "");
+        match e.memory() {
+            Some(memory) => Problem { detail: message, ..Problem::from(memory.clone()) },
+            None => unsafe_upload(message),
+        }
     })
 }
 
-/// An upload to keep, once its files are read without complaint.
+/// An upload to keep: the files `names` of `folder`, once they are read without complaint.
 ///
 /// # Errors
-/// `unsafe-upload`.
-pub fn upload_of(files: BTreeMap<String, Vec<u8>>, owner: String) -> Result<NewUpload, Problem> {
+/// `unsafe-upload`, `too-large`, `busy`.
+pub fn upload_of(
+    folder: &Path,
+    names: BTreeSet<String>,
+    owner: String,
+    limits: &ReadLimits,
+) -> Result<NewUpload, Problem> {
     let force = |drive_mm: f64, force_n: Option<f64>| json!({ "drive_mm": drive_mm, "force_n": force_n });
-    let (title, manifest) = match read(&files)? {
+    let (title, manifest) = match read(folder, limits)? {
         Uploaded::Displacements(read) => {
             let r = read.recording;
             let steps: Vec<_> = r.steps.iter().map(|s| force(s.drive_mm, s.force_n)).collect();
@@ -150,32 +164,88 @@ pub fn upload_of(files: BTreeMap<String, Vec<u8>>, owner: String) -> Result<NewU
             let r = read.recording;
             let steps: Vec<_> = r.steps.iter().map(|s| force(s.drive_mm, s.force_n)).collect();
             let manifest = json!({
-                "specimen": r.specimen, "shape": r.grid.shape, "voxel_mm": r.grid.voxel_mm, "is_raw": true, "steps": steps,
+                "specimen": r.specimen, "shape": r.grid.shape, "voxel_mm": r.grid.voxel_mm,
+                "num_voxels": r.num_voxels(), "is_raw": true, "steps": steps,
             });
             (r.id, manifest)
         }
     };
+    let mut files = Vec::new();
+    for name in names {
+        let path = folder.join(&name);
+        let num_bytes = std::fs::metadata(&path).map_err(scratch_failed)?.len();
+        let sha = digest_of_file(&path).map_err(|e| scratch_failed(e.into_io()))?;
+        files.push(UploadFile { name, path, num_bytes, sha });
+    }
+    let contents = files.iter().map(|f| (f.name.as_str(), f.num_bytes, f.sha.as_str()));
     Ok(NewUpload {
-        id: recording_identifier(&files),
+        id: identifier_of_contents(contents),
         owner,
-        title: title.chars().filter(|c| !c.is_control()).take(200).collect(),
+        title: printable(&title, 200),
         manifest: manifest.to_string(),
-        files: files.into_iter().collect(),
+        files,
     })
+}
+
+/// Space for recordings, bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct Space {
+    /// Of all owners together.
+    pub all: u64,
+    /// Of one owner; as much as of all without it.
+    pub of_owner: Option<u64>,
+}
+
+/// Whether `length` more bytes fit beside the recordings that are kept; where not, what could be deleted.
+///
+/// # Errors
+/// `no-space`.
+pub fn check_space(store: &Store, owner: &str, length: u64, space: Space) -> Result<(), Problem> {
+    let held = |owner: &str| -> Result<u64, Problem> { Ok(store.uploaded_bytes(owner)?.unsigned_abs()) };
+    let of_all = (held("")?, space.all, "recordings hold");
+    let of_owner = match space.of_owner {
+        Some(most) => (held(owner)?, most, "your recordings hold"),
+        None => of_all,
+    };
+    let full = [of_owner, of_all].into_iter().find(|(kept, most, _)| kept.saturating_add(length) > *most);
+    let Some((kept, most, whose)) = full else { return Ok(()) };
+    let own = store.largest_uploads(owner, 5)?;
+    let megabytes = |bytes: u64| bytes as f64 / 1e6;
+    let list: Vec<String> = own
+        .iter()
+        .map(|row| format!("{} ({:?}, {:.1} MB)", row.id, row.title, megabytes(row.num_bytes.unsigned_abs())))
+        .collect();
+    let which = if list.is_empty() {
+        "none of them is yours: ask their owners, or whoever runs the service".to_string()
+    } else {
+        format!("your largest are {}", list.join(", "))
+    };
+    Err(Problem::new(
+        "no-space",
+        format!(
+            "{:.1} MB more do not fit: {whose} {:.1} of {:.1} MB. Delete what is no longer needed (DELETE \
+             /v1/recordings/ID); {which}",
+            megabytes(length),
+            megabytes(kept),
+            megabytes(most)
+        ),
+    ))
 }
 
 /// Keeps the recording that job `job` made. Its identifier is a hash of its content.
 ///
 /// # Errors
-/// `quota` where recordings fill the service's space.
+/// `no-space` where recordings fill the service's space.
 pub fn keep(store: &Store, job: &str, files: BTreeMap<String, Vec<u8>>) -> Result<String, Problem> {
-    let length: usize = files.values().map(Vec::len).sum();
-    let kept = usize::try_from(store.uploaded_bytes()?).unwrap_or(0);
-    if kept + length > super::limits::Limits::default().max_uploads_bytes {
-        return Err(Problem::new("quota", "the recordings fill the service's space"));
-    }
     let owner = store.job(job)?.map(|row| row.owner).unwrap_or_default();
-    let upload = upload_of(files, owner)?;
+    let length = files.values().map(|bytes| bytes.len() as u64).sum();
+    let all = super::limits::Limits::default().max_uploads_bytes as u64;
+    check_space(store, &owner, length, Space { all, of_owner: None })?;
+    let scratch = ScratchFolder::new().map_err(scratch_failed)?;
+    for (name, bytes) in &files {
+        std::fs::write(scratch.path().join(name), bytes).map_err(scratch_failed)?;
+    }
+    let upload = upload_of(scratch.path(), files.into_keys().collect(), owner, &ReadLimits::job())?;
     store.put_upload(&upload)?;
     Ok(upload.id)
 }
@@ -197,12 +267,27 @@ pub(super) struct StoredSurroundings<'a> {
 impl StoredSurroundings<'_> {
     fn uploaded(&self, name: &str) -> Result<Uploaded, JobError> {
         let unreadable = |message: String| JobError::Unreadable { name: name.into(), message };
-        let files = self.store.upload_files(name).map_err(|e| JobError::Internal(e.to_string()))?;
-        let files: BTreeMap<String, Vec<u8>> = files.into_iter().collect();
-        if files.is_empty() {
+        let internal = |e: &dyn std::fmt::Display| JobError::Internal(e.to_string());
+        let names = self.store.upload_file_names(name).map_err(|e| internal(&e))?;
+        if names.is_empty() {
             return Err(unreadable("the recording is gone; upload it again".into()));
         }
-        read(&files).map_err(|problem| unreadable(problem.detail))
+        let scratch = ScratchFolder::new().map_err(|e| internal(&e))?;
+        for file in names {
+            let bytes = self.store.upload_file(name, &file).map_err(|e| internal(&e))?;
+            std::fs::write(scratch.path().join(&file), bytes).map_err(|e| internal(&e))?;
+        }
+        let begin = Instant::now();
+        loop {
+            match read(scratch.path(), &ReadLimits::job()) {
+                // Other jobs hold the memory for as long as they run.
+                Err(problem) if problem.is(BUSY) && begin.elapsed() < MEMORY_WAIT && !self.is_cancelled() => {
+                    std::thread::sleep(MEMORY_PAUSE);
+                }
+                Err(problem) => return Err(unreadable(problem.detail)),
+                Ok(found) => return Ok(found),
+            }
+        }
     }
 }
 
@@ -278,9 +363,13 @@ mod tests {
             vec![0; 1024],
         ]
         .concat();
-        let files = unpack(&tar[..], 1000).unwrap();
-        assert_eq!(files.keys().collect::<Vec<_>>(), ["recording.json", "u_1.nii.gz"]);
-        assert_eq!(files["u_1.nii.gz"], b"xyz");
+        let unpack = |bytes: &[u8], max| {
+            let folder = tempfile::tempdir().unwrap();
+            unpack(bytes, folder.path(), max).map(|names| (names, folder))
+        };
+        let (files, folder) = unpack(&tar[..], 1000).unwrap();
+        assert_eq!(files.iter().collect::<Vec<_>>(), ["recording.json", "u_1.nii.gz"]);
+        assert_eq!(std::fs::read(folder.path().join("u_1.nii.gz")).unwrap(), b"xyz");
         for name in ["../x", "/etc/passwd", ".hidden", "a/../b", "a\\b", "a b", "", "ü"] {
             assert_eq!(unpack(&entry(name, b'0', b"")[..], 1000).unwrap_err().status, 422, "{name:?}");
         }

@@ -2,27 +2,29 @@
 
 use super::access::{Caller, random_hex};
 use super::app::App;
+use super::body::let_run_out;
 use super::problem::Problem;
 use super::{log, routes};
 use axum::Router;
-use axum::extract::{DefaultBodyLimit, MatchedPath, Request, State};
+use axum::extract::{MatchedPath, Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
+use std::time::Instant;
+
+/// The address of the other end of a connection.
+#[derive(Clone, Debug)]
+pub struct Peer(pub Arc<str>);
 
 /// The whole service.
 pub fn router(app: App) -> Router {
     let (api, document) = routes::open_api();
     let document: Arc<str> = document.into();
-    let max_body = app.limits.max_body_bytes;
     api.route("/openapi.json", axum::routing::get(move || routes::document(document.clone())))
         .merge(routes::page())
         .fallback(not_found)
         .method_not_allowed_fallback(not_allowed)
-        .layer(DefaultBodyLimit::max(max_body))
         .layer(axum::middleware::from_fn_with_state(app.clone(), guard))
         .with_state(app)
 }
@@ -45,14 +47,18 @@ async fn guard(State(app): State<App>, mut request: Request, next: Next) -> Resp
     let path = request.uri().path().to_string();
     let route = request.extensions().get::<MatchedPath>().map_or("(none)", MatchedPath::as_str).to_string();
     let is_page = is_public(&path);
-    let caller = check(&app, request.headers(), &method, is_page);
+    let address = request.extensions().get::<Peer>().map_or_else(|| "".into(), |peer| peer.0.clone());
+    let caller = check(&app, request.headers(), &method, if is_page { None } else { Some(&address) });
     let mut name = String::new();
     let answer = match caller {
-        Err(problem) => problem.into_response(),
+        Err(problem) => {
+            let_run_out(request.into_body());
+            problem.into_response()
+        }
         Ok(caller) => {
             name.clone_from(&caller.name);
-            request.extensions_mut().insert(caller);
-            run(&app, request, next, &path).await
+            request.extensions_mut().insert(caller.clone());
+            run(&app, request, next, &caller, is_page).await
         }
     };
     finish(&app, answer, &Served { id, method, route, path, caller: name, started })
@@ -63,23 +69,25 @@ fn is_public(path: &str) -> bool {
     !path.starts_with("/v1/") && path != "/metrics"
 }
 
-async fn run(app: &App, request: Request, next: Next, path: &str) -> Response {
-    if *app.stopping.borrow() && !is_public(path) {
+/// Runs a request. The page and health need no place among the requests in work; a request with a body takes its place
+/// once the body has come (`Shared::answer`), any other one here.
+async fn run(app: &App, request: Request, next: Next, caller: &Caller, is_page: bool) -> Response {
+    if is_page {
+        return next.run(request).await;
+    }
+    if *app.stopping.borrow() {
+        let_run_out(request.into_body());
         return Problem::new("shutting-down", "the service is shutting down; try again").after(5).into_response();
     }
-    let Ok(_permit) = app.requests.try_acquire() else {
-        app.metrics.turned_away.fetch_add(1, Ordering::Relaxed);
-        return Problem::new("too-many-requests", "too many requests at a time; try again").after(1).into_response();
-    };
-    app.metrics.in_flight.fetch_add(1, Ordering::Relaxed);
-    let is_upload = path == "/v1/recordings";
-    let time = if is_upload { Duration::from_secs(600) } else { app.limits.request_time };
-    let answer = tokio::time::timeout(time, next.run(request)).await;
-    app.metrics.in_flight.fetch_sub(1, Ordering::Relaxed);
-    answer.unwrap_or_else(|_| Problem::new("timeout", "the request took too long").into_response())
+    if *request.method() == Method::POST {
+        return next.run(request).await;
+    }
+    let answered = app.answer(caller, app.limits.request_time, async { Ok(next.run(request).await) }).await;
+    answered.unwrap_or_else(Problem::into_response)
 }
 
-fn check(app: &App, headers: &HeaderMap, method: &Method, is_page: bool) -> Result<Caller, Problem> {
+/// Who calls from `address`; the page's own files are anybody's, and have none.
+fn check(app: &App, headers: &HeaderMap, method: &Method, address: Option<&str>) -> Result<Caller, Problem> {
     let mut hosts = headers.get_all(header::HOST).iter();
     let host = hosts.next().and_then(|h| h.to_str().ok());
     if hosts.next().is_some() {
@@ -97,18 +105,26 @@ fn check(app: &App, headers: &HeaderMap, method: &Method, is_page: bool) -> Resu
     }
     let text = |name: &str| headers.get(name).and_then(|v| v.to_str().ok());
     let is_reading = matches!(*method, Method::GET | Method::HEAD | Method::OPTIONS);
-    if !is_reading && text("sec-fetch-site").is_some_and(|site| !matches!(site, "same-origin" | "none")) {
+    // Browsers that do not say where a page comes from in Sec-Fetch-Site name its origin.
+    let is_foreign = match (text("sec-fetch-site"), text("origin")) {
+        (Some(site), _) => !matches!(site, "same-origin" | "none"),
+        (None, Some(origin)) => origin.split_once("://").map(|(_, name)| name) != host,
+        (None, None) => false,
+    };
+    if !is_reading && is_foreign {
         return Err(Problem::new("forbidden", "pages of other origins may not change anything here"));
     }
-    if is_page {
-        return Ok(Caller {
+    match address {
+        None => Ok(Caller {
             name: String::new(),
+            share: String::new(),
             role: super::access::Role::Read,
             max_queued_tasks: None,
             max_elements: None,
-        });
+            max_recordings_bytes: None,
+        }),
+        Some(address) => app.access.caller(text("authorization"), address),
     }
-    app.access.caller(text("authorization"))
 }
 
 /// The client's id where it is short and plain, else a random one.

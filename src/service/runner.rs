@@ -90,16 +90,24 @@ fn run_task(store: &Store, settings: &WorkerSettings, signal: &Signal, worker: &
         let _ = std::fs::write(&path, bytes);
     }
     let watch = Watch::default();
+    let input = (!task.is_gather).then(|| serde_json::from_str::<TaskInput>(&task.input)).transpose();
+    let limit = match &input {
+        Ok(Some(input)) => Duration::try_from_secs_f64(input.max_seconds).unwrap_or(Duration::MAX),
+        _ => Duration::MAX,
+    };
     let outcome = std::thread::scope(|scope| {
         let keeper = scope.spawn(|| keep(store, settings, worker, task, &path, &watch));
         let surroundings = StoredSurroundings {
             store,
-            is_cancelled: &|| watch.is_lost.load(Ordering::Relaxed) || signal.is_stopping(),
+            is_cancelled: &|| {
+                watch.is_lost.load(Ordering::Relaxed) || signal.is_stopping() || started.elapsed() > limit
+            },
             progress: &watch.progress,
             checkpoint: &path,
             max_elements: usize::MAX,
         };
-        let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| run_job(store, task, surroundings)));
+        let work = || run_job(store, task, input, surroundings);
+        let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(work));
         watch.is_done.store(true, Ordering::SeqCst);
         keeper.thread().unpark();
         outcome
@@ -114,6 +122,17 @@ fn run_task(store: &Store, settings: &WorkerSettings, signal: &Signal, worker: &
         Ok(result) => {
             signal.finished.fetch_add(1, Ordering::Relaxed);
             ("finished", until_stored(|| store.finish(task, worker, &result)))
+        }
+        Err(JobError::Stopped { .. }) if started.elapsed() > limit && !signal.is_stopping() => {
+            save_checkpoint(store, worker, task, &path);
+            signal.failed.fetch_add(1, Ordering::Relaxed);
+            let detail = format!(
+                "the task ran for {:.1} h, as long as a task of this service may; resume the job to go on for as long \
+                 again, or ask for less",
+                limit.as_secs_f64() / 3600.0
+            );
+            let problem = Problem::new("time-limit", detail).to_json();
+            ("time-limit", until_stored(|| store.fail(task, worker, &problem)))
         }
         Err(JobError::Stopped { .. }) => {
             save_checkpoint(store, worker, task, &path);
@@ -138,10 +157,14 @@ fn run_task(store: &Store, settings: &WorkerSettings, signal: &Signal, worker: &
 }
 
 /// Runs a task, or gathers the results of its job's tasks.
-fn run_job(store: &Store, task: &Claimed, surroundings: StoredSurroundings) -> Result<Outcome, JobError> {
+fn run_job(
+    store: &Store,
+    task: &Claimed,
+    input: Result<Option<TaskInput>, serde_json::Error>,
+    surroundings: StoredSurroundings,
+) -> Result<Outcome, JobError> {
     let unreadable = |e: serde_json::Error| JobError::Internal(format!("the stored task cannot be read: {e}"));
-    if !task.is_gather {
-        let input: TaskInput = serde_json::from_str(&task.input).map_err(unreadable)?;
+    if let Some(input) = input.map_err(unreadable)? {
         let job = input.job()?;
         let surroundings = StoredSurroundings { max_elements: input.max_elements, ..surroundings };
         return match run(&job, &surroundings) {

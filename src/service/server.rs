@@ -7,10 +7,13 @@ use super::limits::Limits;
 use super::log;
 use super::metrics::Metrics;
 use super::problem::Problem;
-use super::router::router;
+use super::quota::Quota;
+use super::router::{Peer, router};
 use super::runner::{self, WorkerSettings};
 use super::signal::Signal;
 use super::store::{Store, StoreError};
+use super::turns::Turns;
+use crate::job::ScratchFolder;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
 use hyper_util::service::TowerToHyperService;
@@ -20,6 +23,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 use tokio::sync::{Semaphore, watch};
+use tower::ServiceExt;
 
 /// Settings of the service.
 #[derive(Clone, Debug)]
@@ -38,6 +42,8 @@ pub struct ServeOptions {
     pub limits: Limits,
     /// How long a lease lasts.
     pub lease: Duration,
+    /// Ended jobs and recordings older than this are deleted; never without it.
+    pub keep: Option<Duration>,
 }
 
 /// Settings of a worker.
@@ -91,6 +97,8 @@ pub enum ServeError {
 
 /// How long a service that was told to stop still answers that it is not ready, so that a load balancer hears of it.
 const DRAIN: Duration = Duration::from_secs(1);
+/// How often old jobs and recordings are looked for.
+const DELETION_PERIOD: Duration = Duration::from_secs(600);
 /// How long open requests may take to end at shutdown.
 const GRACE: Duration = Duration::from_secs(10);
 
@@ -103,11 +111,8 @@ fn runtime() -> Result<tokio::runtime::Runtime, ServeError> {
         .map_err(|source| ServeError::System { what: "threads", source })
 }
 
-fn scratch() -> Result<PathBuf, ServeError> {
-    let name = random_hex::<8>()?;
-    let path = std::env::temp_dir().join(format!("lambdak-{name}"));
-    std::fs::create_dir(&path).map_err(|source| ServeError::System { what: "a folder for checkpoints", source })?;
-    Ok(path)
+fn scratch() -> Result<ScratchFolder, ServeError> {
+    ScratchFolder::new().map_err(|source| ServeError::System { what: "a folder for checkpoints", source })
 }
 
 /// Resolves at SIGINT or SIGTERM.
@@ -164,7 +169,8 @@ pub fn serve(options: &ServeOptions, on_ready: &dyn Fn(SocketAddr)) -> Result<()
         Vec::new()
     } else {
         let name = format!("service-{}", random_hex::<4>()?);
-        let settings = WorkerSettings { name, slots: options.slots, lease: options.lease, scratch: scratch.clone() };
+        let settings =
+            WorkerSettings { name, slots: options.slots, lease: options.lease, scratch: scratch.path().into() };
         runner::start(&store, &settings, &signal)
     };
     let (stop, stopping) = watch::channel(false);
@@ -178,20 +184,28 @@ pub fn serve(options: &ServeOptions, on_ready: &dyn Fn(SocketAddr)) -> Result<()
         metrics: Metrics::default(),
         signal: signal.clone(),
         stopping: stopping.clone(),
-        requests: Semaphore::new(options.limits.max_requests),
-        quick: Semaphore::new(2),
+        requests: quota("requests in work", options.limits.max_requests),
+        bodies: quota("bodies coming in", options.limits.max_bodies),
+        upload_bodies: quota("uploads coming in", options.limits.max_upload_bodies),
+        streams: quota("event streams", options.limits.max_streams),
+        quick: Turns::new(2),
+        uploads: Arc::new(Semaphore::new(1)),
+        ready: tokio::sync::Mutex::default(),
     });
-    let head_time = options.limits.head_time;
+    let limits = options.limits;
     let slots_signal = signal.clone();
     let result = runtime.block_on(async move {
         let listener = tokio::net::TcpListener::from_std(listener).map_err(fail)?;
+        if let Some(keep) = options.keep {
+            tokio::spawn(delete_old(store.clone(), keep));
+        }
         tokio::spawn(hub::run(hub, store, stopping));
         log::info(
             "listening",
             &serde_json::json!({ "address": listen.to_string(), "version": crate::provenance::VERSION }),
         );
         on_ready(listen);
-        accept(listener, router(app), head_time, || {
+        accept(listener, router(app), &limits, || {
             // Streams end; running tasks keep their checkpoints and go back into the queue.
             let _ = stop.send(true);
             slots_signal.stop();
@@ -203,18 +217,40 @@ pub fn serve(options: &ServeOptions, on_ready: &dyn Fn(SocketAddr)) -> Result<()
     for slot in slots {
         let _ = slot.join();
     }
-    let _ = std::fs::remove_dir_all(scratch);
+    drop(scratch);
     runtime.shutdown_timeout(Duration::from_secs(2));
     log::info("stopped", &serde_json::json!({}));
     result
 }
 
-async fn accept(listener: tokio::net::TcpListener, router: axum::Router, head_time: Duration, on_stop: impl Fn()) {
+/// Deletes what is older than `keep`, again and again.
+async fn delete_old(store: Arc<Store>, keep: Duration) {
+    let keep_ms = i64::try_from(keep.as_millis()).unwrap_or(i64::MAX);
+    loop {
+        let store = store.clone();
+        match tokio::task::spawn_blocking(move || store.delete_older_than(keep_ms)).await {
+            Ok(Ok([0, 0])) => {}
+            Ok(Ok([jobs, recordings])) => {
+                log::info("deleted", &serde_json::json!({ "jobs": jobs, "recordings": recordings }));
+            }
+            Ok(Err(error)) => log::error("deletion", &error.to_string()),
+            Err(_) => return,
+        }
+        tokio::time::sleep(DELETION_PERIOD).await;
+    }
+}
+
+fn quota(what: &'static str, [max, of_caller]: [usize; 2]) -> Arc<Quota> {
+    Quota::new(what, max, of_caller)
+}
+
+/// Takes connections until the service is told to stop. Their number is bounded for each address, so that one cannot
+/// hold them all.
+async fn accept(listener: tokio::net::TcpListener, router: axum::Router, limits: &Limits, on_stop: impl Fn()) {
     let graceful = GracefulShutdown::new();
     let mut http = hyper::server::conn::http1::Builder::new();
-    http.timer(TokioTimer::new()).header_read_timeout(head_time).max_headers(64).max_buf_size(64 << 10);
-    // More connections than requests and streams together are nobody's need.
-    let connections = Arc::new(Semaphore::new(4096));
+    http.timer(TokioTimer::new()).header_read_timeout(limits.head_time).max_headers(64).max_buf_size(64 << 10);
+    let connections = quota("connections", limits.max_connections);
     let mut stopped = std::pin::pin!(interrupted());
     let mut end: Option<tokio::time::Instant> = None;
     loop {
@@ -228,17 +264,23 @@ async fn accept(listener: tokio::net::TcpListener, router: axum::Router, head_ti
             }
             () = tokio::time::sleep_until(end.unwrap_or_else(tokio::time::Instant::now)), if end.is_some() => break,
         };
-        let Ok((socket, _)) = accepted else {
+        let Ok((socket, peer)) = accepted else {
             // Out of file descriptors, say: connections end and free some.
             tokio::time::sleep(Duration::from_millis(50)).await;
             continue;
         };
-        let Ok(permit) = connections.clone().try_acquire_owned() else { continue };
+        let address = peer.ip().to_string();
+        let Ok(entered) = connections.enter(&address) else { continue };
         let _ = socket.set_nodelay(true);
-        let service = TowerToHyperService::new(router.clone());
+        let peer = Peer(address.into());
+        let named = router.clone().map_request(move |mut request: hyper::Request<hyper::body::Incoming>| {
+            request.extensions_mut().insert(peer.clone());
+            request.map(axum::body::Body::new)
+        });
+        let service = TowerToHyperService::new(named);
         let connection = graceful.watch(http.serve_connection(TokioIo::new(socket), service));
         tokio::spawn(async move {
-            let _permit = permit;
+            let _entered = entered;
             let _ = connection.await;
         });
     }
@@ -264,7 +306,7 @@ pub fn work(options: &WorkerOptions) -> Result<(), ServeError> {
         "worker",
         &serde_json::json!({ "name": name, "slots": options.slots, "version": crate::provenance::VERSION }),
     );
-    let settings = WorkerSettings { name, slots: options.slots, lease: options.lease, scratch: scratch.clone() };
+    let settings = WorkerSettings { name, slots: options.slots, lease: options.lease, scratch: scratch.path().into() };
     let slots = runner::start(&store, &settings, &signal);
     let other = runtime.block_on(async {
         let mut stopped = std::pin::pin!(interrupted());
@@ -299,7 +341,7 @@ pub fn work(options: &WorkerOptions) -> Result<(), ServeError> {
     for slot in slots {
         let _ = slot.join();
     }
-    let _ = std::fs::remove_dir_all(scratch);
+    drop(scratch);
     match other {
         Some(error) => Err(error.into()),
         None => Ok(()),

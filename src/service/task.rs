@@ -14,6 +14,8 @@ pub struct TaskInput {
     pub request: serde_json::Value,
     /// Most elements of a mesh.
     pub max_elements: usize,
+    /// Most seconds that it may run.
+    pub max_seconds: f64,
 }
 
 impl TaskInput {
@@ -29,11 +31,12 @@ impl TaskInput {
 }
 
 /// The tasks into which a job is split, and whether their results are put together at the end.
-pub fn tasks_of(job: &Job, max_elements: usize) -> Result<(Vec<NewTask>, bool), serde_json::Error> {
+pub fn tasks_of(job: &Job, max_elements: usize, max_seconds: f64) -> Result<(Vec<NewTask>, bool), serde_json::Error> {
     let task = |job: &Job| {
         let (key, is_numbers_only) = job.work_key();
         let cache_key = if is_numbers_only { key + NUMBERS_ONLY } else { key };
-        let input = TaskInput { kind: job.kind.command.into(), request: job.request.clone(), max_elements };
+        let input =
+            TaskInput { kind: job.kind.command.into(), request: job.request.clone(), max_elements, max_seconds };
         Ok(NewTask { input: serde_json::to_string(&input)?, cache_key })
     };
     let parts = job.parts();
@@ -44,8 +47,12 @@ pub fn tasks_of(job: &Job, max_elements: usize) -> Result<(Vec<NewTask>, bool), 
         Ok(job) => task(&job),
         // A part that cannot be run is a result: it fails when its turn comes.
         Err(_) => {
-            let input =
-                TaskInput { kind: kind_of_part(part.kind).command.into(), request: part.request.clone(), max_elements };
+            let input = TaskInput {
+                kind: kind_of_part(part.kind).command.into(),
+                request: part.request.clone(),
+                max_elements,
+                max_seconds,
+            };
             Ok(NewTask { input: serde_json::to_string(&input)?, cache_key: String::new() })
         }
     });

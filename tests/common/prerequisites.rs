@@ -26,12 +26,14 @@ pub enum Prerequisite {
     Python,
     /// The right to mount a small file system.
     Mount,
+    /// CalculiX (`ccx`).
+    Calculix,
     /// Leave to open some 1,100 files in one process and 550 in another.
     OpenFiles,
 }
 
 impl Prerequisite {
-    const ALL: [Prerequisite; 7] = [
+    const ALL: [Prerequisite; 8] = [
         Prerequisite::Postgres,
         Prerequisite::Slurm,
         Prerequisite::Recordings,
@@ -39,6 +41,7 @@ impl Prerequisite {
         Prerequisite::Python,
         Prerequisite::Mount,
         Prerequisite::OpenFiles,
+        Prerequisite::Calculix,
     ];
 
     /// Its name in `LAMBDAK_REQUIRE`.
@@ -51,6 +54,7 @@ impl Prerequisite {
             Prerequisite::Python => "python",
             Prerequisite::Mount => "mount",
             Prerequisite::OpenFiles => "open-files",
+            Prerequisite::Calculix => "calculix",
         }
     }
 }
@@ -150,6 +154,14 @@ pub fn python() -> Result<(), Missing> {
         return Ok(());
     }
     Err(Missing::new(Prerequisite::Python, "python3 does not run"))
+}
+
+/// Ok where `ccx` runs.
+pub fn calculix() -> Result<(), Missing> {
+    if Command::new("ccx").arg("-v").output().is_ok() {
+        return Ok(());
+    }
+    Err(Missing::new(Prerequisite::Calculix, "ccx does not run (Debian: apt-get install calculix-ccx)"))
 }
 
 /// A recording of the independent code.

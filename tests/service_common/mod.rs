@@ -179,3 +179,19 @@ pub fn small_sweep(count: usize) -> Value {
     let values: Vec<f64> = (0..count).map(|i| 0.5 + 2.0 * i as f64 / count as f64).collect();
     json!({ "name": "kill", "base": small_evaluation(1.0), "vary": [{ "pointer": "/drive_mm/0", "values": values }] })
 }
+
+/// A tar entry with a right checksum.
+pub fn tar_entry(name: &str, kind: u8, bytes: &[u8]) -> Vec<u8> {
+    let mut header = [0u8; 512];
+    header[..name.len()].copy_from_slice(name.as_bytes());
+    header[124..135].copy_from_slice(format!("{:011o}", bytes.len()).as_bytes());
+    header[148..156].fill(b' ');
+    header[156] = kind;
+    let sum: u64 = header.iter().map(|b| u64::from(*b)).sum();
+    header[148..154].copy_from_slice(format!("{sum:06o}").as_bytes());
+    header[154] = 0;
+    let mut out = header.to_vec();
+    out.extend_from_slice(bytes);
+    out.resize(out.len().div_ceil(512) * 512, 0);
+    out
+}

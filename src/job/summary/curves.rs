@@ -1,19 +1,25 @@
 //! Fits of curves as text.
 
+use super::num;
 use crate::homogeneous::{CurveFit, CurveFitSequence, CurveMatch, DumbbellFit};
 
 pub(in crate::job) fn uniaxial(name: &str, families: &[CurveFitSequence], conversion: Option<&DumbbellFit>) -> String {
     let mut text = format!("{name}\n");
     if let Some(c) = conversion {
         text += &format!(
-            "\ngrip to gauge by finite elements: {} rounds, last change {:.1e} of the largest strain, finite element force \
-             within {:.2} % of the data\n  displacement mm   gauge stretch     force N\n",
+            "\ngrip to gauge by finite elements: {} rounds, last change {} of the largest strain, finite element force \
+             within {} % of the data\n  displacement mm   gauge stretch     force N\n",
             c.num_rounds,
-            c.last_change,
-            100.0 * c.force_mismatch
+            num(c.last_change, 2),
+            num(100.0 * c.force_mismatch, 4)
         );
         for p in &c.conversion {
-            text += &format!("  {:>15.3} {:>15.4} {:>11.4}\n", p.displacement_mm, p.gauge_stretch, p.force_n);
+            text += &format!(
+                "  {:>15} {:>15} {:>11}\n",
+                num(p.displacement_mm, 4),
+                num(p.gauge_stretch, 5),
+                num(p.force_n, 5)
+            );
         }
     }
     for family in families {
@@ -33,31 +39,31 @@ fn sequence_table(sequence: &CurveFitSequence) -> String {
     for (model, fit) in s.models.iter().zip(&sequence.fits) {
         let g = fit.initial_shear_modulus_kpa;
         let optional = |v: Option<f64>, width: usize, digits: usize| {
-            v.map_or_else(|| format!("{:>width$}", "-"), |v| format!("{v:>width$.digits$}"))
+            v.map_or_else(|| format!("{:>width$}", "-"), |v| format!("{:>width$}", num(v, digits + 2)))
         };
-        let probability = model.f_probability.map_or_else(|| format!("{:>9}", "-"), |p| format!("{p:>9.1e}"));
+        let probability = model.f_probability.map_or_else(|| format!("{:>9}", "-"), |p| format!("{:>9}", num(p, 2)));
         text += &format!(
-            "  {:<20}{:>9}  {:<10.4e}{} {} {} {:>9.1}   {:.2} ({:.2} to {:.2})\n",
+            "  {:<20}{:>9}  {:<10}{} {} {} {:>9}   {} ({} to {})\n",
             model.name,
             model.num_parameters,
-            model.sum_of_squares,
+            num(model.sum_of_squares, 5),
             optional(model.decrement, 10, 3),
             optional(model.f_value, 8, 1),
             probability,
-            model.bic,
-            g.value,
-            g.interval_95[0],
-            g.interval_95[1]
+            num(model.bic, 7),
+            num(g.value, 4),
+            num(g.interval_95[0], 4),
+            num(g.interval_95[1], 4)
         );
     }
     let name = |i: usize| s.models.get(i).map_or("-", |m| m.name.as_str());
     text += &format!(
-        "  chosen: {} (by BIC, which decides; decrement {}, F-test {}); {} data worth {:.0} independent ones\n",
+        "  chosen: {} (by BIC, which decides; decrement {}, F-test {}); {} data worth {} independent ones\n",
         name(s.by_bic),
         name(s.by_decrement),
         name(s.by_f_test),
         s.num_data,
-        s.num_independent
+        num(s.num_independent, 3)
     );
     text
 }
@@ -65,13 +71,17 @@ fn sequence_table(sequence: &CurveFitSequence) -> String {
 /// One fit's parameters and matches.
 fn fit_table(fit: &CurveFit) -> String {
     let mut text = String::from("  parameter        value         sd   95 % interval\n");
-    for p in &fit.parameters {
+    for (index, p) in fit.parameters.iter().enumerate() {
+        // Factors (every other parameter) are as good as unknown where they scatter by more than themselves; an exponent
+        // near zero may be well known all the same.
+        let is_unknown = |sd: f64| index % 2 == 0 && sd > p.value.abs();
         let rest = match (p.held, p.sd, p.interval_95) {
             (true, _, _) => "      held".to_string(),
-            (_, Some(sd), Some([low, high])) => format!("{sd:>10.4}   {low:.4} to {high:.4}"),
+            (_, Some(sd), _) if is_unknown(sd) => format!("{:>10}   not identifiable", num(sd, 5)),
+            (_, Some(sd), Some([low, high])) => format!("{:>10}   {} to {}", num(sd, 5), num(low, 5), num(high, 5)),
             _ => "   not identifiable".into(),
         };
-        text += &format!("  {:<9} {:>12.4} {rest}\n", p.name, p.value);
+        text += &format!("  {:<9} {:>12} {rest}\n", p.name, num(p.value, 5));
     }
     text += match fit.bulk_kpa {
         Some(_) => "  kappa is held\n",
@@ -80,12 +90,12 @@ fn fit_table(fit: &CurveFit) -> String {
     text += "  curve                points        R²    rms error kPa   relative\n";
     for m in &fit.curves {
         text += &format!(
-            "  {:<20} {:>6} {:>9.5} {:>16.3} {:>9.2} %\n",
+            "  {:<20} {:>6} {:>9} {:>16} {:>9} %\n",
             m.name,
             m.num_points,
-            m.r_squared,
-            m.rms_error_kpa,
-            100.0 * m.relative_rms_error
+            num(m.r_squared, 6),
+            num(m.rms_error_kpa, 4),
+            num(100.0 * m.relative_rms_error, 4)
         );
     }
     for note in &fit.notes {
@@ -101,12 +111,12 @@ pub(in crate::job) fn curves(sequence: &CurveFitSequence, used: &CurveFit, kept_
     text += &fit_table(used);
     for m in kept_back {
         text += &format!(
-            "  predicted, kept back: {}: R² {:.5}, rms error {:.3} kPa ({:.2} %), largest {:.3} kPa\n",
+            "  predicted, kept back: {}: R² {}, rms error {} kPa ({} %), largest {} kPa\n",
             m.name,
-            m.r_squared,
-            m.rms_error_kpa,
-            100.0 * m.relative_rms_error,
-            m.largest_error_kpa
+            num(m.r_squared, 6),
+            num(m.rms_error_kpa, 4),
+            num(100.0 * m.relative_rms_error, 4),
+            num(m.largest_error_kpa, 4)
         );
     }
     text

@@ -1,5 +1,6 @@
 //! A design search as text.
 
+use super::num;
 use crate::design::{DesignEntry, DesignResult};
 
 /// The result as text.
@@ -11,11 +12,11 @@ pub(in crate::job) fn design(result: &DesignResult) -> String {
     text += "\n  design                                     drive mm   force N   gain   closest limit\n";
     let line = |label: &str, e: &DesignEntry| {
         format!(
-            "  {:<42} {:>8.2} {:>9.2} {:>6.3}   {}\n",
+            "  {:<42} {:>8} {:>9} {:>6}   {}\n",
             label,
-            e.specimen.drive_mm.last().copied().unwrap_or(0.0),
-            e.force_n(),
-            e.objective,
+            num(e.specimen.drive_mm.last().copied().unwrap_or(0.0), 5),
+            num(e.force_n(), 4),
+            num(e.objective, 4),
             if e.is_within_limits { e.closest_limit.clone() } else { format!("not kept: {}", e.not_kept()) }
         )
     };
@@ -26,7 +27,7 @@ pub(in crate::job) fn design(result: &DesignResult) -> String {
     text += "\n  gains of the best over the base (above 1: better)\n";
     text += "  material     parameter   integrated sensitivity   promised standard deviation\n";
     for g in &result.best.gains {
-        let show = |v: Option<f64>| v.map_or("-".into(), |v| format!("{v:.3}"));
+        let show = |v: Option<f64>| v.map_or("-".into(), |v| num(v, 4));
         text += &format!(
             "  {:<12} {:<11} {:>22} {:>29}\n",
             g.material,
@@ -41,14 +42,14 @@ pub(in crate::job) fn design(result: &DesignResult) -> String {
         for (label, list) in [("best", &v.best), ("base", &v.base)] {
             for p in list {
                 let show = |v: Option<f64>, digits: usize| {
-                    v.filter(|v| v.is_finite()).map_or("-".into(), |v| format!("{v:.digits$}"))
+                    v.filter(|v| v.is_finite()).map_or("-".into(), |v| num(v, digits + 1))
                 };
                 let ratio = p.promised_sd.map(|sd| p.found_sd / sd);
                 text += &format!(
-                    "  {:<10} {:<10} {:>11.4} {:>12} {:>12} {:>13} {:>7} {:>7}\n",
+                    "  {:<10} {:<10} {:>11} {:>12} {:>12} {:>13} {:>7} {:>7}\n",
                     label,
                     p.parameter,
-                    p.truth,
+                    num(p.truth, 5),
                     show(Some(p.mean), 4),
                     show(Some(p.found_sd), 4),
                     show(p.promised_sd, 4),

@@ -1,5 +1,6 @@
 //! Diagnoses as text.
 
+use super::num;
 use crate::diagnosis::{BeforeAfter, Diagnosis, DiagnosisResult, TogetherResult, Verdict};
 use crate::report::in_words;
 
@@ -17,18 +18,24 @@ pub(in crate::job) fn diagnosis(r: &DiagnosisResult, d: &Diagnosis) -> String {
     if let Some(test) = &r.interior {
         let (before, after) = (test.chi2_per_datum.before, test.chi2_per_datum.after);
         let words = test.origin.in_words();
-        text += &format!("\ninterior test: chi2 per datum {before:.4} -> {after:.4} between the planes: {words}\n");
+        text += &format!(
+            "\ninterior test: chi2 per datum {} -> {} between the planes: {words}\n",
+            num(before, 5),
+            num(after, 5)
+        );
     }
     for c in &r.causes {
         text += &format!("\n{} ({:?}): {}\n", c.name, c.category, c.description);
         for p in &c.parameters {
-            let interval = p.interval_95.map_or("not bounded by the data".into(), |[a, b]| format!("{a:.4} to {b:.4}"));
-            text += &format!("  {:<40} {:>10.4}   {interval}\n", p.name, p.value);
+            let interval = p
+                .interval_95
+                .map_or("not bounded by the data".into(), |[a, b]| format!("{} to {}", num(a, 5), num(b, 5)));
+            text += &format!("  {:<40} {:>10}   {interval}\n", p.name, num(p.value, 5));
         }
         if let Some(l) = &c.location {
             text += &format!("  at the {}: centre {:.1?} mm, extent {:.1?} mm\n", l.region, l.center_mm, l.extent_mm);
         }
-        text += &format!("  evidence {:.0}, explains {:.4} mm rms\n", c.evidence, c.effect_rms_mm);
+        text += &format!("  evidence {}, explains {} mm rms\n", num(c.evidence, 4), num(c.effect_rms_mm, 5));
         text += &format!("  what can be done: {}\n", c.remedy);
     }
     for c in &r.alternatives {
@@ -37,32 +44,35 @@ pub(in crate::job) fn diagnosis(r: &DiagnosisResult, d: &Diagnosis) -> String {
         text += &format!("\n{what}: {} ({})\n", c.name, c.description);
         if let Some(e) = c.experiments.first() {
             text += &format!(
-                "  a further step at {:.2} mm would tell it apart by {:.1} standard deviations\n",
-                e.drive_mm, e.distance_sd
+                "  a further step at {} mm would tell it apart by {} standard deviations\n",
+                num(e.drive_mm, 5),
+                num(e.distance_sd, 4)
             );
         }
     }
     text += &format!(
-        "\nchi2 per datum      {:.4} -> {:.4}\nmisfit beyond noise {:.4} -> {:.4} mm rms (allowance {:.4})\nkept back           {:.4} -> {:.4} mm rms\n",
-        r.chi2_per_datum.before,
-        r.chi2_per_datum.after,
-        r.structured_rms_mm.before,
-        r.structured_rms_mm.after,
-        r.allowance_mm,
-        r.kept_back_rms_mm.before,
-        r.kept_back_rms_mm.after
+        "\nchi2 per datum      {} -> {}\nmisfit beyond noise {} -> {} mm rms (allowance {})\nkept back           {} -> {} mm rms\n",
+        num(r.chi2_per_datum.before, 5),
+        num(r.chi2_per_datum.after, 5),
+        num(r.structured_rms_mm.before, 5),
+        num(r.structured_rms_mm.after, 5),
+        num(r.allowance_mm, 5),
+        num(r.kept_back_rms_mm.before, 5),
+        num(r.kept_back_rms_mm.after, 5)
     );
     if let Some(m) = &r.modulus_against_belief {
         text += &format!("\n{}\n", m.in_words());
     }
     text += "\nmaterial            nominal model -> with the causes\n";
     for p in d.corrected.material.parameters() {
-        let before = if d.nominal.material.parameters().contains(&p) {
-            format!("{:.3}", d.nominal.material.value(p))
-        } else {
-            "-".into()
-        };
-        text += &format!("  {:<10} {before:>12} -> {:.3}\n", p.name(), d.corrected.material.value(p));
+        let before =
+            if d.nominal.material.parameters().contains(&p) { num(d.nominal.material.value(p), 4) } else { "-".into() };
+        let (name, value) = (p.name(), d.corrected.material.value(p));
+        let interval = r.material_parameters.iter().find(|m| m.name == name).and_then(|m| m.interval_95);
+        // Two standard deviations to each side: one of them is more than the value.
+        let is_unknown = interval.is_none_or(|[low, high]| high - low > 4.0 * value.abs());
+        let note = if is_unknown { "   not identifiable" } else { "" };
+        text += &format!("  {name:<10} {before:>12} -> {}{note}\n", num(value, 4));
     }
     text
 }
@@ -78,7 +88,7 @@ pub(in crate::job) fn together(results: &[&DiagnosisResult], found: Option<&Toge
             .iter()
             .map(|p| {
                 let half = p.interval_95.map_or(f64::NAN, |[a, b]| 0.5 * (b - a));
-                format!("{} {:.3} ± {:.3}", p.name, p.value, half)
+                format!("{} {} ± {}", p.name, num(p.value, 4), num(half, 4))
             })
             .collect();
         text += &format!("  {:<18} {:?} [{}]; {}\n", r.recording, r.verdict, causes.join(", "), parameters.join(", "));
@@ -86,25 +96,29 @@ pub(in crate::job) fn together(results: &[&DiagnosisResult], found: Option<&Toge
     let Some(found) = found else { return text };
     text += &format!("\none material for all: {}\n", in_words(&found.one_material));
     for p in &found.material_parameters {
-        let interval = p.interval_95.map_or("not bounded by the data".into(), |[a, b]| format!("{a:.4} to {b:.4}"));
-        text += &format!("  {:<40} {:>10.4}   {interval}\n", p.name, p.value);
+        let interval =
+            p.interval_95.map_or("not bounded by the data".into(), |[a, b]| format!("{} to {}", num(a, 5), num(b, 5)));
+        text += &format!("  {:<40} {:>10}   {interval}\n", p.name, num(p.value, 5));
     }
     for c in &found.common_causes {
         text += &format!("\none size for all of '{}': {}\n", c.description, in_words(&c.agreement));
         for p in &c.parameters {
-            let interval = p.interval_95.map_or("not bounded by the data".into(), |[a, b]| format!("{a:.4} to {b:.4}"));
-            text += &format!("  {:<40} {:>10.4}   {interval}\n", p.name, p.value);
+            let interval = p
+                .interval_95
+                .map_or("not bounded by the data".into(), |[a, b]| format!("{} to {}", num(a, 5), num(b, 5)));
+            text += &format!("  {:<40} {:>10}   {interval}\n", p.name, num(p.value, 5));
         }
     }
     text += "\npredicted by each other  mm rms and largest error of a force: nominal -> with the causes\n";
     for p in &found.predictions {
-        let displacement =
-            p.displacement_rms_mm.map_or("no equilibrium".into(), |b| format!("{:.4} -> {:.4}", b.before, b.after));
+        let displacement = p
+            .displacement_rms_mm
+            .map_or("no equilibrium".into(), |b| format!("{} -> {}", num(b.before, 5), num(b.after, 5)));
         let force = p
             .force_relative
-            .map_or("no force".into(), |b| format!("{:.2} -> {:.2} %", 100.0 * b.before, 100.0 * b.after));
+            .map_or("no force".into(), |b| format!("{} -> {} %", num(100.0 * b.before, 4), num(100.0 * b.after, 4)));
         text += &format!("  {:<18} by {:<18} {displacement}; {force}\n", p.to, p.from);
-        let chi2 = |b: BeforeAfter| format!("{:.1} -> {:.1}", b.before, b.after);
+        let chi2 = |b: BeforeAfter| format!("{} -> {}", num(b.before, 4), num(b.after, 4));
         if let Some(plain) = p.chi2_per_datum {
             let own = p
                 .chi2_per_datum_with_own_motions

@@ -1,5 +1,6 @@
 //! Tables like the paper's as text.
 
+use super::num;
 use crate::calibration::StandIn;
 use crate::homogeneous::UniaxialStandIn;
 use crate::recording::Filter;
@@ -12,23 +13,26 @@ pub(in crate::job) fn paper_tables(uniaxial: &UniaxialStandIn, all: &[StandIn]) 
 /// A table like the paper's 1.
 fn uniaxial_table(found: &UniaxialStandIn) -> String {
     let mut text = format!(
-        "like Table 1: fits of a dumb-bell's curve (moduli in kPa; truth mu {:.2}; gauge stretches within {:.3})\n  stretch  terms  mu       terms (mu, alpha)                                              relative squares\n",
-        found.true_initial_shear_modulus_kpa, found.stretch_error
+        "like Table 1: fits of a dumb-bell's curve (moduli in kPa; truth mu {}; gauge stretches within {})\n  stretch  terms  mu       terms (mu, alpha)                                              relative squares\n",
+        num(found.true_initial_shear_modulus_kpa, 4),
+        num(found.stretch_error, 4)
     );
     for row in &found.rows {
         let terms: Vec<String> = row
             .fit
             .parameters
             .chunks(2)
-            .map(|t| format!("({:.3e}, {:.2}{})", t[0].value, t[1].value, if t[1].held { " held" } else { "" }))
+            .map(|t| {
+                format!("({}, {}{})", num(t[0].value, 4), num(t[1].value, 4), if t[1].held { " held" } else { "" })
+            })
             .collect();
         text += &format!(
-            "  1-{:<6} {:<6} {:<8.2} {:<62} {:.1e}\n",
+            "  1-{:<6} {:<6} {:<8} {:<62} {}\n",
             row.largest_stretch,
             row.fit.num_terms,
-            row.fit.initial_shear_modulus_kpa.value,
+            num(row.fit.initial_shear_modulus_kpa.value, 4),
             terms.join(" "),
-            row.relative_squares
+            num(row.relative_squares, 2)
         );
     }
     text + "\n"
@@ -41,16 +45,17 @@ fn tables(all: &[StandIn]) -> String {
     );
     for s in all {
         for row in &s.calibration.selection.rows {
-            let terms: Vec<String> = row.values[1..].chunks(2).map(|t| format!("({:.3}, {:.2})", t[0], t[1])).collect();
+            let terms: Vec<String> =
+                row.values[1..].chunks(2).map(|t| format!("({}, {})", num(t[0], 4), num(t[1], 4))).collect();
             text += &format!(
-                "  {:<6} {:<7} {:<12.0} {:<8.3} {:<51} {:<10.4} {}\n",
+                "  {:<6} {:<7} {:<12} {:<8} {:<51} {:<10} {}\n",
                 s.drive_mm,
                 if s.filter == Filter::None { "N" } else { "Y" },
-                row.values[0],
-                row.initial_shear_modulus_kpa,
+                num(row.values[0], 5),
+                num(row.initial_shear_modulus_kpa, 4),
                 terms.join(" "),
-                1e3 * row.paper_loss,
-                row.decrement.map_or("".into(), |d| format!("{:.4}", 1e3 * d))
+                num(1e3 * row.paper_loss, 5),
+                row.decrement.map_or("".into(), |d| num(1e3 * d, 5))
             );
         }
     }
@@ -66,9 +71,13 @@ fn tables(all: &[StandIn]) -> String {
         let (mu, mu_sd) = statistics(rows().map(|r| r.initial_shear_modulus_kpa).collect());
         let ratio = |k: f64, g: f64| (3.0 * k - 2.0 * g) / (2.0 * (3.0 * k + g));
         text += &format!(
-            "  {:<7} {kappa:>8.1} ± {kappa_sd:<12.1} {mu:>7.3} ± {mu_sd:<9.3} {:.4}\n",
+            "  {:<7} {:>8} ± {:<12} {:>7} ± {:<9} {}\n",
             if filter == Filter::None { "N" } else { "Y" },
-            ratio(kappa, mu)
+            num(kappa, 4),
+            num(kappa_sd, 4),
+            num(mu, 4),
+            num(mu_sd, 4),
+            num(ratio(kappa, mu), 5)
         );
     }
     text

@@ -1,5 +1,6 @@
 //! A proof of the diagnosis as a table in Markdown.
 
+use super::num;
 use crate::proof::{CauseSummary, Proof, Scored};
 
 pub(in crate::job) fn proof(proof: &Proof) -> String {
@@ -7,7 +8,7 @@ pub(in crate::job) fn proof(proof: &Proof) -> String {
         "| hidden | recordings | detectable | right | right of detectable | right, nothing left | nothing named | place, mm (median) | intervals that hold | named first |\n|---|---|---|---|---|---|---|---|---|---|\n",
     );
     let row = |k: &CauseSummary, note: &str| {
-        let place = k.median_location_error_mm.map_or(String::new(), |x| format!("{x:.1}"));
+        let place = k.median_location_error_mm.map_or(String::new(), |x| num(x, 4));
         let held =
             if k.num_covered[1] == 0 { String::new() } else { format!("{}/{}", k.num_covered[0], k.num_covered[1]) };
         let named: Vec<String> = k.first_named.iter().map(|(n, c)| format!("{n} {c}")).collect();
@@ -41,7 +42,7 @@ pub(in crate::job) fn proof(proof: &Proof) -> String {
         let right = within.iter().filter(|s| s.is_right).count();
         text += &format!("| {} to {} | {} | {right} |\n", pair[0], pair[1], within.len());
     }
-    let percent = |x: f64| if x.is_finite() { format!("{:.1} %", 100.0 * x) } else { "not tried".into() };
+    let percent = |x: f64| if x.is_finite() { format!("{} %", num(100.0 * x, 4)) } else { "not tried".into() };
     text += &format!(
         "\ncause first, of the detectable: {}; false alarms: {}; unknown causes called unexplained, of the detectable: {}; intervals that hold the truth: {}\n",
         percent(proof.right_of_detectable),

@@ -1,11 +1,12 @@
 //! Scans and imports as text.
 
+use super::num;
 use crate::acquisition::ScanResult;
 use crate::job::import_result::ImportResult;
 
 pub(in crate::job) fn scan(name: &str, result: &ScanResult) -> String {
     let mut text = format!("{name}: {} voxels, seed {}\n", result.num_voxels, result.seed);
-    let list = |sd: [f64; 3]| sd.map(|x| format!("{x:.4}")).join(", ");
+    let list = |sd: [f64; 3]| sd.map(|x| num(x, 5)).join(", ");
     if let Some(sd) = result.noise_at_full_signal_mm {
         text += &format!("noise at full signal (x, y, z): {} mm\n", list(sd));
     }
@@ -14,8 +15,8 @@ pub(in crate::job) fn scan(name: &str, result: &ScanResult) -> String {
     }
     text += "\n  drive mm   force N   true N   axis    kept  low signal  disputed  inconsistent  unconnected   rms error mm\n";
     for step in &result.steps {
-        let force = step.force_n.map_or("-".into(), |f| format!("{f:.4}"));
-        text += &format!("{:>10.3} {force:>9} {:>8.4}", step.drive_mm, step.true_force_n);
+        let force = step.force_n.map_or("-".into(), |f| num(f, 5));
+        text += &format!("{:>10} {force:>9} {:>8}", num(step.drive_mm, 5), num(step.true_force_n, 5));
         match (&step.reconstruction, &step.error) {
             (Some(report), Some(errors)) => {
                 for (a, (c, e)) in report.components.iter().zip(errors).enumerate() {
@@ -23,20 +24,20 @@ pub(in crate::job) fn scan(name: &str, result: &ScanResult) -> String {
                         text += &" ".repeat(29);
                     }
                     text += &format!(
-                        "   {:<4} {:>7} {:>11} {:>9} {:>13} {:>12} {:>14.5}{}{}\n",
+                        "   {:<4} {:>7} {:>11} {:>9} {:>13} {:>12} {:>14}{}{}\n",
                         ["x", "y", "z"][a],
                         c.num_kept,
                         c.num_low_signal,
                         c.num_disputed,
                         c.num_inconsistent,
                         c.num_unconnected,
-                        e.rms_mm,
+                        num(e.rms_mm, 6),
                         if e.num_wrong_turns > 0 {
                             format!("  {} a turn off", e.num_wrong_turns)
                         } else {
                             String::new()
                         },
-                        if c.anchor.is_ambiguous { "  whole turns uncertain" } else { "" },
+                        if c.anchor.is_ambiguous { "  whole turns uncertain" } else { "" }
                     );
                 }
             }
@@ -49,23 +50,23 @@ pub(in crate::job) fn scan(name: &str, result: &ScanResult) -> String {
 pub(in crate::job) fn import(result: &ImportResult) -> String {
     let mut text = format!("{}: {} voxels in the mask\n", result.id, result.num_voxels);
     if let Some(sd) = result.noise_sd_mm {
-        text += &format!("noise (x, y, z): {} mm\n", sd.map(|x| format!("{x:.4}")).join(", "));
+        text += &format!("noise (x, y, z): {} mm\n", sd.map(|x| num(x, 5)).join(", "));
     }
     for step in &result.steps {
         text += &format!("\ndrive {} mm: {} voxels with all three components\n", step.drive_mm, step.num_complete);
         let Some(report) = &step.reconstruction else { continue };
         for (axis, c) in ["x", "y", "z"].iter().zip(&report.components) {
             text += &format!(
-                "  {axis}: kept {} of {}; low signal {}, disputed {}, inconsistent {}, unconnected {}; sd {:.4} mm",
+                "  {axis}: kept {} of {}; low signal {}, disputed {}, inconsistent {}, unconnected {}; sd {} mm",
                 c.num_kept,
                 c.num_voxels,
                 c.num_low_signal,
                 c.num_disputed,
                 c.num_inconsistent,
                 c.num_unconnected,
-                c.median_sd_mm
+                num(c.median_sd_mm, 5)
             );
-            let show = |u: Option<f64>| u.map_or("not seen".into(), |u| format!("{u:.3} mm"));
+            let show = |u: Option<f64>| u.map_or("not seen".into(), |u| format!("{} mm", num(u, 4)));
             text += &format!(
                 "; fixed plate {}, moved plate {}\n",
                 show(c.anchor.fixed_plate_mm),

@@ -1,5 +1,6 @@
 //! A proof with several causes at once in tables.
 
+use super::num;
 use crate::proof::{CauseOfSeveral, SeveralProof};
 
 pub(in crate::job) fn several(proof: &SeveralProof) -> String {
@@ -13,7 +14,7 @@ pub(in crate::job) fn several(proof: &SeveralProof) -> String {
         if whole == 0 {
             "not tried".into()
         } else {
-            format!("{part}/{whole} ({:.1} %)", 100.0 * part as f64 / whole as f64)
+            format!("{part}/{whole} ({} %)", num(100.0 * part as f64 / whole as f64, 4))
         }
     };
     text += &format!(
@@ -30,7 +31,7 @@ pub(in crate::job) fn several(proof: &SeveralProof) -> String {
 
 fn row(c: &CauseOfSeveral) -> String {
     let held = if c.num_covered[1] == 0 { String::new() } else { format!("{}/{}", c.num_covered[0], c.num_covered[1]) };
-    let size = |mm: Option<f64>| mm.map_or(String::new(), |mm| format!("{:.0}", 1e3 * mm));
+    let size = |mm: Option<f64>| mm.map_or(String::new(), |mm| num(1e3 * mm, 3));
     let curve = c.detection.as_ref();
     format!(
         "| {} | {} | {} | {} | {} | {held} | {} | {} | {} |\n",

@@ -6,6 +6,7 @@
 mod v5;
 mod v73;
 
+use crate::file::{MemoryError, ReadingMemory};
 use std::path::Path;
 
 /// Nesting of cells and structures.
@@ -54,6 +55,9 @@ pub enum MatError {
         /// What does not fit.
         what: String,
     },
+    /// It would take more memory than reading may.
+    #[error(transparent)]
+    Memory(#[from] MemoryError),
     /// More than allowed.
     #[error("{what}: {found} (limit: {limit})")]
     TooLarge {
@@ -66,11 +70,11 @@ pub enum MatError {
     },
 }
 
-/// The variables of a file, in its order. Arrays of all variables together may hold `max_values` numbers.
+/// The variables of a file, in its order. What they hold is taken from `memory`, and with it what reading them needs.
 ///
 /// # Errors
 /// [`MatError`].
-pub fn read_mat(path: &Path, max_values: u64) -> Result<Vec<(String, MatValue)>, MatError> {
+pub fn read_mat(path: &Path, memory: &ReadingMemory) -> Result<Vec<(String, MatValue)>, MatError> {
     use std::io::{Read, Seek, SeekFrom};
     let mut file = crate::file::open_regular(path).map_err(crate::file::ReadError::into_io)?;
     let mut header = [0u8; 128];
@@ -80,10 +84,10 @@ pub fn read_mat(path: &Path, max_values: u64) -> Result<Vec<(String, MatValue)>,
     // 7.3 carries the text header of version 5 in front of HDF5; files from other tools are plain HDF5.
     let is_hdf5 = header.starts_with(b"\x89HDF\r\n\x1a\n") || header.starts_with(b"MATLAB 7.3");
     if is_hdf5 {
-        return v73::read(path, max_values);
+        return v73::read(path, memory);
     }
     file.seek(SeekFrom::Start(128))?;
-    v5::read(&header, std::io::BufReader::new(file), max_values)
+    v5::read(&header, std::io::BufReader::new(file), memory)
 }
 
 impl MatValue {
@@ -102,6 +106,12 @@ impl MatValue {
             _ => None,
         }
     }
+}
+
+/// Takes the memory of a list of `count` members beside their own content.
+fn take_members<T>(memory: &ReadingMemory, count: usize) -> Result<(), MemoryError> {
+    // A list that grows holds its old place beside the new one.
+    memory.take_values::<[T; 2]>("a list of variables", count as u64)
 }
 
 /// Product of sizes; none where it overflows.

@@ -1,11 +1,11 @@
 //! MAT-files of version 5 (MATLAB 5 to 7.2), after "MAT-File Format", The MathWorks.
 //!
 //! A file is a list of elements, each a tag (type, bytes) and data padded to eight bytes; compressed elements are zlib
-//! streams of one element. What a stream expands to is read piece by piece and counted against the caller's limit.
+//! streams of one element. What a stream expands to is read piece by piece, each taken from the caller's memory first.
 
-use super::{MAX_DEPTH, MatError, MatValue, product};
+use super::{MAX_DEPTH, MatError, MatValue, product, take_members};
+use crate::file::ReadingMemory;
 use flate2::read::ZlibDecoder;
-use std::cell::Cell;
 use std::io::{self, Read};
 
 const MI_MATRIX: u32 = 14;
@@ -17,20 +17,14 @@ const PIECE: u64 = 1 << 20;
 pub(super) fn read(
     header: &[u8; 128],
     mut stream: impl Read,
-    max_values: u64,
+    memory: &ReadingMemory,
 ) -> Result<Vec<(String, MatValue)>, MatError> {
     let is_big_endian = match &header[126..128] {
         b"IM" => false,
         b"MI" => true,
         _ => return Err(MatError::NotMat),
     };
-    let mut reader = Reader {
-        is_big_endian,
-        // Numbers take at most eight bytes; tags and names come on top.
-        budget: max_values.saturating_mul(8).saturating_add(1 << 20),
-        values_left: Cell::new(max_values),
-        limit: max_values,
-    };
+    let reader = Reader { is_big_endian, memory };
     let mut variables = Vec::new();
     loop {
         let mut tag = [0u8; 8];
@@ -46,21 +40,16 @@ pub(super) fn read(
                 let mut tag = [0u8; 8];
                 inner.read_exact(&mut tag).map_err(cut)?;
                 let (kind, size) = (reader.u32(&tag[..4]), reader.u32(&tag[4..]));
-                let found = if kind == MI_MATRIX {
-                    let data = reader_bytes(&mut inner, size, &mut reader.budget, reader.limit)?;
-                    Some(reader.matrix(&data, 0)?)
-                } else {
-                    None
-                };
+                let found = if kind == MI_MATRIX { Some(reader.variable(&mut inner, size)?) } else { None };
                 // The next tag follows the compressed bytes, read or not.
                 let mut rest = inner.into_inner();
                 io::copy(&mut rest, &mut io::sink()).map_err(cut)?;
                 found
             }
             MI_MATRIX => {
-                let data = reader_bytes(&mut stream, bytes, &mut reader.budget, reader.limit)?;
+                let found = reader.variable(&mut stream, bytes)?;
                 skip(&mut stream, padding(bytes))?;
-                Some(reader.matrix(&data, 0)?)
+                Some(found)
             }
             // Other elements at the top are no variables.
             _ => {
@@ -72,6 +61,7 @@ pub(super) fn read(
         if let Some((name, value)) = found
             && !name.is_empty()
         {
+            take_members::<(String, MatValue)>(memory, 1)?;
             variables.push((name, value));
         }
     }
@@ -105,15 +95,13 @@ fn skip(stream: &mut impl Read, bytes: u64) -> Result<(), MatError> {
     io::copy(&mut stream.take(bytes), &mut io::sink()).map(|_| ()).map_err(cut)
 }
 
-/// Exactly `bytes` bytes, taken off the budget.
-fn reader_bytes(stream: &mut impl Read, bytes: u32, budget: &mut u64, limit: u64) -> Result<Vec<u8>, MatError> {
+/// Exactly `bytes` bytes.
+fn bytes_of(stream: &mut impl Read, bytes: u32, memory: &ReadingMemory) -> Result<Vec<u8>, MatError> {
     let wanted = u64::from(bytes);
-    if wanted > *budget {
-        return Err(MatError::TooLarge { what: "bytes of variables", found: wanted, limit: limit.saturating_mul(8) });
-    }
-    *budget -= wanted;
-    let mut data = Vec::new();
+    // All of it at once: a promise above the limit is refused before a byte of it is expanded.
+    let mut data = memory.list("a variable of the file", wanted)?;
     while (data.len() as u64) < wanted {
+        memory.check()?;
         let piece = PIECE.min(wanted - data.len() as u64);
         if stream.take(piece).read_to_end(&mut data).map_err(cut)? as u64 != piece {
             return Err(damaged(format!("{} of {wanted} bytes of a variable", data.len())));
@@ -122,16 +110,20 @@ fn reader_bytes(stream: &mut impl Read, bytes: u32, budget: &mut u64, limit: u64
     Ok(data)
 }
 
-struct Reader {
+struct Reader<'m> {
     is_big_endian: bool,
-    /// Bytes that may still be read.
-    budget: u64,
-    /// Numbers that arrays may still hold: a byte in the file becomes eight in memory.
-    values_left: Cell<u64>,
-    limit: u64,
+    memory: &'m ReadingMemory,
 }
 
-impl Reader {
+impl Reader<'_> {
+    /// Name and value of a variable of `bytes` bytes; the bytes are given back.
+    fn variable(&self, stream: &mut impl Read, bytes: u32) -> Result<(String, MatValue), MatError> {
+        let data = bytes_of(stream, bytes, self.memory)?;
+        let found = self.matrix(&data, 0);
+        self.memory.give_back_values::<u8>(data.len());
+        found
+    }
+
     fn u32(&self, b: &[u8]) -> u32 {
         let b = [b[0], b[1], b[2], b[3]];
         if self.is_big_endian { u32::from_be_bytes(b) } else { u32::from_le_bytes(b) }
@@ -190,12 +182,9 @@ impl Reader {
         }
         let count = product(&dims).ok_or_else(|| damaged("sizes overflow"))?;
         let (_, name, rest) = self.element(rest)?;
+        self.memory.take("a variable's name", 3 * name.len() as u64)?;
         let name = String::from_utf8_lossy(name).into_owned();
         let wanted = (count as u64).saturating_mul(1 + u64::from(is_complex));
-        if wanted > self.values_left.get() {
-            return Err(MatError::TooLarge { what: "numbers in variables", found: wanted, limit: self.limit });
-        }
-        self.values_left.set(self.values_left.get() - wanted);
         let value = match class {
             1 => self.cell(dims, count, rest, depth)?,
             2 => self.structure(count, rest, depth)?,
@@ -238,6 +227,7 @@ impl Reader {
     fn cell(&self, dims: Vec<usize>, count: usize, mut rest: &[u8], depth: usize) -> Result<MatValue, MatError> {
         let mut members = Vec::new();
         for _ in 0..count {
+            take_members::<MatValue>(self.memory, 1)?;
             let (kind, data, next) = self.element(rest)?;
             if kind != MI_MATRIX {
                 return Err(damaged("a cell's member is no matrix"));
@@ -260,6 +250,7 @@ impl Reader {
         }
         let mut fields = Vec::new();
         for name in names.chunks_exact(length) {
+            take_members::<(String, MatValue)>(self.memory, 1)?;
             let end = name.iter().position(|b| *b == 0).unwrap_or(length);
             let (kind, data, next) = self.element(rest)?;
             if kind != MI_MATRIX {
@@ -280,28 +271,27 @@ impl Reader {
             9 | 12 | 13 => 8,
             kind => return Err(damaged(format!("numbers of type {kind}"))),
         };
-        Ok(data
-            .chunks_exact(width)
-            .map(|bytes| {
-                let mut b = [0u8; 8];
-                b[..width].copy_from_slice(bytes);
-                if self.is_big_endian {
-                    b[..width].reverse();
-                }
-                let (two, four) = ([b[0], b[1]], [b[0], b[1], b[2], b[3]]);
-                match kind {
-                    1 => f64::from(b[0] as i8),
-                    2 | 16 => f64::from(b[0]),
-                    3 => f64::from(i16::from_le_bytes(two)),
-                    4 | 17 => f64::from(u16::from_le_bytes(two)),
-                    5 => f64::from(i32::from_le_bytes(four)),
-                    6 | 18 => f64::from(u32::from_le_bytes(four)),
-                    7 => f64::from(f32::from_le_bytes(four)),
-                    12 => i64::from_le_bytes(b) as f64,
-                    13 => u64::from_le_bytes(b) as f64,
-                    _ => f64::from_le_bytes(b),
-                }
-            })
-            .collect())
+        let mut numbers = self.memory.list("numbers of a variable", (data.len() / width) as u64)?;
+        numbers.extend(data.chunks_exact(width).map(|bytes| {
+            let mut b = [0u8; 8];
+            b[..width].copy_from_slice(bytes);
+            if self.is_big_endian {
+                b[..width].reverse();
+            }
+            let (two, four) = ([b[0], b[1]], [b[0], b[1], b[2], b[3]]);
+            match kind {
+                1 => f64::from(b[0] as i8),
+                2 | 16 => f64::from(b[0]),
+                3 => f64::from(i16::from_le_bytes(two)),
+                4 | 17 => f64::from(u16::from_le_bytes(two)),
+                5 => f64::from(i32::from_le_bytes(four)),
+                6 | 18 => f64::from(u32::from_le_bytes(four)),
+                7 => f64::from(f32::from_le_bytes(four)),
+                12 => i64::from_le_bytes(b) as f64,
+                13 => u64::from_le_bytes(b) as f64,
+                _ => f64::from_le_bytes(b),
+            }
+        }));
+        Ok(numbers)
     }
 }

@@ -1,37 +1,34 @@
 //! MAT-files of version 7.3: HDF5, read with the `hdf5-pure` crate. Cells are arrays of references, complex numbers are
 //! compounds, sizes stand in reverse.
 
-use super::{MAX_DEPTH, MatError, MatValue};
+use super::{MAX_DEPTH, MatError, MatValue, take_members};
+use crate::file::ReadingMemory;
 use hdf5_pure::{AttrValue, DType, Dataset, File, Group, Object};
 use std::collections::HashMap;
 use std::path::Path;
 
-pub(super) fn read(path: &Path, max_values: u64) -> Result<Vec<(String, MatValue)>, MatError> {
+pub(super) fn read(path: &Path, memory: &ReadingMemory) -> Result<Vec<(String, MatValue)>, MatError> {
     let file = File::open_streaming(path).map_err(failed)?;
-    let mut budget = Budget { left: max_values, limit: max_values };
-    fields(&file.root(), &mut budget, 0)
+    fields(&file.root(), memory, 0)
 }
 
-struct Budget {
-    left: u64,
-    limit: u64,
+/// What the numbers of a dataset take while they are read: its bytes as stored, one chunk of them unpacked, and the
+/// numbers themselves. All sizes are the file's own word, so nothing is read before this is granted.
+fn reading_bytes(dataset: &Dataset, count: u64) -> Result<u64, MatError> {
+    let width = dataset.element_size().map_err(failed)?;
+    let chunk = dataset.chunk_shape().map_err(failed)?.unwrap_or_default();
+    let in_chunk = chunk.iter().fold(1u64, |product, &n| product.saturating_mul(n));
+    Ok(count.saturating_mul(width).saturating_add(in_chunk.saturating_mul(2).saturating_mul(width)))
 }
 
-impl Budget {
-    fn take(&mut self, values: u64) -> Result<(), MatError> {
-        if values > self.left {
-            return Err(MatError::TooLarge { what: "numbers in variables", found: values, limit: self.limit });
-        }
-        self.left -= values;
-        Ok(())
-    }
-}
+/// What an opened object takes beside its content, bytes.
+const REFERENCE_BYTES: u64 = 2048;
 
 fn failed(error: impl std::fmt::Display) -> MatError {
     MatError::Damaged { what: error.to_string() }
 }
 
-fn fields(group: &Group, budget: &mut Budget, depth: usize) -> Result<Vec<(String, MatValue)>, MatError> {
+fn fields(group: &Group, memory: &ReadingMemory, depth: usize) -> Result<Vec<(String, MatValue)>, MatError> {
     if depth > MAX_DEPTH {
         let (found, limit) = (depth as u64, MAX_DEPTH as u64);
         return Err(MatError::TooLarge { what: "groups within groups", found, limit });
@@ -39,14 +36,15 @@ fn fields(group: &Group, budget: &mut Budget, depth: usize) -> Result<Vec<(Strin
     let mut found = Vec::new();
     for name in group.datasets().map_err(failed)? {
         if !name.starts_with('#') {
+            take_members::<(String, MatValue)>(memory, 1)?;
             let dataset = group.dataset(&name).map_err(failed)?;
-            found.push((name, value(&dataset, budget, depth)?));
+            found.push((name, value(&dataset, memory, depth)?));
         }
     }
     for name in group.groups().map_err(failed)? {
         if !name.starts_with('#') {
             let inner = group.group(&name).map_err(failed)?;
-            found.push((name, MatValue::Struct(fields(&inner, budget, depth + 1)?)));
+            found.push((name, MatValue::Struct(fields(&inner, memory, depth + 1)?)));
         }
     }
     found.sort_by(|a, b| a.0.cmp(&b.0));
@@ -63,34 +61,60 @@ fn text_attribute(attributes: &HashMap<String, AttrValue>, name: &str) -> Option
     }
 }
 
-fn value(dataset: &Dataset, budget: &mut Budget, depth: usize) -> Result<MatValue, MatError> {
+fn value(dataset: &Dataset, memory: &ReadingMemory, depth: usize) -> Result<MatValue, MatError> {
     if depth > MAX_DEPTH {
         let (found, limit) = (depth as u64, MAX_DEPTH as u64);
         return Err(MatError::TooLarge { what: "cells within cells", found, limit });
     }
     let shape = dataset.shape().map_err(failed)?;
     let count = shape.iter().try_fold(1u64, |p, &d| p.checked_mul(d)).ok_or_else(|| failed("sizes overflow"))?;
-    budget.take(count)?;
+    memory.check()?;
     let attributes = dataset.attrs().map_err(failed)?;
     let dims: Vec<usize> = shape.iter().rev().map(|&d| d as usize).collect();
     // An empty array is stored as its sizes.
     if attributes.contains_key("MATLAB_empty") {
         return Ok(MatValue::Numeric { dims: vec![0, 0], values: vec![], imaginary: None });
     }
-    match dataset.dtype().map_err(failed)? {
+    let dtype = dataset.dtype().map_err(failed)?;
+    if matches!(
+        dtype,
+        DType::String | DType::Enum(_) | DType::Array(..) | DType::VariableLengthString | DType::Other(_)
+    ) {
+        return Ok(MatValue::Other("a type that is not read"));
+    }
+    let transient = reading_bytes(dataset, count)?;
+    memory.take("a variable of the file", transient)?;
+    let found = stored(dataset, dtype, (dims, count), &attributes, memory, depth);
+    memory.give_back(transient);
+    found
+}
+
+/// The value of a dataset of a type that is read.
+fn stored(
+    dataset: &Dataset,
+    dtype: DType,
+    (dims, count): (Vec<usize>, u64),
+    attributes: &HashMap<String, AttrValue>,
+    memory: &ReadingMemory,
+    depth: usize,
+) -> Result<MatValue, MatError> {
+    match dtype {
         DType::ObjectReference => {
             let mut members = Vec::new();
+            // A reference takes eight bytes in the file, and what it leads to is opened with all its attributes.
+            memory.take("references", count.saturating_mul(REFERENCE_BYTES))?;
             for object in dataset.dereference().map_err(failed)? {
+                take_members::<MatValue>(memory, 1)?;
                 members.push(match object {
-                    Object::Dataset(inner) => value(&inner, budget, depth + 1)?,
-                    Object::Group(inner) => MatValue::Struct(fields(&inner, budget, depth + 1)?),
+                    Object::Dataset(inner) => value(&inner, memory, depth + 1)?,
+                    Object::Group(inner) => MatValue::Struct(fields(&inner, memory, depth + 1)?),
                     _ => MatValue::Other("object"),
                 });
             }
             Ok(MatValue::Cell { dims, members })
         }
         DType::Compound(parts) if parts.len() == 2 => {
-            budget.take(count)?;
+            memory.take_values::<[f64; 4]>("complex numbers", count)?;
             let raw = dataset.read_raw().map_err(failed)?;
             // MATLAB runs on little-endian machines alone; a complex number is two of its reals without a gap.
             let numbers: Vec<f64> = match (&parts[0].1, &parts[1].1) {
@@ -120,11 +144,12 @@ fn value(dataset: &Dataset, budget: &mut Budget, depth: usize) -> Result<MatValu
         | DType::U16
         | DType::U32
         | DType::U64 => {
+            memory.take_values::<f64>("numbers of a variable", count)?;
             let values = dataset.read_f64().map_err(failed)?;
             if values.len() as u64 != count {
                 return Err(failed(format!("{} numbers, the sizes ask for {count}", values.len())));
             }
-            if text_attribute(&attributes, "MATLAB_class").as_deref() == Some("char") {
+            if text_attribute(attributes, "MATLAB_class").as_deref() == Some("char") {
                 return Ok(MatValue::Text(values.iter().filter_map(|c| char::from_u32(*c as u32)).collect()));
             }
             Ok(MatValue::Numeric { dims, values, imaginary: None })

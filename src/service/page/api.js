@@ -18,7 +18,7 @@ function headers(more = {}) {
 async function send(path, options = {}) {
   const answer = await fetch(path, { ...options, headers: headers(options.headers) });
   if (answer.status === 401) {
-    await askToken();
+    await askToken(token ? (await answer.json().catch(() => ({}))).detail : "");
     return send(path, options);
   }
   if (!answer.ok) {
@@ -30,8 +30,8 @@ async function send(path, options = {}) {
 }
 
 let asking;
-/** Asks for a token, once at a time. */
-function askToken() {
+/** Asks for a token, once at a time; `wrong` says what is wrong with the one that was sent. */
+function askToken(wrong) {
   asking ??= new Promise((resolve) => {
     const input = h("input", { type: "password", autocomplete: "off", required: true });
     const dialog = h("dialog", {},
@@ -43,6 +43,7 @@ function askToken() {
         resolve();
       } },
       h("h3", {}, "A token is needed"),
+      wrong && h("p", { class: "bad", role: "alert" }, wrong),
       h("p", { class: "quiet" }, "The person who runs this service makes one with lambdak serve --add-token."),
       h("label", {}, "Token", input),
       h("p", {}, h("button", { class: "main" }, "Go on"))));
@@ -60,6 +61,8 @@ export const post = async (path, body, more = {}) =>
 
 export const upload = async (path, blob) =>
   (await send(path, { method: "POST", headers: { "content-type": "application/x-tar" }, body: blob })).json();
+
+export const remove = (path) => send(path, { method: "DELETE" });
 
 const hasEnded = (job) => !["queued", "running"].includes(job.state);
 

@@ -1,6 +1,6 @@
 // Jobs: the list, and one job followed live.
 
-import { download, follow, getJson, post } from "./api.js";
+import { download, follow, getJson, post, remove } from "./api.js";
 import { digits, duration, fill, h, say } from "./dom.js";
 import { resultView } from "./result.js";
 
@@ -64,6 +64,10 @@ export async function jobView(content, id, signal) {
         h("div", { class: "row" },
           isOpen(job) && h("button", { onclick: act("cancel", "Cancelled; what was found is kept.") }, "Cancel"),
           ["failed", "cancelled"].includes(job.state) && h("button", { onclick: act("resume", "Back in the queue.") }, "Resume"),
+          !isOpen(job) && h("button", { id: "delete", onclick: async () => {
+            if (!confirm("Delete this job with its results and files?")) return;
+            try { await remove(`/v1/jobs/${id}`); say("Deleted."); location.hash = "#/jobs"; } catch (error) { say(error.message); }
+          } }, "Delete"),
           h("button", { onclick: async () => { try { await navigator.clipboard.writeText(location.href); say("The link is copied."); } catch { say(location.href); } } }, "Copy link"),
           ["evaluations", "designs"].includes(job.kind) && h("a", { class: "button", href: `#/plan/${id}` }, "Plan from here"))),
       isOpen(job) && share && h("div", {},

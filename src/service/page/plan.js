@@ -32,7 +32,7 @@ export async function planView(content, signal, from) {
   async function check() {
     const mine = number += 1;
     try {
-      const found = await post("/v1/specimens/check", { specimen: model.specimen, limits: model.limits, voxel_mm: model.scan.voxel_mm });
+      const found = await post("/v1/specimens/check", { specimen: model.specimen, limits: model.limits, voxel_mm: model.scan.voxel_mm, material: model.material });
       if (mine !== number) return;
       model.wrong = new Set(found.errors.flatMap((e) => [...`${e.pointer} ${e.detail}`.matchAll(/holes?[\/\[ ]?(\d+)/g)].map((m) => Number(m[1]))));
       showReport(found);
@@ -42,7 +42,7 @@ export async function planView(content, signal, from) {
   }
 
   function showReport(found) {
-    const state = found.errors.length ? ["bad", "This specimen cannot be evaluated."] : found.is_valid ? ["good", "Every limit is kept."] : ["bad", "A limit is broken."];
+    const state = found.errors.length ? ["bad", "This specimen cannot be evaluated."] : !found.is_valid ? ["bad", "A limit is broken."] : found.unchecked.length ? ["good", "Every limit that was checked is kept."] : ["good", "Every limit is kept."];
     fill(report,
       h("p", { class: state[0], role: "status" }, state[1]),
       found.errors.map((e) => h("p", { class: "bad" }, e.detail)),
@@ -50,7 +50,8 @@ export async function planView(content, signal, from) {
         h("span", {}, LABELS[m.name] ?? m.name.replaceAll("_", " ")),
         h("span", {}, m.name === "symmetry" ? (m.is_satisfied ? "kept" : "broken") : `${digits(m.value, 3)} / ${digits(m.limit, 3)}`),
         h("div", { class: "bar" }, h("i", { width_percent: Math.max(2, Math.min(100, 50 * (1 + m.margin_relative))) })))),
-      found.cost && h("p", { class: "quiet" }, `${found.cost.num_voxels.toLocaleString("en")} voxels, ${found.cost.num_elements.toLocaleString("en")} elements, about ${duration(1000 * found.cost.seconds_per_drive)} per drive; ${digits(found.volume_mm3, 4)} mm³ of material.`));
+      found.unchecked.map((u) => h("p", { class: "quiet" }, `${LABELS[u.name] ?? u.name.replaceAll("_", " ")} (limit ${digits(u.limit, 3)}) was not checked: ${u.detail}`)),
+      found.cost && h("p", { class: "quiet" }, `${found.cost.num_voxels.toLocaleString("en")} voxels, ${found.cost.num_elements.toLocaleString("en")} elements, about ${duration(1000 * found.cost.seconds_per_drive)} per drive, ${duration(1000 * found.cost.seconds)} for an evaluation (a job may take ${duration(1000 * found.cost.most_seconds)}); ${digits(found.volume_mm3, 4)} mm³ of material.`));
   }
 
   const form = h("div", {});

@@ -1,6 +1,6 @@
 // Recordings: upload a folder, look at what it holds, calibrate on it, diagnose it.
 
-import { Failure, getJson, post, upload } from "./api.js";
+import { Failure, getJson, post, remove, upload } from "./api.js";
 import { digits, fill, h, say } from "./dom.js";
 
 /** A tar file of plain files. */
@@ -61,6 +61,10 @@ export async function recordingsView(content, signal) {
         h("tbody", {}, summary.steps.map((s) => h("tr", {}, h("td", {}, digits(s.drive_mm)), h("td", {}, digits(s.force_n))))))),
       h("div", { class: "row" }, h("div", {}, mesh)),
       h("div", { class: "row" }, h("button", { class: "main calibrate", onclick: calibrate }, "Calibrate"), h("div", {}, terms)),
+      h("div", { class: "row" }, h("button", { onclick: async () => {
+        if (!confirm("Delete this recording? Results of jobs that read it stay.")) return;
+        try { await remove(`/v1/recordings/${recording.id}`); say("Deleted."); await show(); } catch (error) { fail(error); }
+      } }, "Delete")),
       h("div", { class: "row" }, h("button", { class: "main diagnose", onclick: diagnose }, "Diagnose"), h("div", {}, material)));
   }
 

@@ -1,22 +1,22 @@
 //! Jobs: list, look, cancel, resume, follow.
 
 use crate::job::kind_of_collection;
-use crate::service::access::{Caller, Role};
+use crate::service::access::Caller;
 use crate::service::app::App;
 use crate::service::hub::Watched;
 use crate::service::problem::Problem;
-use crate::service::store::JobFilter;
+use crate::service::quota::Entered;
+use crate::service::store::{JobFilter, Removed};
 use crate::service::view::{JobEvent, JobList, JobState, JobView};
 use axum::Json;
 use axum::extract::{Extension, Path, Query, State};
-use axum::http::header;
+use axum::http::{StatusCode, header};
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use futures_util::stream;
 use serde::Deserialize;
 use std::convert::Infallible;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 use utoipa::IntoParams;
 
@@ -39,7 +39,7 @@ pub(super) struct ListQuery {
 }
 
 /// Jobs, newest first.
-#[utoipa::path(get, path = "/v1/jobs", params(ListQuery), responses(
+#[utoipa::path(get, path = "/v1/jobs", operation_id = "list_jobs", params(ListQuery), responses(
     (status = 200, description = "Jobs", body = JobList),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "jobs")]
@@ -88,7 +88,7 @@ pub(super) async fn find(app: &App, id: &str) -> Result<JobView, Problem> {
 }
 
 /// One job.
-#[utoipa::path(get, path = "/v1/jobs/{id}", params(("id" = String, Path, description = "Identifier")), responses(
+#[utoipa::path(get, path = "/v1/jobs/{id}", operation_id = "get_job", params(("id" = String, Path, description = "Identifier")), responses(
     (status = 200, description = "The job", body = JobView),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "jobs")]
@@ -96,16 +96,26 @@ pub(super) async fn get(State(app): State<App>, Path(id): Path<String>) -> Resul
     Ok(Json(find(&app, &id).await?))
 }
 
-fn check_owner(caller: &Caller, job: &JobView) -> Result<(), Problem> {
-    caller.require(Role::Submit)?;
-    if job.owner == caller.name || caller.role == Role::Admin {
-        return Ok(());
+/// Delete a job that has ended, with its results and files.
+#[utoipa::path(delete, path = "/v1/jobs/{id}", operation_id = "delete_job", params(("id" = String, Path, description = "Identifier")), responses(
+    (status = 204, description = "It is gone"),
+    (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
+), tag = "jobs")]
+pub(super) async fn delete(
+    State(app): State<App>,
+    Extension(caller): Extension<Caller>,
+    Path(id): Path<String>,
+) -> Result<StatusCode, Problem> {
+    caller.require_owner(&find(&app, &id).await?.owner, "job")?;
+    match app.with_store(move |store| store.delete_job(&id)).await? {
+        Removed::Gone => Ok(StatusCode::NO_CONTENT),
+        Removed::Missing => Err(Problem::new("not-found", "there is no such job")),
+        Removed::InUse => Err(Problem::new("wrong-state", "the job has not ended; cancel it first")),
     }
-    Err(Problem::new("forbidden", format!("the job is {}'s; only {} or an admin may change it", job.owner, job.owner)))
 }
 
 /// Cancel a job; what its search has found so far is kept for a resume.
-#[utoipa::path(post, path = "/v1/jobs/{id}/cancel", params(("id" = String, Path, description = "Identifier")), responses(
+#[utoipa::path(post, path = "/v1/jobs/{id}/cancel", operation_id = "cancel_job", params(("id" = String, Path, description = "Identifier")), responses(
     (status = 200, description = "The job", body = JobView),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "jobs")]
@@ -114,8 +124,9 @@ pub(super) async fn cancel(
     Extension(caller): Extension<Caller>,
     Path(id): Path<String>,
 ) -> Result<Json<JobView>, Problem> {
+    let _entered = app.enter(&caller)?;
     let job = find(&app, &id).await?;
-    check_owner(&caller, &job)?;
+    caller.require_owner(&job.owner, "job")?;
     if job.state.has_ended() && job.state != JobState::Cancelled {
         return Err(Problem::new("wrong-state", "the job has ended; there is nothing to cancel"));
     }
@@ -125,7 +136,7 @@ pub(super) async fn cancel(
 }
 
 /// Put a failed or cancelled job back into the queue; it goes on where it was.
-#[utoipa::path(post, path = "/v1/jobs/{id}/resume", params(("id" = String, Path, description = "Identifier")), responses(
+#[utoipa::path(post, path = "/v1/jobs/{id}/resume", operation_id = "resume_job", params(("id" = String, Path, description = "Identifier")), responses(
     (status = 200, description = "The job", body = JobView),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "jobs")]
@@ -134,23 +145,15 @@ pub(super) async fn resume(
     Extension(caller): Extension<Caller>,
     Path(id): Path<String>,
 ) -> Result<Json<JobView>, Problem> {
+    let _entered = app.enter(&caller)?;
     let job = find(&app, &id).await?;
-    check_owner(&caller, &job)?;
+    caller.require_owner(&job.owner, "job")?;
     let key = id.clone();
     if !app.with_store(move |store| store.resume(&key)).await? {
         return Err(Problem::new("wrong-state", "only failed and cancelled jobs can be resumed"));
     }
     app.signal.wake();
     Ok(Json(find(&app, &id).await?))
-}
-
-/// Counts a stream for as long as it lives.
-struct StreamGuard(App);
-
-impl Drop for StreamGuard {
-    fn drop(&mut self) {
-        self.0.metrics.streams.fetch_sub(1, Ordering::Relaxed);
-    }
 }
 
 struct Following {
@@ -160,21 +163,21 @@ struct Following {
     first: Option<Arc<JobView>>,
     has_ended: bool,
     stopping: tokio::sync::watch::Receiver<bool>,
-    _guard: StreamGuard,
+    _entered: Entered,
 }
 
 /// The job's changes as server-sent events `job`, each a whole job; ends when the job has. Poll `/v1/jobs/{id}` instead
 /// where streams do not pass.
-#[utoipa::path(get, path = "/v1/jobs/{id}/events", params(("id" = String, Path, description = "Identifier")), responses(
+#[utoipa::path(get, path = "/v1/jobs/{id}/events", operation_id = "follow_job", params(("id" = String, Path, description = "Identifier")), responses(
     (status = 200, description = "Events", body = JobEvent, content_type = "text/event-stream"),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "jobs")]
-pub(super) async fn events(State(app): State<App>, Path(id): Path<String>) -> Result<Response, Problem> {
-    if app.metrics.streams.fetch_add(1, Ordering::Relaxed) >= app.limits.max_streams as i64 {
-        app.metrics.streams.fetch_sub(1, Ordering::Relaxed);
-        return Err(Problem::new("too-many-requests", "too many event streams; poll the job instead").after(5));
-    }
-    let guard = StreamGuard(app.clone());
+pub(super) async fn events(
+    State(app): State<App>,
+    Extension(caller): Extension<Caller>,
+    Path(id): Path<String>,
+) -> Result<Response, Problem> {
+    let entered = app.streams.enter(&caller.share)?;
     // Subscribed before it is read: no change is missed between.
     let watched = app.hub.subscribe(&id);
     let first = find(&app, &id).await?;
@@ -185,7 +188,7 @@ pub(super) async fn events(State(app): State<App>, Path(id): Path<String>) -> Re
         first: Some(Arc::new(first)),
         has_ended: false,
         stopping: app.stopping.clone(),
-        _guard: guard,
+        _entered: entered,
     };
     let events = stream::unfold(start, next_event);
     let keep_alive = KeepAlive::new().interval(Duration::from_secs(15)).text("still here");

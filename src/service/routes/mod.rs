@@ -36,9 +36,9 @@ struct Document;
 pub fn open_api() -> (Router<App>, String) {
     let (router, mut document) = OpenApiRouter::with_openapi(Document::openapi())
         .routes(routes!(recordings::list, recordings::upload))
-        .routes(routes!(recordings::get))
+        .routes(routes!(recordings::get, recordings::delete))
         .routes(routes!(jobs::list))
-        .routes(routes!(jobs::get))
+        .routes(routes!(jobs::get, jobs::delete))
         .routes(routes!(jobs::cancel))
         .routes(routes!(jobs::resume))
         .routes(routes!(jobs::events))

@@ -1,17 +1,17 @@
 //! What answers at once: checking and drawing a specimen, its cost, the shipped files, who is asking.
 
-use super::submit::json_body;
+use crate::design::Study;
 use crate::field::FieldError;
-use crate::job::defaults;
+use crate::job::{QuickResponse, defaults, quick_response, seconds_per_drive};
+use crate::material::Ogden;
 use crate::mesh::{MeshSize, mesh_specimen};
 use crate::service::access::{Caller, Role};
 use crate::service::app::App;
+use crate::service::body::receive_json;
 use crate::service::problem::{FieldProblem, Problem};
 use crate::specimen::{LimitMargin, ManufacturingLimits, Specimen, to_svg};
 use axum::Json;
-use axum::body::Bytes;
-use axum::extract::{Extension, State};
-use axum::http::HeaderMap;
+use axum::extract::{Extension, Request, State};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -32,6 +32,10 @@ pub(super) struct CheckRequest {
     #[serde(default)]
     #[schema(default = MeshSize::default)]
     mesh: MeshSize,
+    /// With a material the specimen is solved at its largest drive on the search's mesh, where a limit on force or
+    /// local stretch asks for it.
+    #[serde(default)]
+    material: Option<Ogden>,
 }
 
 /// A limit and how far it is.
@@ -75,17 +79,35 @@ pub(super) struct Cost {
     num_voxels: usize,
     /// Processor seconds per drive, within a factor of about three.
     seconds_per_drive: f64,
+    /// Processor seconds of an evaluation at all of the specimen's drives, within the same factor.
+    seconds: f64,
+    /// Most processor seconds that a job of this service may be estimated to take.
+    most_seconds: f64,
+}
+
+/// A limit that was not checked.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct Unchecked {
+    /// Name, with its unit.
+    name: &'static str,
+    /// The limit.
+    limit: f64,
+    /// Why it was not checked, and what to do.
+    detail: String,
 }
 
 /// What was found.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct Checked {
-    /// Whether it can be evaluated and keeps every limit.
+    /// Whether it can be evaluated and keeps every limit that was checked.
     is_valid: bool,
     /// What keeps it from being evaluated.
     errors: Vec<FieldProblem>,
-    /// The limits, closest first.
+    /// The limits that were checked, closest first. Force and local stretch are those at the largest drive on the
+    /// search's mesh.
     margins: Vec<Margin>,
+    /// The limits that were not checked.
+    unchecked: Vec<Unchecked>,
     /// Volume of material, mm³.
     volume_mm3: Option<f64>,
     /// Drawing, SVG.
@@ -95,21 +117,39 @@ pub(super) struct Checked {
     cost: Option<Cost>,
 }
 
-/// Processor seconds of one drive of an evaluation with a material of one term. From the release build on one thread of
-/// the development machine: eight evaluations of the shipped specimens (1,393 to 11,687 nodes, 2,000 to 21,000
-/// voxels; 0.15 s to 2.5 s a drive) give 2.28 s at 10,000 nodes with the power 1.4, each within a factor of 2.3; voxels
-/// eight times as many cost 2 µs each. Material terms and other machines change it: an estimate to decide by, not a
-/// promise.
-fn seconds(num_nodes: usize, num_voxels: usize) -> f64 {
-    2.28 * (num_nodes as f64 / 1e4).powf(1.4) + 2e-6 * num_voxels as f64
+/// Adds the limits on what the test does: the drive always, force and local stretch where they can be solved at once.
+fn check_response(request: &CheckRequest, limits: &ManufacturingLimits, checked: &mut Checked) {
+    let drive_mm = request.specimen.drive_mm.iter().copied().fold(0.0, f64::max);
+    if let Some(limit) = limits.max_drive_mm {
+        checked.margins.push(LimitMargin::at_most("max_drive_mm", drive_mm, limit).into());
+    }
+    let solved = match &request.material {
+        None => Err("it is known once the specimen is solved; give a material, or start an evaluation".to_string()),
+        Some(_) if limits.max_force_n.is_none() && limits.max_local_stretch.is_none() => return,
+        Some(material) => quick_response(&request.specimen, material).map_err(|e| e.to_string()),
+    };
+    let value = |of: fn(&QuickResponse) -> f64| solved.as_ref().map(of);
+    for (name, limit, value) in [
+        ("max_force_n", limits.max_force_n, value(|r| r.force_n.abs())),
+        ("max_local_stretch", limits.max_local_stretch, value(|r| r.local_stretch)),
+    ] {
+        match (limit, value) {
+            (None, _) => {}
+            (Some(limit), Ok(value)) => checked.margins.push(LimitMargin::at_most(name, value, limit).into()),
+            (Some(limit), Err(detail)) => {
+                checked.unchecked.push(Unchecked { name, limit, detail: detail.clone() });
+            }
+        }
+    }
 }
 
-fn check(request: &CheckRequest) -> Result<Checked, Problem> {
+fn check(request: &CheckRequest, most_seconds: f64) -> Result<Checked, Problem> {
     let specimen = &request.specimen;
     let mut checked = Checked {
         is_valid: false,
         errors: Vec::new(),
         margins: Vec::new(),
+        unchecked: Vec::new(),
         volume_mm3: None,
         drawing_svg: None,
         cost: None,
@@ -117,6 +157,12 @@ fn check(request: &CheckRequest) -> Result<Checked, Problem> {
     let below = |errors: Vec<FieldError>, prefix: &str| errors.into_iter().map(|e| e.below(prefix)).collect::<Vec<_>>();
     if let Some(limits) = &request.limits {
         let errors = below(limits.field_errors(), "/limits");
+        if !errors.is_empty() {
+            return Err(Problem::invalid(errors));
+        }
+    }
+    if let Some(material) = &request.material {
+        let errors = below(material.field_errors(), "/material");
         if !errors.is_empty() {
             return Err(Problem::invalid(errors));
         }
@@ -131,16 +177,17 @@ fn check(request: &CheckRequest) -> Result<Checked, Problem> {
         Problem::invalid(vec![error.remedy(e.to_string())])
     })?;
     if let Some(limits) = &request.limits {
-        let mut margins = limits.check_geometry(specimen, voxel);
-        margins.sort_by(|a, b| a.margin_relative.total_cmp(&b.margin_relative));
-        checked.margins = margins.into_iter().map(Margin::from).collect();
+        checked.margins = limits.check_geometry(specimen, voxel).into_iter().map(Margin::from).collect();
+        check_response(request, limits, &mut checked);
+        checked.margins.sort_by(|a, b| a.margin_relative.total_cmp(&b.margin_relative));
     }
     checked.drawing_svg = Some(to_svg(specimen));
     match mesh_specimen(specimen, &request.mesh.options(specimen)) {
         Ok(mesh) => {
             let (num_elements, num_nodes, num_voxels) = (mesh.num_elements(), mesh.nodes.len(), grid.num_voxels());
-            let seconds_per_drive = seconds(num_nodes, num_voxels);
-            checked.cost = Some(Cost { num_elements, num_nodes, num_voxels, seconds_per_drive });
+            let seconds_per_drive = seconds_per_drive(num_nodes, num_voxels);
+            let seconds = seconds_per_drive * specimen.drive_mm.len() as f64;
+            checked.cost = Some(Cost { num_elements, num_nodes, num_voxels, seconds_per_drive, seconds, most_seconds });
             checked.is_valid = checked.margins.iter().all(|m| m.is_satisfied);
         }
         Err(error) => checked.errors.push(crate::job::unmeshable("/specimen", &error).into()),
@@ -150,18 +197,22 @@ fn check(request: &CheckRequest) -> Result<Checked, Problem> {
 }
 
 /// Check a specimen against limits, draw it and estimate its cost.
-#[utoipa::path(post, path = "/v1/specimens/check", request_body = CheckRequest, responses(
+#[utoipa::path(post, path = "/v1/specimens/check", operation_id = "check_specimen", request_body(content = CheckRequest, example = json!({ "specimen": { "schema": "specimen/1" } })), responses(
     (status = 200, description = "What was found", body = Checked),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "quick")]
 pub(super) async fn check_specimen(
     State(app): State<App>,
-    headers: HeaderMap,
-    body: Bytes,
+    Extension(caller): Extension<Caller>,
+    request: Request,
 ) -> Result<Json<Checked>, Problem> {
-    let value = json_body(&headers, &body)?;
-    let request: CheckRequest = crate::field::read(&value).map_err(|e| Problem::invalid(vec![e]))?;
-    Ok(Json(app.compute(move || check(&request)).await?))
+    let body = receive_json(&app, request).await?;
+    let most_seconds = app.limits.max_job_time.as_secs_f64();
+    let work = app.compute(&caller.share, move || {
+        let request: CheckRequest = crate::field::read(&body.value).map_err(|e| Problem::invalid(vec![e]))?;
+        check(&request, most_seconds)
+    });
+    Ok(Json(app.answer(&caller, app.limits.request_time, work).await?))
 }
 
 /// The specimens, materials and studies that the program ships.
@@ -171,11 +222,20 @@ pub(super) struct Library {
     #[schema(value_type = Vec<Specimen>)]
     specimens: Vec<serde_json::Value>,
     /// Materials: name and content.
-    #[schema(value_type = Vec<Object>)]
+    #[schema(value_type = Vec<NamedMaterial>)]
     materials: Vec<serde_json::Value>,
     /// Studies, spelled out.
-    #[schema(value_type = Vec<Object>)]
+    #[schema(value_type = Vec<Study>)]
     studies: Vec<serde_json::Value>,
+}
+
+/// A material with its name.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct NamedMaterial {
+    /// Name.
+    name: String,
+    /// The material.
+    material: Ogden,
 }
 
 macro_rules! shipped {
@@ -185,7 +245,7 @@ macro_rules! shipped {
 }
 
 /// What the program ships.
-#[utoipa::path(get, path = "/v1/library", responses(
+#[utoipa::path(get, path = "/v1/library", operation_id = "get_library", responses(
     (status = 200, description = "Specimens, materials, studies", body = Library),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "quick")]
@@ -239,7 +299,7 @@ pub(super) struct Me {
 }
 
 /// Who is asking, and what it may do.
-#[utoipa::path(get, path = "/v1/me", responses(
+#[utoipa::path(get, path = "/v1/me", operation_id = "get_caller", responses(
     (status = 200, description = "The caller", body = Me),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "quick")]

@@ -1,18 +1,21 @@
 //! Recordings: upload, list.
 
+use crate::file::StopFlag;
+use crate::job::ScratchFolder;
+use crate::recording::ReadLimits;
 use crate::service::access::{Caller, Role};
 use crate::service::app::App;
+use crate::service::body::{let_run_out, receive_file};
 use crate::service::problem::Problem;
-use crate::service::recordings;
-use crate::service::store::{NewUpload, Store, UploadRow};
+use crate::service::recordings::{self, Space};
+use crate::service::store::{Removed, Store, UploadRow};
+use crate::specimen::Specimen;
 use axum::Json;
-use axum::body::Body;
-use axum::extract::{Extension, Path, State};
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::extract::{Extension, Path, Request, State};
+use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use http_body_util::BodyExt;
 use serde::Serialize;
-use std::io::{Seek, SeekFrom, Write};
+use std::fs::File;
 use utoipa::ToSchema;
 
 /// A recording.
@@ -22,14 +25,50 @@ pub(super) struct RecordingView {
     id: String,
     /// Its own name.
     title: String,
+    /// Name of the token that uploaded it, or whose job made it.
+    owner: String,
     /// Length of its files, bytes.
     num_bytes: i64,
     /// Milliseconds since 1970.
     created_ms: i64,
-    /// What it holds: specimen, steps, grid.
-    #[schema(value_type = Object)]
+    /// What it holds.
+    #[schema(value_type = RecordingSummary)]
     summary: serde_json::Value,
 }
+
+/// What a recording holds, as it is kept when it is uploaded.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct RecordingSummary {
+    /// The specimen as drawn.
+    specimen: Specimen,
+    /// Voxels along x, y, z.
+    #[schema(min_items = 3, max_items = 3)]
+    shape: [usize; 3],
+    /// Edges of a voxel, mm.
+    #[schema(min_items = 3, max_items = 3)]
+    voxel_mm: [f64; 3],
+    /// Voxels of the mask.
+    num_voxels: usize,
+    /// Whether it holds raw phases; left out where it does not.
+    #[schema(nullable = false)]
+    is_raw: Option<bool>,
+    /// Drives and forces.
+    steps: Vec<StepSummary>,
+}
+
+/// A step of a recording.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct StepSummary {
+    /// Drive, mm.
+    drive_mm: f64,
+    /// Force, N; null where it was not measured.
+    force_n: Option<f64>,
+}
+
+/// Bytes as they are.
+#[derive(Debug, ToSchema)]
+#[schema(value_type = String, format = Binary)]
+pub(super) struct Binary(#[allow(dead_code)] Vec<u8>);
 
 impl From<UploadRow> for RecordingView {
     fn from(row: UploadRow) -> Self {
@@ -37,6 +76,7 @@ impl From<UploadRow> for RecordingView {
             summary: serde_json::from_str(&row.manifest).unwrap_or_else(|_| serde_json::json!({})),
             id: row.id,
             title: row.title,
+            owner: row.owner,
             num_bytes: row.num_bytes,
             created_ms: row.created_ms,
         }
@@ -51,7 +91,7 @@ pub(super) struct RecordingList {
 }
 
 /// The latest 200 recordings.
-#[utoipa::path(get, path = "/v1/recordings", responses(
+#[utoipa::path(get, path = "/v1/recordings", operation_id = "list_recordings", responses(
     (status = 200, description = "Recordings", body = RecordingList),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "recordings")]
@@ -61,7 +101,7 @@ pub(super) async fn list(State(app): State<App>) -> Result<Json<RecordingList>, 
 }
 
 /// One recording.
-#[utoipa::path(get, path = "/v1/recordings/{id}", params(("id" = String, Path, description = "Identifier")), responses(
+#[utoipa::path(get, path = "/v1/recordings/{id}", operation_id = "get_recording", params(("id" = String, Path, description = "Identifier")), responses(
     (status = 200, description = "The recording", body = RecordingView),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "recordings")]
@@ -70,66 +110,96 @@ pub(super) async fn get(State(app): State<App>, Path(id): Path<String>) -> Resul
     row.map(|row| Json(row.into())).ok_or_else(|| Problem::new("not-found", "there is no such recording"))
 }
 
+/// Delete a recording. Jobs that have ended keep their results.
+#[utoipa::path(delete, path = "/v1/recordings/{id}", operation_id = "delete_recording", params(("id" = String, Path, description = "Identifier")), responses(
+    (status = 204, description = "It is gone"),
+    (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
+), tag = "recordings")]
+pub(super) async fn delete(
+    State(app): State<App>,
+    Extension(caller): Extension<Caller>,
+    Path(id): Path<String>,
+) -> Result<StatusCode, Problem> {
+    let missing = || Problem::new("not-found", "there is no such recording");
+    let key = id.clone();
+    let row = app.with_store(move |store| store.upload(&key)).await?.ok_or_else(missing)?;
+    caller.require_owner(&row.owner, "recording")?;
+    match app.with_store(move |store| store.delete_upload(&id)).await? {
+        Removed::Gone => Ok(StatusCode::NO_CONTENT),
+        Removed::Missing => Err(missing()),
+        Removed::InUse => Err(Problem::new("wrong-state", "a job that has not ended reads it; cancel the job first")),
+    }
+}
+
 /// Upload a recording: a tar file of its folder. Its content is read and checked before it is kept.
-#[utoipa::path(post, path = "/v1/recordings", request_body(content = String, content_type = "application/octet-stream"), responses(
+#[utoipa::path(post, path = "/v1/recordings", operation_id = "upload_recording", request_body(content((Binary = "application/x-tar"), (Binary = "application/octet-stream")), description = "A tar file of the recording's folder"), responses(
     (status = 201, description = "Kept", body = RecordingView, headers(("Location" = String, description = "The recording"))),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "recordings")]
 pub(super) async fn upload(
     State(app): State<App>,
     Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
-    body: Body,
+    request: Request,
 ) -> Result<Response, Problem> {
-    caller.require(Role::Submit)?;
-    if !headers.get(header::CONTENT_TYPE).is_some_and(|t| t == "application/x-tar" || t == "application/octet-stream") {
+    if let Err(problem) = caller.require(Role::Submit) {
+        let_run_out(request.into_body());
+        return Err(problem);
+    }
+    if !request
+        .headers()
+        .get(header::CONTENT_TYPE)
+        .is_some_and(|t| t == "application/x-tar" || t == "application/octet-stream")
+    {
         return Err(Problem::new("unsupported-media-type", "send the recording's folder as application/x-tar"));
     }
-    let max = app.limits.max_upload_bytes;
-    let kept = app.with_store(Store::uploaded_bytes).await?;
-    if usize::try_from(kept).unwrap_or(0) + max > app.limits.max_uploads_bytes {
-        return Err(Problem::new("quota", "the recordings fill the service's space").after(3600));
+    // Before the body: where there is no space at all nobody need send it.
+    let promised = request.headers().get(header::CONTENT_LENGTH).and_then(|v| v.to_str().ok()?.parse().ok());
+    let (store, owner, space) = (app.store.clone(), caller.name.clone(), space_of(&app, &caller));
+    let space =
+        app.compute(&caller.share, move || recordings::check_space(&store, &owner, promised.unwrap_or(0), space)).await;
+    if let Err(problem) = space {
+        let_run_out(request.into_body());
+        return Err(problem);
     }
-    let file = receive(body, max).await?;
+    let file = receive_file(&app, request).await?;
+    app.answer(&caller, app.limits.upload_time, keep(&app, &caller, file)).await
+}
+
+/// Keeps an upload whose body has come.
+async fn keep(app: &App, caller: &Caller, file: File) -> Result<Response, Problem> {
+    let max = (app.limits.max_upload_bytes, space_of(app, caller));
     let owner = caller.name.clone();
-    let upload = app.compute(move || checked(file, max, owner)).await?;
-    let id = upload.id.clone();
-    let row = app
-        .with_store(move |store| {
-            store.put_upload(&upload)?;
-            store.upload(&id)
-        })
-        .await?;
+    let store = app.store.clone();
+    let row = app.read_upload(move |stop| keep_upload(&store, file, owner, (max, stop))).await?;
     let row = row.ok_or_else(|| Problem::new("internal", "the recording was not kept"))?;
     let location = format!("/v1/recordings/{}", row.id);
     Ok((StatusCode::CREATED, [(header::LOCATION, location)], Json(RecordingView::from(row))).into_response())
 }
 
-/// Streams the body into a file without a name, so that memory does not hold it.
-async fn receive(mut body: Body, max: usize) -> Result<std::fs::File, Problem> {
-    let failed = |e: std::io::Error| Problem::new("internal", format!("scratch: {e}"));
-    let name = crate::service::access::random_hex::<8>().map_err(|e| Problem::new("internal", e.to_string()))?;
-    let path = std::env::temp_dir().join(format!("lambdak-upload-{name}"));
-    let mut file = std::fs::OpenOptions::new().read(true).write(true).create_new(true).open(&path).map_err(failed)?;
-    let _ = std::fs::remove_file(&path);
-    let mut length = 0;
-    while let Some(frame) = body.frame().await {
-        let frame = frame.map_err(|_| Problem::new("invalid-parameter", "the body ended too early"))?;
-        let Ok(data) = frame.into_data() else { continue };
-        length += data.len();
-        if length > max {
-            return Err(Problem::new("too-large", format!("a recording has at most {max} bytes")));
-        }
-        file = tokio::task::spawn_blocking(move || file.write_all(&data).map(|()| file))
-            .await
-            .map_err(|_| Problem::new("internal", "scratch"))?
-            .map_err(failed)?;
-    }
-    file.seek(SeekFrom::Start(0)).map_err(failed)?;
-    Ok(file)
+fn space_of(app: &App, caller: &Caller) -> Space {
+    Space { all: app.limits.max_uploads_bytes as u64, of_owner: caller.max_recordings_bytes }
 }
 
-fn checked(file: std::fs::File, max: usize, owner: String) -> Result<NewUpload, Problem> {
-    let files = recordings::unpack(std::io::BufReader::new(file), max)?;
-    recordings::upload_of(files, owner)
+/// Takes the tar file apart, reads the recording, and keeps it.
+fn keep_upload(
+    store: &Store,
+    file: std::fs::File,
+    owner: String,
+    ((max, space), stop): ((usize, Space), StopFlag),
+) -> Result<Option<UploadRow>, Problem> {
+    let scratch = ScratchFolder::new().map_err(recordings::scratch_failed)?;
+    let names = recordings::unpack(std::io::BufReader::new(file), scratch.path(), max)?;
+    let mut limits = ReadLimits::upload();
+    limits.memory.stop = stop;
+    let upload = recordings::upload_of(scratch.path(), names, owner, &limits)?;
+    let length = upload.files.iter().map(|f| f.num_bytes).sum();
+    // A recording that is kept already takes no more space.
+    if store.upload(&upload.id)?.is_none() {
+        recordings::check_space(store, &upload.owner, length, space)?;
+    }
+    // A file is held by its reader, by the statement and by the database when it is stored.
+    let memory = limits.memory.begin();
+    memory.take("the upload's largest file", 3 * upload.files.iter().map(|f| f.num_bytes).max().unwrap_or(0))?;
+    store.put_upload(&upload)?;
+    Ok(store.upload(&upload.id)?)
 }

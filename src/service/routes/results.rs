@@ -1,6 +1,7 @@
 //! Results and artefacts.
 
 use super::jobs::find;
+use super::recordings::Binary;
 use crate::service::app::App;
 use crate::service::problem::Problem;
 use crate::service::view::{ArtefactList, ArtefactView};
@@ -8,6 +9,8 @@ use axum::Json;
 use axum::extract::{Path, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
+use serde::Serialize;
+use utoipa::ToSchema;
 
 /// An answer under its content's name: unchanged content is not sent twice.
 fn content(headers: &HeaderMap, sha: &str, media_type: &str, bytes: Vec<u8>, name: Option<&str>) -> Response {
@@ -33,9 +36,23 @@ fn content(headers: &HeaderMap, sha: &str, media_type: &str, bytes: Vec<u8>, nam
     answer
 }
 
+/// A job's result: what every one of them has, beside the fields of its own schema.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct JobResult {
+    /// Which kind of result it is, with its version, such as `evaluation/1`.
+    schema: String,
+    /// Version of the program.
+    version: String,
+    /// SHA-256 of everything that went into it, hexadecimal; not in comparisons and lists.
+    input_hash: Option<String>,
+    /// The fields of the kind.
+    #[serde(flatten)]
+    fields: std::collections::BTreeMap<String, serde_json::Value>,
+}
+
 /// A job's result: `evaluation/1`, `design/1`, …
-#[utoipa::path(get, path = "/v1/jobs/{id}/result", params(("id" = String, Path, description = "Identifier")), responses(
-    (status = 200, description = "The result", body = Object, headers(("ETag" = String, description = "Of the content"))),
+#[utoipa::path(get, path = "/v1/jobs/{id}/result", operation_id = "get_result", params(("id" = String, Path, description = "Identifier")), responses(
+    (status = 200, description = "The result", body = JobResult, headers(("ETag" = String, description = "Of the content"))),
     (status = 304, description = "Unchanged"),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "results")]
@@ -59,8 +76,8 @@ pub(super) async fn result(
 }
 
 /// The body that the job was made from.
-#[utoipa::path(get, path = "/v1/jobs/{id}/request", params(("id" = String, Path, description = "Identifier")), responses(
-    (status = 200, description = "The request", body = Object),
+#[utoipa::path(get, path = "/v1/jobs/{id}/request", operation_id = "get_request", params(("id" = String, Path, description = "Identifier")), responses(
+    (status = 200, description = "The request", body = serde_json::Value),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "results")]
 pub(super) async fn request(State(app): State<App>, Path(id): Path<String>) -> Result<Response, Problem> {
@@ -70,7 +87,7 @@ pub(super) async fn request(State(app): State<App>, Path(id): Path<String>) -> R
 }
 
 /// The files that a job left.
-#[utoipa::path(get, path = "/v1/jobs/{id}/artefacts", params(("id" = String, Path, description = "Identifier")), responses(
+#[utoipa::path(get, path = "/v1/jobs/{id}/artefacts", operation_id = "list_artefacts", params(("id" = String, Path, description = "Identifier")), responses(
     (status = 200, description = "The files", body = ArtefactList),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "results")]
@@ -91,12 +108,12 @@ pub(super) async fn artefacts(State(app): State<App>, Path(id): Path<String>) ->
 }
 
 /// One file.
-#[utoipa::path(get, path = "/v1/jobs/{id}/artefacts/{name}", params(
+#[utoipa::path(get, path = "/v1/jobs/{id}/artefacts/{name}", operation_id = "get_artefact", params(
     ("id" = String, Path, description = "Identifier"), ("name" = String, Path, description = "Name in the list"),
 ), responses(
     (status = 200, description = "The file", content(
         (String = "image/svg+xml"), (String = "text/html"), (String = "text/csv"), (String = "application/xml"),
-        (String = "image/vnd.dxf"), (Vec<u8> = "application/gzip"), (Vec<u8> = "application/vnd.apache.parquet"), (Vec<u8> = "model/stl"), (Object = "application/json"),
+        (String = "image/vnd.dxf"), (Binary = "application/gzip"), (Binary = "application/vnd.apache.parquet"), (Binary = "model/stl"), (serde_json::Value = "application/json"),
     )),
     (status = 304, description = "Unchanged"),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),

@@ -4,54 +4,64 @@ use crate::field::FieldError;
 use crate::job::{Job, KINDS, Kind};
 use crate::service::access::{Caller, Role, random_hex};
 use crate::service::app::App;
+use crate::service::body::{JsonBody, let_run_out, receive_json};
 use crate::service::problem::Problem;
 use crate::service::store::{Idempotency, NewJob, Submitted, sha256_hex};
 use crate::service::task::tasks_of;
 use crate::service::view::JobView;
 use crate::specimen::Specimen;
 use axum::Router;
-use axum::body::Bytes;
-use axum::extract::{Extension, State};
+use axum::extract::{Extension, Query, Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::post;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::openapi::{OpenApi, Paths};
+use utoipa::{PartialSchema, ToSchema};
 
-/// Reads a JSON body.
-pub(super) fn json_body(headers: &HeaderMap, body: &[u8]) -> Result<serde_json::Value, Problem> {
-    let media_type = headers.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or_default();
-    let essence = media_type.split(';').next().unwrap_or_default().trim();
-    if !essence.eq_ignore_ascii_case("application/json") {
-        return Err(Problem::new("unsupported-media-type", "send the body as Content-Type: application/json"));
+async fn receive(app: App, caller: Caller, request: Request, kind: &'static Kind) -> Result<Response, Problem> {
+    // Before the body: whoever may not submit need not send it.
+    if let Err(problem) = caller.require(Role::Submit) {
+        let_run_out(request.into_body());
+        return Err(problem);
     }
-    serde_json::from_slice(body).map_err(|e| Problem::new("invalid-json", e.to_string()))
+    let query = request.uri().query().unwrap_or_default().to_string();
+    let Query(query) = Query::<SubmitQuery>::try_from_uri(request.uri())
+        .map_err(|e| Problem::new("invalid-parameter", format!("{query}: {}", e.body_text())))?;
+    let body = receive_json(&app, request).await?;
+    app.answer(&caller, app.limits.request_time, submit(&app, &caller, body, (kind, query.dry_run))).await
 }
 
 async fn submit(
-    app: App,
-    caller: Caller,
-    headers: HeaderMap,
-    body: Bytes,
-    kind: &'static Kind,
+    app: &App,
+    caller: &Caller,
+    body: JsonBody,
+    (kind, is_dry_run): (&'static Kind, bool),
 ) -> Result<Response, Problem> {
-    caller.require(Role::Submit)?;
-    let value = json_body(&headers, &body)?;
-    let key = idempotency_key(&headers)?;
+    let key = idempotency_key(&body.headers)?;
+    let value = body.value;
     let max_elements = caller.max_elements.unwrap_or(usize::MAX).min(app.limits.max_elements);
     let canonical = value.to_string();
     // The request is read once; from here on it is typed.
-    let job = app.compute(move || kind.job(&value).map_err(Problem::invalid)).await?;
-    let specimens = specimens_of(&app, &job).await?;
-    let (title, tasks, has_gather) = app
-        .compute(move || {
+    let job = app.compute(&caller.share, move || kind.job(&value).map_err(Problem::invalid)).await?;
+    let specimens = specimens_of(app, &job).await?;
+    let most_seconds = app.limits.max_job_time.as_secs_f64();
+    let (title, tasks, has_gather, estimated_seconds) = app
+        .compute(&caller.share, move || {
             job.check_size(&specimens, max_elements).map_err(|e| Problem::from(crate::job::JobError::TooBig(e)))?;
+            let estimated_seconds = job.estimated_seconds();
+            check_cost(estimated_seconds, most_seconds)?;
             let (tasks, has_gather) =
-                tasks_of(&job, max_elements).map_err(|e| Problem::new("internal", e.to_string()))?;
-            Ok((job.title(), tasks, has_gather))
+                tasks_of(&job, max_elements, most_seconds).map_err(|e| Problem::new("internal", e.to_string()))?;
+            Ok((job.title(), tasks, has_gather, estimated_seconds))
         })
         .await?;
+    if is_dry_run {
+        return Ok(
+            axum::Json(Estimate { title, num_tasks: tasks.len(), estimated_seconds, most_seconds }).into_response()
+        );
+    }
     let id = random_hex::<16>().map_err(|e| Problem::new("internal", e.to_string()))?;
     let fingerprint = sha256_hex(format!("{}\n{canonical}", kind.collection).as_bytes());
     let idempotency = key.map(|key| Idempotency { key, fingerprint });
@@ -85,6 +95,47 @@ async fn submit(
     Ok((StatusCode::ACCEPTED, [(header::LOCATION, location)], axum::Json(JobView::new(&row))).into_response())
 }
 
+/// What a job would take.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct Estimate {
+    /// Title.
+    title: String,
+    /// Tasks.
+    #[schema(minimum = 0)]
+    num_tasks: usize,
+    /// Processor seconds, within a factor of about three; left out where they cannot be told before it runs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    estimated_seconds: Option<f64>,
+    /// Most processor seconds that a job of this service may be estimated to take, and most seconds that one of its
+    /// tasks may run.
+    most_seconds: f64,
+}
+
+/// How a request is meant.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SubmitQuery {
+    /// Check the request and estimate its cost; start nothing.
+    #[serde(default)]
+    dry_run: bool,
+}
+
+fn check_cost(estimated_seconds: Option<f64>, most_seconds: f64) -> Result<(), Problem> {
+    match estimated_seconds {
+        Some(seconds) if seconds > most_seconds => {
+            let hours = |seconds: f64| seconds / 3600.0;
+            let detail = format!(
+                "the job would take about {:.1} h of one processor (limit: {:.1} h); ask for fewer drives or evaluations, \
+                 a coarser mesh or larger voxels, or have the service started with a larger --max-job-hours",
+                hours(seconds),
+                hours(most_seconds)
+            );
+            Err(Problem::new("too-costly", detail))
+        }
+        _ => Ok(()),
+    }
+}
+
 fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, Problem> {
     let Some(value) = headers.get("idempotency-key") else { return Ok(None) };
     match value.to_str() {
@@ -113,10 +164,9 @@ async fn specimens_of(app: &App, job: &Job) -> Result<Vec<Specimen>, Problem> {
 /// The addresses of all kinds.
 pub(super) fn router() -> Router<App> {
     KINDS.iter().fold(Router::new(), |router, kind| {
-        let handler = move |State(app): State<App>,
-                            Extension(caller): Extension<Caller>,
-                            headers: HeaderMap,
-                            body: Bytes| submit(app, caller, headers, body, kind);
+        let handler = move |State(app): State<App>, Extension(caller): Extension<Caller>, request: Request| {
+            receive(app, caller, request, kind)
+        };
         router.route(&format!("/v1/{}", kind.collection), post(handler))
     })
 }
@@ -127,6 +177,7 @@ pub(super) fn router() -> Router<App> {
 /// Where a schema is none that OpenAPI knows.
 pub(super) fn describe(document: &mut OpenApi) -> Result<(), serde_json::Error> {
     let components = document.components.get_or_insert_with(Default::default);
+    components.schemas.insert(Estimate::name().into_owned(), Estimate::schema());
     let mut paths = serde_json::Map::new();
     for kind in &KINDS {
         for (name, schema) in kind.schemas() {
@@ -139,17 +190,27 @@ pub(super) fn describe(document: &mut OpenApi) -> Result<(), serde_json::Error> 
             "description": "The same key gives the same job",
             "schema": { "type": "string", "minLength": 1, "maxLength": 200, "pattern": "^[!-~]+$" },
         });
+        let dry_run = json!({
+            "name": "dry_run", "in": "query", "required": false,
+            "description": "Check the request and estimate its cost; start nothing",
+            "schema": { "type": "boolean", "default": false },
+        });
+        let estimate = json!({ "application/json": { "schema": { "$ref": "#/components/schemas/Estimate" } } });
         let location = json!({ "description": "The job", "schema": { "type": "string" } });
         let operation = json!({ "post": {
             "tags": ["jobs"],
             "summary": kind.about,
             "operationId": format!("post_{}", kind.collection.replace('-', "_")),
-            "parameters": [key],
+            "parameters": [key, dry_run],
             "requestBody": {
                 "required": true,
-                "content": { "application/json": { "schema": { "$ref": format!("#/components/schemas/{}", kind.schema_name()) } } },
+                "content": { "application/json": {
+                    "schema": { "$ref": format!("#/components/schemas/{}", kind.schema_name()) },
+                    "example": kind.example(),
+                } },
             },
             "responses": {
+                "200": { "description": "What it would take (dry_run)", "content": estimate },
                 "202": { "description": "Accepted", "headers": { "Location": location }, "content": accepted },
                 "default": { "description": "A problem", "content": problem },
             },

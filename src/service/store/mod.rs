@@ -11,14 +11,16 @@
 mod database;
 mod error;
 mod jobs;
+mod removal;
 mod tasks;
 mod uploads;
 
 pub use database::{Database, Row, Transaction, Value};
 pub use error::StoreError;
 pub use jobs::{ArtefactRow, Idempotency, JobFilter, JobRow, NewJob, NewTask, Submitted, TaskRow};
+pub use removal::Removed;
 pub use tasks::{Claimed, Finished, TaskResult};
-pub use uploads::{NewUpload, UploadRow};
+pub use uploads::{NewUpload, UploadFile, UploadRow};
 
 use crate::provenance::VERSION;
 use sha2::{Digest, Sha256};
@@ -28,6 +30,8 @@ use std::path::Path;
 pub const MAX_LOSSES: i64 = 5;
 /// Ending of the key of an evaluation kept without pictures; one with pictures serves too.
 pub const NUMBERS_ONLY: &str = ":numbers";
+/// What the disk must still take for the service to be ready, bytes.
+const PROBE_BYTES: usize = 4 << 20;
 /// Version of the tables.
 const SCHEMA_VERSION: &str = "1";
 
@@ -39,6 +43,8 @@ pub fn sha256_hex(bytes: &[u8]) -> String {
 /// The storage. All methods block; asynchronous callers use a blocking thread.
 pub struct Store {
     pub(super) database: Database,
+    /// The data folder, where there is one.
+    folder: Option<std::path::PathBuf>,
     /// Held as long as the service owns its data folder.
     _lock: Option<std::fs::File>,
 }
@@ -62,7 +68,8 @@ impl Store {
             Err(std::fs::TryLockError::WouldBlock) => return Err(StoreError::FolderInUse { path: folder.into() }),
             Err(std::fs::TryLockError::Error(source)) => return Err(fail(source)),
         }
-        let store = Store { database: Database::open_sqlite(&folder.join("lambdak.sqlite"))?, _lock: Some(lock) };
+        let database = Database::open_sqlite(&folder.join("lambdak.sqlite"))?;
+        let store = Store { database, folder: Some(folder.into()), _lock: Some(lock) };
         store.prepare()?;
         Ok(store)
     }
@@ -72,7 +79,7 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn connect(url: &str) -> Result<Store, StoreError> {
-        let store = Store { database: Database::connect_postgres(url)?, _lock: None };
+        let store = Store { database: Database::connect_postgres(url)?, folder: None, _lock: None };
         store.prepare()?;
         Ok(store)
     }
@@ -143,9 +150,27 @@ impl Store {
         }
     }
 
-    /// Whether the database answers.
-    pub fn is_ready(&self) -> bool {
-        self.database.read("SELECT 1", &[]).is_ok()
+    /// Whether the database answers, and takes what is written: a row, and some of its file's disk.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn check_ready(&self) -> Result<(), StoreError> {
+        self.database.read("SELECT 1", &[])?;
+        if let Some(folder) = &self.folder {
+            // A file of the database may have room in it while its disk is full.
+            let path = folder.join("ready-probe");
+            let written = std::fs::write(&path, vec![0x5a; PROBE_BYTES]);
+            let removed = std::fs::remove_file(&path);
+            written.and(removed).map_err(|source| StoreError::Folder { path: folder.clone(), source })?;
+        }
+        self.database.transact(&|t| {
+            t.execute(
+                "INSERT INTO meta (key, value) VALUES ('ready', 'yes') \
+                 ON CONFLICT (key) DO UPDATE SET value = excluded.value",
+                &[],
+            )?;
+            Ok(())
+        })
     }
 
     /// Bytes under a SHA-256.
@@ -158,11 +183,11 @@ impl Store {
 }
 
 /// Keeps bytes; equal ones once.
-fn put_blob(t: &mut Transaction, bytes: &[u8]) -> Result<String, StoreError> {
-    let sha = sha256_hex(bytes);
+fn put_blob(t: &mut Transaction, bytes: Vec<u8>) -> Result<String, StoreError> {
+    let (sha, length) = (sha256_hex(&bytes), bytes.len());
     t.execute(
         "INSERT INTO blobs (sha, bytes, num_bytes) VALUES ($1, $2, $3) ON CONFLICT DO NOTHING",
-        &[(&sha).into(), bytes.to_vec().into(), bytes.len().into()],
+        &[(&sha).into(), bytes.into(), length.into()],
     )?;
     Ok(sha)
 }

@@ -35,3 +35,8 @@ CREATE TABLE IF NOT EXISTS uploads (
 CREATE TABLE IF NOT EXISTS upload_files (
     upload_id TEXT NOT NULL REFERENCES uploads (id) ON DELETE CASCADE, name TEXT NOT NULL, sha TEXT NOT NULL,
     num_bytes BIGINT NOT NULL, PRIMARY KEY (upload_id, name));
+CREATE INDEX IF NOT EXISTS tasks_by_result ON tasks (result_sha);
+CREATE INDEX IF NOT EXISTS jobs_by_result ON jobs (result_sha);
+CREATE INDEX IF NOT EXISTS artefacts_by_content ON artefacts (sha);
+CREATE INDEX IF NOT EXISTS upload_files_by_content ON upload_files (sha);
+CREATE INDEX IF NOT EXISTS results_by_content ON results (result_sha);

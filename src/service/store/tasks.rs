@@ -160,13 +160,13 @@ impl Store {
             if !is_ours(t, task, worker)? {
                 return Ok(Finished::NotOurs);
             }
-            let sha = put_blob(t, &result.result)?;
+            let sha = put_blob(t, result.result.clone())?;
             let mut known = Vec::new();
             for (name, media_type, bytes) in &result.artefacts {
                 known.push(KnownArtefact {
                     name: name.clone(),
                     media_type: media_type.clone(),
-                    sha: put_blob(t, bytes)?,
+                    sha: put_blob(t, bytes.clone())?,
                     num_bytes: bytes.len() as i64,
                 });
             }

@@ -1,6 +1,7 @@
 //! Uploaded recordings: their files as blobs. A name from outside is a column's value, never a path.
 
 use super::{Store, StoreError, put_blob};
+use std::path::PathBuf;
 
 /// An upload to keep.
 #[derive(Clone, Debug)]
@@ -13,8 +14,21 @@ pub struct NewUpload {
     pub title: String,
     /// Summary, JSON.
     pub manifest: String,
-    /// Name and bytes.
-    pub files: Vec<(String, Vec<u8>)>,
+    /// Its files.
+    pub files: Vec<UploadFile>,
+}
+
+/// A file of an upload to keep: it is read when it is stored, one at a time.
+#[derive(Clone, Debug)]
+pub struct UploadFile {
+    /// Name.
+    pub name: String,
+    /// Where it lies until then.
+    pub path: PathBuf,
+    /// Length.
+    pub num_bytes: u64,
+    /// SHA-256 of its content, hexadecimal.
+    pub sha: String,
 }
 
 /// An upload as stored.
@@ -22,6 +36,8 @@ pub struct NewUpload {
 pub struct UploadRow {
     /// Identifier.
     pub id: String,
+    /// Name of the token that uploaded it, or whose job made it.
+    pub owner: String,
     /// For lists.
     pub title: String,
     /// Summary, JSON.
@@ -39,7 +55,7 @@ impl Store {
     /// [`StoreError`].
     pub fn put_upload(&self, upload: &NewUpload) -> Result<(), StoreError> {
         self.database.transact(&|t| {
-            let total: usize = upload.files.iter().map(|f| f.1.len()).sum();
+            let total: u64 = upload.files.iter().map(|f| f.num_bytes).sum();
             let made = t.execute(
                 "INSERT INTO uploads (id, owner, title, manifest, num_bytes, created_ms) \
                  VALUES ($1, $2, $3, $4, $5, {now}) ON CONFLICT DO NOTHING",
@@ -48,17 +64,19 @@ impl Store {
                     (&upload.owner).into(),
                     (&upload.title).into(),
                     (&upload.manifest).into(),
-                    total.into(),
+                    (total as usize).into(),
                 ],
             )?;
             if made == 0 {
                 return Ok(());
             }
-            for (name, bytes) in &upload.files {
+            for UploadFile { name, path, .. } in &upload.files {
+                let bytes = std::fs::read(path).map_err(|source| StoreError::Folder { path: path.clone(), source })?;
+                let length = bytes.len();
                 let sha = put_blob(t, bytes)?;
                 t.execute(
                     "INSERT INTO upload_files (upload_id, name, sha, num_bytes) VALUES ($1, $2, $3, $4)",
-                    &[(&upload.id).into(), name.into(), sha.into(), bytes.len().into()],
+                    &[(&upload.id).into(), name.into(), sha.into(), length.into()],
                 )?;
             }
             Ok(())
@@ -71,7 +89,7 @@ impl Store {
     /// [`StoreError`].
     pub fn uploads(&self, limit: usize) -> Result<Vec<UploadRow>, StoreError> {
         let rows = self.database.read(
-            "SELECT id, title, manifest, num_bytes, created_ms FROM uploads ORDER BY created_ms DESC, id LIMIT $1",
+            "SELECT id, title, manifest, num_bytes, created_ms, owner FROM uploads ORDER BY created_ms DESC, id LIMIT $1",
             &[limit.into()],
         )?;
         Ok(rows.iter().map(upload_of).collect())
@@ -82,35 +100,69 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn upload(&self, id: &str) -> Result<Option<UploadRow>, StoreError> {
-        let rows = self
-            .database
-            .read("SELECT id, title, manifest, num_bytes, created_ms FROM uploads WHERE id = $1", &[id.into()])?;
+        let rows = self.database.read(
+            "SELECT id, title, manifest, num_bytes, created_ms, owner FROM uploads WHERE id = $1",
+            &[id.into()],
+        )?;
         Ok(rows.first().map(upload_of))
     }
 
-    /// An upload's files: name and bytes.
+    /// Names of an upload's files.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn upload_files(&self, id: &str) -> Result<Vec<(String, Vec<u8>)>, StoreError> {
-        let rows = self.database.read(
-            "SELECT f.name, b.bytes FROM upload_files f JOIN blobs b ON b.sha = f.sha WHERE f.upload_id = $1 ORDER BY f.name",
-            &[id.into()],
-        )?;
-        Ok(rows.iter().map(|r| (r.text(0), r.blob(1))).collect())
+    pub fn upload_file_names(&self, id: &str) -> Result<Vec<String>, StoreError> {
+        let rows =
+            self.database.read("SELECT name FROM upload_files WHERE upload_id = $1 ORDER BY name", &[id.into()])?;
+        Ok(rows.iter().map(|r| r.text(0)).collect())
     }
 
-    /// Length of all uploads, bytes.
+    /// Bytes of one of an upload's files; empty where there is none of the name.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn uploaded_bytes(&self) -> Result<i64, StoreError> {
+    pub fn upload_file(&self, id: &str, name: &str) -> Result<Vec<u8>, StoreError> {
+        let rows = self.database.read(
+            "SELECT b.bytes FROM upload_files f JOIN blobs b ON b.sha = f.sha WHERE f.upload_id = $1 AND f.name = $2",
+            &[id.into(), name.into()],
+        )?;
+        Ok(rows.first().map(|r| r.blob(0)).unwrap_or_default())
+    }
+
+    /// An owner's largest uploads; anybody's where `owner` is empty.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn largest_uploads(&self, owner: &str, limit: usize) -> Result<Vec<UploadRow>, StoreError> {
+        let rows = self.database.read(
+            "SELECT id, title, '', num_bytes, created_ms, owner FROM uploads WHERE ($1 = '' OR owner = $1) \
+             ORDER BY num_bytes DESC, created_ms LIMIT $2",
+            &[owner.into(), limit.into()],
+        )?;
+        Ok(rows.iter().map(upload_of).collect())
+    }
+
+    /// Length of all uploads of an owner, bytes; of everybody's where `owner` is empty.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn uploaded_bytes(&self, owner: &str) -> Result<i64, StoreError> {
         // SUM of BIGINT is NUMERIC on PostgreSQL.
-        let rows = self.database.read("SELECT CAST(COALESCE(SUM(num_bytes), 0) AS BIGINT) FROM uploads", &[])?;
+        let rows = self.database.read(
+            "SELECT CAST(COALESCE(SUM(num_bytes), 0) AS BIGINT) FROM uploads WHERE $1 = '' OR owner = $1",
+            &[owner.into()],
+        )?;
         Ok(rows.first().map_or(0, |r| r.int(0)))
     }
 }
 
 fn upload_of(r: &super::Row) -> UploadRow {
-    UploadRow { id: r.text(0), title: r.text(1), manifest: r.text(2), num_bytes: r.int(3), created_ms: r.int(4) }
+    UploadRow {
+        owner: r.text(5),
+        id: r.text(0),
+        title: r.text(1),
+        manifest: r.text(2),
+        num_bytes: r.int(3),
+        created_ms: r.int(4),
+    }
 }

@@ -1,0 +1,120 @@
+//! The text of a material for each program.
+
+use super::convention::{Constant, Convention, MaterialFormat};
+use super::error::ExportError;
+use super::label::label;
+use crate::homogeneous::StressUnit;
+use crate::material::Ogden;
+
+/// Numbers on a line of Abaqus and CalculiX.
+const PER_LINE: usize = 8;
+/// Constants of one `TBDATA` command.
+const PER_TBDATA: usize = 6;
+
+/// Where a file comes from, for its comments.
+#[derive(Clone, Copy, Debug)]
+pub struct Origin<'a> {
+    /// What is written, such as the material's name.
+    pub name: &'a str,
+    /// Version of the program.
+    pub version: &'a str,
+    /// SHA-256 of what went in, hexadecimal.
+    pub input_hash: &'a str,
+}
+
+/// `material` as the program of `format` reads it, with stresses in `unit`.
+///
+/// ```
+/// use lambdak::export::{MaterialFormat, Origin, material_card};
+/// use lambdak::homogeneous::StressUnit;
+/// use lambdak::material::Ogden;
+/// let text = r#"{ "schema": "ogden/1", "bulk_kpa": 2000.0, "terms": [{ "mu_kpa": 16.0, "alpha": 2.0 }] }"#;
+/// let origin = Origin { name: "silicone", version: "0.1.0", input_hash: "" };
+/// let card = material_card(&Ogden::from_json(text)?, MaterialFormat::Abaqus, StressUnit::MPa, &origin)?;
+/// assert!(card.ends_with("*HYPERELASTIC, OGDEN, N=1\n1.6e-2, 2.0e0, 1.0e0\n"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// [`ExportError`].
+pub fn material_card(
+    material: &Ogden,
+    format: MaterialFormat,
+    unit: StressUnit,
+    origin: &Origin,
+) -> Result<String, ExportError> {
+    let convention = format.convention();
+    let constants = convention.constants(material, unit)?;
+    let lines = comments(convention, unit, origin);
+    Ok(match format {
+        MaterialFormat::Abaqus | MaterialFormat::Calculix => {
+            commented("** ", &lines) + &keyword_material(&constants, &label(origin.name))
+        }
+        MaterialFormat::Ansys => commented("! ", &lines) + &commands(&constants),
+        MaterialFormat::Comsol => commented("% ", &lines) + &parameters(&constants),
+        MaterialFormat::Febio => {
+            // Two minus signs end a comment in XML.
+            let inner = lines.join("\n  ").replace("--", "- -");
+            format!("<!-- {inner} -->\n{}", febio_material(&constants, &label(origin.name), ""))
+        }
+    })
+}
+
+/// What the reader of a card should know.
+fn comments(convention: &Convention, unit: StressUnit, origin: &Origin) -> Vec<String> {
+    let Origin { name, version, input_hash } = origin;
+    let name = name.replace(['\n', '\r'], " ");
+    vec![
+        format!(
+            "{name}: Ogden material for {}, written by lambdak {version} (inputs {input_hash})",
+            convention.program
+        ),
+        format!("Stresses in {}. l1, l2, l3: principal stretches times J^(-1/3).", unit.symbol()),
+        convention.energy.to_string(),
+        format!("Volume: {}.", convention.law.meaning()),
+    ]
+}
+
+fn commented(mark: &str, lines: &[String]) -> String {
+    lines.iter().map(|line| format!("{mark}{line}\n")).collect()
+}
+
+/// `*MATERIAL` with `*HYPERELASTIC` as Abaqus and CalculiX read it: all factors and exponents, then D_1 to D_N, of which
+/// those after the first are zero (no such term).
+pub(super) fn keyword_material(constants: &[Constant], name: &str) -> String {
+    let num_terms = constants.len() / 2;
+    let mut numbers: Vec<String> = constants.iter().map(Constant::text).collect();
+    numbers.resize(3 * num_terms, super::number::number(0.0));
+    let lines: String = numbers.chunks(PER_LINE).map(|line| line.join(", ") + "\n").collect();
+    format!("*MATERIAL, NAME={name}\n*HYPERELASTIC, OGDEN, N={num_terms}\n{lines}")
+}
+
+/// Commands of Ansys for the material number 1; d_2 and further are zero where they are not given (no such term).
+fn commands(constants: &[Constant]) -> String {
+    let mut text = format!("TB,HYPER,1,1,{},OGDEN\n", constants.len() / 2);
+    for (index, part) in constants.chunks(PER_TBDATA).enumerate() {
+        let numbers: Vec<String> = part.iter().map(Constant::text).collect();
+        text += &format!("TBDATA,{},{}\n", PER_TBDATA * index + 1, numbers.join(","));
+    }
+    text
+}
+
+/// Parameters as COMSOL loads them: name, expression with unit, description.
+fn parameters(constants: &[Constant]) -> String {
+    let line = |c: &Constant| {
+        // A plain number has no unit there.
+        let unit = if c.unit == "1" { String::new() } else { format!("[{}]", c.unit) };
+        format!("{} {}{unit} \"Ogden material\"\n", c.name, c.text())
+    };
+    constants.iter().map(line).collect()
+}
+
+/// A `material` of FEBio.
+pub(super) fn febio_material(constants: &[Constant], name: &str, indent: &str) -> String {
+    let mut text = format!("{indent}<material id=\"1\" name=\"{name}\" type=\"Ogden\">\n");
+    for c in constants {
+        let tag = c.name.replace('_', "");
+        text += &format!("{indent}  <{tag}>{}</{tag}>\n", c.text());
+    }
+    text + &format!("{indent}</material>\n")
+}

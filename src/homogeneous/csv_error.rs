@@ -1,0 +1,83 @@
+//! Why a table is refused.
+
+/// Why a CSV is refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CsvError {
+    /// No header or no rows.
+    #[error("the file has no {what}; the first line names the columns, numbers follow")]
+    Empty {
+        /// What is missing.
+        what: &'static str,
+    },
+    /// A needed column is not there.
+    #[error("no column for the {what} among {found:?}; name it with an option")]
+    NoColumn {
+        /// What is looked for.
+        what: &'static str,
+        /// The header.
+        found: Vec<String>,
+    },
+    /// Several columns may be meant.
+    #[error("the columns {found:?} may all be the {what}; name one with an option")]
+    Ambiguous {
+        /// What is looked for.
+        what: &'static str,
+        /// The columns.
+        found: Vec<String>,
+    },
+    /// A cell is not a number.
+    #[error(
+        "line {line}: {text:?} is not a number; numbers have no signs between thousands, and one decimal sign in the \
+         whole file"
+    )]
+    NotANumber {
+        /// Line, from 1.
+        line: usize,
+        /// The cell.
+        text: String,
+    },
+    /// A row of another length than the header.
+    #[error(
+        "line {line} has {found} cells, the header {expected}; part cells by semicolons or tabs where numbers have \
+         decimal commas, and leave out lines after the table"
+    )]
+    RowLength {
+        /// Line, from 1.
+        line: usize,
+        /// Cells found.
+        found: usize,
+        /// Cells of the header.
+        expected: usize,
+    },
+    /// The unit of a column cannot be told.
+    #[error("column {column:?} does not say its unit; end its name in one, such as {examples}")]
+    NoUnit {
+        /// The column.
+        column: String,
+        /// Endings that would fit, and what else can be done.
+        examples: &'static str,
+    },
+    /// The unit of a column is not that of what it holds.
+    #[error("column {column:?} is taken for the {what}, and its unit is not one of it; name another column")]
+    WrongUnit {
+        /// The column.
+        column: String,
+        /// What it is taken for.
+        what: &'static str,
+    },
+    /// Too many rows.
+    #[error("more than {limit} rows; thin the recording")]
+    TooLong {
+        /// The limit.
+        limit: usize,
+    },
+    /// A length or area that cannot be.
+    #[error("{name} is {value}; it must be positive")]
+    NotPositive {
+        /// Which.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+    },
+}

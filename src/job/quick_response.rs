@@ -1,0 +1,60 @@
+//! Force and stretch of a specimen at its largest drive, on the search's mesh: what a check before any job can tell.
+
+use super::cost::seconds_per_drive;
+use crate::fem::{ForwardModel, SolveOptions};
+use crate::kinematics::decompose;
+use crate::material::Ogden;
+use crate::mesh::{MeshOptions, mesh_specimen};
+use crate::specimen::Specimen;
+
+/// What takes longer is not solved for a check, s.
+const MOST_SECONDS: f64 = 2.0;
+
+/// What a specimen does at its largest drive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct QuickResponse {
+    /// Force of all samples, N.
+    pub force_n: f64,
+    /// Largest principal stretch at any quadrature point.
+    pub local_stretch: f64,
+}
+
+/// Why there is no response.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoResponse {
+    /// It would take too long for a check.
+    #[error(
+        "solving it would take about {seconds:.0} s, more than a check takes ({MOST_SECONDS} s); start an evaluation"
+    )]
+    TooSlow {
+        /// Estimate, s.
+        seconds: f64,
+    },
+    /// There is no drive.
+    #[error("the specimen has no drive")]
+    NoDrive,
+    /// Meshing or solving failed.
+    #[error("{0}")]
+    Failed(String),
+}
+
+/// Solves `specimen` at its largest drive.
+///
+/// # Errors
+/// [`NoResponse`].
+pub fn quick_response(specimen: &Specimen, material: &Ogden) -> Result<QuickResponse, NoResponse> {
+    let failed = |e: &dyn std::fmt::Display| NoResponse::Failed(e.to_string());
+    let drive = specimen.drive_mm.iter().copied().reduce(f64::max).ok_or(NoResponse::NoDrive)?;
+    let options = MeshOptions::search(specimen);
+    let mesh = mesh_specimen(specimen, &options).map_err(|e| failed(&e))?;
+    let seconds = seconds_per_drive(mesh.nodes.len(), 0);
+    if seconds > MOST_SECONDS {
+        return Err(NoResponse::TooSlow { seconds });
+    }
+    let mut model = ForwardModel::of_specimen(specimen, &options).map_err(|e| failed(&e))?;
+    let found = model.solve(material, drive, None, &SolveOptions::default(), &|| false).map_err(|e| failed(&e))?;
+    let stretches = model.quadrature_fields(material, &found);
+    let stretches = stretches.iter().map(|q| decompose(&q.deformation_gradient).principal_stretches[0]);
+    Ok(QuickResponse { force_n: found.force_n, local_stretch: stretches.fold(f64::NEG_INFINITY, f64::max) })
+}

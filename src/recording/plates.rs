@@ -1,0 +1,132 @@
+//! Whether the displacements next to the plates are those of the drive: a wrong unit, sign or order of components shows
+//! there at once, and nowhere later.
+
+use super::{PlateFault, Recording, RecordingError};
+use crate::specimen::TestKind;
+
+/// Ratios of plate motion and drive within these bounds are taken as one: mounts give way, and lines to the plates err.
+const NEAR_ONE: std::ops::RangeInclusive<f64> = 0.5..=1.6;
+/// Voxels this part of the way between the plates from a plate, or nearer, tell of it.
+const REACH: f64 = 0.15;
+/// Displacements in metres are nowhere above this part of the drive.
+const SMALL: f64 = 0.02;
+/// A component below this part of the drive does not follow it.
+const STILL: f64 = 0.2;
+
+impl Recording {
+    /// Compares the motion of the plates in every step, where its voxels reach both, with the drive.
+    ///
+    /// # Errors
+    /// [`RecordingError::PlateMotion`] where a unit, a sign or the order of components is wrong.
+    pub fn check_plate_motion(&self) -> Result<(), RecordingError> {
+        for (n, step) in self.steps.iter().enumerate() {
+            let Some(found_mm) = self.plate_motion_mm(&step.displacement) else { continue };
+            if let Some(fault) = fault(found_mm, step.drive_mm, &step.displacement) {
+                return Err(RecordingError::PlateMotion { step: n + 1, drive_mm: step.drive_mm, found_mm, fault });
+            }
+        }
+        Ok(())
+    }
+
+    /// Motion of the driven plate against the other one, by component: the median over columns of voxels of the line
+    /// through their outermost ones.
+    fn plate_motion_mm(&self, displacement: &[[f64; 3]]) -> Option<[f64; 3]> {
+        let (axis, extent) = match self.specimen.test {
+            TestKind::DoubleLapShear => (1, self.specimen.block.thickness_mm),
+            TestKind::Uniaxial => (0, self.specimen.block.length_mm),
+        };
+        let grid = &self.grid;
+        let (stride, n) = ([1, grid.shape[0], grid.shape[0] * grid.shape[1]][axis], grid.shape[axis]);
+        let mut motions = [Vec::new(), Vec::new(), Vec::new()];
+        for start in (0..grid.num_voxels()).filter(|v| (v / stride).is_multiple_of(n)) {
+            let is_measured = |i: &usize| {
+                let v = start + i * stride;
+                self.mask[v] && displacement[v].iter().all(|u| u.is_finite())
+            };
+            let (Some(first), Some(last)) = ((0..n).find(is_measured), (0..n).rfind(is_measured)) else { continue };
+            let place = |i: usize| (grid.origin_mm[axis] + i as f64 * grid.voxel_mm[axis]) / extent;
+            if place(first) > REACH - 0.5 || place(last) < 0.5 - REACH {
+                continue;
+            }
+            let (low, high) = (displacement[start + first * stride], displacement[start + last * stride]);
+            for (c, motion) in motions.iter_mut().enumerate() {
+                motion.push((high[c] - low[c]) / (place(last) - place(first)));
+            }
+        }
+        let median = |values: &mut Vec<f64>| {
+            values.sort_by(f64::total_cmp);
+            values.get(values.len() / 2).copied()
+        };
+        let [x, y, z] = &mut motions;
+        Some([median(x)?, median(y)?, median(z)?])
+    }
+}
+
+fn fault(found_mm: [f64; 3], drive_mm: f64, displacement: &[[f64; 3]]) -> Option<PlateFault> {
+    let [x, y, z] = found_mm.map(|motion| motion / drive_mm);
+    let is_near = |ratio: f64| NEAR_ONE.contains(&ratio);
+    if is_near(x) {
+        return None;
+    }
+    let is_small = || displacement.iter().flatten().all(|u| !(u.abs() > SMALL * drive_mm));
+    if is_near(-x) {
+        Some(PlateFault::Sign)
+    } else if is_near(x.abs() / 1e3) {
+        Some(PlateFault::Micrometres)
+    } else if is_near(x.abs() * 1e3) && is_small() {
+        Some(PlateFault::Metres)
+    } else if x.abs() < STILL && is_near(y.abs()) {
+        Some(PlateFault::Permuted { component: 'y' })
+    } else if x.abs() < STILL && is_near(z.abs()) {
+        Some(PlateFault::Permuted { component: 'z' })
+    } else {
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::{Filter, RecordedStep};
+    use crate::specimen::Specimen;
+    use crate::voxel::VoxelGrid;
+
+    /// A block in simple shear by 5 mm, each displacement changed by `change`.
+    fn sheared(change: impl Fn([f64; 3]) -> [f64; 3]) -> Result<(), RecordingError> {
+        let specimen = Specimen::from_json(include_str!("../../geometries/solid-shear.json")).expect("a specimen");
+        let grid = VoxelGrid::covering(&specimen, [2.0, 0.5, 2.0]).expect("a grid");
+        let at = |v: usize| [5.0 * (grid.center_mm(v)[1] / specimen.block.thickness_mm + 0.5), 0.0, 0.1];
+        let displacement = (0..grid.num_voxels()).map(|v| change(at(v))).collect();
+        let step = RecordedStep { drive_mm: 5.0, force_n: None, force_sd_n: None, window_s: None, displacement };
+        let mask = vec![true; grid.num_voxels()];
+        let recording = Recording {
+            id: "sheared".into(),
+            specimen,
+            grid,
+            mask,
+            steps: vec![step],
+            noise_sd_mm: None,
+            filter: Filter::None,
+            load: None,
+            notes: None,
+        };
+        recording.check_plate_motion()
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        sheared(|u| u).expect("as it should be");
+        sheared(|u| u.map(|u| 0.7 * u)).expect("a mount that gives way");
+        sheared(|u| [u[0] + 40.0, u[1], u[2]]).expect("a phase without a zero");
+        sheared(|_| [0.0; 3]).expect("nothing moved: that is for the diagnosis");
+        let fault = |change: fn([f64; 3]) -> [f64; 3]| match sheared(change) {
+            Err(RecordingError::PlateMotion { step: 1, fault, .. }) => fault,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(fault(|u| u.map(|u| u / 1e3)), PlateFault::Metres);
+        assert_eq!(fault(|u| u.map(|u| u * 1e3)), PlateFault::Micrometres);
+        assert_eq!(fault(|[x, y, z]| [-x, y, z]), PlateFault::Sign);
+        assert_eq!(fault(|[x, y, z]| [y, x, z]), PlateFault::Permuted { component: 'y' });
+        assert_eq!(fault(|[x, y, z]| [y, z, -x]), PlateFault::Permuted { component: 'z' });
+    }
+}
