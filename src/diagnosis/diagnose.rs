@@ -4,6 +4,7 @@
 use super::cause_fit::CauseFit;
 use super::conclusion::{explain_too_little, kept_back, verdict_on};
 use super::error::DiagnosisError;
+use super::evidence::UNEXPLAINED;
 use super::findings::Findings;
 use super::found::FoundCause;
 use super::inference::{Inference, KNOWN_LOG_SD};
@@ -40,7 +41,8 @@ const TOLERANCE: f64 = 0.3;
 /// The allowance where none is stated, as a part of the largest drive.
 const ALLOWANCE_OF_DRIVE: f64 = 1e-3;
 
-/// The set-up as a whole is looked at where single causes leave more than this part of the misfit (rms).
+/// The set-up as a whole is looked at where single causes leave more than this part of the misfit (rms), or more than
+/// could be called explained.
 const SET_UP_LEAVES: f64 = 0.25;
 /// It is gone on from where it leaves less than this part of what they leave (rms).
 const SET_UP_GAINS: f64 = 0.7;
@@ -55,6 +57,12 @@ const INTERIOR_ABOVE: f64 = 2.0;
 /// The artefacts among the causes of a fit.
 fn artefacts_of(fitted: &CauseFit) -> Vec<Supposed> {
     fitted.causes.iter().filter(|c| c.cause.is_artefact()).cloned().collect()
+}
+
+/// Whether causes that leave `left_mm` of `before_mm` (rms) explain a misfit as far as single causes can be asked to:
+/// else the set-up as a whole is fitted in their place.
+fn is_explained(left_mm: f64, before_mm: f64, allowance_mm: f64) -> bool {
+    left_mm < (SET_UP_LEAVES * before_mm).max(allowance_mm) && left_mm < UNEXPLAINED * allowance_mm
 }
 
 /// Whether causes, found one after the other, explain less and less of what was left (`lefts`, before the first and
@@ -313,7 +321,7 @@ impl<'a> Run<'a> {
         let to_ask = |inference: &Inference, findings: &Findings| {
             let left = left_mm(&findings.current, &inference.metric);
             lefts.borrow_mut().push(inference.misfit_beyond_noise(&findings.current));
-            let is_explained = left < (SET_UP_LEAVES * before_mm).max(inference.allowance_mm);
+            let is_explained = is_explained(left, before_mm, inference.allowance_mm);
             are_given_up.set(is_promising && !is_explained && explain_ever_less(&lefts.borrow()));
             let asked = if is_explained { everything } else { first };
             (!are_given_up.get()).then_some(asked)
@@ -358,7 +366,7 @@ impl<'a> Run<'a> {
             leftover(run.observed, &fitted.residual, &run.inference.metric).structured_rms_mm
         };
         let (before, single) = (left(self, &self.findings.nominal), left(self, &self.findings.current));
-        let is_explained = single < (SET_UP_LEAVES * before).max(self.inference.allowance_mm);
+        let is_explained = is_explained(single, before, self.inference.allowance_mm);
         if is_explained || self.registry.set_up(self.observed).is_empty() {
             return Ok(false);
         }

@@ -102,6 +102,10 @@ impl Request for ExportMaterialRequest {
     const COLLECTION: &'static str = "material-exports";
     const ABOUT: &'static str = "A material as Abaqus, Ansys, CalculiX, COMSOL and FEBio read it.";
 
+    fn example() -> serde_json::Value {
+        serde_json::json!({ "material": super::defaults::ecoflex(), "stress_unit": "kpa" })
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let mut errors: Vec<FieldError> =
             self.material.field_errors().into_iter().map(|e| e.below("/material")).collect();

@@ -92,6 +92,14 @@ impl Request for ExportModelRequest {
     const ABOUT: &'static str = "A specimen's mesh, material, boundary conditions and drives for Abaqus, CalculiX and \
                                  FEBio.";
 
+    fn example() -> serde_json::Value {
+        serde_json::json!({
+            "specimen": super::defaults::two_hole_shear(),
+            "material": super::defaults::ecoflex(),
+            "drive_mm": [2.0]
+        })
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let mut errors = Vec::new();
         let specimen = driven(&self.specimen, self.drive_mm.as_ref(), &mut errors);

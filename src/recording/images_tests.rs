@@ -33,11 +33,11 @@ fn times(r: &[[f64; 3]; 3], v: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|i| (0..3).map(|j| r[i][j] * v[j]).sum())
 }
 
-/// An image whose index i runs along `axes[i]` of the specimen, which lies in the scanner turned by `turn`.
 fn memory() -> crate::file::ReadingMemory {
     crate::file::MemoryLimit::body(1 << 24).begin()
 }
 
+/// An image whose index i runs along `axes[i]` of the specimen, which lies in the scanner turned by `turn`.
 fn image(axes: [IndexAxis; 3], turn: &[[f64; 3]; 3], frame: VectorFrame, intent: i16) -> NamedImage {
     let size = axes.map(|a| SHAPE[a.axis]);
     let unit = |i: usize| {
