@@ -18,7 +18,7 @@ pub(super) async fn alive() -> &'static str {
 }
 
 /// How long what was found of the storage holds.
-const FRESH: Duration = Duration::from_secs(2);
+const FRESH: Duration = Duration::from_secs(5);
 
 /// The storage answers, takes what is written, and the service is not shutting down.
 #[utoipa::path(get, path = "/readyz", operation_id = "get_ready", responses(

@@ -31,7 +31,7 @@ pub const MAX_LOSSES: i64 = 5;
 /// Ending of the key of an evaluation kept without pictures; one with pictures serves too.
 pub const NUMBERS_ONLY: &str = ":numbers";
 /// What the disk must still take for the service to be ready, bytes.
-const PROBE_BYTES: usize = 4 << 20;
+const PROBE_BYTES: usize = 64 << 10;
 /// Version of the tables.
 const SCHEMA_VERSION: &str = "1";
 
