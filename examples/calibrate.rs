@@ -49,8 +49,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
+/// Displacements in mm and a force in N.
+type Measured = (Vec<[f64; 3]>, f64);
+
 /// What a scan would see of a known material, with a wave in place of noise, and the force.
-fn measured(specimen: &Specimen, grid: &VoxelGrid) -> Result<(Vec<[f64; 3]>, f64), Box<dyn std::error::Error>> {
+fn measured(specimen: &Specimen, grid: &VoxelGrid) -> Result<Measured, Box<dyn std::error::Error>> {
     let truth = Ogden::new(2173.0, [(17.0, 1.91)])?;
     let mut model = ForwardModel::of_specimen(specimen, &MeshOptions::search(specimen))?;
     let state = model.solve(&truth, specimen.drive_mm[0], None, &SolveOptions::default(), &|| false)?;

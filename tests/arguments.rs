@@ -125,3 +125,28 @@ fn results_of_commands_do_not_replace_each_other() {
     assert_eq!(code, Some(0), "{text}");
     assert!(text.contains("replacing the results of an earlier solve with other inputs"), "{text}");
 }
+
+/// Fields at every drive make a series, each drive its own; too many are refused before any work.
+#[test]
+fn fields_are_a_series_over_the_drives() {
+    let scratch = tempfile::tempdir().unwrap();
+    let specimen = Path::new(env!("CARGO_MANIFEST_DIR")).join("geometries/solid-shear.json");
+    let run = |drives: &str, more: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_lambdak"));
+        command.current_dir(scratch.path()).args(["solve", "--mesh", "5", "--out", "out", "--drive", drives]);
+        command.args(more).arg(&specimen).output().unwrap()
+    };
+    let read = |name: &str| std::fs::read_to_string(scratch.path().join("out").join(name));
+    assert_eq!(run("1,2", &[]).status.code(), Some(0));
+    let series = read("solution.pvd").unwrap();
+    for (drive, name) in [(1, "solution_1.vtu"), (2, "solution_2.vtu")] {
+        assert!(series.contains(&format!("timestep=\"{drive}\" part=\"0\" file=\"{name}\"")), "{series}");
+    }
+    assert_ne!(read("solution_1.vtu").unwrap(), read("solution_2.vtu").unwrap());
+    assert_eq!(run("1,2", &["--fields", "last"]).status.code(), Some(0));
+    assert!(read("solution_1.vtu").is_err() && read("solution_2.vtu").is_ok());
+    let many: Vec<String> = (1..=101).map(|i| format!("{}", 0.01 * f64::from(i))).collect();
+    let refused = run(&many.join(","), &[]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("--fields"));
+}

@@ -140,7 +140,8 @@ impl Case {
         path.iter().map(|e| (e.force_n, of_law(e))).collect()
     }
 
-    /// Writes the model for CalculiX into `folder`, by the command where it can; gives what reactions are multiplied by.
+    /// Writes the model for CalculiX into `folder`, by the command where it can; gives what reactions are multiplied
+    /// by.
     fn write(&self, folder: &Path, factor: f64) -> f64 {
         if self.has_prisms {
             let forward = self.model(factor);
@@ -179,9 +180,10 @@ impl Case {
 /// material hardly changes its volume; the bulk modulus is therefore twenty times the shear modulus, and twice for the
 /// fully integrated prisms.
 ///
-/// What is allowed is the error of both meshes, and what the volumetric law changes. The forces of bonded blocks converge at least with the first order (the
-/// stress at the edges is singular with an exponent of about -0.4, and the energy converges twice as fast as the
-/// stress): what is left at half the element size is then no more than the change from the whole one.
+/// What is allowed is the error of both meshes, and what the volumetric law changes. The forces of bonded blocks
+/// converge at least with the first order (the stress at the edges is singular with an exponent of about -0.4, and the
+/// energy converges twice as fast as the stress): what is left at half the element size is then no more than the change
+/// from the whole one.
 fn forces_are_ours() -> Result<(), Missing> {
     prerequisites::calculix()?;
     let soft = ogden(324.7, &[(17.0, 1.91)]);

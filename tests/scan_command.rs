@@ -98,3 +98,33 @@ fn bad_input_ends_with_code_2() {
         assert_eq!(output.status.code(), Some(2), "{arguments:?} {}", String::from_utf8_lossy(&output.stderr));
     }
 }
+
+/// The images of a recording alone, without its `recording.json`, give the same displacements.
+#[test]
+fn images_alone_are_imported() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    let (scanned, imported) = (place("scanned"), place("imported"));
+    json(&lambdak(&[&SMALL[..], &["--json", "--seed", "5", "--out", &scanned]].concat()));
+    let [u, mask] = ["u_1.nii.gz", "mask.nii.gz"].map(|name| format!("{scanned}/{name}"));
+    let specimen = ["--specimen", "geometries/two-hole-shear.json", "--drive", "2.5"];
+    let result = json(&lambdak(&[&["import", &u, &mask, "--json", "--out", &imported], &specimen[..]].concat()));
+    assert_eq!(result["schema"], "import/1");
+    let limits = ReadLimits::default();
+    let [from, to] = [&scanned, &imported].map(|name| Recording::read(Path::new(name), &limits).unwrap());
+    // The import keeps the mask's box, and centres it: voxels are compared by their order inside the mask.
+    let inside = |r: &Recording| -> Vec<[f64; 3]> {
+        r.steps[0].displacement.iter().zip(&r.mask).filter(|(_, m)| **m).map(|(u, _)| *u).collect()
+    };
+    let (from, to) = (inside(&from), inside(&to));
+    assert_eq!(from.len(), to.len());
+    for (a, b) in from.iter().zip(&to) {
+        // Both are kept in single precision.
+        assert!((0..3).all(|c| (a[c] - b[c]).abs() < 1e-6 || (a[c].is_nan() && b[c].is_nan())), "{a:?} {b:?}");
+    }
+    // Without a specimen, and with a frame that there is not, the command says what it needs.
+    assert_eq!(lambdak(&["import", &u, "--drive", "2.5"]).status.code(), Some(2));
+    let bad = lambdak(&[&["import", &u, "--vectors", "up"], &specimen[..]].concat());
+    assert_eq!(bad.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&bad.stderr).contains("ras or lps or index"));
+}

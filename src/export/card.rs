@@ -79,8 +79,8 @@ fn commented(mark: &str, lines: &[String]) -> String {
     lines.iter().map(|line| format!("{mark}{line}\n")).collect()
 }
 
-/// `*MATERIAL` with `*HYPERELASTIC` as Abaqus and CalculiX read it: all factors and exponents, then D_1 to D_N, of which
-/// those after the first are zero (no such term).
+/// `*MATERIAL` with `*HYPERELASTIC` as Abaqus and CalculiX read it: all factors and exponents, then D_1 to D_N, of
+/// which those after the first are zero (no such term).
 pub(super) fn keyword_material(constants: &[Constant], name: &str) -> String {
     let num_terms = constants.len() / 2;
     let mut numbers: Vec<String> = constants.iter().map(Constant::text).collect();

@@ -34,8 +34,8 @@ pub(super) struct Written<'a> {
 
 /// The nodes of quadratic elements without nodes in faces and in the middle, renumbered from 1.
 ///
-/// Abaqus, CalculiX, FEBio and VTK order them alike: corners of the bottom, of the top, middles of the bottom's edges, of
-/// the top's, of the uprights.
+/// Abaqus, CalculiX, FEBio and VTK order them alike: corners of the bottom, of the top, middles of the bottom's edges,
+/// of the top's, of the uprights.
 pub(super) struct Numbered<'a> {
     mesh: &'a Mesh,
     local: &'static [usize],

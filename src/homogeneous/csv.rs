@@ -10,15 +10,16 @@
 //! | time (s) | `time`, `t`, `Zeit` |
 //! | stretch | `stretch`, `lambda` |
 //! | shear | `shear strain`, `shear`, `gamma` (simple shear; else as strain), `stretch` |
-//! | strain (stretch − 1; a fraction or per cent) | `engineering strain`, `nominal strain`, `strain`, `Dehnung`, other strains |
-//! | displacement (needs a length) | `displacement`, `extension`, `drive`, `compression` (turned), `Weg`, crosshead and such |
-//! | nominal stress | `nominal stress`, `engineering stress`, `shear nominal stress`, `p11` (shear: `p12`), `stress`, `Spannung` |
+//! | strain (stretch − 1; also in %) | `engineering strain`, `nominal strain`, `strain`, `Dehnung`, other strains |
+//! | displacement (needs a length) | `displacement`, `extension`, `drive`, `compression` (turned), `Weg`, crosshead |
+//! | nominal stress | `nominal stress`, `engineering stress`, `shear nominal stress`, `p11` (shear: `p12`), `stress` |
+//! | | `Spannung`, other stresses |
 //! | force (needs an area) | `force`, `load`, `Kraft` (turned where the drive is a compression) |
 //!
 //! True and logarithmic quantities and rates are passed over. Of several columns that fit equally well none is taken:
 //! one has to be named.
 
-use super::csv_columns::{DriveKind, Found, StressKind, drive_column, headers, stress_column, time_column};
+use super::csv_columns::{DriveKind, Found, StressKind, drive_column, headers, is_header, stress_column, time_column};
 use super::csv_error::CsvError;
 use super::csv_text::TextTable;
 use super::deformation::HomogeneousTest;
@@ -91,20 +92,15 @@ pub fn read_csv(text: &str, test: HomogeneousTest, options: &CsvOptions) -> Resu
             return Err(CsvError::NotPositive { name, value });
         }
     }
-    let of = |names: &[String], units: &[String]| {
-        let all = headers(names, units);
-        let drive = drive_column(&all, test, options.drive_column.as_deref());
-        let stress = stress_column(&all, test, options.stress_column.as_deref(), options.stress_unit);
-        (drive, stress, time_column(&all))
+    let wanted = [options.drive_column.as_deref(), options.stress_column.as_deref()];
+    let table = TextTable::read(text, &|cells| is_header(&headers(cells, &[]), test, wanted))?;
+    let all = headers(&table.names, &table.units);
+    let columns = Columns {
+        drive: drive_column(&all, test, wanted[0])?,
+        stress: stress_column(&all, test, wanted[1], options.stress_unit)?,
+        time: time_column(&all),
+        is_shear: test == HomogeneousTest::SimpleShear,
     };
-    let is_named = |error: Option<&CsvError>| !matches!(error, Some(CsvError::NoColumn { .. }));
-    let is_header = |cells: &[String]| {
-        let (drive, stress, _) = of(cells, &[]);
-        is_named(drive.as_ref().err()) && is_named(stress.as_ref().err())
-    };
-    let table = TextTable::read(text, &is_header)?;
-    let (drive, stress, time) = of(&table.names, &table.units);
-    let columns = Columns { drive: drive?, stress: stress?, time, is_shear: test == HomogeneousTest::SimpleShear };
     columns.read(&table, options)
 }
 
@@ -259,6 +255,17 @@ mod tests {
         let german = read(files[0], &sized).unwrap().reading;
         assert_eq!((german.drive_column.as_str(), german.num_preamble_lines), ("Dehnung", 2));
         assert!(german.has_decimal_comma);
+    }
+
+    /// Words of both columns in one cell make no header, whatever parts the cells.
+    #[test]
+    fn a_header_has_two_columns() {
+        let none = CsvOptions::default();
+        let text = "time_s,col2_unlabelled,shear_nominal_stress_kPa,shear_strain\n0,9,1,0.1\n";
+        let c = read_csv(text, HomogeneousTest::SimpleShear, &none).unwrap();
+        assert_eq!((c.drive[0], c.stress[0]), (0.1, 1.0));
+        let c = read("Stress-strain curve of 7;A\nstrain;stress_kpa\n0,5;2\n", &none).unwrap();
+        assert_eq!((c.drive[0], c.stress[0], c.reading.num_preamble_lines), (1.5, 2.0, 1));
     }
 
     #[test]

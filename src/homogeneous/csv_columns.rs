@@ -168,6 +168,22 @@ fn best<K: Copy>(
     }
 }
 
+/// Whether one of the columns may be the drive and another one the stress, or both are those that are wanted.
+pub(super) fn is_header(all: &[Header], test: HomogeneousTest, wanted: [Option<&str>; 2]) -> bool {
+    let is_shear = test == HomogeneousTest::SimpleShear;
+    let is_wanted = |at: usize, name: &str| named(all, name, "column").is_ok_and(|found| found == at);
+    let fits = |at: usize, wanted: Option<&str>, ranks: bool| wanted.map_or(ranks, |name| is_wanted(at, name));
+    let is_drive = |at: usize| fits(at, wanted[0], all[at].as_drive(is_shear).is_some());
+    let is_stress = |at: usize| fits(at, wanted[1], all[at].as_stress(component(test)).is_some());
+    let indices = || 0..all.len();
+    indices().any(|d| is_drive(d) && indices().any(|s| s != d && is_stress(s)))
+}
+
+/// The component of the stress that a test measures, as columns name it.
+fn component(test: HomogeneousTest) -> &'static str {
+    if test == HomogeneousTest::SimpleShear { "p12" } else { "p11" }
+}
+
 /// The column of the drive.
 ///
 /// # Errors
@@ -213,7 +229,7 @@ pub(super) fn stress_column(
     wanted: Option<&str>,
     unit: Option<StressUnit>,
 ) -> Result<Found<StressKind>, CsvError> {
-    let component = if test == HomogeneousTest::SimpleShear { "p12" } else { "p11" };
+    let component = component(test);
     let (at, kind) = match wanted {
         None => best(all, "nominal stress or force", &|h| h.as_stress(component))?,
         Some(wanted) => {

@@ -75,8 +75,8 @@ impl TextTable {
     /// The table in `text`, whose header is the first line for which `is_header` holds.
     ///
     /// # Errors
-    /// [`CsvError`]. Where no line is a header, the names are those of the line that could best be one, and there are no
-    /// rows.
+    /// [`CsvError`]. Where no line is a header, the names are those of the line that could best be one, and there are
+    /// no rows.
     pub fn read(text: &str, is_header: &dyn Fn(&[String]) -> bool) -> Result<TextTable, CsvError> {
         let is_said = |line: &str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
         let lines: Vec<Line> = text

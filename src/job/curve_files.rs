@@ -67,12 +67,17 @@ impl CurveReport {
         }
         text += &format!(", {}\n", said.join(", "));
         if let Some(u) = &self.unloading {
+            // Beyond both ends what follows is no way back.
+            let work = if (0.0..=1.0).contains(&u.dissipated_part) {
+                format!("; the way back gives {} % less work", plain_number(100.0 * u.dissipated_part, 3))
+            } else {
+                String::new()
+            };
             text += &format!(
                 "  the test turns at {}: {} rows after that are left out, since an elastic material has one stress for \
-                 each state; the way back gives {} % less work ({BRANCHES} fits all)\n",
+                 each state{work} ({BRANCHES} fits all)\n",
                 plain_number(u.turn, 4),
-                u.num_rows,
-                plain_number(100.0 * u.dissipated_part, 3)
+                u.num_rows
             );
         }
         text

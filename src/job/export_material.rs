@@ -3,8 +3,9 @@
 //! It reads a material and writes files, without solving anything; that it is a kind of job all the same gives it the
 //! same check, provenance and two doors as every other result.
 
+use super::export_result::Card;
 use super::{Context, JobError, Outcome, Request, Run, summary};
-use crate::export::{Constant, ExportError, MaterialFormat, Origin, VolumetricLaw, material_card};
+use crate::export::{ExportError, MaterialFormat, Origin, material_card};
 use crate::field::FieldError;
 use crate::homogeneous::StressUnit;
 use crate::material::Ogden;
@@ -34,21 +35,6 @@ pub struct ExportMaterialRequest {
 
 pub(super) fn stress_unit() -> StressUnit {
     StressUnit::MPa
-}
-
-/// The card of one program.
-#[derive(Serialize)]
-pub(super) struct Card {
-    format: MaterialFormat,
-    /// The program, as it is called.
-    pub(super) program: &'static str,
-    file: String,
-    /// Its constants.
-    pub(super) constants: Vec<Constant>,
-    energy: &'static str,
-    /// Its volumetric energy.
-    pub(super) volumetric_law: VolumetricLaw,
-    manual: &'static str,
 }
 
 /// Result (`export-material/1`).

@@ -1,5 +1,6 @@
 //! Export of a model: a specimen's mesh, material, boundary conditions and drives for other programs.
 
+use super::export_result::{ExportModelResult, ModelFile};
 use super::subject::{check_mesh, driven, model_of};
 use super::{Context, JobError, Outcome, Request, Run, defaults, summary};
 use crate::export::{ExportError, Model, ModelFormat, Origin, model_file};
@@ -35,33 +36,6 @@ pub struct ExportModelRequest {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(min_items = 1, max_items = 3)]
     pub formats: Option<Vec<ModelFormat>>,
-}
-
-/// Result (`export-model/1`).
-#[derive(Serialize)]
-pub(super) struct ExportModelResult<'a> {
-    schema: &'static str,
-    version: &'static str,
-    input_hash: &'a str,
-    /// Name of the specimen.
-    pub(super) name: &'a str,
-    /// Elements of the mesh.
-    pub(super) num_elements: usize,
-    /// Mirror planes in use (y, z).
-    mirror: [bool; 2],
-    /// What reactions are multiplied by to give the forces of the whole test.
-    pub(super) reaction_multiplier: f64,
-    drive_mm: &'a [f64],
-    /// The files.
-    pub(super) files: Vec<ModelFile>,
-}
-
-/// A file for a program.
-#[derive(Serialize)]
-pub(super) struct ModelFile {
-    format: ModelFormat,
-    /// Its name.
-    pub(super) file: &'static str,
 }
 
 struct CheckedExport {

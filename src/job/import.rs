@@ -97,8 +97,8 @@ pub struct ImportRequest {
     #[serde(default)]
     #[schema(default = GridOrigin::default)]
     pub origin: GridOrigin,
-    /// Frame of the vectors in images; where it is left out, lps for those of the intent 1007, which ITK and ANTs write,
-    /// and ras for others.
+    /// Frame of the vectors in images; where it is left out, lps for those of the intent 1007, which ITK and ANTs
+    /// write, and ras for others.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vectors: Option<VectorFrame>,
     /// Voxel size in mm: along the indices of MATLAB arrays, or x,y,z to average points in.

@@ -24,6 +24,7 @@ mod evaluation_list;
 mod evaluation_table;
 mod export_material;
 mod export_model;
+mod export_result;
 mod import;
 mod import_result;
 mod kind;

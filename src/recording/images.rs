@@ -2,9 +2,9 @@
 //! turned or mirrored against the scanner's axes.
 //!
 //! Everything is expressed along the image's own three indices: the voxel's edges are the lengths of the affine's
-//! columns, and component i is the displacement along the unit vector of index i. A turned or mirrored grid then needs no
-//! interpolation; which index runs along which of the specimen's axes says [`ImportOptions::axes`], or, where the scanner's
-//! axes are the specimen's, [`axes_of_affine`].
+//! columns, and component i is the displacement along the unit vector of index i. A turned or mirrored grid then needs
+//! no interpolation; which index runs along which of the specimen's axes says [`ImportOptions::axes`], or, where the
+//! scanner's axes are the specimen's, [`axes_of_affine`].
 
 use super::Recording;
 use super::import::{ImportError, ImportOptions, IndexAxis};

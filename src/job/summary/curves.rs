@@ -72,8 +72,8 @@ fn sequence_table(sequence: &CurveFitSequence) -> String {
 fn fit_table(fit: &CurveFit) -> String {
     let mut text = String::from("  parameter        value         sd   95 % interval\n");
     for (index, p) in fit.parameters.iter().enumerate() {
-        // Factors (every other parameter) are as good as unknown where they scatter by more than themselves; an exponent
-        // near zero may be well known all the same.
+        // Factors (every other parameter) are as good as unknown where they scatter by more than themselves; an
+        // exponent near zero may be well known all the same.
         let is_unknown = |sd: f64| index % 2 == 0 && sd > p.value.abs();
         let rest = match (p.held, p.sd, p.interval_95) {
             (true, _, _) => "      held".to_string(),

@@ -1,8 +1,7 @@
 //! Exports as text.
 
 use super::num;
-use crate::job::export_material::Card;
-use crate::job::export_model::ExportModelResult;
+use crate::job::export_result::{Card, ExportModelResult};
 
 /// The constants of each card.
 pub(in crate::job) fn export_material(name: &str, cards: &[Card]) -> String {
