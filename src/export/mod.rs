@@ -2,8 +2,8 @@
 //!
 //! * [`MaterialFormat`]: the conventions of Abaqus, Ansys, CalculiX, COMSOL and FEBio, and their constants from ours.
 //! * [`material_card`]: the text that such a program reads.
-//! * [`model_file`]: a specimen's mesh, material, boundary conditions and drives as Abaqus, CalculiX and FEBio read
-//!   them.
+//! * [`model_file()`]: a specimen's mesh, material, boundary conditions and drives as Abaqus, CalculiX and FEBio
+//!   read them.
 //!
 //! `docs/export.md` derives the conversions.
 

@@ -1,6 +1,6 @@
 //! Units of stress.
 
-/// A unit of stress.
+/// A unit of stress: of a column of stresses whose name does not say it, or of what is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, utoipa::ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum StressUnit {

