@@ -1,7 +1,8 @@
-//! Proposals: the structures that did best in the samples are improved by what their designs so far have taught. A
-//! [`Surrogate`] of each structure's gains and margins says where the next designs promise most; they are evaluated, and
-//! it learns from them. Every round halves the structures that are left and doubles what each of them gets, until one is
-//! left.
+//! Proposals: the structures that did best in the samples are improved by what their designs so far have taught.
+//!
+//! A [`Surrogate`] of each structure's gains and margins says where the next designs promise most; they are evaluated,
+//! and it learns from them. Every round halves the structures that are left and doubles what each of them gets, until
+//! one is left.
 
 use super::explore::is_makeable;
 use super::objective::{Judged, Reference};

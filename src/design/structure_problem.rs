@@ -19,8 +19,8 @@ pub(super) struct StructureProblem<'a> {
     pub on_evaluation: &'a (dyn Fn() + Sync),
 }
 
-/// ln of the factor by which an improvement stays away from force, stretch and guard limits: the search's mesh is coarser
-/// than the confirmation's, and a limit that is just met on the one can be broken on the other.
+/// ln of the factor by which an improvement stays away from force, stretch and guard limits: the search's mesh is
+/// coarser than the confirmation's, and a limit that is just met on the one can be broken on the other.
 pub(super) const RESERVE: f64 = 2e-3;
 
 impl<'a> StructureProblem<'a> {

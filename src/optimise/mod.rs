@@ -1,4 +1,5 @@
-//! Least squares, quadratic programmes with linear limits, and a search that needs no derivatives. The room knows nothing of materials, meshes or data.
+//! Least squares, quadratic programmes with linear limits, and a search that needs no derivatives. The room knows
+//! nothing of materials, meshes or data.
 //!
 //! * [`descend()`]: the loop of every nonlinear fit. What is fitted is a [`LeastSquares`] problem; how steps are
 //!   shortened and when the loop ends are its [`Rules`].
