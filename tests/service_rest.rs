@@ -62,7 +62,7 @@ fn every_example_of_the_document_is_taken() {
         assert!(reply.status == 200 || reply.status == 422 && names_recording, "{path}: {body}");
         count += 1;
     }
-    assert_eq!(count, 15);
+    assert_eq!(count, 17);
 }
 
 /// Schemas of objects of which nothing is said.
