@@ -164,18 +164,23 @@ impl LimitMargin {
     }
 
     fn from_difference(name: &str, value: f64, limit: f64, difference: f64) -> Self {
-        // Counts may be limited to zero; every other limit is positive.
-        let scale = if limit.abs() > f64::MIN_POSITIVE { limit.abs() } else { 1.0 };
-        let margin_relative = difference / scale;
+        let margin_relative = relative(difference, limit);
         LimitMargin { name: name.into(), value, limit, margin_relative, is_satisfied: margin_relative >= -ROUNDING }
     }
 
     /// A limit without a distance: met within `tolerance` of `limit`, or violated by `difference / scale`.
     fn discrete(name: &str, value: f64, limit: f64, difference: f64, tolerance: f64, scale: f64) -> Self {
         let is_satisfied = difference <= tolerance;
-        let margin_relative = if is_satisfied { 1.0 } else { -difference / scale };
+        let margin_relative = if is_satisfied { 1.0 } else { -relative(difference, scale) };
         LimitMargin { name: name.into(), value, limit, margin_relative, is_satisfied }
     }
+}
+
+/// A difference relative to a limit, finite where both are. Counts may be limited to zero; every other limit is
+/// positive, but may be smaller than any difference.
+fn relative(difference: f64, limit: f64) -> f64 {
+    let scale = if limit.abs() > f64::MIN_POSITIVE { limit.abs() } else { 1.0 };
+    (difference / scale).clamp(f64::MIN, f64::MAX)
 }
 
 impl ManufacturingLimits {

@@ -352,3 +352,12 @@ fn limits_that_are_none_have_pointers() {
     let pointers: Vec<String> = bad.field_errors().into_iter().map(|e| e.pointer).collect();
     assert_eq!(pointers, ["/min_ligament_hole_hole_mm", "/punches_mm/1", "/max_local_stretch", "/max_holes"]);
 }
+
+/// A limit may be smaller than any difference: the margin stays a number that JSON can hold.
+#[test]
+fn margins_are_finite() {
+    for limit in [5e-324, f64::MIN_POSITIVE, 1e-300] {
+        let broken = LimitMargin::at_most("max_drive_mm", 7.0, limit);
+        assert!(broken.margin_relative.is_finite() && broken.margin_relative < 0.0 && !broken.is_satisfied, "{limit}");
+    }
+}
