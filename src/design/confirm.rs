@@ -1,4 +1,9 @@
-//! Confirmation: a design at the reported fidelity, standard mesh and the scan's own voxels, for every material.
+//! Confirmation: a design at the reported fidelity, fine meshes and the scan's own voxels, for every material.
+//!
+//! The bonded edges are singular, and what little the displacement there changes with a parameter depends on how they
+//! are meshed: promised standard deviations by a few percent, up and down, with no order in the element size. A design
+//! is therefore confirmed on several meshes. Means of logarithms over them count, and their scatter is the mesh's
+//! uncertainty of a gain.
 
 use super::aim::{Normalisation, ObjectiveKind};
 use super::evaluation_failure::EvaluationFailure;
@@ -19,6 +24,9 @@ use crate::specimen::{LimitMargin, Specimen};
 use crate::voxel::Sampling;
 use serde::{Deserialize, Serialize};
 
+/// Element sizes of a confirmation, as factors on the standard one; the last is the one that is reported.
+const MESHES: [f64; 3] = [1.0, 0.85, 0.7];
+
 /// A confirmed design.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -27,10 +35,15 @@ pub struct Confirmed {
     pub specimen: Specimen,
     /// The evaluation with each prior's central values.
     pub by_material: Vec<MaterialEvaluation>,
-    /// What each material sample of [`sample_materials`] gives, the priors' variants included, in that order.
+    /// What each material sample of [`sample_materials`] gives, the priors' variants included, in that order: means
+    /// over the meshes.
     pub responses: Vec<Response>,
-    /// Gain over the base specimen, from these responses.
+    /// The same on each mesh.
+    pub responses_by_mesh: Vec<Vec<Response>>,
+    /// Gain over the base specimen, from the means.
     pub objective: f64,
+    /// Standard error of the objective's mean over the meshes, relative to it.
+    pub mesh_relative_sd: f64,
     /// Gains that make up the objective.
     pub gains: Vec<Gain>,
     /// Every limit, closest first; force and stretch are the largest over the material samples.
@@ -105,8 +118,15 @@ pub fn confirm(
     specimen: &Specimen,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Confirmed, EvaluationFailure> {
-    let by_material = by_material(study, specimen, EvaluationOptions::standard(specimen), is_cancelled)?;
-    let responses = responses(study, specimen, &by_material, is_cancelled)?;
+    let mut evaluated = Vec::new();
+    let mut responses_by_mesh = Vec::new();
+    for factor in MESHES {
+        let mesh = MeshOptions::scaled(specimen, factor);
+        let options = EvaluationOptions { mesh, ..EvaluationOptions::standard(specimen) };
+        evaluated = by_material(study, specimen, options, is_cancelled)?;
+        responses_by_mesh.push(responses(study, specimen, &evaluated, is_cancelled)?);
+    }
+    let responses = mean_over_meshes(&responses_by_mesh);
     let largest = |f: fn(&Response) -> f64| responses.iter().map(f).fold(f64::NEG_INFINITY, f64::max).exp();
     let (force, stretch) = (largest(|r| r.log_force), largest(|r| r.log_stretch));
     let mut limits = study.limits.check_geometry(specimen, study.scan.voxel_mm);
@@ -115,15 +135,29 @@ pub fn confirm(
     limits.sort_by(|a, b| a.margin_relative.total_cmp(&b.margin_relative));
     Ok(Confirmed {
         specimen: specimen.clone(),
-        by_material,
+        by_material: evaluated,
         responses,
+        responses_by_mesh,
         objective: 1.0,
+        mesh_relative_sd: 0.0,
         gains: Vec::new(),
         is_within_limits: limits.iter().all(|m| m.is_satisfied),
         limits,
         volume_mm3: specimen.volume_mm3(),
         remark: None,
     })
+}
+
+/// Every sample's response, the mean of its entries over the meshes.
+fn mean_over_meshes(by_mesh: &[Vec<Response>]) -> Vec<Response> {
+    let num_samples = by_mesh.first().map_or(0, Vec::len);
+    let of_sample = |sample: usize| {
+        let all: Vec<Vec<f64>> = by_mesh.iter().map(|r| r[sample].to_vector()).collect();
+        let num = all.len() as f64;
+        let mean = |entry: usize| all.iter().map(|v| v[entry]).sum::<f64>() / num;
+        Response::from_vector(&(0..all[0].len()).map(mean).collect::<Vec<_>>())
+    };
+    (0..num_samples).map(of_sample).collect()
 }
 
 /// What a design is judged by in the search: the same figures from the same voxels, on a coarser mesh; at the priors'
@@ -290,16 +324,24 @@ impl Confirmed {
         let reference = Reference::new(study, &samples, &base.responses);
         let judged = self.judged(&reference);
         self.objective = reference.objective(&judged).exp();
+        self.mesh_relative_sd = standard_error(&self.log_objectives(study, base));
         // The ratio of two equal numbers rounds.
         self.is_within_limits =
             self.limits.iter().all(|m| m.is_satisfied) && judged.margins.iter().all(|m| *m >= -1e-9);
         self.gains.clear();
-        let normalisation = study.objective.normalisation;
         for (index, (own, of_base)) in self.by_material.iter().zip(&base.by_material).enumerate() {
             let parameters = study.materials[index].material.parameters().into_iter().map(|p| p.name());
             for (entry, parameter) in parameters.filter(|n| n != "kappa").enumerate() {
-                let ratio = |a: Option<f64>, b: Option<f64>| Some(a? / b?);
-                let promised_sd = ratio(of_base.promised(&parameter), own.promised(&parameter));
+                // A prior's central values come first among its samples.
+                let central = samples.iter().position(|s| s.prior == index);
+                let mean = |of: fn(&Response) -> &Vec<f64>| {
+                    let at = |c: &Confirmed| of(c.responses.get(central?)?).get(entry).copied();
+                    Some((at(self)?, at(base)?))
+                };
+                let is_determined = own.promised(&parameter).and(of_base.promised(&parameter)).is_some();
+                let promised = mean(|r| &r.log_relative_sd).filter(|_| is_determined);
+                let promised_sd = promised.map(|(own, base)| (base - own).exp());
+                let integrated_sensitivity = mean(|r| &r.log_integrated).map(|(own, base)| (own - base).exp());
                 let worst = samples
                     .iter()
                     .zip(self.responses.iter().zip(&base.responses))
@@ -310,16 +352,24 @@ impl Confirmed {
                     .reduce(f64::min);
                 self.gains.push(Gain {
                     material: own.material.clone(),
-                    integrated_sensitivity: ratio(
-                        own.integrated(&parameter, normalisation),
-                        of_base.integrated(&parameter, normalisation),
-                    ),
+                    integrated_sensitivity,
                     worst_promised_sd: promised_sd.and(worst),
                     promised_sd,
                     parameter,
                 });
             }
         }
+    }
+
+    /// ln of the objective on each mesh, over the base on the same one.
+    pub(super) fn log_objectives(&self, study: &Study, base: &Confirmed) -> Vec<f64> {
+        let samples = sample_materials(&study.materials);
+        let on_mesh = |(own, of_base): (&Vec<Response>, &Vec<Response>)| {
+            let reference = Reference::new(study, &samples, of_base);
+            let own = Evaluated { responses: own.clone(), gradients: Vec::new() };
+            reference.objective(&reference.judge(&own))
+        };
+        self.responses_by_mesh.iter().zip(&base.responses_by_mesh).map(on_mesh).collect()
     }
 
     /// Gains and margins, counted from a reference to the base's confirmed responses.
@@ -330,5 +380,43 @@ impl Confirmed {
     /// The limit with the smallest relative margin.
     pub fn closest_limit(&self) -> Option<&LimitMargin> {
         self.limits.first()
+    }
+}
+
+/// Standard error of the mean of some values; zero with fewer than two.
+pub(super) fn standard_error(values: &[f64]) -> f64 {
+    let num = values.len() as f64;
+    if values.len() < 2 {
+        return 0.0;
+    }
+    let mean = values.iter().sum::<f64>() / num;
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / ((num - 1.0) * num)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn standard_errors() {
+        assert_eq!(standard_error(&[]), 0.0);
+        assert_eq!(standard_error(&[0.3]), 0.0);
+        // The variance of 1, 2, 3 is 1; rounding only.
+        assert!((standard_error(&[1.0, 2.0, 3.0]) - (1.0f64 / 3.0).sqrt()).abs() < 1e-15);
+    }
+
+    #[test]
+    fn means_are_of_every_entry() {
+        let response = |x: f64| Response {
+            log_integrated: vec![x, 2.0 * x],
+            log_relative_sd: vec![-x],
+            log_criteria: [x; 4],
+            log_separation: 0.0,
+            log_force: 3.0 * x,
+            log_stretch: x,
+        };
+        let mean = mean_over_meshes(&[vec![response(1.0), response(5.0)], vec![response(3.0), response(7.0)]]);
+        let expected: Vec<Vec<f64>> = [2.0, 6.0].into_iter().map(|x| response(x).to_vector()).collect();
+        assert_eq!(mean.iter().map(Response::to_vector).collect::<Vec<_>>(), expected);
     }
 }

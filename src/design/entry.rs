@@ -13,8 +13,11 @@ pub struct DesignEntry {
     pub specimen: Specimen,
     /// The first material's evaluation.
     pub evaluation: Evaluation,
-    /// Gain over the base specimen.
+    /// Gain over the base specimen: mean over the meshes of the confirmation.
     pub objective: f64,
+    /// Standard error of that mean, relative to it: what meshes leave open.
+    #[serde(default)]
+    pub mesh_relative_sd: f64,
     /// The limit with the smallest margin, in words.
     pub closest_limit: String,
     /// Everything confirmed: all materials, gains, limits.
@@ -39,6 +42,7 @@ impl DesignEntry {
             specimen: confirmed.specimen.clone(),
             evaluation: confirmed.by_material.first()?.evaluation.clone(),
             objective: confirmed.objective,
+            mesh_relative_sd: confirmed.mesh_relative_sd,
             closest_limit: confirmed.closest_limit().map_or("none".into(), |m| {
                 format!("{}: {:.3} (limit {:.3}, margin {:.1} %)", m.name, m.value, m.limit, 100.0 * m.margin_relative)
             }),

@@ -6,6 +6,7 @@ use super::evaluation_failure::EvaluationFailure;
 use super::local::{LocalSettings, improve};
 use super::material_samples::sample_materials;
 use super::objective::Reference;
+use super::rounding::in_steps;
 use super::search_error::SearchError;
 use super::search_run::{Progress, SearchRun};
 use super::space::Subspace;
@@ -43,7 +44,7 @@ impl SearchRun<'_> {
     ) -> Result<(Confirmed, Vec<Confirmed>), SearchError> {
         let base_specimen = base;
         let study = self.study;
-        let finalists = state.finalists(study);
+        let finalists: Vec<Finalist> = state.finalists(study).into_iter().map(|f| self.in_steps(f)).collect();
         let specimens: Vec<&Specimen> = std::iter::once(base).chain(finalists.iter().map(|f| &f.specimen)).collect();
         let (total, done) = (specimens.len(), AtomicUsize::new(0));
         let best = state.history.last().copied();
@@ -116,6 +117,12 @@ impl SearchRun<'_> {
         Ok((base, ranked))
     }
 
+    /// The finalist as a mould maker would make it, where it can be made so.
+    fn in_steps(&self, finalist: Finalist) -> Finalist {
+        let made = in_steps(&finalist.specimen, &self.study.limits, self.study.scan.voxel_mm);
+        Finalist { specimen: made.unwrap_or(finalist.specimen), ..finalist }
+    }
+
     /// Improves a finalist anew with the margins of `in_integrals` shifted to those that the confirmation gave, and
     /// confirms where that ends. `None` where nothing came of it.
     fn repair(
@@ -148,7 +155,9 @@ impl SearchRun<'_> {
             return Err(state.stopped(self.study, "repair"));
         }
         let Some(improved) = improved else { return Ok(None) };
-        match self.confirmed(&spaces[*index].specimen(&improved.x)) {
+        let repaired = spaces[*index].specimen(&improved.x);
+        let repaired = in_steps(&repaired, &self.study.limits, self.study.scan.voxel_mm).unwrap_or(repaired);
+        match self.confirmed(&repaired) {
             None => Err(state.stopped(self.study, "repair")),
             Some(Err(_)) => Ok(None),
             Some(Ok(confirmed)) => Ok(Some(confirmed)),

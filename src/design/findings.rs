@@ -116,16 +116,27 @@ fn factors(values: &[f64]) -> Option<String> {
     Some(if most - least < 5e-4 { format!("×{least:.3}") } else { format!("×{least:.3} to ×{most:.3}") })
 }
 
-/// Sentences for the report: first the winner and its gains, then what holes do for each material, then where the two
+/// Places in a ranking: the designs that are equal to the first, and the simplest of them.
+#[derive(Clone, Copy, Debug)]
+pub struct Equals<'a> {
+    /// The first included.
+    pub equal_to_best: &'a [usize],
+    /// One of them.
+    pub simplest: usize,
+}
+
+/// Sentences for the report: first the winner, its equals and its gains, then what holes do for each material, then where the two
 /// measures disagree, then what can and cannot be seen, then what happened at confirmation.
 pub fn findings(
     study: &Study,
     base: &DesignEntry,
     ranked: &[DesignEntry],
     disagreement: &[Disagreement],
+    equals: Equals,
 ) -> Vec<String> {
     let Some(best) = ranked.first() else { return Vec::new() };
     let mut said = vec![winner(base, best)];
+    said.extend(which_are_equal(ranked, equals));
     said.extend(what_size_does(study, base, best));
     said.extend(how_far_apart(base, best));
     for (index, prior) in study.materials.iter().enumerate() {
@@ -177,6 +188,30 @@ fn winner(base: &DesignEntry, best: &DesignEntry) -> String {
         best.force_n(),
         base.force_n(),
     )
+}
+
+/// What meshes leave open of the winner's gain, and which design to make of those that are as good.
+fn which_are_equal(ranked: &[DesignEntry], Equals { equal_to_best, simplest }: Equals) -> Option<String> {
+    let best = ranked.first()?;
+    let open = format!("Meshes leave {:.1} % of this factor open (standard error).", 100.0 * best.mesh_relative_sd);
+    let others: Vec<String> = equal_to_best.iter().filter(|i| **i > 0).map(|i| (i + 1).to_string()).collect();
+    if others.is_empty() {
+        return (best.mesh_relative_sd > 0.0).then_some(open);
+    }
+    let chosen = ranked.get(simplest)?;
+    let advice = if simplest == 0 {
+        "The first is also the simplest to make.".to_string()
+    } else {
+        format!(
+            "Number {} (\"{}\", {}, objective {:.3}) is the simplest to make of them, and the one that we recommend.",
+            simplest + 1,
+            chosen.specimen.name,
+            holes(chosen.specimen.holes.len()),
+            chosen.objective
+        )
+    };
+    let (noun, verb) = if others.len() == 1 { ("design", "is") } else { ("designs", "are") };
+    Some(format!("{open} Within that, {noun} {} of the list {verb} as good as the first. {advice}", others.join(", ")))
 }
 
 /// Where blocks may differ: what of the gain is size and what is geometry.

@@ -19,6 +19,7 @@ mod objective;
 mod propose;
 mod response;
 mod result;
+mod rounding;
 mod search;
 mod search_error;
 mod search_run;
@@ -37,6 +38,7 @@ mod study_limits;
 mod study_tests;
 mod surrogate;
 mod tell_apart;
+mod ties;
 mod unfinished;
 
 pub use aim::{Combine, Guard, Normalisation, Objective, ObjectiveKind};

@@ -2,10 +2,11 @@
 
 use super::aim::Objective;
 use super::entry::DesignEntry;
-use super::findings::{Disagreement, disagreement, findings};
+use super::findings::{Disagreement, Equals, disagreement, findings};
 use super::search::Found;
 use super::study::Study;
 use super::study_hash::study_hash;
+use super::ties::{equal_to_best, simplest};
 use crate::calibration::ParameterSpread;
 use crate::provenance::VERSION;
 use serde::{Deserialize, Serialize};
@@ -24,6 +25,13 @@ pub struct DesignResult {
     pub best: DesignEntry,
     /// Every confirmed design, best first, those within every limit before others.
     pub ranked: Vec<DesignEntry>,
+    /// Indices in `ranked` of the designs that are equal to the best within what meshes leave open, the best included.
+    #[serde(default)]
+    pub equal_to_best: Vec<usize>,
+    /// Index in `ranked` of the one of them that is simplest to make: fewest holes, then fewest different diameters, then
+    /// least material.
+    #[serde(default)]
+    pub simplest: usize,
     /// Indices in `ranked` of the trade-off between information (D-optimal figure of the first material) and force:
     /// none of the others has both less force and a smaller standard deviation.
     pub pareto: Vec<usize>,
@@ -83,6 +91,8 @@ impl DesignResult {
     /// Puts a search's findings together; `None` if nothing was confirmed.
     pub fn new(study: &Study, found: &Found) -> Option<DesignResult> {
         let ranked: Vec<DesignEntry> = found.ranked.iter().filter_map(DesignEntry::of).collect();
+        let equal_to_best = equal_to_best(study, &found.base, &found.ranked);
+        let simplest = simplest(&found.ranked, &equal_to_best).unwrap_or(0);
         let base = DesignEntry::of(&found.base)?;
         let best = ranked.first()?.clone();
         let disagreement = disagreement(study, &base, &ranked);
@@ -90,7 +100,15 @@ impl DesignResult {
             schema: "design/1".into(),
             name: study.name.clone(),
             pareto: pareto(&ranked),
-            findings: findings(study, &base, &ranked, &disagreement),
+            findings: findings(
+                study,
+                &base,
+                &ranked,
+                &disagreement,
+                Equals { equal_to_best: &equal_to_best, simplest },
+            ),
+            equal_to_best,
+            simplest,
             disagreement,
             base,
             best,

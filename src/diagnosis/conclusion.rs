@@ -17,6 +17,9 @@ const EXPLAINED_LEAVES: f64 = 0.25;
 /// Causes of a smaller misfit explain it where they leave less than this part of it (rms): half of the squares, as much
 /// of which is what the mesh leaves.
 const SMALL_LEAVES: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// Without a cause, a misfit above this multiple of the allowance (rms) is one. Nominal models of recordings with
+/// nothing hidden leave less than one.
+const MISMATCH: f64 = 1.5;
 /// Causes claim a misfit where one of them moves the sample by more than this part of it (rms).
 const CLAIMS: f64 = 0.5;
 /// Where causes leave more than this part of the squares unexplained, they are not named but listed as tried.
@@ -39,7 +42,8 @@ pub(super) fn verdict_on(
     let claim_it = before > allowance_mm && causes.iter().any(|c| c.effect_rms_mm > CLAIMS * before);
     let enough = allowance_mm.min(if claim_it { SMALL_LEAVES * before } else { f64::INFINITY });
     let is_half_done = (before > limit || claim_it) && after > enough.max(EXPLAINED_LEAVES * before);
-    if after > limit || is_half_done {
+    let is_left = after > if causes.is_empty() { MISMATCH * allowance_mm } else { limit };
+    if is_left || is_half_done {
         Verdict::Unexplained
     } else if causes.is_empty() {
         Verdict::NoMismatch

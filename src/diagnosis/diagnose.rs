@@ -1,10 +1,11 @@
 //! The diagnosis: fit the nominal model, look at what is left, suppose causes, fit them, and prove them on data kept
 //! back.
 
+use super::cause::CauseName;
 use super::cause_fit::CauseFit;
 use super::conclusion::{explain_too_little, kept_back, verdict_on};
 use super::error::DiagnosisError;
-use super::evidence::UNEXPLAINED;
+use super::evidence::{EVIDENCE, UNEXPLAINED, is_large_force, penalty};
 use super::findings::Findings;
 use super::found::FoundCause;
 use super::inference::{Inference, KNOWN_LOG_SD};
@@ -16,12 +17,12 @@ use super::load_history::LoadHistoryFit;
 use super::material_cause::{MaterialCase, Recheck};
 use super::mesh_error::{Finer, MeshDefect, widen};
 use super::metric::Metric;
-use super::nominal::{first_guess, fit_nominal};
+use super::nominal::{first_guess, fit_nominal, fit_with_terms};
 use super::options::DiagnosisOptions;
 use super::outcome::Diagnosis;
 use super::prior::{BulkPrior, FitSettings, ShearPrior, shear_modulus};
 use super::registry::Registry;
-use super::rounds::{Asked, RoundLimits, add_causes, fit_round, score_round};
+use super::rounds::{Asked, RoundLimits, add_causes, fit_round, score_round, take_out_artefacts};
 use super::set_up::{fit_set_up, is_set_up_promising, simplest_set_up};
 use super::supposed::Supposed;
 use super::thinning::{Needed, named_causes, thinned};
@@ -114,10 +115,18 @@ pub(super) fn diagnose_among(
     run.question_material()?;
     run.take_out_artefacts()?;
     run.add_causes()?;
+    run.read_load_curve_again(recording)?;
     run.question_material_again()?;
     run.name_artefacts();
     let seen = run.correct_fits()?;
     run.conclude(&seen)
+}
+
+/// What was found with the set-up as a whole in the fit.
+struct WithSetUp {
+    findings: Findings,
+    /// What its misfits are weighed by ([`Inference::discrepancy_mm2`]).
+    discrepancy_mm2: [f64; 3],
 }
 
 /// A diagnosis at work: its stages are its methods, in the order of [`diagnose_among`].
@@ -235,6 +244,46 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
+    /// Reads the load curve with the causes found: the nominal model's force has another course over the drive than
+    /// theirs, and what the first reading made of the difference is no effect of time or of the load cell. Where it
+    /// changes, so do the forces that are compared, and the fits to them.
+    fn read_load_curve_again(&mut self, recording: &Recording) -> Result<(), DiagnosisError> {
+        if self.load.is_none() || self.findings.current.causes.iter().all(|c| c.cause.is_artefact()) {
+            return Ok(());
+        }
+        self.tell("reading the load curve again, with the causes found");
+        let effects = self.registry.load_effects();
+        let again = match read_load_curve(&mut self.inference, recording, &self.findings.current, &effects) {
+            Ok(again) => again,
+            Err(error) if self.is_cancelled() => return Err(error),
+            // Between the steps the causes may have no equilibrium.
+            Err(_) => return Ok(()),
+        };
+        let names = |load: &Option<LoadHistoryFit>| -> Vec<CauseName> {
+            load.iter().flat_map(|l| &l.effects).map(|e| e.effect.name()).collect()
+        };
+        if names(&again) == names(&self.load) {
+            return Ok(());
+        }
+        self.load = again;
+        self.recorded = self.inference.laboratory.measured();
+        take_off_effects(&mut self.recorded, self.load.as_ref());
+        let effects = self.load.as_ref().map_or(&[][..], |l| &l.effects);
+        self.findings.causes.retain(|c| !c.is_of_load_curve());
+        self.findings.causes.extend(FoundCause::of_load_curve(effects));
+        self.tell("refitting with the forces that this leaves");
+        let measured = self.measured();
+        let Findings { nominal, current, .. } = &self.findings;
+        let (start, material, causes) = (nominal.material.clone(), current.material.clone(), current.causes.clone());
+        let with_causes = self.inference.settings;
+        self.inference.settings.bulk = self.inference.nominal_bulk;
+        let nominal = self.inference.fit(&measured, &start, &[]);
+        self.inference.settings = with_causes;
+        self.findings.nominal = nominal?;
+        self.findings.current = self.inference.fit(&measured, &material, &causes)?;
+        self.leave_out_what_is_not_needed(&measured)
+    }
+
     /// Takes off what our mesh gets wrong of the nominal model, before a misfit is looked for.
     fn correct_mesh(&mut self) -> Result<(), DiagnosisError> {
         self.finer = Finer::new(self.observed, self.options.mesh_factor);
@@ -283,15 +332,11 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Finds the artefacts of the image in what the fit so far leaves, and fits their sizes.
+    /// Finds the artefacts of the image in what the nominal model leaves.
     fn take_out_artefacts(&mut self) -> Result<(), DiagnosisError> {
-        let current = &self.findings.current;
-        let found = self.registry.artefacts(self.observed, &current.residual, self.inference.progress);
-        if !found.is_empty() {
-            let measured = self.measured();
-            self.findings.current = self.inference.fit(&measured, &self.findings.current.material, &found)?;
-        }
-        Ok(())
+        let measured = self.measured();
+        let Run { inference, registry, findings, .. } = self;
+        take_out_artefacts(inference, registry, findings, &measured).map(|_| ())
     }
 
     /// Tests, fits and names causes, round by round. Where the interior test found that the inside fits, causes there
@@ -308,10 +353,14 @@ impl<'a> Run<'a> {
         let does_inside_wait = self.interior.as_ref().is_some_and(InteriorTest::inside_fits);
         let first = if does_inside_wait { Asked { registry: &at_boundary, with_terms: false } } else { everything };
         let Run { inference, findings, observed, .. } = self;
-        let scored = score_round(inference, first, findings, limits)?;
         let left_mm =
             |fitted: &CauseFit, metric: &Metric| leftover(observed, &fitted.residual, metric).structured_rms_mm;
         let before_mm = left_mm(&findings.current, &inference.metric);
+        // What is no more than a mesh's has no cause.
+        if before_mm < inference.allowance_mm && !is_large_force(observed, &findings.current.residual) {
+            return Ok(());
+        }
+        let scored = score_round(inference, first, findings, limits)?;
         // What is no more than a mesh's needs no set-up.
         let is_promising = before_mm > inference.allowance_mm
             && is_set_up_promising(inference, first.registry, &findings.current, &scored.candidates)?;
@@ -329,24 +378,79 @@ impl<'a> Run<'a> {
         if fit_round(inference, findings, &measured, &scored)? {
             add_causes(inference, findings, &measured, limits, &to_ask)?;
         }
-        let is_set_up = is_promising && self.consider_set_up(&measured)?;
-        let num_before = self.findings.current.causes.len();
-        let Run { inference, registry, findings, .. } = self;
-        if is_set_up || does_inside_wait || are_given_up.get() {
-            // On top of the set-up; or, where single causes were given up for nothing or not all were asked, on with
-            // them.
-            add_causes(inference, findings, &measured, limits, &|_, _| Some(everything))?;
+        let are_all_asked = !(does_inside_wait || are_given_up.get());
+        if are_all_asked {
+            self.fit_material_anew(&measured, limits)?;
         }
-        if is_set_up && findings.current.causes.len() > num_before {
-            findings.current = simplest_set_up(inference, registry, &measured, findings.current.clone())?;
-            self.name_causes_of_fit()?;
-        } else if !is_set_up {
-            self.leave_out_what_is_not_needed(&measured)?;
+        let Some(with_set_up) = self.with_set_up(&measured, limits, is_promising)? else {
+            return if are_all_asked { Ok(()) } else { self.ask_all(&measured, limits) };
+        };
+        if !are_all_asked && !self.is_explained_by(&with_set_up.findings) {
+            self.ask_all(&measured, limits)?;
+        }
+        if self.left_mm(&with_set_up.findings.current) < SET_UP_GAINS * self.left_mm(&self.findings.current) {
+            self.go_on_with(with_set_up);
         }
         Ok(())
     }
 
-    /// Takes out of the fit the causes that later ones have made needless.
+    /// Goes on with single causes where they were given up, or not all of them asked.
+    fn ask_all(&mut self, measured: &Trace, limits: RoundLimits) -> Result<(), DiagnosisError> {
+        let Run { inference, registry, findings, options, .. } = self;
+        let everything = Asked { registry, with_terms: options.prior.is_none() };
+        add_causes(inference, findings, measured, limits, &|_, _| Some(everything))?;
+        self.fit_material_anew(measured, limits)
+    }
+
+    /// Where causes leave more than a mesh does: fits the material from its start again, now that they are in the fit,
+    /// and goes on from there where that explains more. The nominal fit took terms to make up for what causes do, from
+    /// which a fit does not find back. In the end, what later causes made needless goes.
+    fn fit_material_anew(&mut self, measured: &Trace, limits: RoundLimits) -> Result<(), DiagnosisError> {
+        let is_believed = self.options.prior.is_some();
+        let current = &self.findings.current;
+        if !is_believed && !current.causes.is_empty() && self.left_mm(current) > self.inference.allowance_mm {
+            self.tell("fitting the material anew, with the causes found");
+            let (causes, deviance) = (current.causes.clone(), current.deviance);
+            let num_terms = current.material.terms.len();
+            match fit_with_terms(&mut self.inference, measured, &self.start, &causes) {
+                Ok(anew) => {
+                    let num_more = anew.material.terms.len() as f64 - num_terms as f64;
+                    let cost = num_more * penalty(&self.inference.metric, 2);
+                    if deviance - anew.deviance - cost > EVIDENCE {
+                        self.findings.current = anew;
+                        let Run { inference, registry, findings, .. } = self;
+                        let everything = Asked { registry, with_terms: true };
+                        add_causes(inference, findings, measured, limits, &|_, _| Some(everything))?;
+                    }
+                }
+                Err(error) if self.is_cancelled() => return Err(error),
+                Err(_) => {}
+            }
+        }
+        self.leave_out_what_is_not_needed(measured)
+    }
+
+    /// What a fit leaves beyond noise, mm rms.
+    fn left_mm(&self, fitted: &CauseFit) -> f64 {
+        leftover(self.observed, &fitted.residual, &self.inference.metric).structured_rms_mm
+    }
+
+    /// Whether findings explain the misfit as far as causes can be asked to.
+    fn is_explained_by(&self, findings: &Findings) -> bool {
+        let (before, left) = (self.left_mm(&findings.nominal), self.left_mm(&findings.current));
+        is_explained(left, before, self.inference.allowance_mm)
+    }
+
+    /// Goes on with the set-up as a whole and the weights that belong to it.
+    fn go_on_with(&mut self, with_set_up: WithSetUp) {
+        let WithSetUp { mut findings, discrepancy_mm2 } = with_set_up;
+        (findings.ranked, findings.maps) =
+            (std::mem::take(&mut self.findings.ranked), std::mem::take(&mut self.findings.maps));
+        self.findings = findings;
+        self.inference.weigh_by(discrepancy_mm2);
+    }
+
+    /// Takes out of the fit the causes that `measured`, or later causes, have made needless.
     fn leave_out_what_is_not_needed(&mut self, measured: &Trace) -> Result<(), DiagnosisError> {
         let Run { inference, findings, .. } = self;
         let num_causes = findings.current.causes.len();
@@ -359,16 +463,17 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Fits the set-up as a whole where what was named so far leaves much of the misfit, and goes on from it where it
-    /// explains much more; whether it does.
-    fn consider_set_up(&mut self, measured: &Trace) -> Result<bool, DiagnosisError> {
-        let left = |run: &Self, fitted: &CauseFit| {
-            leftover(run.observed, &fitted.residual, &run.inference.metric).structured_rms_mm
-        };
-        let (before, single) = (left(self, &self.findings.nominal), left(self, &self.findings.current));
-        let is_explained = is_explained(single, before, self.inference.allowance_mm);
-        if is_explained || self.registry.set_up(self.observed).is_empty() {
-            return Ok(false);
+    /// The set-up as a whole with causes added to it, where what was named so far leaves much of the misfit and the
+    /// set-up `is_promising`. `None` where it is not asked for, or has no fit.
+    fn with_set_up(
+        &mut self,
+        measured: &Trace,
+        limits: RoundLimits,
+        is_promising: bool,
+    ) -> Result<Option<WithSetUp>, DiagnosisError> {
+        let is_asked = is_promising && !self.is_explained_by(&self.findings);
+        if !is_asked || self.registry.set_up(self.observed).is_empty() {
+            return Ok(None);
         }
         self.tell("fitting the set-up as a whole: plates, rig, layers, block");
         // Without the further terms that the nominal fit took to make up for the set-up.
@@ -378,26 +483,51 @@ impl<'a> Run<'a> {
             ..self.findings.nominal.clone()
         };
         let Run { inference, registry, .. } = self;
-        let fitted = match fit_set_up(inference, registry, measured, &start) {
-            Ok(fitted) => simplest_set_up(inference, registry, measured, fitted),
+        let fitted = fit_set_up(inference, registry, measured, &start)
+            .and_then(|fitted| simplest_set_up(inference, registry, measured, fitted));
+        let found = match fitted {
+            Ok(fitted) => self.and_causes(fitted, measured, limits),
             Err(error) => Err(error),
         };
-        match fitted {
-            Ok(fitted) if left(self, &fitted) < SET_UP_GAINS * single => {
-                let Findings { nominal, current, causes, alternatives, .. } = &mut self.findings;
-                *current = fitted;
-                nominal.deviance = self.inference.misfit_of(&nominal.residual);
-                causes.retain(|c| !c.is_of_fit());
-                alternatives.clear();
-                self.name_causes_of_fit()?;
-                Ok(true)
-            }
+        self.inference.forget_discrepancy();
+        match found {
+            Ok(found) => Ok(Some(found)),
             Err(error) if self.is_cancelled() => Err(error),
-            _ => {
-                self.inference.forget_discrepancy();
-                Ok(false)
-            }
+            Err(_) => Ok(None),
         }
+    }
+
+    /// What is found from `fitted` on, a fit of the set-up as a whole; the findings so far stay as they are, but for
+    /// the list of what was tested.
+    fn and_causes(
+        &mut self,
+        fitted: CauseFit,
+        measured: &Trace,
+        limits: RoundLimits,
+    ) -> Result<WithSetUp, DiagnosisError> {
+        let from_set_up = self.findings.going_on_from(fitted);
+        let before = std::mem::replace(&mut self.findings, from_set_up);
+        self.findings.nominal.deviance = self.inference.misfit_of(&self.findings.nominal.residual);
+        let added = self.add_causes_to_set_up(measured, limits);
+        let mut findings = std::mem::replace(&mut self.findings, before);
+        (self.findings.ranked, self.findings.maps) =
+            (std::mem::take(&mut findings.ranked), std::mem::take(&mut findings.maps));
+        self.findings.num_rounds = findings.num_rounds;
+        added.map(|()| WithSetUp { findings, discrepancy_mm2: self.inference.discrepancy_mm2 })
+    }
+
+    /// Adds causes to the set-up as a whole, and names all of them.
+    fn add_causes_to_set_up(&mut self, measured: &Trace, limits: RoundLimits) -> Result<(), DiagnosisError> {
+        self.name_causes_of_fit()?;
+        let Run { inference, registry, findings, options, .. } = self;
+        let everything = Asked { registry, with_terms: options.prior.is_none() };
+        let num_before = findings.current.causes.len();
+        add_causes(inference, findings, measured, limits, &|_, _| Some(everything))?;
+        if findings.current.causes.len() > num_before {
+            findings.current = simplest_set_up(inference, registry, measured, findings.current.clone())?;
+            self.name_causes_of_fit()?;
+        }
+        Ok(())
     }
 
     /// Names the causes that are in the fit, with the evidence for each among all others.
@@ -449,10 +579,16 @@ impl<'a> Run<'a> {
         let with_causes = self.inference.settings;
         let settings = [FitSettings { bulk: self.inference.nominal_bulk, ..with_causes }, with_causes];
         for n in 0..2 {
-            if let Some(defect) = self.correct_fit(n, &settings[n])? {
+            let defect = self.correct_fit(n, &settings[n])?;
+            if let Some(defect) = &defect {
                 seen[n] = defect.taken_off(&self.recorded);
-                self.mesh_defect = Some(defect);
+                if n == 1 {
+                    // What our mesh alone called for.
+                    self.leave_out_what_is_not_needed(&seen[n])?;
+                }
             }
+            self.widen_intervals(n, &settings[n], defect.as_ref())?;
+            self.mesh_defect = defect.or(self.mesh_defect.take());
         }
         Ok(seen)
     }
@@ -461,25 +597,39 @@ impl<'a> Run<'a> {
     /// ours.
     fn correct_fit(&mut self, n: usize, settings: &FitSettings) -> Result<Option<MeshDefect>, DiagnosisError> {
         let Run { inference, finer, findings, recorded, .. } = self;
-        let Inference { laboratory, metric, mesh_factor, is_cancelled, progress, .. } = inference;
-        let (mesh_factor, is_cancelled, progress) = (*mesh_factor, *is_cancelled, *progress);
+        let Inference { laboratory, metric, is_cancelled, progress, .. } = inference;
+        let (is_cancelled, progress) = (*is_cancelled, *progress);
         let fitted = if n == 0 { &mut findings.nominal } else { &mut findings.current };
         let correction =
             finer.as_mut().map(|f| f.correct(laboratory, metric, recorded, settings, fitted, is_cancelled));
-        let defect = match correction.transpose() {
-            Err(error) if is_cancelled() => return Err(error),
+        match correction.transpose() {
+            Err(error) if is_cancelled() => Err(error),
             Err(_) => {
                 progress("a finer model has no equilibrium: estimates are those of this mesh");
-                None
+                Ok(None)
             }
-            Ok(defect) => defect,
-        };
-        match widen(laboratory, mesh_factor, metric, settings, fitted, defect.as_ref(), is_cancelled) {
-            Err(error) if is_cancelled() => return Err(error),
-            Err(_) => progress("a coarser model has no equilibrium: the intervals are those of the noise"),
-            Ok(()) => {}
+            Ok(defect) => Ok(defect),
         }
-        Ok(defect)
+    }
+
+    /// Widens the intervals of one fit, numbered as for [`Self::correct_fit`], by what meshes do.
+    fn widen_intervals(
+        &mut self,
+        n: usize,
+        settings: &FitSettings,
+        defect: Option<&MeshDefect>,
+    ) -> Result<(), DiagnosisError> {
+        let Run { inference, findings, .. } = self;
+        let Inference { laboratory, metric, mesh_factor, is_cancelled, progress, .. } = inference;
+        let fitted = if n == 0 { &mut findings.nominal } else { &mut findings.current };
+        match widen(laboratory, *mesh_factor, metric, settings, fitted, defect, *is_cancelled) {
+            Err(error) if is_cancelled() => Err(error),
+            Err(_) => {
+                progress("a coarser model has no equilibrium: the intervals are those of the noise");
+                Ok(())
+            }
+            Ok(()) => Ok(()),
+        }
     }
 
     /// Looks at what is left, predicts data that were kept back, and says how the diagnosis ended.

@@ -3,7 +3,7 @@
 use super::metric::Metric;
 use super::supposed::Supposed;
 use super::trace::Trace;
-use crate::calibration::Observed;
+use crate::calibration::{Observed, ObservedForce};
 
 /// A cause must lower the deviance by this much beyond ln n per parameter. For a single cause this would be many times
 /// what counts as very strong evidence; it takes that much because many causes are tried.
@@ -34,14 +34,15 @@ pub(super) fn penalty(metric: &Metric, num_parameters: usize) -> f64 {
     num_parameters as f64 * (metric.num_data() as f64).ln()
 }
 
+/// Whether a change of the forces, or what is left of them, is more than noise and a mesh's error.
+pub(super) fn is_large_force(observed: &Observed, change: &Trace) -> bool {
+    let forces = observed.steps.iter().zip(&change.force);
+    let is_large = |f: &ObservedForce, change: f64| change.abs() > 4.0 * f.sd_n + 0.01 * f.value_n.abs();
+    forces.filter_map(|(s, change)| s.force.map(|f| is_large(&f, *change))).any(|large| large)
+}
+
 /// Whether a change of the prediction is large enough to be more than a mesh's.
 pub(super) fn is_large(observed: &Observed, effect: &Trace, allowance_mm: f64) -> bool {
-    let is_large_force = observed
-        .steps
-        .iter()
-        .zip(&effect.force)
-        .filter_map(|(s, change)| s.force.map(|f| change.abs() > 4.0 * f.sd_n + 0.01 * f.value_n.abs()))
-        .any(|large| large);
     let last = Trace { displacement: effect.displacement.last().cloned().into_iter().collect(), force: vec![] };
-    is_large_force || last.rms_mm() > SMALLEST_EFFECT * allowance_mm
+    is_large_force(observed, effect) || last.rms_mm() > SMALLEST_EFFECT * allowance_mm
 }

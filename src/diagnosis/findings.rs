@@ -36,6 +36,19 @@ impl Findings {
         self.nominal = nominal;
     }
 
+    /// The same with `current` as the fit so far: its causes are to be named anew.
+    pub(super) fn going_on_from(&mut self, current: CauseFit) -> Findings {
+        Findings {
+            nominal: self.nominal.clone(),
+            current,
+            causes: self.causes.iter().filter(|c| !c.is_of_fit()).cloned().collect(),
+            alternatives: vec![],
+            ranked: std::mem::take(&mut self.ranked),
+            maps: std::mem::take(&mut self.maps),
+            num_rounds: self.num_rounds,
+        }
+    }
+
     /// How much of the deviance causes have explained.
     pub(super) fn explained(&self) -> f64 {
         self.nominal.deviance - self.current.deviance

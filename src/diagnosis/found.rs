@@ -117,6 +117,11 @@ impl FoundCause {
         matches!(self.source, Source::Fit(_))
     }
 
+    /// Whether the load curve told of it.
+    pub(super) fn is_of_load_curve(&self) -> bool {
+        matches!(self.source, Source::LoadCurve)
+    }
+
     /// Takes parameters and place from the last fit, all causes together. What the load curve told stays.
     pub(super) fn refresh(&mut self, fitted: &CauseFit, observed: &Observed) {
         match self.source {

@@ -68,7 +68,12 @@ impl Inference<'_> {
 
     /// Weighs misfits by noise and allowance alone again.
     pub(super) fn forget_discrepancy(&mut self) {
-        self.discrepancy_mm2 = [0.0; 3];
+        self.weigh_by([0.0; 3]);
+    }
+
+    /// Weighs misfits by these variances (mm²) too, for what the model is known to leave.
+    pub(super) fn weigh_by(&mut self, discrepancy_mm2: [f64; 3]) {
+        self.discrepancy_mm2 = discrepancy_mm2;
         self.metric = self.metric_of(&|_| true);
     }
 

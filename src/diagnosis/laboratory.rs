@@ -180,13 +180,14 @@ impl<'a> Laboratory<'a> {
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Vec<(f64, Vec<f64>, KernelState)>, DiagnosisError> {
         let at = self.stations.at(scene)?;
-        let departures = self.departures(material, scene, 0);
-        let mut model = self.stations[at].model.departed(&departures);
         let mut last: Option<Equilibrium> = None;
         let mut table = Vec::with_capacity(drives_mm.len());
         for &drive in drives_mm {
             self.num_solves += 1;
-            let state = model.solve(material, drive, last.as_ref(), &self.solve, is_cancelled)?;
+            let (here, step) = scene.between_steps(drive, &self.observed.steps);
+            let departures = here.departures(0, &step, bond_scale(material), self.face_axis);
+            let mut model = self.stations[at].model.departed(&departures);
+            let state = self.cold_state(&mut model, material, drive, last.as_ref(), is_cancelled)?;
             let mut tangent = model.tangent(material, &state)?;
             let sensitivities = tangent.material_sensitivities()?;
             let remembered = KernelState::of(&model, material, &state, &mut tangent)?;

@@ -4,15 +4,14 @@
 //! another.
 
 use super::elastic_table::ElasticTable;
+use super::evidence::EVIDENCE;
 use super::load_effect::{FittedEffect, LoadEffect};
 use super::load_problem::{LoadFit, LoadProblem};
 use super::memory_kernel::MemoryKernel;
 use crate::recording::LoadCurve;
 
-/// A further effect must lower the deviance by ln n per parameter and this much more.
-const EVIDENCE: f64 = 12.0;
-/// It must also lower it by this part of what the effects before it did: their models err by some percent. A repeated
-/// effect, such as a second relaxation, is a part of one model and need not.
+/// A further effect must lower the deviance by this part of what the effects before it did, too: their models err by
+/// some percent. A repeated effect, such as a second relaxation, is a part of one model and need not.
 const SMALLEST_SHARE: f64 = 0.02;
 /// Most effects.
 const MAX_EFFECTS: usize = 5;

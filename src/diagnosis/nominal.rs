@@ -7,6 +7,7 @@ use super::further_term::further_term;
 use super::inference::Inference;
 use super::laboratory::Laboratory;
 use super::scene::Scene;
+use super::supposed::Supposed;
 use super::trace::Trace;
 use crate::material::{Ogden, OgdenTerm};
 
@@ -46,22 +47,25 @@ pub(super) fn fit_nominal(
 ) -> Result<CauseFit, DiagnosisError> {
     let settings = inference.settings;
     inference.settings.relative_tolerance = ROUGH_TOLERANCE;
-    let found = fit_with_terms(inference, measured, start, is_believed);
+    let found =
+        if is_believed { inference.fit(measured, start, &[]) } else { fit_with_terms(inference, measured, start, &[]) };
     inference.settings = settings;
     found
 }
 
-fn fit_with_terms(
+/// The fit with `causes` and as many Ogden terms as the data call for.
+///
+/// # Errors
+/// As [`first_guess`].
+pub(super) fn fit_with_terms(
     inference: &mut Inference,
     measured: &Trace,
     start: &Ogden,
-    is_believed: bool,
+    causes: &[Supposed],
 ) -> Result<CauseFit, DiagnosisError> {
-    let mut found = inference.fit(measured, start, &[])?;
-    if !is_believed {
-        while let Some((richer, _)) = further_term(inference, measured, &found)? {
-            found = richer;
-        }
+    let mut found = inference.fit(measured, start, causes)?;
+    while let Some((richer, _)) = further_term(inference, measured, &found)? {
+        found = richer;
     }
     Ok(found)
 }

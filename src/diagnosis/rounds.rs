@@ -48,7 +48,9 @@ impl Trial {
 }
 
 /// What the first half of a round found.
-pub(super) struct Scored {
+pub(super) struct Scored<'r> {
+    /// The causes asked for.
+    registry: &'r Registry,
     /// Suspects, most explaining first.
     pub(super) candidates: Vec<Candidate>,
     /// Changes of the prediction with the parameters of the fit so far, for fits of further causes; empty where these
@@ -80,12 +82,12 @@ pub(super) struct Asked<'r> {
 ///
 /// # Errors
 /// [`DiagnosisError`]: the work was cancelled, or the fit so far has no derivatives.
-pub(super) fn score_round(
+pub(super) fn score_round<'r>(
     inference: &mut Inference,
-    asked: Asked,
+    asked: Asked<'r>,
     findings: &mut Findings,
     limits: RoundLimits,
-) -> Result<Scored, DiagnosisError> {
+) -> Result<Scored<'r>, DiagnosisError> {
     findings.num_rounds += 1;
     let round = findings.num_rounds;
     (inference.progress)(&format!("round {round}: testing causes"));
@@ -103,7 +105,7 @@ pub(super) fn score_round(
     }));
     // The nominal model's few parameters are worked out at every step: they change most with the first cause.
     let known = if findings.current.causes.is_empty() { Vec::new() } else { known };
-    Ok(Scored { candidates, known, with_terms: asked.with_terms })
+    Ok(Scored { registry: asked.registry, candidates, known, with_terms: asked.with_terms })
 }
 
 /// The second half of a round: fits the leading candidates and names the best, unless a further Ogden term of the
@@ -128,7 +130,29 @@ pub(super) fn fit_round(
             return Ok(true);
         }
     }
-    take_best(inference, findings, trials)
+    Ok(take_best(inference, findings, trials)? && take_out_artefacts(inference, scored.registry, findings, measured)?)
+}
+
+/// Finds the artefacts of the image in what the fit so far leaves, if none is in it yet, and fits their sizes. Always
+/// true: a fit with a cause goes on with or without them.
+///
+/// # Errors
+/// As [`score_round`].
+pub(super) fn take_out_artefacts(
+    inference: &mut Inference,
+    registry: &Registry,
+    findings: &mut Findings,
+    measured: &Trace,
+) -> Result<bool, DiagnosisError> {
+    let current = &findings.current;
+    if current.causes.iter().all(|c| !c.cause.is_artefact()) {
+        let found = registry.artefacts(inference.laboratory.observed(), &current.residual, inference.progress);
+        if !found.is_empty() {
+            let causes = current.causes.iter().cloned().chain(found).collect::<Vec<_>>();
+            findings.current = inference.fit(measured, &current.material, &causes)?;
+        }
+    }
+    Ok(true)
 }
 
 /// Adds causes round by round, each of those that the next round is `to_ask` for, until no further one is called for,
@@ -215,8 +239,14 @@ fn take_best(inference: &mut Inference, findings: &mut Findings, trials: Vec<Tri
     let Some(best) = trials.next() else { return Ok(false) };
     let effect = best.fit.prediction.trace.plus(-1.0, &findings.current.prediction.trace);
     let share = smallest_share(&findings.current.causes);
-    let is_too_little = best.gain < EVIDENCE.max(share * findings.explained());
-    if is_too_little || !is_large(inference.laboratory.observed(), &effect, inference.allowance_mm) {
+    let least = EVIDENCE.max(share * findings.explained());
+    (inference.progress)(&format!(
+        "round {}: '{}' lowers the deviance by {:.0}; {least:.0} are called for",
+        findings.num_rounds,
+        best.fit.causes.last().map_or_else(String::new, |c| c.cause.description()),
+        best.gain
+    ));
+    if best.gain < least || !is_large(inference.laboratory.observed(), &effect, inference.allowance_mm) {
         return Ok(false);
     }
     for other in trials {

@@ -79,6 +79,44 @@ impl Scene {
         }
     }
 
+    /// The scene at a drive between the steps of `observed`, as one step's: what each step has of its own, and the
+    /// measured force, go from step to step in proportion to the drive, from nothing at rest. The moved plate lags by
+    /// no more than the drive.
+    pub(super) fn between_steps(&self, drive_mm: f64, observed: &[ObservedStep]) -> (Scene, ObservedStep) {
+        let mut scene = self.clone();
+        let mut step = ObservedStep { drive_mm, force: None, displacement: Vec::new(), faces_per_mm: [None, None] };
+        if let Some(first) = observed.first() {
+            step.faces_per_mm.clone_from(&first.faces_per_mm);
+        }
+        let mut before = (0.0, [PlateMotion::default(); 2], 0.0);
+        let mut force_n = 0.0;
+        scene.plates_at = vec![Default::default()];
+        let mut order: Vec<usize> = (0..observed.len()).collect();
+        order.sort_by(|a, b| observed[*a].drive_mm.abs().total_cmp(&observed[*b].drive_mm.abs()));
+        for (place, &n) in order.iter().enumerate() {
+            let own = self.plates_at.get(n).copied().unwrap_or_default();
+            let after = (observed[n].drive_mm.abs(), own, observed[n].force.map_or(0.0, |f| f.value_n));
+            let span = after.0 - before.0;
+            let part = if span > 0.0 { (drive_mm.abs() - before.0) / span } else { 1.0 };
+            let is_last = place + 1 == order.len();
+            if part <= 1.0 || is_last {
+                // Beyond the last step plates stay as they are there; the force goes on.
+                let held = part.min(1.0);
+                let blend = |a: &PlateMotion, b: &PlateMotion| a.scaled(1.0 - held).plus(&b.scaled(held));
+                scene.plates_at[0] = [0, 1].map(|i| blend(&before.1[i], &after.1[i]));
+                force_n = before.2 + part * (after.2 - before.2);
+                break;
+            }
+            before = after;
+        }
+        let moved = &mut scene.plates[1].translation_mm;
+        moved[0] += scene.compliance_mm_per_n * force_n;
+        scene.compliance_mm_per_n = 0.0;
+        let lag = -(moved[0] + scene.plates_at[0][1].translation_mm[0]) * drive_mm.signum();
+        moved[0] += (lag - drive_mm.abs()).max(0.0) * drive_mm.signum();
+        (scene, step)
+    }
+
     /// Whether the nodes of the fixed and of the moved face must be free to leave their plate.
     pub fn releases(&self) -> [bool; 2] {
         [0, 1].map(|face| !self.looseness[face].is_empty() || self.bond_mm_per_kpa[face].abs() > 0.0)
@@ -108,4 +146,45 @@ impl Scene {
 fn bond_of(loose: f64, scale: f64) -> f64 {
     let loose = loose.clamp(0.0, 1.0);
     (scale * (1.0 - loose) / loose.max(1e-9)).min(FIRM_BOND_KPA_PER_MM)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibration::ObservedForce;
+
+    fn step(drive_mm: f64, value_n: f64) -> ObservedStep {
+        let force = Some(ObservedForce { value_n, sd_n: 0.01 });
+        ObservedStep { drive_mm, force, displacement: Vec::new(), faces_per_mm: [None, None] }
+    }
+
+    /// Translation of the moved plate along x of a scene at a drive, mm.
+    fn moved_x(scene: &Scene, drive_mm: f64, steps: &[ObservedStep]) -> f64 {
+        let (here, step) = scene.between_steps(drive_mm, steps);
+        here.departures(0, &step, 1.0, 1).moved_plate.translation_mm[0]
+    }
+
+    #[test]
+    fn a_plate_lags_by_no_more_than_the_drive() {
+        let steps = [step(2.0, 4.0), step(4.0, 8.0)];
+        let mut scene = Scene::default();
+        scene.plates[1].translation_mm[0] = -0.3;
+        assert_eq!(moved_x(&scene, 2.0, &steps), -0.3);
+        // Rounding only, here and below.
+        assert!((moved_x(&scene, 0.1, &steps) + 0.1).abs() < 1e-12);
+        assert!((moved_x(&scene, -0.1, &steps) + 0.3).abs() < 1e-12, "it leads in the other direction");
+    }
+
+    #[test]
+    fn own_values_and_forces_go_from_step_to_step() {
+        let steps = [step(2.0, 4.0), step(4.0, 6.0)];
+        let mut scene = Scene { compliance_mm_per_n: -0.01, ..Scene::default() };
+        scene.plates_at_mut(0)[1].translation_mm[0] = -0.1;
+        scene.plates_at_mut(1)[1].translation_mm[0] = -0.3;
+        for (drive, expected) in [(1.0, -0.05 - 0.02), (2.0, -0.1 - 0.04), (3.0, -0.2 - 0.05), (4.0, -0.3 - 0.06)] {
+            assert!((moved_x(&scene, drive, &steps) - expected).abs() < 1e-12, "{drive} mm");
+        }
+        // Beyond the last step the plate's own motion stays, and the force goes on.
+        assert!((moved_x(&scene, 5.0, &steps) - (-0.3 - 0.07)).abs() < 1e-12);
+    }
 }

@@ -116,7 +116,7 @@ pub(super) fn leading<'c>(candidates: &'c [Candidate], current: &CauseFit) -> Ve
 }
 
 /// Whether a recording has steps at different drives.
-fn has_several_drives(observed: &Observed) -> bool {
+pub(super) fn has_several_drives(observed: &Observed) -> bool {
     observed.steps.iter().any(|s| (s.drive_mm - observed.steps[0].drive_mm).abs() > 0.0)
 }
 

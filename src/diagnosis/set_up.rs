@@ -9,13 +9,14 @@
 //! take the place of free ones where they explain as much.
 
 use super::candidate::Candidate;
-use super::cause::Cause;
+use super::cause::{Cause, Course};
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
 use super::evidence::penalty;
 use super::inference::Inference;
+use super::leftover::leftover;
 use super::registry::Registry;
-use super::score_round::score_of_set_up;
+use super::score_round::{has_several_drives, score_of_set_up};
 use super::supposed::Supposed;
 use super::thinning::{Needed, thinned};
 use super::trace::Trace;
@@ -33,6 +34,9 @@ const SETTLED: f64 = 0.05;
 /// Where a single cause explains more than this part of the misfit, to first order, what the set-up promises is not
 /// worked out.
 const SINGLE_EXPLAINS: f64 = 0.75;
+
+/// A smooth field takes the place of motions where it leaves less than this part of what they leave (rms).
+const SPONGE_LEAVES: f64 = 0.5;
 
 /// Whether the set-up as a whole may explain more than any of `candidates`, to first order.
 ///
@@ -126,7 +130,7 @@ pub(super) fn with_plain_motions(
         return Ok(fitted);
     }
     let observed = inference.laboratory.observed();
-    let has_several_drives = observed.steps.iter().any(|s| (s.drive_mm - observed.steps[0].drive_mm).abs() > 0.0);
+    let has_several_drives = has_several_drives(observed);
     let plain = registry
         .tested(&observed.specimen)
         .into_iter()
@@ -142,6 +146,30 @@ pub(super) fn with_plain_motions(
     Ok(if cost(&other) < cost(&fitted) { other } else { fitted })
 }
 
+/// The fit with a smooth field that is alike at all drives in place of motions of the plates that are alike at all
+/// drives, too, or free at each: where it explains as much more for its number as a cause without a mechanism must.
+///
+/// # Errors
+/// As [`fit_set_up`].
+fn with_sponge_for_motions(
+    inference: &mut Inference,
+    registry: &Registry,
+    measured: &Trace,
+    fitted: CauseFit,
+) -> Result<CauseFit, DiagnosisError> {
+    let observed = inference.laboratory.observed();
+    let may_be_alike = |s: &Supposed| s.cause.moves_only_plates() && s.cause.course() != Course::InProportion;
+    if !has_several_drives(observed) || !fitted.causes.iter().any(may_be_alike) {
+        return Ok(fitted);
+    }
+    let sponges = registry.tested(&observed.specimen).into_iter().filter(|c| c.is_sponge());
+    let sponges = sponges.map(|cause| Supposed { values: cause.start(), cause });
+    let causes: Vec<Supposed> = fitted.causes.iter().filter(|s| !may_be_alike(s)).cloned().chain(sponges).collect();
+    let Ok(other) = inference.fit(measured, &fitted.material, &causes) else { return Ok(fitted) };
+    let left = |fit: &CauseFit| leftover(observed, &fit.residual, &inference.metric).structured_rms_mm;
+    Ok(if left(&other) < SPONGE_LEAVES * left(&fitted) { other } else { fitted })
+}
+
 /// As far as the set-up is in a fit: the fit without what it does not need.
 ///
 /// # Errors
@@ -154,6 +182,7 @@ pub(super) fn simplest_set_up(
 ) -> Result<CauseFit, DiagnosisError> {
     let fitted = thinned(inference, measured, fitted, Needed::BeyondAMesh)?;
     let fitted = with_plain_motions(inference, registry, measured, fitted)?;
+    let fitted = with_sponge_for_motions(inference, registry, measured, fitted)?;
     let fitted = settled(inference, measured, fitted)?;
     inference.fit(measured, &fitted.material, &fitted.causes)
 }

@@ -103,7 +103,7 @@ impl PlateMotion {
     }
 
     /// The motion times a factor.
-    pub(super) fn scaled(&self, factor: f64) -> PlateMotion {
+    pub fn scaled(&self, factor: f64) -> PlateMotion {
         let times = |v: [f64; 3]| v.map(|x| factor * x);
         PlateMotion {
             translation_mm: times(self.translation_mm),

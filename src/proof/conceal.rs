@@ -2,10 +2,11 @@
 
 use super::draw::{Draw, Hidden, HiddenCause};
 use super::experiment::Experiment;
-use super::history::{BEYOND, DRIFT_SD_N, history};
+use super::history::{BEYOND, DRIFT_SD_N, History, history};
 use crate::fem::{
     Departures, Equilibrium, Fibre, Field, ForwardModel, PlateMotion, PrepareError, SolveError, SolveOptions,
 };
+use crate::homogeneous::TableError;
 use crate::material::Ogden;
 use crate::mesh::{MeshOptions, half_extents_mm, mesh_specimen, mesh_specimen_along};
 use crate::recording::{Filter, RecordedStep, Recording};
@@ -27,6 +28,13 @@ const WEDGE: usize = 2;
 /// Voxels without a signal show any displacement within a turn of phase, mm.
 const LOST_MM: f64 = 1.5;
 
+/// Parts of the largest drive at which the force is worked out too, for the load curve between the steps.
+const PARTS_OF_CURVE: [f64; 4] = [0.06, 0.18, 0.55, 0.85];
+/// A drive as near to another as this part of the largest is the same.
+const SAME_PART: f64 = 0.02;
+/// Drive over which a plate comes to sit out of its place, mm.
+const SETTLED_MM: f64 = 0.4;
+
 /// Why a recording cannot be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -40,6 +48,9 @@ pub enum ConcealError {
     /// No voxels.
     #[error(transparent)]
     Voxel(#[from] VoxelError),
+    /// No load curve.
+    #[error(transparent)]
+    Curve(#[from] TableError),
 }
 
 /// A recording and what its causes do to it.
@@ -59,25 +70,41 @@ pub(super) struct Shown {
     pub(super) mask: VoxelMask,
     /// Displacement at every drive of the specimen (mm), at the voxels of the mask.
     pub(super) displacement: Vec<Vec<[f64; 3]>>,
-    /// Forces at these drives and beyond them ([`BEYOND`]), N.
+    /// Forces at these drives, N.
     pub(super) forces: Vec<f64>,
+    /// Force (N) over drive (mm) from rest to beyond the largest drive ([`BEYOND`]), where it was asked for.
+    pub(super) curve: Vec<[f64; 2]>,
 }
 
-/// The drives of a specimen and one beyond the largest, mm.
-fn drives_mm(specimen: &Specimen) -> Vec<f64> {
+/// The drives of a specimen's load curve: between its steps and beyond the last of them, mm.
+fn drives_of_curve(specimen: &Specimen) -> Vec<f64> {
     let largest = specimen.drive_mm.iter().fold(0.0f64, |s, d| s.max(d.abs()));
-    specimen.drive_mm.iter().copied().chain([BEYOND * largest]).collect()
+    let parts = PARTS_OF_CURVE.into_iter().chain([BEYOND]).map(|part| part * largest);
+    let is_new = |d: &f64| specimen.drive_mm.iter().all(|step| (step - d).abs() > SAME_PART * largest);
+    parts.filter(is_new).collect()
 }
 
 /// What a scan of `experiment` with `specimen` would show, on prisms whose size is `mesh_factor` times the standard
-/// one.
+/// one; the force at the drives of `between` too.
 ///
 /// # Errors
 /// [`ConcealError`].
-pub(super) fn show(specimen: &Specimen, experiment: &Experiment, mesh_factor: f64) -> Result<Shown, ConcealError> {
+pub(super) fn show(
+    specimen: &Specimen,
+    experiment: &Experiment,
+    mesh_factor: f64,
+    between: &[f64],
+) -> Result<Shown, ConcealError> {
     let made = made_specimen(specimen, experiment);
     let model = model_of(&made, experiment, mesh_factor)?;
-    let states = path(&model, &made, experiment, &drives_mm(specimen))?;
+    let mut drives: Vec<f64> = specimen.drive_mm.iter().chain(between).copied().collect();
+    drives.sort_by(f64::total_cmp);
+    let on_the_way = path(&model, &made, experiment, &drives)?;
+    let curve = std::iter::once([0.0, 0.0]).chain(drives.iter().zip(&on_the_way).map(|(d, s)| [*d, s.force_n]));
+    let curve = curve.collect();
+    let is_step = |d: &f64| specimen.drive_mm.iter().any(|step| (step - d).abs() <= 0.0);
+    let states: Vec<Equilibrium> =
+        drives.iter().zip(on_the_way).filter(|(d, _)| is_step(d)).map(|(_, state)| state).collect();
     let drawn = VoxelGrid::covering(specimen, VOXEL_MM)?;
     let mut grid = drawn.clone();
     for h in experiment.of(HiddenCause::Registration) {
@@ -85,9 +112,9 @@ pub(super) fn show(specimen: &Specimen, experiment: &Experiment, mesh_factor: f6
     }
     let mask = VoxelMask::of_specimen(&made, grid)?;
     let operator = VoxelOperator::new(&made, model.mesh(), &mask, Sampling::default())?;
-    let num_steps = specimen.drive_mm.len();
+    let num_steps = states.len();
     let mut displacement = Vec::with_capacity(num_steps);
-    for (n, state) in states[..num_steps].iter().enumerate() {
+    for (n, state) in states.iter().enumerate() {
         let mut field = operator.average(&state.displacement)?;
         for (u, &voxel) in field.iter_mut().zip(&mask.voxels) {
             for hidden in &experiment.hidden {
@@ -96,7 +123,7 @@ pub(super) fn show(specimen: &Specimen, experiment: &Experiment, mesh_factor: f6
         }
         displacement.push(field);
     }
-    Ok(Shown { mask, displacement, forces: states.iter().map(|s| s.force_n).collect() })
+    Ok(Shown { mask, displacement, forces: states.iter().map(|s| s.force_n).collect(), curve })
 }
 
 /// Makes the recording of `experiment` with `specimen`.
@@ -104,9 +131,9 @@ pub(super) fn show(specimen: &Specimen, experiment: &Experiment, mesh_factor: f6
 /// # Errors
 /// [`ConcealError`].
 pub fn conceal(specimen: &Specimen, experiment: &Experiment) -> Result<Concealed, ConcealError> {
-    let shown = show(specimen, experiment, MESH_FACTOR)?;
+    let shown = show(specimen, experiment, MESH_FACTOR, &drives_of_curve(specimen))?;
     // What the nominal model would show, for the size of the effect.
-    let plain = show(specimen, &experiment.nominal(RUBBER), MESH_FACTOR)?;
+    let plain = show(specimen, &experiment.nominal(RUBBER), MESH_FACTOR, &[])?;
     let last = specimen.drive_mm.len() - 1;
     let expected = plain.mask.spread(&plain.displacement[last], [f64::NAN; 3]);
     let (mut squares, mut count) = (0.0, 0usize);
@@ -132,12 +159,12 @@ pub fn conceal(specimen: &Specimen, experiment: &Experiment) -> Result<Concealed
             displacement: shown.mask.spread(&noisy, [f64::NAN; 3]),
         });
     }
-    let (load, windows, means) = history(&drives_mm(specimen), &shown.forces, experiment, &mut noise);
+    let History { load, windows_s, means_n } = history(&shown.curve, &specimen.drive_mm, experiment, &mut noise)?;
     let mut effect_force_relative = 0.0f64;
     for (n, step) in steps.iter_mut().enumerate() {
-        step.force_n = Some(means[n]);
-        step.window_s = Some(windows[n]);
-        effect_force_relative = effect_force_relative.max((means[n] / plain.forces[n] - 1.0).abs());
+        step.force_n = Some(means_n[n]);
+        step.window_s = Some(windows_s[n]);
+        effect_force_relative = effect_force_relative.max((means_n[n] / plain.forces[n] - 1.0).abs());
         lose_voxels(&mut step.displacement, &shown.mask, experiment.lost_share, &mut noise);
     }
     let recording = Recording {
@@ -281,9 +308,14 @@ fn depart(d: &mut Departures, made: &Specimen, material: &Ogden, hidden: &Hidden
         HiddenCause::Offaxis => motion.translation_per_mm[which] = strength / largest,
         HiddenCause::Debond => d.bond_kpa_per_mm = Some(Field::new(|_| 0.0)),
         HiddenCause::Bond => d.bond_kpa_per_mm = Some(Field::new(move |_| 1.0 / strength)),
-        HiddenCause::Slack => motion.translation_mm[0] = -strength,
-        HiddenCause::Mount if which < 2 => motion.translation_mm[1 + which] = strength,
-        HiddenCause::Mount => motion.rotation_rad[which - 2] = strength.to_radians(),
+        // Play is taken up on the way; so is what lets a plate sit out of its place.
+        HiddenCause::Slack => motion.translation_mm[0] = -strength * taken_up(drive_mm, strength.abs()),
+        HiddenCause::Mount if which < 2 => {
+            motion.translation_mm[1 + which] = strength * taken_up(drive_mm, SETTLED_MM);
+        }
+        HiddenCause::Mount => {
+            motion.rotation_rad[which - 2] = strength.to_radians() * taken_up(drive_mm, SETTLED_MM);
+        }
         HiddenCause::Travel => {
             let part = strength * (drive_mm.abs() / largest).powf(hidden.extent_mm[0]);
             motion.translation_mm = hidden.direction.map(|x| part * x);
@@ -291,6 +323,11 @@ fn depart(d: &mut Departures, made: &Specimen, material: &Ogden, hidden: &Hidden
         _ => {}
     }
     d.moved_plate = d.moved_plate.plus(&motion);
+}
+
+/// The part of a play of `over_mm` that is taken up at a drive.
+fn taken_up(drive_mm: f64, over_mm: f64) -> f64 {
+    1.0 - (-drive_mm.abs() / over_mm.max(1e-9)).exp()
 }
 
 /// A factor on the stiffness, beside those that are there.

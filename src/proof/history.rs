@@ -2,6 +2,7 @@
 
 use super::draw::{Draw, HiddenCause};
 use super::experiment::Experiment;
+use crate::homogeneous::{ForceTable, TableError};
 use crate::recording::LoadCurve;
 
 /// The load cell: drift of each hold and a single reading, N.
@@ -16,16 +17,30 @@ const SPEED_MM_PER_S: f64 = 0.5;
 /// The first cycle goes this much beyond the largest drive.
 pub(super) const BEYOND: f64 = 1.1;
 
+/// What a load cell would have read.
+pub(super) struct History {
+    /// The load curve.
+    pub(super) load: LoadCurve,
+    /// From when to when each step is scanned, s.
+    pub(super) windows_s: Vec<[f64; 2]>,
+    /// The mean force of each, N.
+    pub(super) means_n: Vec<f64>,
+}
+
 /// The load curve of a first cycle beyond the largest drive and then the steps with holds; windows and mean forces of
-/// the steps.
+/// the steps. `curve` is the elastic force (N) over drive (mm) from rest to beyond the largest drive.
+///
+/// # Errors
+/// [`TableError`] where the drives of `curve` do not rise.
 pub(super) fn history(
-    drives: &[f64],
-    forces: &[f64],
+    curve: &[[f64; 2]],
+    steps_mm: &[f64],
     experiment: &Experiment,
     noise: &mut Draw,
-) -> (LoadCurve, Vec<[f64; 2]>, Vec<f64>) {
-    let num_steps = drives.len() - 1;
-    let beyond = drives[num_steps];
+) -> Result<History, TableError> {
+    let [table_mm, forces]: [Vec<f64>; 2] = [0, 1].map(|i| curve.iter().map(|point| point[i]).collect());
+    let table = ForceTable::new(&table_mm, &forces)?;
+    let beyond = table.range()[1];
     let mut corners = vec![[0.0, 0.0], [REST_S, 0.0]];
     let ramp = |corners: &mut Vec<[f64; 2]>, to: f64| {
         let [t, from] = corners[corners.len() - 1];
@@ -39,7 +54,7 @@ pub(super) fn history(
     ramp(&mut corners, 0.0);
     hold(&mut corners, 3.0 * REST_S);
     let mut windows = Vec::new();
-    for &drive in &drives[..num_steps] {
+    for &drive in steps_mm {
         ramp(&mut corners, drive);
         let arrival = corners[corners.len() - 1][0];
         hold(&mut corners, HOLD_S);
@@ -59,7 +74,7 @@ pub(super) fn history(
         }
         let ([t0, d0], [t1, d1]) = (corners[piece], corners[piece + 1]);
         let drive = if t1 > t0 { d0 + (d1 - d0) * ((time - t0) / (t1 - t0)).clamp(0.0, 1.0) } else { d1 };
-        let elastic = interpolated(drives, forces, drive);
+        let elastic = table.at(drive)?.0;
         let mut force = elastic;
         for hidden in &experiment.hidden {
             match hidden.cause {
@@ -84,7 +99,7 @@ pub(super) fn history(
         load.drive_mm.push(drive);
         load.force_n.push(force + drift + READING_SD_N * noise.normal());
     }
-    let means = windows
+    let means_n = windows
         .iter()
         .map(|[start, end]| {
             let inside: Vec<f64> = load
@@ -97,20 +112,5 @@ pub(super) fn history(
             inside.iter().sum::<f64>() / inside.len().max(1) as f64
         })
         .collect();
-    (load, windows, means)
-}
-
-/// The odd polynomial in the drive through rest and all points (Lagrange): smooth, and exact at the steps.
-fn interpolated(drives: &[f64], forces: &[f64], drive: f64) -> f64 {
-    let mut sum = 0.0;
-    for (i, (d, f)) in drives.iter().zip(forces).enumerate() {
-        let mut weight = drive / d;
-        for (j, other) in drives.iter().enumerate() {
-            if i != j {
-                weight *= (drive * drive - other * other) / (d * d - other * other);
-            }
-        }
-        sum += weight * f;
-    }
-    sum
+    Ok(History { load, windows_s: windows, means_n })
 }

@@ -29,16 +29,16 @@ pub(super) struct OwnEffect {
 /// # Errors
 /// [`ConcealError`].
 pub(super) fn own_effects(specimen: &Specimen, experiment: &Experiment) -> Result<Vec<OwnEffect>, ConcealError> {
-    let all = show(specimen, experiment, MESH_FACTOR)?;
+    let all = show(specimen, experiment, MESH_FACTOR, &[])?;
     let mut others: Vec<Shown> = Vec::new();
     for place in 0..experiment.hidden.len() {
-        others.push(show(specimen, &experiment.without(place, RUBBER), MESH_FACTOR)?);
+        others.push(show(specimen, &experiment.without(place, RUBBER), MESH_FACTOR, &[])?);
     }
     for (n, parameter) in experiment.material.parameters().into_iter().enumerate() {
         let mut other = experiment.clone();
         let step = if n == 0 { BULK_STEP } else { STEP };
         other.material.set(parameter, (1.0 + step) * other.material.value(parameter));
-        others.push(show(specimen, &other, MESH_FACTOR)?);
+        others.push(show(specimen, &other, MESH_FACTOR, &[])?);
     }
     let rows = rows_of_all(&all, &others);
     let changes = changes(&all, &others, &rows);

@@ -241,7 +241,11 @@ fn ranked_table(result: &DesignResult) -> Table {
             block(entry),
             significant(entry.specimen.drive_mm.last().copied().unwrap_or(f64::NAN), 3),
             significant(entry.force_n(), 3),
-            significant(entry.objective, 4),
+            format!(
+                "{} ± {}",
+                significant(entry.objective, 4),
+                significant(entry.objective * entry.mesh_relative_sd, 1)
+            ),
             show(entry.information().map(|i| 100.0 * i), 3),
             if entry.is_within_limits {
                 entry.closest_limit.clone()

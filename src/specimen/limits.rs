@@ -133,6 +133,10 @@ pub struct ManufacturingLimits {
     /// Mirror planes that the geometry must have.
     #[serde(default)]
     pub symmetry: Symmetry,
+    /// What a mould maker works to, mm: designs are given in multiples of it, but for punches; 0.1 where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<PositiveMm>, nullable = false)]
+    pub dimension_step_mm: Option<f64>,
 }
 
 /// How far a value is from its limit.
@@ -228,6 +232,7 @@ impl ManufacturingLimits {
             ("min_voxels_across_ligament", self.min_voxels_across_ligament, 0.0),
             ("max_force_n", self.max_force_n, 0.0),
             ("max_drive_mm", self.max_drive_mm, 0.0),
+            ("dimension_step_mm", self.dimension_step_mm, 0.0),
             ("max_local_stretch", self.max_local_stretch, UNDEFORMED_STRETCH),
         ] {
             if let Some(value) = value {

@@ -60,6 +60,7 @@ pub(super) const REGISTRY: &[Entry] = &[
     inclusion::ENTRY,
     travel::ENTRY,
     registration::OF_SET_UP,
+    swelling::OF_SET_UP,
     layer::ENTRY,
     block::ENTRY,
 ];

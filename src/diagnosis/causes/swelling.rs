@@ -10,10 +10,22 @@ const NAME: CauseName = CauseName::new("swelling");
 const REMEDY: &str = "Weigh the sample before and after the scan, and keep it from drying or taking up liquid.";
 /// Its line in the registry.
 pub(super) const ENTRY: Entry =
-    Entry { name: NAME, remedy: REMEDY, origin: Origin::Tested(|_| vec![Arc::new(Swelling)]) };
+    Entry { name: NAME, remedy: REMEDY, origin: Origin::Tested(|_| vec![Arc::new(Swelling { is_of_set_up: false })]) };
+/// Its line in the registry as a part of the set-up.
+pub(super) const OF_SET_UP: Entry = Entry {
+    name: NAME,
+    remedy: REMEDY,
+    origin: Origin::SetUp { parts: |_| vec![Arc::new(Swelling { is_of_set_up: true })], special_cases: &[] },
+};
+
+/// A sample is believed to keep its volume between mould and scan to about this: 1 % in length.
+const BELIEVED_LOG_RATIO: f64 = 0.03;
 
 /// Uniform swelling by a volume ratio.
-pub struct Swelling;
+pub struct Swelling {
+    /// Whether it is held by what a laboratory believes of its sample.
+    is_of_set_up: bool,
+}
 
 impl Cause for Swelling {
     fn name(&self) -> CauseName {
@@ -29,10 +41,14 @@ impl Cause for Swelling {
     }
 
     fn parameters(&self) -> Vec<CauseParameter> {
-        vec![CauseParameter::new("log_volume_ratio", 0.02, [-0.3, 0.3])]
+        let ratio = CauseParameter::new("log_volume_ratio", 0.02, [-0.3, 0.3]);
+        vec![if self.is_of_set_up { ratio.believed(BELIEVED_LOG_RATIO) } else { ratio }]
     }
 
     fn apply(&self, values: &[f64], scene: &mut Scene) {
         scene.log_growth += values[0];
+    }
+    fn is_of_set_up(&self) -> bool {
+        self.is_of_set_up
     }
 }

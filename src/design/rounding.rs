@@ -1,0 +1,82 @@
+//! Designs in the steps that a mould maker works to.
+
+use super::explore::is_makeable;
+use crate::specimen::{ManufacturingLimits, Specimen};
+
+/// The step where limits state none, mm.
+const USUAL_STEP_MM: f64 = 0.1;
+
+/// The design nearest to `specimen` whose dimensions, places and drive are multiples of the limits' step, and that can
+/// be made: holes are smaller by up to two steps where the nearest ones come too close to something. Punches keep their
+/// diameters. `None` where no such design can be made.
+pub(super) fn in_steps(specimen: &Specimen, limits: &ManufacturingLimits, voxel_mm: [f64; 3]) -> Option<Specimen> {
+    let step = limits.dimension_step_mm.unwrap_or(USUAL_STEP_MM);
+    let nearest = |value: f64| multiple(step, (value / step).round());
+    let mut rounded = specimen.clone();
+    let block = &mut rounded.block;
+    for length in [&mut block.length_mm, &mut block.thickness_mm, &mut block.width_mm] {
+        *length = nearest(*length);
+    }
+    rounded.drive_mm.iter_mut().for_each(|d| *d = nearest(*d));
+    for hole in &mut rounded.holes {
+        hole.center_mm = hole.center_mm.map(nearest);
+    }
+    if limits.punches_mm.is_some() {
+        return Some(rounded).filter(|s| is_makeable(s, limits, voxel_mm));
+    }
+    let with_diameters = |of: &dyn Fn(f64) -> f64| {
+        let mut made = rounded.clone();
+        for (hole, drawn) in made.holes.iter_mut().zip(&specimen.holes) {
+            hole.diameter_mm = multiple(step, of(drawn.diameter_mm / step));
+        }
+        made
+    };
+    let smaller_by = |steps: f64| with_diameters(&move |d: f64| (d + 1e-9).floor() - steps);
+    [with_diameters(&f64::round), smaller_by(0.0), smaller_by(1.0), smaller_by(2.0)]
+        .into_iter()
+        .find(|s| is_makeable(s, limits, voxel_mm))
+}
+
+/// `count` steps, without the last digit that a product of a decimal fraction leaves.
+fn multiple(step: f64, count: f64) -> f64 {
+    let per_mm = (1.0 / step).round();
+    if (per_mm * step - 1.0).abs() < 1e-12 { count / per_mm } else { count * step }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::specimen::{Hole, HoleAxis};
+
+    fn published() -> (Specimen, ManufacturingLimits) {
+        let specimen = Specimen::from_json(include_str!("../../geometries/two-hole-shear.json")).expect("a specimen");
+        let limits = r#"{ "min_ligament_hole_hole_mm": 1.5, "min_ligament_hole_edge_mm": 1.2, "diameter_mm": { "min": 2, "max": 8 } }"#;
+        (specimen, ManufacturingLimits::from_json(limits).expect("limits"))
+    }
+
+    #[test]
+    fn every_dimension_is_a_multiple() {
+        let (mut specimen, limits) = published();
+        specimen.block.length_mm = 28.6613;
+        specimen.drive_mm = vec![6.9999];
+        let made = in_steps(&specimen, &limits, [1.0; 3]).expect("it can be made");
+        assert_eq!(made.block.length_mm, 28.7);
+        assert_eq!(made.drive_mm, [7.0]);
+        assert_eq!(made.holes[0].center_mm, [-4.2, 0.0]);
+        assert_eq!(made.holes[1].center_mm, [4.2, 0.0]);
+        assert_eq!(made.holes[0].diameter_mm, 5.0);
+    }
+
+    /// A ligament at its limit is not rounded away: the holes give way.
+    #[test]
+    fn ligaments_are_kept() {
+        let (mut specimen, limits) = published();
+        // 1.5 mm between the holes as drawn; places rounded inwards would leave 1.42.
+        let [a, b] =
+            [-3.2449, 3.2449].map(|x| Hole { axis: HoleAxis::Thickness, center_mm: [x, 0.0], diameter_mm: 4.9898 });
+        specimen.holes = vec![a, b];
+        let made = in_steps(&specimen, &limits, [1.0; 3]).expect("it can be made");
+        assert!(made.holes.iter().all(|h| h.diameter_mm < 4.95), "{:?}", made.holes);
+        assert!(is_makeable(&made, &limits, [1.0; 3]));
+    }
+}

@@ -1,0 +1,63 @@
+//! Designs that are equal within what meshes leave open, and the one of them that is simplest to make.
+
+use super::confirm::{Confirmed, standard_error};
+use super::study::Study;
+use crate::specimen::Specimen;
+
+/// Two designs are equal where the mean of the difference of their ln objectives over the meshes is less than so many
+/// of its standard errors. With three meshes, chance alone exceeds four with a probability of one in twenty
+/// (Student's t, two degrees of freedom).
+const EQUAL_WITHIN: f64 = 4.0;
+/// Differences of ln objectives below this are of no use to anybody.
+const NO_DIFFERENCE: f64 = 0.002;
+
+/// The places in `ranked` of the designs within every limit that are equal to the first, the first included.
+pub(super) fn equal_to_best(study: &Study, base: &Confirmed, ranked: &[Confirmed]) -> Vec<usize> {
+    let Some(best) = ranked.first() else { return Vec::new() };
+    let of_best = best.log_objectives(study, base);
+    let is_equal = |c: &Confirmed| {
+        let apart: Vec<f64> = of_best.iter().zip(c.log_objectives(study, base)).map(|(a, b)| a - b).collect();
+        let mean = apart.iter().sum::<f64>() / (apart.len() as f64).max(1.0);
+        mean.abs() <= (EQUAL_WITHIN * standard_error(&apart)).max(NO_DIFFERENCE)
+    };
+    let within = ranked.iter().enumerate().filter(|(_, c)| c.is_within_limits == best.is_within_limits);
+    within.filter(|(place, c)| *place == 0 || is_equal(c)).map(|(place, _)| place).collect()
+}
+
+/// Of the designs at `places`, the place of the one that is simplest to make: fewest holes, then fewest different
+/// diameters, then least material.
+pub(super) fn simplest(ranked: &[Confirmed], places: &[usize]) -> Option<usize> {
+    let key = |place: usize| {
+        let c = &ranked[place];
+        (c.specimen.holes.len(), num_diameters(&c.specimen), c.volume_mm3)
+    };
+    let order = |a: &usize, b: &usize| {
+        let (a, b) = (key(*a), key(*b));
+        a.0.cmp(&b.0).then(a.1.cmp(&b.1)).then(a.2.total_cmp(&b.2))
+    };
+    places.iter().copied().min_by(order)
+}
+
+/// How many different diameters (to 1 µm) a specimen's holes have.
+fn num_diameters(specimen: &Specimen) -> usize {
+    let mut all: Vec<i64> = specimen.holes.iter().map(|h| (1e3 * h.diameter_mm).round() as i64).collect();
+    all.sort_unstable();
+    all.dedup();
+    all.len()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn diameters_are_counted_once() {
+        let text = include_str!("../../geometries/two-hole-shear.json");
+        let mut specimen = Specimen::from_json(text).expect("the published specimen");
+        assert_eq!(num_diameters(&specimen), 1);
+        specimen.holes[0].diameter_mm = 4.0;
+        assert_eq!(num_diameters(&specimen), 2);
+        specimen.holes.clear();
+        assert_eq!(num_diameters(&specimen), 0);
+    }
+}
