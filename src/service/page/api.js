@@ -103,12 +103,15 @@ export async function follow(id, show, signal) {
   }
 }
 
-/** Offers a file for download. */
-export async function download(path, name) {
-  const url = URL.createObjectURL(await getBlob(path));
+/** Offers a blob as a file. */
+export function save(blob, name) {
+  const url = URL.createObjectURL(blob);
   const link = h("a", { href: url, download: name });
   document.body.append(link);
   link.click();
   link.remove();
   setTimeout(() => URL.revokeObjectURL(url), 60000);
 }
+
+/** Offers a file of the service for download. */
+export const download = async (path, name) => save(await getBlob(path), name);

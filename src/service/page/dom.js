@@ -47,24 +47,17 @@ export function say(text) {
   timer = setTimeout(() => { line.textContent = ""; }, 6000);
 }
 
-/** A number with so many significant digits. */
-export function digits(value, count = 4) {
-  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
-  const magnitude = Math.abs(value);
-  if (magnitude !== 0 && (magnitude >= 1e6 || magnitude < 1e-3)) return value.toExponential(count - 1);
-  return String(Number(value.toPrecision(count)));
+let count = 0;
+/** A term with its meaning: shown on hover and focus, read by screen readers. */
+export function term(text, meaning) {
+  if (!meaning) return text;
+  const id = `term-${count += 1}`;
+  return h("span", { class: "term", tabindex: 0, "aria-describedby": id }, text,
+    h("span", { class: "tip", role: "tooltip", id }, meaning));
 }
 
-/** The symbol of a parameter. */
-export function symbol(name) {
-  const [kind, number] = name.split("_");
-  const letter = { mu: "μ", alpha: "α", kappa: "κ" }[kind] ?? name;
-  return number ? letter + "₀₁₂₃₄₅₆₇₈₉"[Number(number)] : letter;
-}
+/** A sheet with a heading. */
+export const sheet = (title, ...children) => h("section", { class: "sheet" }, title && h("h3", {}, title), children);
 
-/** Milliseconds as words. */
-export function duration(ms) {
-  const seconds = ms / 1000;
-  if (seconds < 90) return `${seconds.toFixed(seconds < 10 ? 1 : 0)} s`;
-  return `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
-}
+/** A part that is closed until someone wants it. */
+export const more = (summary, ...children) => h("details", {}, h("summary", {}, summary), children);

@@ -1,6 +1,7 @@
 // Draws the section of a specimen; holes are dragged, or moved by the arrow keys (Shift: ten times as far).
 
-import { h, s, digits } from "./dom.js";
+import { h, s } from "./dom.js";
+import { digits } from "./numbers.js";
 
 /** Extents of the section: x along the length; the other axis is z for holes through the thickness, y for the width. */
 export function section(specimen) {

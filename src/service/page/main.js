@@ -3,7 +3,8 @@
 import { getJson } from "./api.js";
 import { fill, h } from "./dom.js";
 import { planView } from "./plan.js";
-import { jobView, jobsView } from "./jobs.js";
+import { jobView } from "./job.js";
+import { jobsView } from "./jobs.js";
 import { recordingsView } from "./recordings.js";
 
 const content = document.getElementById("content");

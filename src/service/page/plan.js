@@ -1,7 +1,8 @@
 // Planning: a specimen, a material, a scan, limits, an objective; then an evaluation, a sweep of the diameter, or a design.
 
 import { Failure, getJson, post } from "./api.js";
-import { digits, duration, fill, h, say } from "./dom.js";
+import { fill, h, say } from "./dom.js";
+import { digits, duration } from "./numbers.js";
 import { editor, section } from "./editor.js";
 import { sweepForm } from "./sweep.js";
 

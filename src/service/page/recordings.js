@@ -1,7 +1,8 @@
 // Recordings: upload a folder, look at what it holds, calibrate on it, diagnose it.
 
 import { Failure, getJson, post, remove, upload } from "./api.js";
-import { digits, fill, h, say } from "./dom.js";
+import { fill, h, say } from "./dom.js";
+import { digits } from "./numbers.js";
 
 /** A tar file of plain files. */
 async function tar(files) {

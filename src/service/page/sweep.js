@@ -1,6 +1,7 @@
 // The form of a sweep: what varies, from where to where, how many, which seed.
 
-import { digits, fill, h, symbol } from "./dom.js";
+import { fill, h } from "./dom.js";
+import { digits, symbol } from "./numbers.js";
 
 /** What of an evaluation can vary: pointer, words, value now. */
 export function variables(model) {

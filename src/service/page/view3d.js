@@ -1,6 +1,7 @@
 // The deformed surface in WebGL, coloured by λ or k. Drag or use the arrow keys to turn, wheel or + and − to come nearer.
 
-import { digits, h } from "./dom.js";
+import { h } from "./dom.js";
+import { digits } from "./numbers.js";
 
 const RAMP = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]].map((c) => c.map((v) => v / 255));
 const VERTEX = `attribute vec3 at; attribute vec3 moved; attribute vec3 tint; uniform mat4 view; uniform float amount; varying vec3 colour; varying vec3 place;
