@@ -77,7 +77,7 @@ function maps(result, files) {
   return slicesView("Measured, model and what is left", steps.flatMap(({ r, n, label }) => [
     { label: `${label}: measured and model`, panels: [panel("Measured", `measured_${r}_${n}.nii.gz`), panel("Model", `model_${r}_${n}.nii.gz`)] },
     { label: `${label}: measured and what is left`, panels: [panel("Measured", `measured_${r}_${n}.nii.gz`), panel("Measured less model", `misfit_${r}_${n}.nii.gz`)] },
-  ]), { scale: 1 });
+  ]), { scale: 1, aimed: 1 });
 }
 
 export function calibration(result, files, request) {

@@ -21,7 +21,7 @@ function set(element, attributes) {
     if (value === null || value === undefined || value === false) continue;
     if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
     else if (name === "value" && "value" in element) element.value = value;
-    else if (name === "width_percent") element.style.width = value + "%";
+    else if (name === "width_percent") element.style.width = `${value}%`;
     else element.setAttribute(name, value === true ? "" : value);
   }
 }
@@ -52,7 +52,7 @@ let count = 0;
 export function term(text, meaning) {
   if (!meaning) return text;
   const id = `term-${count += 1}`;
-  return h("span", { class: "term", tabindex: 0, "aria-describedby": id }, text,
+  return h("span", { class: "term" }, h("button", { type: "button", "aria-describedby": id }, text),
     h("span", { class: "tip", role: "tooltip", id }, meaning));
 }
 

@@ -9,7 +9,7 @@ const FIRST = 6;
 
 /** Bars of one round, the strongest first. */
 function bars(entries) {
-  const strength = (e) => Math.max(e.score, e.fitted ?? 0);
+  const strength = (e) => e.fitted ?? e.score;
   const reach = Math.log(Math.max(2 * LEAST, ...entries.map(strength)) / LEAST);
   const width = (v) => Math.max(1, 100 * Math.log(Math.max(v, LEAST) / LEAST) / reach);
   const line = (e) => h("li", { class: "suspect" },

@@ -11,27 +11,30 @@ const DARK_INKS = {
 };
 const dark = matchMedia("(prefers-color-scheme: dark)");
 
-/** Whether a text stands on a coloured field, which keeps its colour. */
-function isOnField(text) {
-  const [x, y] = ["x", "y"].map((a) => Number(text.getAttribute(a)));
-  return [...text.parentNode.children].some((r) => {
-    if (r.tagName !== "rect" || DARK_INKS[r.getAttribute("fill")]) return false;
-    const [left, top, width, height] = ["x", "y", "width", "height"].map((a) => Number(r.getAttribute(a) ?? 0));
-    return x >= left && x <= left + width && y >= top && y <= top + height && width > 8 && height > 8;
-  });
+const attribute = (tag, name) => tag.match(new RegExp(`\\s${name}="([^"]*)"`))?.[1];
+const place = (tag, names) => names.map((name) => Number(attribute(tag, name) ?? 0));
+
+/** A coloured field that is large enough for letters: its box. */
+function fieldOf(tag) {
+  const [x, y, width, height] = place(tag, ["x", "y", "width", "height"]);
+  return !DARK_INKS[attribute(tag, "fill")] && width > 8 && height > 8 ? { x, y, width, height } : null;
 }
 
+/** The figure in dark inks. Letters on coloured fields keep their ink, as the fields keep their colour. */
 function darkened(text) {
-  const picture = new DOMParser().parseFromString(text, "image/svg+xml");
-  if (picture.querySelector("parsererror")) return text;
-  for (const element of picture.querySelectorAll("[fill], [stroke]")) {
-    if (element.tagName === "text" && isOnField(element)) continue;
-    for (const name of ["fill", "stroke"]) {
-      const ink = DARK_INKS[element.getAttribute(name)];
-      if (ink) element.setAttribute(name, ink);
-    }
-  }
-  return new XMLSerializer().serializeToString(picture);
+  let fields = [];
+  const isOnField = (tag) => {
+    const [x, y] = place(tag, ["x", "y"]);
+    return fields.some((f) => x >= f.x && x <= f.x + f.width && y >= f.y && y <= f.y + f.height);
+  };
+  const sheets = text.replace(/<style>[^<]*<\/style>/g, (sheet) => sheet.replace(/#[0-9a-f]+/g, (ink) => DARK_INKS[ink] ?? ink));
+  return sheets.replace(/<\/?([a-z]+)[^>]*>/g, (tag, name) => {
+    if (name === "g") fields = [];
+    const field = name === "rect" && fieldOf(tag);
+    if (field) fields.push(field);
+    if (name === "text" && isOnField(tag)) return tag;
+    return tag.replace(/(\s(?:fill|stroke))="(#[0-9a-f]+)"/g, (whole, key, ink) => `${key}="${DARK_INKS[ink] ?? ink}"`);
+  });
 }
 
 /** A figure from SVG text. */

@@ -79,16 +79,22 @@ export function reach(image, component) {
   return all.length ? all[Math.floor(0.99 * (all.length - 1))] : 0;
 }
 
-/** Component, plane and slice in which there is the most to see: the largest sum of squares. */
+/** The sum of squared differences from the mean: how much of a pattern a slice shows. */
+function pattern(values) {
+  let [sum, squares, count] = [0, 0, 0];
+  for (const v of values) if (Number.isFinite(v)) { sum += v; squares += v * v; count += 1; }
+  return count ? squares - sum * sum / count : 0;
+}
+
+/** Component, plane and slice in which there is the most to see. */
 export function mostToSee(image, planes) {
-  const best = { component: 0, plane: 0, index: null, sum: -1 };
+  const best = { component: 0, plane: 0, index: null, seen: -1 };
   for (let component = 0; component < image.components; component += 1) {
     planes.forEach((axes, plane) => {
       const [low, high] = image.bounds[axes[2]];
       for (let index = low; index <= high; index += 1) {
-        let sum = 0;
-        for (const v of slice(image, component, axes, index).values) if (Number.isFinite(v)) sum += v * v;
-        if (sum > best.sum) Object.assign(best, { component, plane, index, sum });
+        const seen = pattern(slice(image, component, axes, index).values);
+        if (seen > best.seen) Object.assign(best, { component, plane, index, seen });
       }
     });
   }

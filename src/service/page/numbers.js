@@ -5,7 +5,7 @@ export function digits(value, count = 4) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   const magnitude = Math.abs(value);
   if (magnitude !== 0 && (magnitude >= 1e6 || magnitude < 1e-3)) return powers(value, count);
-  if (magnitude >= 10 ** count) return String(Math.round(value));
+  if (magnitude >= 10 ** count) return Number(value.toPrecision(count)).toLocaleString("en");
   return value === 0 ? "0" : value.toPrecision(count);
 }
 
@@ -47,7 +47,7 @@ export function interval(ends, unit = "") {
   if (high === null) return `above ${digits(low, 3)}${behind}`;
   const width = high - low;
   const isWide = !(width > 0) || Math.max(Math.abs(low), Math.abs(high)) >= 1e5;
-  const text = (v) => (isWide || width > Math.abs(low + high) ? digits(v, 2) : v.toFixed(decimals(width)));
+  const text = (v) => (isWide || width > Math.abs(low + high) || Math.abs(v) < width / 20 ? digits(v, 2) : v.toFixed(decimals(width)));
   return `${text(low)} to ${text(high)}${behind}`;
 }
 

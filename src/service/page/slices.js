@@ -67,8 +67,9 @@ function beyond(cut, limit) {
   return part > 0.02 ? `; ${Math.round(100 * part)} % of it lies beyond the colours` : "";
 }
 
-/** Maps of `sets`: [{ label, panels: [{ label, href or blob }] }]. A set's panels share the scale of panel `scale`. */
-export function slicesView(title, sets, { note, scale = 0 } = {}) {
+/** Maps of `sets`: [{ label, panels: [{ label, href or blob }] }]. A set's panels share the scale of panel `scale`; the
+ * slice shown first is the one with the most to see in panel `aimed`. */
+export function slicesView(title, sets, { note, scale = 0, aimed = 0 } = {}) {
   if (sets.length === 0) return null;
   const state = { set: sets.length - 1, component: null, plane: null, index: null, scale };
   const images = new Map();
@@ -104,7 +105,7 @@ export function slicesView(title, sets, { note, scale = 0 } = {}) {
     try {
       const loaded = await Promise.all(set.panels.map(load));
       if (mine !== turn) return;
-      aim(loaded.at(-1));
+      aim(loaded[Math.min(aimed, loaded.length - 1)]);
       draw(set, loaded);
       fill(problem);
     } catch (error) {

@@ -1,14 +1,15 @@
 // The deformed surface in WebGL, coloured by λ or k. Drag or use the arrow keys to turn, wheel or + and − to come nearer.
 
 import { h } from "./dom.js";
-import { digits } from "./numbers.js";
+import { frameOf } from "./frame3d.js";
+import { digits, plain } from "./numbers.js";
 
 const RAMP = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]].map((c) => c.map((v) => v / 255));
 const VERTEX = `attribute vec3 at; attribute vec3 moved; attribute vec3 tint; uniform mat4 view; uniform float amount; varying vec3 colour; varying vec3 place;
 void main() { vec3 p = at + amount * moved; gl_Position = view * vec4(p, 1.0); colour = tint; place = p; }`;
 const FRAGMENT = `#extension GL_OES_standard_derivatives : enable
-precision mediump float; varying vec3 colour; varying vec3 place;
-void main() { vec3 n = normalize(cross(dFdx(place), dFdy(place))); float light = 0.62 + 0.38 * abs(dot(n, normalize(vec3(0.4, 0.55, 0.75)))); gl_FragColor = vec4(colour * light, 1.0); }`;
+precision mediump float; varying vec3 colour; varying vec3 place; uniform float plain;
+void main() { if (plain > 0.5) { gl_FragColor = vec4(colour, 1.0); return; } vec3 n = normalize(cross(dFdx(place), dFdy(place))); float light = 0.62 + 0.38 * abs(dot(n, normalize(vec3(0.4, 0.55, 0.75)))); gl_FragColor = vec4(colour * light, 1.0); }`;
 
 function colour(value, low, high) {
   if (value === null) return [0.6, 0.6, 0.6];
@@ -37,6 +38,7 @@ export function view3d(surfaces) {
           h("option", { value: "stretch_amplitude" }, "stretch amplitude λ"), h("option", { value: "deformation_mode" }, "mode k"))),
         h("label", {}, "Deformation", h("input", { type: "range", min: 0, max: 1, step: 0.05, value: 1, oninput: (e) => { state.amount = Number(e.target.value); views.forEach((v) => v.draw()); } })))),
     h("div", { class: "scale" }, low, h("div", { class: "ramp" }), high),
+    h("p", { class: "quiet" }, "Lines show what holds the specimen, and an arrow where it is moved to. Drag or use the arrow keys to turn."),
     h("div", { class: views.length > 1 ? "halves" : null }, views.map((v) => h("figure", {}, v.canvas, h("figcaption", {}, v.label)))));
   requestAnimationFrame(recolour);
   new ResizeObserver(() => views.forEach((v) => v.draw())).observe(element);
@@ -45,7 +47,7 @@ export function view3d(surfaces) {
 
 class View {
   constructor(surface, label, state, redraw) {
-    Object.assign(this, { surface, label: `${label}, drive ${digits(surface.drive_mm)} mm`, state });
+    Object.assign(this, { surface, label: `${label}, drive ${plain(surface.drive_mm, 3)} mm`, state });
     this.canvas = h("canvas", { tabindex: 0, role: "img", "aria-label": `${label}: deformed surface; arrow keys turn it` });
     let last = null;
     const turn = (dx, dy) => { state.turn += dx; state.tilt = Math.max(-1.5, Math.min(1.5, state.tilt + dy)); redraw(); };
@@ -83,15 +85,14 @@ class View {
       return new Float32Array(out);
     };
     const at = spread(this.surface.reference_mm);
-    this.count = at.length / 3;
     const moved = spread(this.surface.displacement_mm);
     // The sphere that holds the specimen at rest and deformed.
     this.size = 0;
     for (let i = 0; i < at.length; i += 3) {
       this.size = Math.max(this.size, Math.hypot(at[i], at[i + 1], at[i + 2]), Math.hypot(at[i] + moved[i], at[i + 1] + moved[i + 1], at[i + 2] + moved[i + 2]));
     }
-    this.put("at", at);
-    this.put("moved", moved);
+    this.surfaceData = { at, moved };
+    this.frame = frameOf(this.surface);
   }
 
   put(name, data) {
@@ -100,22 +101,38 @@ class View {
     this.buffers ??= {};
     this.buffers[name] ??= gl.createBuffer();
     gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers[name]);
-    gl.bufferData(gl.ARRAY_BUFFER, data, gl.STATIC_DRAW);
+    gl.bufferData(gl.ARRAY_BUFFER, data, gl.DYNAMIC_DRAW);
     gl.enableVertexAttribArray(place);
     gl.vertexAttribPointer(place, 3, gl.FLOAT, false, 0, 0);
+  }
+
+  /** Draws triangles or lines of { at, moved, tint }. */
+  shape(data, kind, isPlain) {
+    const gl = this.gl;
+    for (const name of ["at", "moved", "tint"]) this.put(name, data[name]);
+    gl.uniform1f(gl.getUniformLocation(this.program, "plain"), isPlain ? 1 : 0);
+    gl.drawArrays(kind, 0, data.at.length / 3);
+  }
+
+  /** Plates, grips and the drive, in the ink of the page. */
+  drawFrame() {
+    if (!this.frame) return;
+    const ink = getComputedStyle(this.canvas).color.match(/[\d.]+/g).slice(0, 3).map((v) => v / 255);
+    const tint = new Float32Array(this.frame.at.length).map((_, i) => ink[i % 3]);
+    this.shape({ ...this.frame, tint }, this.gl.LINES, true);
   }
 
   tint([low, high]) {
     if (!this.gl) return;
     const out = [];
     for (const value of this.surface[this.state.what]) { const c = colour(value, low, high); for (let i = 0; i < 6; i += 1) out.push(...c); }
-    this.put("tint", new Float32Array(out));
+    this.surfaceData.tint = new Float32Array(out);
     this.draw();
   }
 
   draw() {
     const gl = this.gl;
-    if (!gl || !this.buffers.tint) return;
+    if (!gl || !this.surfaceData.tint) return;
     const { canvas, state } = this;
     const ratio = Math.min(2, devicePixelRatio || 1);
     canvas.width = Math.max(1, canvas.clientWidth * ratio);
@@ -135,6 +152,7 @@ class View {
       rows[0][2] * fx, rows[1][2] * fy, rows[2][2] * z, 0, 0, 0, 0, 1]);
     gl.uniformMatrix4fv(gl.getUniformLocation(this.program, "view"), false, view);
     gl.uniform1f(gl.getUniformLocation(this.program, "amount"), state.amount);
-    gl.drawArrays(gl.TRIANGLES, 0, this.count);
+    this.shape(this.surfaceData, gl.TRIANGLES, false);
+    this.drawFrame();
   }
 }
