@@ -10,7 +10,7 @@ import { GLOSSARY } from "./words.js";
 
 const CAPTIONS = {
   convergence: "How the fit converged", correlation: "Which parameters the data tell apart",
-  "residual-histogram": "Misfit in units of the noise, against what noise alone gives",
+  "residuals-1": "Measured, model and misfit through the sample", "residual-histogram": "Misfit in units of the noise, against what noise alone gives",
 };
 
 /** Whether a part of the misfit is neither noise nor what meshes leave. */
@@ -64,7 +64,7 @@ function fitPerDrive(result) {
   return sheet("Fit per drive", table(["Drive, mm", "Voxels", "Misfit rms x, y, z, mm", "Force, N", "Model's force, N", "Difference, %"],
     result.steps.map((s) => [digits(s.drive_mm, 3), many(s.num_voxels), s.rms_mm.map((v) => digits(v, 2)).join(", "),
       digits(s.force_n, 4), digits(s.model_force_n, 4),
-      s.force_n && s.model_force_n !== null ? digits(100 * (s.model_force_n / s.force_n - 1), 2) : "–"])));
+      s.force_n && s.model_force_n !== null ? (100 * (s.model_force_n / s.force_n - 1)).toFixed(1) : "–"])));
 }
 
 function maps(result, files) {

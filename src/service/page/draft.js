@@ -6,6 +6,9 @@ const PARTS = ["specimen", "base", "material", "scan", "limits", "vary", "object
 
 const partsOf = (model) => Object.fromEntries(PARTS.filter((p) => model[p] !== undefined).map((p) => [p, model[p]]));
 
+/** A copy whose parts share nothing, so that the base stays as it is while the specimen is edited. */
+export const apart = (value) => JSON.parse(JSON.stringify(value));
+
 /** The plan that this browser keeps; nothing where there is none. */
 export function kept() {
   try { return JSON.parse(localStorage.getItem(KEY)); } catch { return null; }
@@ -18,7 +21,7 @@ export function keep(model) {
 
 /** Goes to the plan with some of its parts replaced. */
 export function usePlan(parts) {
-  keep({ ...kept(), ...JSON.parse(JSON.stringify(partsOf(parts))) });
+  keep({ ...kept(), ...apart(partsOf(parts)) });
   location.hash = "#/plan";
 }
 

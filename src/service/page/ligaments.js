@@ -29,11 +29,14 @@ function toEdges(holes, specimen, section, limit) {
   });
 }
 
-/** All places that break a limit. */
+/** All places that break a limit. Where a ligament has too few voxels, the thinnest one is the place. */
 export function brokenLigaments(model, section) {
   const { holes } = model.specimen;
   const { min_ligament_hole_hole_mm: between, min_ligament_hole_edge_mm: edge } = model.limits;
-  return [...betweenHoles(holes, between ?? 0), ...toEdges(holes, model.specimen, section, edge ?? 0)];
+  const thinnerThan = (a, b) => [...betweenHoles(holes, a), ...toEdges(holes, model.specimen, section, b)];
+  const found = thinnerThan(between ?? 0, edge ?? 0);
+  if (found.length > 0 || !model.brokenLimits?.includes("min_voxels_across_ligament")) return found;
+  return thinnerThan(Infinity, Infinity).sort((a, b) => a.value - b.value).slice(0, 1).map((one) => ({ ...one, limit: null }));
 }
 
 /** Holes whose diameter breaks a limit, by number. */

@@ -3,7 +3,7 @@
 import { Failure, getJson, post } from "./api.js";
 import { showCheck } from "./check.js";
 import { fill, h, more, sheet } from "./dom.js";
-import { Past, keep, kept, planOfFile, planOfLink } from "./draft.js";
+import { Past, apart, keep, kept, planOfFile, planOfLink } from "./draft.js";
 import { editor } from "./editor.js";
 import { markErrors } from "./field.js";
 import { livePanel } from "./live.js";
@@ -13,12 +13,11 @@ import { startJob } from "./start.js";
 import { sweepForm } from "./sweep.js";
 
 const CHECK_WAIT_MS = 180;
-const copy = (value) => structuredClone(value);
 
 /** A plan to begin with. */
 function fresh(library) {
   const study = library.studies[0];
-  return copy({
+  return apart({
     specimen: library.specimens[0], base: library.specimens[0], material: library.materials[0].material, scan: study.scan, limits: study.limits,
     vary: study.vary, objective: study.objective, budget: { explore: 40, refine: 3, iterations: 6, confirm: 4 }, draws: 0,
   });
@@ -47,7 +46,7 @@ const scanOf = (model, mesh) => ({ specimen: model.specimen, material: model.mat
 
 export async function planView(content, signal, from) {
   const library = await getJson("/v1/library");
-  const model = { ...fresh(library), ...await planOf(from, library), chosen: -1, brokenLimits: [] };
+  const model = { ...apart({ ...fresh(library), ...await planOf(from, library) }), chosen: -1, brokenLimits: [] };
   // A link or a job has given its plan; from here on it is the one that is kept, also over a reload.
   if (from) { keep(model); history.replaceState(null, "", "#/plan"); }
   const past = new Past(model);
@@ -98,7 +97,7 @@ export async function planView(content, signal, from) {
     check();
     live.hold();
   }
-  const replace = (parts) => { Object.assign(model, copy(parts)); past.push(); shown(); };
+  const replace = (parts) => { Object.assign(model, apart(parts)); past.push(); shown(); };
   const bar = planBar(model, past, study, { replace, restored: shown, fresh: () => replace(fresh(library)) });
 
   async function check() {
@@ -141,11 +140,11 @@ export async function planView(content, signal, from) {
     h("h2", {}, "Plan a specimen"), bar.element, problem,
     h("div", { class: "columns" },
       h("div", {},
-        h("section", { class: "sheet" },
+        h("section", { class: "sheet first" },
           h("div", { class: "row end" }, h("h3", {}, "Section"), h("button", { type: "button", onclick: () => draw.add() }, "Add a hole")), draw.element),
         sheet("Specimen", forms.specimen), sheet("Material", forms.material), sheet("Scan", forms.scan)),
       h("div", {},
-        sheet("What this sketch would give", live.element),
+        h("section", { class: "sheet second" }, h("h3", {}, "What this sketch would give"), live.element),
         sheet("Check", report),
         sheet("Evaluate this specimen",
           h("p", { class: "quiet" }, "What the scan would see, and how well it would tell the material."),

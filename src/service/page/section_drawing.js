@@ -78,9 +78,13 @@ function sideView(model, section, { text, side }) {
 
 /** Where limits are broken, with what is there and what is asked for. */
 function marks(model, section, { text }) {
+  const told = (value, limit) => {
+    if (limit === null) return "too few voxels";
+    return value < 0 ? `${digits(-value, 2)} mm too far` : `${digits(value, 2)} < ${plain(limit)} mm`;
+  };
   return brokenLigaments(model, section).map(({ from, to, value, limit }) => [
     line("broken", [from[0], -from[1]], [to[0], -to[1]]),
-    words(text, (from[0] + to[0]) / 2, -(from[1] + to[1]) / 2 - 0.4 * text, value < 0 ? `${digits(-value, 2)} mm too far` : `${digits(value, 2)} < ${plain(limit)} mm`, { class: "wrong" })]);
+    words(text, (from[0] + to[0]) / 2, -(from[1] + to[1]) / 2 - 0.4 * text, told(value, limit), { class: "wrong" })]);
 }
 
 /** Everything but the holes; `svg` takes its frame. */

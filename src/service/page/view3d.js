@@ -132,7 +132,7 @@ class View {
 
   draw() {
     const gl = this.gl;
-    if (!gl || !this.surfaceData.tint) return;
+    if (!gl || !this.surfaceData.tint || !this.canvas.isConnected) return;
     const { canvas, state } = this;
     const ratio = Math.min(2, devicePixelRatio || 1);
     canvas.width = Math.max(1, canvas.clientWidth * ratio);
