@@ -52,8 +52,18 @@ let count = 0;
 export function term(text, meaning) {
   if (!meaning) return text;
   const id = `term-${count += 1}`;
-  return h("span", { class: "term" }, h("button", { type: "button", "aria-describedby": id }, text),
-    h("span", { class: "tip", role: "tooltip", id }, meaning));
+  const tip = h("span", { class: "tip", role: "tooltip", id }, meaning);
+  const button = h("button", { type: "button", "aria-describedby": id }, text);
+  // Placed on the screen, so that no scrolling part of the page cuts it off.
+  const place = () => {
+    const box = button.getBoundingClientRect();
+    tip.style.left = `${Math.max(8, Math.min(box.left, innerWidth - Math.min(336, 0.9 * innerWidth)))}px`;
+    tip.style.top = `${box.bottom + 4}px`;
+  };
+  button.addEventListener("pointerenter", place);
+  button.addEventListener("focus", place);
+  button.addEventListener("keydown", (event) => { if (event.key === "Escape") button.blur(); });
+  return h("span", { class: "term" }, button, tip);
 }
 
 /** A sheet with a heading. */

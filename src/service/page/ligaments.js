@@ -2,8 +2,8 @@
 
 import { outlineAt } from "./outline.js";
 
-/** A place that breaks a limit: from, to (mm), value and limit (mm). */
-const broken = (from, to, value, limit) => ({ from, to, value, limit });
+/** A place that breaks a limit: from, to (mm), value and limit (mm), and where there is room for words. */
+const broken = (from, to, value, limit, room) => ({ from, to, value, limit, room });
 
 function betweenHoles(holes, limit) {
   const found = [];
@@ -13,7 +13,9 @@ function betweenHoles(holes, limit) {
     const value = apart - (a.diameter_mm + b.diameter_mm) / 2;
     if (value >= limit - 1e-9) return;
     const along = (hole, sign) => [0, 1].map((k) => hole.center_mm[k] + sign * [dx, dy][k] / apart * hole.diameter_mm / 2);
-    found.push(broken(along(a, 1), along(b, -1), value, limit));
+    const room = [0, 1].map((k) => (a.center_mm[k] + b.center_mm[k]) / 2);
+    room[1] += Math.max(a.diameter_mm, b.diameter_mm) / 2;
+    found.push(broken(along(a, 1), along(b, -1), value, limit, room));
   }));
   return found;
 }
@@ -25,7 +27,7 @@ function toEdges(holes, specimen, section, limit) {
     const half = outlineAt(specimen, section, x);
     return [[[x, y + r], [x, half], half - y - r], [[x, y - r], [x, -half], half + y - r],
       [[x + r, y], [section.length / 2, y], section.length / 2 - x - r], [[x - r, y], [-section.length / 2, y], section.length / 2 + x - r]]
-      .filter(([, , value]) => value < limit - 1e-9).map(([from, to, value]) => broken(from, to, value, limit));
+      .filter(([, , value]) => value < limit - 1e-9).map(([from, to, value]) => broken(from, to, value, limit, [x, y + r]));
   });
 }
 

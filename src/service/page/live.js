@@ -106,6 +106,7 @@ export function livePanel(model, signal, isSound) {
     clearTimeout(timer);
     state.turn += 1;
     if (state.isOn) status.textContent = "The figures below are those before the last edit.";
+    document.getElementById("live")?.classList.add("stale");
   };
   const update = (wait = WAIT_MS) => {
     hold();

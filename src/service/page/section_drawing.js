@@ -82,9 +82,10 @@ function marks(model, section, { text }) {
     if (limit === null) return "too few voxels";
     return value < 0 ? `${digits(-value, 2)} mm too far` : `${digits(value, 2)} < ${plain(limit)} mm`;
   };
-  return brokenLigaments(model, section).map(({ from, to, value, limit }) => [
+  const inside = (x) => Math.max(-section.length / 2 + 4 * text, Math.min(section.length / 2 - 4 * text, x));
+  return brokenLigaments(model, section).map(({ from, to, value, limit, room }) => [
     line("broken", [from[0], -from[1]], [to[0], -to[1]]),
-    words(text, (from[0] + to[0]) / 2, -(from[1] + to[1]) / 2 - 0.4 * text, told(value, limit), { class: "wrong" })]);
+    words(text, inside(room[0]), -room[1] - 0.5 * text, told(value, limit), { class: "wrong" })]);
 }
 
 /** Everything but the holes; `svg` takes its frame. */
