@@ -13,22 +13,41 @@ function verdict(found) {
 
 function meter(m) {
   const unit = LIMITS[m.name]?.[1] ?? "";
-  const text = m.name === "symmetry" ? (m.is_satisfied ? "kept" : "broken") : `${plain(m.value, 3)} / ${plain(m.limit, 3)}${unit ? ` ${unit}` : ""}`;
+  const text =
+    m.name === "symmetry"
+      ? m.is_satisfied
+        ? "kept"
+        : "broken"
+      : `${plain(m.value, 3)} / ${plain(m.limit, 3)}${unit ? ` ${unit}` : ""}`;
   const [words, , side] = LIMITS[m.name] ?? [m.name.replaceAll("_", " "), "", ""];
-  return h("div", { class: `meter${m.is_satisfied ? "" : " broken"}` },
-    h("span", {}, `${words}${side ? ` (${side})` : ""}${m.is_satisfied ? "" : ": broken"}`), h("span", {}, text),
-    h("div", { class: "bar" }, h("i", { width_percent: Math.max(2, Math.min(100, 50 * (1 + m.margin_relative))) })));
+  return h(
+    "div",
+    { class: `meter${m.is_satisfied ? "" : " broken"}` },
+    h("span", {}, `${words}${side ? ` (${side})` : ""}${m.is_satisfied ? "" : ": broken"}`),
+    h("span", {}, text),
+    h("div", { class: "bar" }, h("i", { width_percent: Math.max(2, Math.min(100, 50 * (1 + m.margin_relative))) })),
+  );
 }
 
-const cost = (c, volume) => h("p", { class: "quiet" }, `${many(c.num_voxels)} voxels, ${many(c.num_elements)} elements; an evaluation takes about `
-  + `${duration(1000 * c.seconds)} (a job of this service at most ${duration(1000 * c.most_seconds)}). ${digits(volume, 4)} mm³ of material.`);
+const cost = (c, volume) =>
+  h(
+    "p",
+    { class: "quiet" },
+    `${many(c.num_voxels)} voxels, ${many(c.num_elements)} elements; an evaluation takes about ` +
+      `${duration(1000 * c.seconds)} (a job of this service at most ${duration(1000 * c.most_seconds)}). ${digits(volume, 4)} mm³ of material.`,
+  );
 
 /** Shows what was found; `others` are the errors that have no field. */
 export function showCheck(element, found, others) {
   const [kind, words] = verdict(found);
-  fill(element, h("p", { class: kind, role: "status" }, words),
+  fill(
+    element,
+    h("p", { class: kind, role: "status" }, words),
     others.map((e) => h("p", { class: "bad" }, e.detail)),
     found.margins.map(meter),
-    found.unchecked.map((u) => h("p", { class: "quiet" }, `${limitWords(u.name)} (limit ${digits(u.limit, 3)}) was not checked: ${u.detail}`)),
-    found.cost && cost(found.cost, found.volume_mm3));
+    found.unchecked.map((u) =>
+      h("p", { class: "quiet" }, `${limitWords(u.name)} (limit ${digits(u.limit, 3)}) was not checked: ${u.detail}`),
+    ),
+    found.cost && cost(found.cost, found.volume_mm3),
+  );
 }

@@ -44,14 +44,16 @@ export function say(text) {
   const line = document.getElementById("message");
   line.textContent = text;
   clearTimeout(timer);
-  timer = setTimeout(() => { line.textContent = ""; }, 6000);
+  timer = setTimeout(() => {
+    line.textContent = "";
+  }, 6000);
 }
 
 let count = 0;
 /** A term with its meaning: shown on hover and focus, read by screen readers. */
 export function term(text, meaning) {
   if (!meaning) return text;
-  const id = `term-${count += 1}`;
+  const id = `term-${(count += 1)}`;
   const tip = h("span", { class: "tip", role: "tooltip", id }, meaning);
   const button = h("button", { type: "button", "aria-describedby": id }, text);
   // Placed on the screen, so that no scrolling part of the page cuts it off.
@@ -62,7 +64,9 @@ export function term(text, meaning) {
   };
   button.addEventListener("pointerenter", place);
   button.addEventListener("focus", place);
-  button.addEventListener("keydown", (event) => { if (event.key === "Escape") button.blur(); });
+  button.addEventListener("keydown", (event) => {
+    if (event.key === "Escape") button.blur();
+  });
   return h("span", { class: "term" }, button, tip);
 }
 

@@ -11,12 +11,20 @@ export const apart = (value) => JSON.parse(JSON.stringify(value));
 
 /** The plan that this browser keeps; nothing where there is none. */
 export function kept() {
-  try { return JSON.parse(localStorage.getItem(KEY)); } catch { return null; }
+  try {
+    return JSON.parse(localStorage.getItem(KEY));
+  } catch {
+    return null;
+  }
 }
 
 /** Keeps a plan in this browser. */
 export function keep(model) {
-  try { localStorage.setItem(KEY, JSON.stringify(partsOf(model))); } catch { /* a browser may keep nothing */ }
+  try {
+    localStorage.setItem(KEY, JSON.stringify(partsOf(model)));
+  } catch {
+    /* a browser may keep nothing */
+  }
 }
 
 /** Goes to the plan with some of its parts replaced. */
@@ -41,7 +49,9 @@ export class Past {
     this.at = this.steps.length - 1;
   }
 
-  can(by) { return this.steps[this.at + by] !== undefined; }
+  can(by) {
+    return this.steps[this.at + by] !== undefined;
+  }
 
   /** One step back (-1) or forth (1). */
   go(by) {
@@ -51,12 +61,19 @@ export class Past {
   }
 }
 
-const through = async (bytes, stream) => new Uint8Array(await new Response(new Blob([bytes]).stream().pipeThrough(stream)).arrayBuffer());
+const through = async (bytes, stream) =>
+  new Uint8Array(await new Response(new Blob([bytes]).stream().pipeThrough(stream)).arrayBuffer());
 
 /** A link that holds the whole plan: whoever opens it has it. */
 export async function linkOf(model) {
-  const bytes = await through(new TextEncoder().encode(JSON.stringify(partsOf(model))), new CompressionStream("deflate-raw"));
-  const text = btoa(String.fromCharCode(...bytes)).replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "");
+  const bytes = await through(
+    new TextEncoder().encode(JSON.stringify(partsOf(model))),
+    new CompressionStream("deflate-raw"),
+  );
+  const text = btoa(String.fromCharCode(...bytes))
+    .replaceAll("+", "-")
+    .replaceAll("/", "_")
+    .replaceAll("=", "");
   return `${location.origin}${location.pathname}#/plan/~${text}`;
 }
 
@@ -71,18 +88,32 @@ const FORMATS = {
   "specimen/1": (specimen) => ({ specimen }),
   "ogden/1": (material) => ({ material }),
   "study/1": (study) => ({
-    specimen: study.base, base: study.base, material: study.materials[0].material, scan: study.scan, limits: study.limits, vary: study.vary,
-    objective: study.objective, budget: study.budget, draws: study.verification?.is_on ? study.verification.draws : 0,
+    specimen: study.base,
+    base: study.base,
+    material: study.materials[0].material,
+    scan: study.scan,
+    limits: study.limits,
+    vary: study.vary,
+    objective: study.objective,
+    budget: study.budget,
+    draws: study.verification?.is_on ? study.verification.draws : 0,
   }),
 };
 
 /** The parts of a plan that a request or a file holds; an error in words where it holds none. */
 export function planOfFile(text) {
   let content;
-  try { content = JSON.parse(text); } catch { throw new Error("The file is not JSON."); }
+  try {
+    content = JSON.parse(text);
+  } catch {
+    throw new Error("The file is not JSON.");
+  }
   if (content.specimen) return partsOf(content);
   const read = FORMATS[content.schema];
-  if (!read) throw new Error(`Files of the formats ${Object.keys(FORMATS).join(", ")} can be opened; this one is ${content.schema ?? "none of them"}.`);
+  if (!read)
+    throw new Error(
+      `Files of the formats ${Object.keys(FORMATS).join(", ")} can be opened; this one is ${content.schema ?? "none of them"}.`,
+    );
   const parts = read(content);
   if (typeof parts.specimen === "string" || typeof parts.material === "string") {
     throw new Error("This study names other files; spell its specimen and materials out, or open those files.");

@@ -2,8 +2,14 @@
 
 import { unzip } from "./zip.js";
 
-const fileOf = (entry) => new Promise((resolve, reject) => { entry.file(resolve, reject); });
-const part = (reader) => new Promise((resolve, reject) => { reader.readEntries(resolve, reject); });
+const fileOf = (entry) =>
+  new Promise((resolve, reject) => {
+    entry.file(resolve, reject);
+  });
+const part = (reader) =>
+  new Promise((resolve, reject) => {
+    reader.readEntries(resolve, reject);
+  });
 
 /** All files below an entry of a drop. */
 async function below(entry) {
@@ -12,7 +18,7 @@ async function below(entry) {
   const found = [];
   // A reader gives a part at a time and ends with an empty one.
   for (let some = await part(reader); some.length > 0; some = await part(reader)) {
-    for (const one of some) found.push(...await below(one));
+    for (const one of some) found.push(...(await below(one)));
   }
   return found;
 }
@@ -26,7 +32,10 @@ export async function unpacked(files) {
 
 /** Makes an element a place to drop files on; `take(files)` is given them. */
 export function dropPlace(element, take) {
-  const over = (is) => (event) => { event.preventDefault(); element.classList.toggle("over", is); };
+  const over = (is) => (event) => {
+    event.preventDefault();
+    element.classList.toggle("over", is);
+  };
   element.addEventListener("dragover", over(true));
   element.addEventListener("dragleave", over(false));
   element.addEventListener("drop", async (event) => {

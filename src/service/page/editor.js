@@ -7,19 +7,35 @@ import { sectionOf } from "./outline.js";
 import { drawSection } from "./section_drawing.js";
 
 /** What ties holes by symmetry: the signs of the mirrors between them. */
-const MIRRORS = { mirror_x: [[-1, 1]], mirror_z: [[1, -1]], mirror_x_and_z: [[-1, 1], [1, -1], [-1, -1]], point: [[-1, -1]] };
-const HELP = "Drag a hole, or choose it with Tab and move it with the arrow keys; + and − change its size, Delete removes it. "
-  + "Where the limits ask for symmetry, mirrored holes move together.";
+const MIRRORS = {
+  mirror_x: [[-1, 1]],
+  mirror_z: [[1, -1]],
+  mirror_x_and_z: [
+    [-1, 1],
+    [1, -1],
+    [-1, -1],
+  ],
+  point: [[-1, -1]],
+};
+const HELP =
+  "Drag a hole, or choose it with Tab and move it with the arrow keys; + and − change its size, Delete removes it. " +
+  "Where the limits ask for symmetry, mirrored holes move together.";
 const round = (value) => Math.round(value * 20) / 20;
 
 /** The holes that symmetry ties to the one of this number, with the signs of the mirrors. */
 function images(model, index) {
   const holes = model.specimen.holes;
-  const { center_mm: [x, y], diameter_mm } = holes[index];
-  const isAt = (hole, m) => Math.abs(hole.center_mm[0] - m[0] * x) < 1e-6 && Math.abs(hole.center_mm[1] - m[1] * y) < 1e-6;
+  const {
+    center_mm: [x, y],
+    diameter_mm,
+  } = holes[index];
+  const isAt = (hole, m) =>
+    Math.abs(hole.center_mm[0] - m[0] * x) < 1e-6 && Math.abs(hole.center_mm[1] - m[1] * y) < 1e-6;
   return holes.flatMap((hole, other) => {
-    const signs = other === index || Math.abs(hole.diameter_mm - diameter_mm) > 1e-6 ? undefined
-      : (MIRRORS[model.limits.symmetry] ?? []).find((m) => isAt(hole, m));
+    const signs =
+      other === index || Math.abs(hole.diameter_mm - diameter_mm) > 1e-6
+        ? undefined
+        : (MIRRORS[model.limits.symmetry] ?? []).find((m) => isAt(hole, m));
     return signs ? [{ hole, signs }] : [];
   });
 }
@@ -35,7 +51,10 @@ export function editor(model, change) {
     const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
     return [point.x, -point.y];
   };
-  const edited = () => { draw(); change(); };
+  const edited = () => {
+    draw();
+    change();
+  };
   const move = (index, x, y) => {
     const { length, height } = sectionOf(model.specimen);
     const clamp = (value, half) => round(Math.max(-half, Math.min(half, value)));
@@ -61,7 +80,12 @@ export function editor(model, change) {
   const onKey = (index) => (event) => {
     const [x, y] = model.specimen.holes[index].center_mm;
     const step = event.shiftKey ? 1 : 0.1;
-    const to = { ArrowLeft: [x - step, y], ArrowRight: [x + step, y], ArrowUp: [x, y + step], ArrowDown: [x, y - step] }[event.key];
+    const to = {
+      ArrowLeft: [x - step, y],
+      ArrowRight: [x + step, y],
+      ArrowUp: [x, y + step],
+      ArrowDown: [x, y - step],
+    }[event.key];
     const by = { "+": 0.1, "=": 0.1, "-": -0.1 }[event.key];
     if (to) move(index, ...to);
     else if (by) resize(index, by);
@@ -76,13 +100,21 @@ export function editor(model, change) {
     const [x, y] = toMm(event);
     move(dragging.index, x - dragging.dx, y - dragging.dy);
   });
-  for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, () => { dragging = null; });
+  for (const end of ["pointerup", "pointercancel"])
+    svg.addEventListener(end, () => {
+      dragging = null;
+    });
 
   function circle(hole, index, wrong) {
     const classes = ["hole", index === model.chosen ? "chosen" : "", wrong ? "wrong" : ""].join(" ");
     const [x, y] = hole.center_mm;
     return s("circle", {
-      class: classes, cx: x, cy: -y, r: hole.diameter_mm / 2, tabindex: 0, role: "button",
+      class: classes,
+      cx: x,
+      cy: -y,
+      r: hole.diameter_mm / 2,
+      tabindex: 0,
+      role: "button",
       "aria-label": `Hole ${index + 1}, ${plain(hole.diameter_mm)} mm at ${plain(x)}, ${plain(y)} mm${wrong ? ", breaks a limit" : ""}`,
       onpointerdown: (event) => {
         const at = toMm(event);
@@ -90,7 +122,10 @@ export function editor(model, change) {
         model.chosen = index;
         svg.setPointerCapture(event.pointerId);
       },
-      onfocus: () => { model.chosen = index; }, onkeydown: onKey(index),
+      onfocus: () => {
+        model.chosen = index;
+      },
+      onkeydown: onKey(index),
     });
   }
 
@@ -98,33 +133,125 @@ export function editor(model, change) {
     const { under, over, text } = drawSection(svg, model);
     const sizes = wrongDiameters(model);
     const holes = model.specimen.holes.map((hole, i) => circle(hole, i, sizes.has(i) || model.wrong?.has(i)));
-    const labels = model.specimen.holes.map((hole, i) => s("text", { class: "in-hole", x: hole.center_mm[0], y: -hole.center_mm[1] + text / 3,
-      "font-size": Math.min(text, hole.diameter_mm / 3.2), "text-anchor": "middle" }, `${i + 1}: ⌀ ${plain(hole.diameter_mm, 4)}`));
+    const labels = model.specimen.holes.map((hole, i) =>
+      s(
+        "text",
+        {
+          class: "in-hole",
+          x: hole.center_mm[0],
+          y: -hole.center_mm[1] + text / 3,
+          "font-size": Math.min(text, hole.diameter_mm / 3.2),
+          "text-anchor": "middle",
+        },
+        `${i + 1}: ⌀ ${plain(hole.diameter_mm, 4)}`,
+      ),
+    );
     svg.replaceChildren(...[under, holes, labels, over].flat(Infinity));
     table();
   }
 
   function table() {
     const holes = model.specimen.holes;
-    const number = (hole, name, get, put) => h("input", {
-      type: "number", step: "any", value: get(hole), "aria-label": name,
-      onchange: (event) => { const v = Number(event.target.value); if (event.target.value !== "" && Number.isFinite(v)) { put(hole, v); edited(); } },
-    });
+    const number = (hole, name, get, put) =>
+      h("input", {
+        type: "number",
+        step: "any",
+        value: get(hole),
+        "aria-label": name,
+        onchange: (event) => {
+          const v = Number(event.target.value);
+          if (event.target.value !== "" && Number.isFinite(v)) {
+            put(hole, v);
+            edited();
+          }
+        },
+      });
     const other = sectionOf(model.specimen).up;
-    list.replaceChildren(holes.length === 0 ? h("p", { class: "quiet" }, "No holes.") : h("table", {},
-      h("thead", {}, h("tr", {}, ["Hole", "x, mm", `${other}, mm`, "Diameter, mm", h("span", { class: "hidden" }, "Remove")].map((t) => h("th", { scope: "col" }, t)))),
-      h("tbody", {}, holes.map((hole, index) => h("tr", {},
-        h("td", {}, String(index + 1)),
-        h("td", {}, number(hole, `x of hole ${index + 1}, mm`, (o) => o.center_mm[0], (o, v) => { o.center_mm[0] = v; })),
-        h("td", {}, number(hole, `${other} of hole ${index + 1}, mm`, (o) => o.center_mm[1], (o, v) => { o.center_mm[1] = v; })),
-        h("td", {}, number(hole, `diameter of hole ${index + 1}, mm`, (o) => o.diameter_mm, (o, v) => { o.diameter_mm = v; })),
-        h("td", {}, h("button", { type: "button", onclick: () => remove(index), "aria-label": `Remove hole ${index + 1}` }, "Remove")))))));
+    list.replaceChildren(
+      holes.length === 0
+        ? h("p", { class: "quiet" }, "No holes.")
+        : h(
+            "table",
+            {},
+            h(
+              "thead",
+              {},
+              h(
+                "tr",
+                {},
+                ["Hole", "x, mm", `${other}, mm`, "Diameter, mm", h("span", { class: "hidden" }, "Remove")].map((t) =>
+                  h("th", { scope: "col" }, t),
+                ),
+              ),
+            ),
+            h(
+              "tbody",
+              {},
+              holes.map((hole, index) =>
+                h(
+                  "tr",
+                  {},
+                  h("td", {}, String(index + 1)),
+                  h(
+                    "td",
+                    {},
+                    number(
+                      hole,
+                      `x of hole ${index + 1}, mm`,
+                      (o) => o.center_mm[0],
+                      (o, v) => {
+                        o.center_mm[0] = v;
+                      },
+                    ),
+                  ),
+                  h(
+                    "td",
+                    {},
+                    number(
+                      hole,
+                      `${other} of hole ${index + 1}, mm`,
+                      (o) => o.center_mm[1],
+                      (o, v) => {
+                        o.center_mm[1] = v;
+                      },
+                    ),
+                  ),
+                  h(
+                    "td",
+                    {},
+                    number(
+                      hole,
+                      `diameter of hole ${index + 1}, mm`,
+                      (o) => o.diameter_mm,
+                      (o, v) => {
+                        o.diameter_mm = v;
+                      },
+                    ),
+                  ),
+                  h(
+                    "td",
+                    {},
+                    h(
+                      "button",
+                      { type: "button", onclick: () => remove(index), "aria-label": `Remove hole ${index + 1}` },
+                      "Remove",
+                    ),
+                  ),
+                ),
+              ),
+            ),
+          ),
+    );
   }
 
-  return { element, draw, add: () => {
-    const { axis, height } = sectionOf(model.specimen);
-    model.specimen.holes.push({ axis, center_mm: [0, 0], diameter_mm: Math.max(1, round(0.25 * height)) });
-    model.chosen = model.specimen.holes.length - 1;
-    edited();
-  } };
+  return {
+    element,
+    draw,
+    add: () => {
+      const { axis, height } = sectionOf(model.specimen);
+      model.specimen.holes.push({ axis, center_mm: [0, 0], diameter_mm: Math.max(1, round(0.25 * height)) });
+      model.chosen = model.specimen.holes.length - 1;
+      edited();
+    },
+  };
 }

@@ -11,7 +11,10 @@ const number = (example) => (text) => {
 
 /** Numbers in one line. */
 const numbers = (example, count) => (text) => {
-  const values = text.split(/[\s,;]+/).filter(Boolean).map(Number);
+  const values = text
+    .split(/[\s,;]+/)
+    .filter(Boolean)
+    .map(Number);
   if (values.length === 0 || values.some((v) => !Number.isFinite(v)) || (count && values.length !== count)) {
     throw new Error(`give ${count ? `${count} ` : ""}numbers such as ${example}`);
   }
@@ -39,11 +42,17 @@ let made = 0;
  * was read. A value that cannot be read changes nothing.
  */
 export function field({ label, kind = "number", value, put, example = "5", pointer, meaning, wide, changed, ...more }) {
-  const id = `field-${made += 1}`;
+  const id = `field-${(made += 1)}`;
   const wrong = h("span", { class: "wrong-field", id: `${id}-wrong`, role: "alert" });
   const name = label.split(",")[0];
-  const input = h("input", { id, value: value ?? "", "data-pointer": pointer, "aria-describedby": `${id}-wrong`, inputmode: kind === "text" ? null : "decimal",
-    ...more, onchange: () => {
+  const input = h("input", {
+    id,
+    value: value ?? "",
+    "data-pointer": pointer,
+    "aria-describedby": `${id}-wrong`,
+    inputmode: kind === "text" ? null : "decimal",
+    ...more,
+    onchange: () => {
       try {
         put(READERS[kind](example)(input.value));
         mark(input, "");
@@ -51,18 +60,28 @@ export function field({ label, kind = "number", value, put, example = "5", point
       } catch (error) {
         mark(input, `${name}: ${error.message}`);
       }
-    } });
-  return h("div", { class: wide ? "field wide" : "field" }, h("div", { class: "row tight" }, h("label", { for: id }, label), meaning && term("?", meaning)), input, wrong);
+    },
+  });
+  return h(
+    "div",
+    { class: wide ? "field wide" : "field" },
+    h("div", { class: "row tight" }, h("label", { for: id }, label), meaning && term("?", meaning)),
+    input,
+    wrong,
+  );
 }
 
 /** Says what is wrong with a field; nothing takes it back. */
 function mark(input, words) {
-  if (words) input.setAttribute("aria-invalid", "true"); else input.removeAttribute("aria-invalid");
+  if (words) input.setAttribute("aria-invalid", "true");
+  else input.removeAttribute("aria-invalid");
   fill(document.getElementById(`${input.id}-wrong`) ?? input.nextElementSibling, words);
 }
 
 /** The service's words about a field: its value, what is allowed, what to change. */
-const wordsOf = (error) => error.detail || [error.value && `${error.value} is not allowed`, error.allowed, error.remedy].filter(Boolean).join("; ");
+const wordsOf = (error) =>
+  error.detail ||
+  [error.value && `${error.value} is not allowed`, error.allowed, error.remedy].filter(Boolean).join("; ");
 
 /** Shows errors of the service at their fields; the ones that have no field are given back. */
 export function markErrors(root, errors) {
@@ -70,7 +89,9 @@ export function markErrors(root, errors) {
   for (const input of inputs) if (input.hasAttribute("aria-invalid")) mark(input, "");
   return errors.filter((error) => {
     const pointer = (error.pointer ?? "").replace(/^\/base(?=\/|$)/, "/specimen").replace(/^\/materials\/0/, "");
-    const input = inputs.find((one) => pointer === one.dataset.pointer || pointer.startsWith(`${one.dataset.pointer}/`));
+    const input = inputs.find(
+      (one) => pointer === one.dataset.pointer || pointer.startsWith(`${one.dataset.pointer}/`),
+    );
     if (input) mark(input, wordsOf(error));
     return !input;
   });
@@ -78,8 +99,22 @@ export function markErrors(root, errors) {
 
 /** A choice among [[value, words]]. */
 export function choice({ label, options, value, put, meaning, wide, changed, ...more }) {
-  const id = `field-${made += 1}`;
-  return h("div", { class: wide ? "field wide" : "field" }, h("div", { class: "row tight" }, h("label", { for: id }, label), meaning && term("?", meaning)),
-    h("select", { id, ...more, onchange: (event) => { put(event.target.value); changed?.(); } },
-      options.map(([key, text]) => h("option", { value: key, selected: String(key) === String(value) }, text))));
+  const id = `field-${(made += 1)}`;
+  return h(
+    "div",
+    { class: wide ? "field wide" : "field" },
+    h("div", { class: "row tight" }, h("label", { for: id }, label), meaning && term("?", meaning)),
+    h(
+      "select",
+      {
+        id,
+        ...more,
+        onchange: (event) => {
+          put(event.target.value);
+          changed?.();
+        },
+      },
+      options.map(([key, text]) => h("option", { value: key, selected: String(key) === String(value) }, text)),
+    ),
+  );
 }

@@ -5,9 +5,21 @@ import { h } from "./dom.js";
 
 /** Inks of the figures on white paper, and what stands for them on dark paper. */
 const DARK_INKS = {
-  "#ffffff": "#1c2027", "#fff": "#1c2027", "#222222": "#e6e9ee", "#111": "#e6e9ee", "#335": "#a9b7e8", "#666666": "#a3adbd",
-  "#777": "#a3adbd", "#8c8c8c": "#7d8899", "#e8e8e8": "#333a45", "#f3f3f1": "#2a303a", "#c6c6c4": "#566073",
-  "#76848f": "#a9b6c2", "#20639b": "#6cb2ff", "#b3261e": "#ff8a80", "#c8511b": "#ff9255",
+  "#ffffff": "#1c2027",
+  "#fff": "#1c2027",
+  "#222222": "#e6e9ee",
+  "#111": "#e6e9ee",
+  "#335": "#a9b7e8",
+  "#666666": "#a3adbd",
+  "#777": "#a3adbd",
+  "#8c8c8c": "#7d8899",
+  "#e8e8e8": "#333a45",
+  "#f3f3f1": "#2a303a",
+  "#c6c6c4": "#566073",
+  "#76848f": "#a9b6c2",
+  "#20639b": "#6cb2ff",
+  "#b3261e": "#ff8a80",
+  "#c8511b": "#ff9255",
 };
 const dark = matchMedia("(prefers-color-scheme: dark)");
 
@@ -27,7 +39,9 @@ function darkened(text) {
     const [x, y] = place(tag, ["x", "y"]);
     return fields.some((f) => x >= f.x && x <= f.x + f.width && y >= f.y && y <= f.y + f.height);
   };
-  const sheets = text.replace(/<style>[^<]*<\/style>/g, (sheet) => sheet.replace(/#[0-9a-f]+/g, (ink) => DARK_INKS[ink] ?? ink));
+  const sheets = text.replace(/<style>[^<]*<\/style>/g, (sheet) =>
+    sheet.replace(/#[0-9a-f]+/g, (ink) => DARK_INKS[ink] ?? ink),
+  );
   return sheets.replace(/<\/?([a-z]+)[^>]*>/g, (tag, name) => {
     if (name === "g") fields = [];
     const field = name === "rect" && fieldOf(tag);
@@ -44,7 +58,10 @@ export function figureOf(text, caption) {
     URL.revokeObjectURL(image.src);
     image.src = URL.createObjectURL(new Blob([dark.matches ? darkened(text) : text], { type: "image/svg+xml" }));
   };
-  const follow = () => { if (image.isConnected) show(); else dark.removeEventListener("change", follow); };
+  const follow = () => {
+    if (image.isConnected) show();
+    else dark.removeEventListener("change", follow);
+  };
   show();
   dark.addEventListener("change", follow);
   return h("figure", {}, image, h("figcaption", {}, caption));
@@ -59,5 +76,8 @@ export async function figure(files, name, caption) {
 /** A sheet of figures: [[file, caption]]. */
 export async function figureSheet(files, wanted) {
   const figures = (await Promise.all(wanted.map(([name, caption]) => figure(files, name, caption)))).filter(Boolean);
-  return figures.length > 0 && h("section", { class: "sheet" }, h("div", { class: figures.length > 1 ? "halves" : null }, figures));
+  return (
+    figures.length > 0 &&
+    h("section", { class: "sheet" }, h("div", { class: figures.length > 1 ? "halves" : null }, figures))
+  );
 }

@@ -3,7 +3,12 @@
 /** Corners of a rectangle: the axis that it stands on, where, and its half extents along the other two. */
 function rectangle(axis, at, [a, b]) {
   const others = [0, 1, 2].filter((k) => k !== axis);
-  return [[-a, -b], [a, -b], [a, b], [-a, b]].map(([u, v]) => {
+  return [
+    [-a, -b],
+    [a, -b],
+    [a, b],
+    [-a, b],
+  ].map(([u, v]) => {
     const p = [0, 0, 0];
     p[axis] = at;
     p[others[0]] = u;
@@ -15,11 +20,12 @@ function rectangle(axis, at, [a, b]) {
 const closed = (points) => points.flatMap((p, i) => [p, points[(i + 1) % points.length]]);
 
 /** Extents of a surface, mm: half along each axis. */
-const halves = (reference) => [0, 1, 2].map((k) => {
-  let most = 0;
-  for (let i = k; i < reference.length; i += 3) most = Math.max(most, Math.abs(reference[i]));
-  return most;
-});
+const halves = (reference) =>
+  [0, 1, 2].map((k) => {
+    let most = 0;
+    for (let i = k; i < reference.length; i += 3) most = Math.max(most, Math.abs(reference[i]));
+    return most;
+  });
 
 /** An arrow along x from `start`. */
 function arrow([x, y, z], length) {
@@ -54,6 +60,9 @@ export function frameOf(surface) {
   const moving = closed(rectangle(axis, 1.01 * half[axis], others));
   const start = axis === 1 ? [0, 1.01 * half[1], 1.25 * half[2]] : [half[0], 0, 1.4 * half[2]];
   const drive = [surface.drive_mm, 0, 0];
-  const lines = [...fixed.map((p) => [p, [0, 0, 0]]), ...[...moving, ...arrow(start, Math.max(0.3 * half[0], surface.drive_mm))].map((p) => [p, drive])];
+  const lines = [
+    ...fixed.map((p) => [p, [0, 0, 0]]),
+    ...[...moving, ...arrow(start, Math.max(0.3 * half[0], surface.drive_mm))].map((p) => [p, drive]),
+  ];
   return { at: new Float32Array(lines.flatMap((l) => l[0])), moved: new Float32Array(lines.flatMap((l) => l[1])) };
 }

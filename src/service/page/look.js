@@ -8,7 +8,10 @@ import { slicesView } from "./slices.js";
 
 /** Columns of a CSV file by their names. */
 function columns(text) {
-  const [head, ...rows] = text.trim().split(/\r?\n/).map((l) => l.split(","));
+  const [head, ...rows] = text
+    .trim()
+    .split(/\r?\n/)
+    .map((l) => l.split(","));
   return Object.fromEntries(head.map((name, i) => [name.trim(), rows.map((r) => Number(r[i]))]));
 }
 
@@ -16,11 +19,32 @@ async function loadCurve(file, steps) {
   const { time_s: time, drive_mm: drive, force_n: force } = columns(await file.text());
   if (!time || !force) return null;
   const held = steps.filter((s) => Number.isFinite(s.force_n));
-  const over = (list, marks, words) => linePlot(list.map((v, i) => [v, force[i]]).filter((p) => p.every(Number.isFinite)), words, "force, N", marks);
-  return sheet("The load cell", h("div", { class: "halves" },
-    over(time, held.filter((s) => s.window_s).map((s) => [(s.window_s[0] + s.window_s[1]) / 2, s.force_n]), "time, s"),
-    drive && over(drive, held.map((s) => [s.drive_mm, s.force_n]), "drive, mm")),
-  h("p", { class: "quiet" }, "Dots are the forces that the recording gives for its drives."));
+  const over = (list, marks, words) =>
+    linePlot(
+      list.map((v, i) => [v, force[i]]).filter((p) => p.every(Number.isFinite)),
+      words,
+      "force, N",
+      marks,
+    );
+  return sheet(
+    "The load cell",
+    h(
+      "div",
+      { class: "halves" },
+      over(
+        time,
+        held.filter((s) => s.window_s).map((s) => [(s.window_s[0] + s.window_s[1]) / 2, s.force_n]),
+        "time, s",
+      ),
+      drive &&
+        over(
+          drive,
+          held.map((s) => [s.drive_mm, s.force_n]),
+          "drive, mm",
+        ),
+    ),
+    h("p", { class: "quiet" }, "Dots are the forces that the recording gives for its drives."),
+  );
 }
 
 /** What the files of a recording hold. */
@@ -30,13 +54,31 @@ export async function look(files) {
   const recording = JSON.parse(await byName.get("recording.json").text());
   const steps = recording.steps ?? [];
   const named = (s) => [s.displacement].flat().filter((n) => typeof n === "string" && byName.has(n));
-  const sets = steps.flatMap((s) => named(s).map((name) => ({ label: `drive ${plain(s.drive_mm, 4)} mm`, panels: [{ label: "Displacement as recorded", blob: byName.get(name) }] })));
+  const sets = steps.flatMap((s) =>
+    named(s).map((name) => ({
+      label: `drive ${plain(s.drive_mm, 4)} mm`,
+      panels: [{ label: "Displacement as recorded", blob: byName.get(name) }],
+    })),
+  );
   return [
-    sheet(recording.id ?? "Recording",
-      h("p", { class: "quiet" }, `${recording.specimen?.name ?? "a specimen"}, ${files.length} files, ${digits(files.reduce((sum, f) => sum + f.size, 0) / 1e6, 3)} MB`),
-      table(["Drive, mm", "Force, N", "± N"], steps.map((s) => [plain(s.drive_mm, 4), digits(s.force_n), digits(s.force_sd_n, 2)]))),
-    sets.length > 0 ? slicesView("The displacement, drive by drive", sets)
-      : sheet("Maps", h("p", { class: "quiet" }, "This recording holds raw phases; they become displacements by an import.")),
-    byName.has("load.csv") && await loadCurve(byName.get("load.csv"), steps),
+    sheet(
+      recording.id ?? "Recording",
+      h(
+        "p",
+        { class: "quiet" },
+        `${recording.specimen?.name ?? "a specimen"}, ${files.length} files, ${digits(files.reduce((sum, f) => sum + f.size, 0) / 1e6, 3)} MB`,
+      ),
+      table(
+        ["Drive, mm", "Force, N", "± N"],
+        steps.map((s) => [plain(s.drive_mm, 4), digits(s.force_n), digits(s.force_sd_n, 2)]),
+      ),
+    ),
+    sets.length > 0
+      ? slicesView("The displacement, drive by drive", sets)
+      : sheet(
+          "Maps",
+          h("p", { class: "quiet" }, "This recording holds raw phases; they become displacements by an import."),
+        ),
+    byName.has("load.csv") && (await loadCurve(byName.get("load.csv"), steps)),
   ];
 }

@@ -21,7 +21,8 @@ async function show() {
   const id = rest.join("/");
   for (const link of document.querySelectorAll("nav a")) {
     const isHere = link.hash === `#/${UNDER[view] ?? view}`;
-    if (isHere) link.setAttribute("aria-current", "page"); else link.removeAttribute("aria-current");
+    if (isHere) link.setAttribute("aria-current", "page");
+    else link.removeAttribute("aria-current");
   }
   fill(content, h("p", { class: "quiet" }, "Loading …"));
   try {
@@ -35,8 +36,15 @@ async function show() {
   }
 }
 
-addEventListener("hashchange", () => { show().then(() => content.focus()); });
+addEventListener("hashchange", () => {
+  show().then(() => content.focus());
+});
 show();
-getJson("/v1/me").then((me) => {
-  document.getElementById("who").textContent = me.needs_token ? `${me.name} (${me.role}) · ${me.version}` : `lambdak ${me.version}`;
-}, () => {});
+getJson("/v1/me").then(
+  (me) => {
+    document.getElementById("who").textContent = me.needs_token
+      ? `${me.name} (${me.role}) · ${me.version}`
+      : `lambdak ${me.version}`;
+  },
+  () => {},
+);

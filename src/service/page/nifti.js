@@ -4,8 +4,14 @@
 export const unzipped = async (blob) =>
   new Response(blob.stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
 
-const READERS = { 2: ["getUint8", 1], 4: ["getInt16", 2], 8: ["getInt32", 4], 16: ["getFloat32", 4], 64: ["getFloat64", 8],
-  512: ["getUint16", 2] };
+const READERS = {
+  2: ["getUint8", 1],
+  4: ["getInt16", 2],
+  8: ["getInt32", 4],
+  16: ["getFloat32", 4],
+  64: ["getFloat64", 8],
+  512: ["getUint16", 2],
+};
 
 /** The values of an image; single precision is taken as it lies. */
 function valuesOf(bytes, view, offset, count) {
@@ -27,19 +33,29 @@ export async function readImage(blob) {
   const components = dim(5);
   const values = valuesOf(bytes, view, view.getFloat32(108, true), shape[0] * shape[1] * shape[2] * components);
   return {
-    shape, components, values, bounds: bounds(values, shape), voxel: [1, 2, 3].map((n) => view.getFloat32(76 + 4 * n, true)),
+    shape,
+    components,
+    values,
+    bounds: bounds(values, shape),
+    voxel: [1, 2, 3].map((n) => view.getFloat32(76 + 4 * n, true)),
     origin: [0, 1, 2].map((n) => view.getFloat32(292 + 16 * n, true)),
   };
 }
 
 /** First and last place along each axis where there is a value: maps leave out the empty margin. */
 function bounds(values, [nx, ny, nz]) {
-  const found = [[nx, -1], [ny, -1], [nz, -1]];
+  const found = [
+    [nx, -1],
+    [ny, -1],
+    [nz, -1],
+  ];
   for (let z = 0, i = 0; z < nz; z += 1) {
     for (let y = 0; y < ny; y += 1) {
       for (let x = 0; x < nx; x += 1, i += 1) {
         if (!Number.isFinite(values[i])) continue;
-        [x, y, z].forEach((p, a) => { found[a] = [Math.min(found[a][0], p), Math.max(found[a][1], p)]; });
+        [x, y, z].forEach((p, a) => {
+          found[a] = [Math.min(found[a][0], p), Math.max(found[a][1], p)];
+        });
       }
     }
   }
@@ -68,22 +84,35 @@ export function slice(image, component, [across, up, through], index) {
 /** Root mean square of the values that there are. */
 export function rms(values) {
   let [sum, count] = [0, 0];
-  for (const v of values) if (Number.isFinite(v)) { sum += v * v; count += 1; }
+  for (const v of values)
+    if (Number.isFinite(v)) {
+      sum += v * v;
+      count += 1;
+    }
   return count ? Math.sqrt(sum / count) : NaN;
 }
 
 /** The 99th percentile of |value| of a component. */
 export function reach(image, component) {
   const size = image.values.length / image.components;
-  const all = image.values.subarray(component * size, (component + 1) * size).filter(Number.isFinite).map(Math.abs).sort();
+  const all = image.values
+    .subarray(component * size, (component + 1) * size)
+    .filter(Number.isFinite)
+    .map(Math.abs)
+    .sort();
   return all.length ? all[Math.floor(0.99 * (all.length - 1))] : 0;
 }
 
 /** The sum of squared differences from the mean: how much of a pattern a slice shows. */
 function pattern(values) {
   let [sum, squares, count] = [0, 0, 0];
-  for (const v of values) if (Number.isFinite(v)) { sum += v; squares += v * v; count += 1; }
-  return count ? squares - sum * sum / count : 0;
+  for (const v of values)
+    if (Number.isFinite(v)) {
+      sum += v;
+      squares += v * v;
+      count += 1;
+    }
+  return count ? squares - (sum * sum) / count : 0;
 }
 
 /** Component, plane and slice in which there is the most to see. */

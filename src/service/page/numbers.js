@@ -47,7 +47,8 @@ export function interval(ends, unit = "") {
   if (high === null) return `above ${digits(low, 3)}${behind}`;
   const width = high - low;
   const isWide = !(width > 0) || Math.max(Math.abs(low), Math.abs(high)) >= 1e5;
-  const text = (v) => (isWide || width > Math.abs(low + high) || Math.abs(v) < width / 20 ? digits(v, 2) : v.toFixed(decimals(width)));
+  const text = (v) =>
+    isWide || width > Math.abs(low + high) || Math.abs(v) < width / 20 ? digits(v, 2) : v.toFixed(decimals(width));
   return `${text(low)} to ${text(high)}${behind}`;
 }
 
@@ -81,4 +82,4 @@ export function symbol(name) {
 }
 
 /** The unit of a material's parameter. */
-export const unitOf = (name) => ({ mu: "kPa", kappa: "kPa" }[name.split("_")[0]] ?? "");
+export const unitOf = (name) => ({ mu: "kPa", kappa: "kPa" })[name.split("_")[0]] ?? "";

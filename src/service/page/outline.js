@@ -5,7 +5,14 @@ export function sectionOf(specimen) {
   const axis = specimen.holes[0]?.axis ?? "thickness";
   const { length_mm: length, thickness_mm: thickness, width_mm: width } = specimen.block;
   const isFront = axis !== "width";
-  return { axis, length, height: isFront ? width : thickness, depth: isFront ? thickness : width, up: isFront ? "z" : "y", through: isFront ? "y" : "z" };
+  return {
+    axis,
+    length,
+    height: isFront ? width : thickness,
+    depth: isFront ? thickness : width,
+    up: isFront ? "z" : "y",
+    through: isFront ? "y" : "z",
+  };
 }
 
 const isDumbbell = (specimen, section) => specimen.outline === "iso37_type4" && section.up === "z";
@@ -31,7 +38,7 @@ export function outlinePath(specimen, section) {
   const half = section.length / 2;
   const count = isDumbbell(specimen, section) ? 140 : 1;
   const upper = Array.from({ length: count + 1 }, (_, i) => {
-    const x = -half + section.length * i / count;
+    const x = -half + (section.length * i) / count;
     return [x, outlineAt(specimen, section, x)];
   });
   const points = [...upper, ...[...upper].reverse().map(([x, y]) => [x, -y])];

@@ -18,8 +18,15 @@ const CHECK_WAIT_MS = 180;
 function fresh(library) {
   const study = library.studies[0];
   return apart({
-    specimen: library.specimens[0], base: library.specimens[0], material: library.materials[0].material, scan: study.scan, limits: study.limits,
-    vary: study.vary, objective: study.objective, budget: { explore: 40, refine: 3, iterations: 6, confirm: 4 }, draws: 0,
+    specimen: library.specimens[0],
+    base: library.specimens[0],
+    material: library.materials[0].material,
+    scan: study.scan,
+    limits: study.limits,
+    vary: study.vary,
+    objective: study.objective,
+    budget: { explore: 40, refine: 3, iterations: 6, confirm: 4 },
+    draws: 0,
   });
 }
 
@@ -33,26 +40,48 @@ async function planOf(from, library) {
 /** The study of a plan. */
 function study(model) {
   return {
-    schema: "study/1", name: model.specimen.name, base: model.specimen,
+    schema: "study/1",
+    name: model.specimen.name,
+    base: model.specimen,
     materials: [{ name: "material", material: model.material, relative_sd: 0, weight: 1 }],
-    scan: model.scan, vary: { ...model.vary, tests: [model.specimen.test] }, limits: model.limits, objective: model.objective,
-    budget: model.budget, verification: { is_on: model.draws > 0, draws: Math.max(1, model.draws) }, seed: 1,
+    scan: model.scan,
+    vary: { ...model.vary, tests: [model.specimen.test] },
+    limits: model.limits,
+    objective: model.objective,
+    budget: model.budget,
+    verification: { is_on: model.draws > 0, draws: Math.max(1, model.draws) },
+    seed: 1,
   };
 }
 
 const evaluationOf = (model, mesh) => ({ specimen: model.specimen, material: model.material, scan: model.scan, mesh });
-const scanOf = (model, mesh) => ({ specimen: model.specimen, material: model.material, voxel_mm: model.scan.voxel_mm,
-  noise_sd_mm: model.scan.noise_sd_mm, force_sd_n: model.scan.force_sd_n, mesh });
+const scanOf = (model, mesh) => ({
+  specimen: model.specimen,
+  material: model.material,
+  voxel_mm: model.scan.voxel_mm,
+  noise_sd_mm: model.scan.noise_sd_mm,
+  force_sd_n: model.scan.force_sd_n,
+  mesh,
+});
 
 export async function planView(content, signal, from) {
   const library = await getJson("/v1/library");
-  const model = { ...apart({ ...fresh(library), ...await planOf(from, library) }), chosen: -1, brokenLimits: [] };
+  const model = { ...apart({ ...fresh(library), ...(await planOf(from, library)) }), chosen: -1, brokenLimits: [] };
   // A link or a job has given its plan; from here on it is the one that is kept, also over a reload.
-  if (from) { keep(model); history.replaceState(null, "", "#/plan"); }
+  if (from) {
+    keep(model);
+    history.replaceState(null, "", "#/plan");
+  }
   const past = new Past(model);
   const report = h("div", { role: "region", "aria-label": "Limits and cost" });
   const problem = h("div", { role: "alert" });
-  const forms = { specimen: h("div", {}), material: h("div", {}), scan: h("div", {}), limits: h("div", {}), goal: h("div", {}) };
+  const forms = {
+    specimen: h("div", {}),
+    material: h("div", {}),
+    scan: h("div", {}),
+    limits: h("div", {}),
+    goal: h("div", {}),
+  };
   let [timer, number, isSound] = [undefined, 0, true];
   signal.addEventListener("abort", () => clearTimeout(timer));
 
@@ -81,7 +110,10 @@ export async function planView(content, signal, from) {
     past.push();
     keep(model);
     bar.update();
-    if (isForm) { refreshForms(); draw.draw(); }
+    if (isForm) {
+      refreshForms();
+      draw.draw();
+    }
     clearTimeout(timer);
     timer = setTimeout(check, CHECK_WAIT_MS);
     live.hold();
@@ -97,18 +129,26 @@ export async function planView(content, signal, from) {
     check();
     live.hold();
   }
-  const replace = (parts) => { Object.assign(model, apart(parts)); past.push(); shown(); };
+  const replace = (parts) => {
+    Object.assign(model, apart(parts));
+    past.push();
+    shown();
+  };
   const bar = planBar(model, past, study, { replace, restored: shown, fresh: () => replace(fresh(library)) });
 
   async function check() {
-    const mine = number += 1;
+    const mine = (number += 1);
     const { specimen, limits, material, scan } = model;
     try {
       const found = await post("/v1/specimens/check", { specimen, limits, voxel_mm: scan.voxel_mm, material });
       if (mine !== number) return;
       isSound = found.errors.length === 0;
       live.update();
-      model.wrong = new Set(found.errors.flatMap((e) => [...`${e.pointer} ${e.detail}`.matchAll(/holes?[/[ ]?(\d+)/g)].map((m) => Number(m[1]))));
+      model.wrong = new Set(
+        found.errors.flatMap((e) =>
+          [...`${e.pointer} ${e.detail}`.matchAll(/holes?[/[ ]?(\d+)/g)].map((m) => Number(m[1])),
+        ),
+      );
       model.brokenLimits = found.margins.filter((m) => !m.is_satisfied).map((m) => m.name);
       showCheck(report, found, markErrors(content, found.errors));
       draw.draw();
@@ -121,41 +161,121 @@ export async function planView(content, signal, from) {
   }
 
   function showProblem(element, error) {
-    const errors = error instanceof Failure ? error.problem.errors ?? [] : [];
+    const errors = error instanceof Failure ? (error.problem.errors ?? []) : [];
     const others = markErrors(content, errors);
-    fill(element, h("p", { class: "bad" }, errors.length > others.length ? "Some fields hold what is not allowed; it is said at each." : error.message),
-      others.map((e) => h("p", { class: "bad" }, `${e.pointer || "The whole"}: ${e.detail ?? ""}`)));
+    fill(
+      element,
+      h(
+        "p",
+        { class: "bad" },
+        errors.length > others.length ? "Some fields hold what is not allowed; it is said at each." : error.message,
+      ),
+      others.map((e) => h("p", { class: "bad" }, `${e.pointer || "The whole"}: ${e.detail ?? ""}`)),
+    );
   }
 
   const mesh = { value: "standard" };
-  const start = (label, id, kind, body, isMain = true) => h("button", { type: "button", class: isMain ? "main" : null, id, onclick: async (event) => {
-    const button = event.currentTarget;
-    button.disabled = true;
-    fill(problem);
-    try { await startJob(kind, body()); } catch (error) { showProblem(problem, error); problem.scrollIntoView({ block: "nearest" }); }
-    button.disabled = false;
-  } }, label);
+  const start = (label, id, kind, body, isMain = true) =>
+    h(
+      "button",
+      {
+        type: "button",
+        class: isMain ? "main" : null,
+        id,
+        onclick: async (event) => {
+          const button = event.currentTarget;
+          button.disabled = true;
+          fill(problem);
+          try {
+            await startJob(kind, body());
+          } catch (error) {
+            showProblem(problem, error);
+            problem.scrollIntoView({ block: "nearest" });
+          }
+          button.disabled = false;
+        },
+      },
+      label,
+    );
 
-  fill(content,
-    h("h2", {}, "Plan a specimen"), bar.element, problem,
-    h("div", { class: "columns" },
-      h("div", {},
-        h("section", { class: "sheet first" },
-          h("div", { class: "row end" }, h("h3", {}, "Section"), h("button", { type: "button", onclick: () => draw.add() }, "Add a hole")), draw.element),
-        sheet("Specimen", forms.specimen), sheet("Material", forms.material), sheet("Scan", forms.scan)),
-      h("div", {},
+  fill(
+    content,
+    h("h2", {}, "Plan a specimen"),
+    bar.element,
+    problem,
+    h(
+      "div",
+      { class: "columns" },
+      h(
+        "div",
+        {},
+        h(
+          "section",
+          { class: "sheet first" },
+          h(
+            "div",
+            { class: "row end" },
+            h("h3", {}, "Section"),
+            h("button", { type: "button", onclick: () => draw.add() }, "Add a hole"),
+          ),
+          draw.element,
+        ),
+        sheet("Specimen", forms.specimen),
+        sheet("Material", forms.material),
+        sheet("Scan", forms.scan),
+      ),
+      h(
+        "div",
+        {},
         h("section", { class: "sheet second" }, h("h3", {}, "What this sketch would give"), live.element),
         sheet("Check", report),
-        sheet("Evaluate this specimen",
+        sheet(
+          "Evaluate this specimen",
           h("p", { class: "quiet" }, "What the scan would see, and how well it would tell the material."),
-          h("div", { class: "row" },
+          h(
+            "div",
+            { class: "row" },
             start("Evaluate", "evaluate", "evaluations", () => evaluationOf(model, mesh.value)),
-            h("div", {}, h("select", { "aria-label": "Mesh", onchange: (e) => { mesh.value = e.target.value; } }, ["standard", "search", "fine"].map((m) => h("option", { value: m }, `${m} mesh`)))),
-            start("Scan it synthetically", "scan", "scans", () => scanOf(model, mesh.value), false)),
-          h("p", { class: "quiet" }, "A synthetic scan becomes a recording to calibrate on.")),
-        sheet("Sweep", sweep.element, h("p", {}, start("Sweep", "sweep", "sweeps", () => sweep.body(mesh.value)))),
-        sheet("Search for a better one", forms.goal, more("Limits of what can be made", forms.limits),
-          h("p", {}, start("Search", "design", "designs", () => study(model)))))));
+            h(
+              "div",
+              {},
+              h(
+                "select",
+                {
+                  "aria-label": "Mesh",
+                  onchange: (e) => {
+                    mesh.value = e.target.value;
+                  },
+                },
+                ["standard", "search", "fine"].map((m) => h("option", { value: m }, `${m} mesh`)),
+              ),
+            ),
+            start("Scan it synthetically", "scan", "scans", () => scanOf(model, mesh.value), false),
+          ),
+          h("p", { class: "quiet" }, "A synthetic scan becomes a recording to calibrate on."),
+        ),
+        sheet(
+          "Sweep",
+          sweep.element,
+          h(
+            "p",
+            {},
+            start("Sweep", "sweep", "sweeps", () => sweep.body(mesh.value)),
+          ),
+        ),
+        sheet(
+          "Search for a better one",
+          forms.goal,
+          more("Limits of what can be made", forms.limits),
+          h(
+            "p",
+            {},
+            start("Search", "design", "designs", () => study(model)),
+          ),
+        ),
+      ),
+    ),
+  );
   undoKeys(past, shown, signal);
   renderForms();
   draw.draw();

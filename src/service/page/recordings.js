@@ -16,33 +16,85 @@ const here = new Map();
 /** What several recordings are started with, and one. */
 const several = (ids) => (ids.length === 1 ? { recording: ids[0] } : { recordings: ids });
 
-const options = (label, list) => h("select", { "aria-label": label }, list.map(([value, text]) => h("option", { value }, text)));
+const options = (label, list) =>
+  h(
+    "select",
+    { "aria-label": label },
+    list.map(([value, text]) => h("option", { value }, text)),
+  );
 
 /** What a fit can be told: mesh, number of terms, material as believed. */
 function settings(library) {
-  const mesh = options("Mesh", [["", "default mesh"], ["2", "coarse mesh"], ["1", "standard mesh"]]);
-  const terms = options("Number of terms", [["", "number of terms: chosen"], ["1", "one term"], ["2", "two terms"], ["3", "three terms"]]);
-  const material = options("Material as believed", [["", "material unknown"], ...library.materials.map((m, i) => [i, m.name])]);
+  const mesh = options("Mesh", [
+    ["", "default mesh"],
+    ["2", "coarse mesh"],
+    ["1", "standard mesh"],
+  ]);
+  const terms = options("Number of terms", [
+    ["", "number of terms: chosen"],
+    ["1", "one term"],
+    ["2", "two terms"],
+    ["3", "three terms"],
+  ]);
+  const material = options("Material as believed", [
+    ["", "material unknown"],
+    ...library.materials.map((m, i) => [i, m.name]),
+  ]);
   const factor = () => (mesh.value === "" ? {} : { mesh_factor: Number(mesh.value) });
   return {
-    mesh, terms, material,
-    calibration: (ids) => ({ recordings: ids, ...(terms.value === "" ? {} : { num_terms: Number(terms.value) }), ...factor() }),
-    diagnosis: (ids) => ({ ...several(ids), ...(material.value === "" ? {} : { material: library.materials[Number(material.value)].material }), ...factor() }),
+    mesh,
+    terms,
+    material,
+    calibration: (ids) => ({
+      recordings: ids,
+      ...(terms.value === "" ? {} : { num_terms: Number(terms.value) }),
+      ...factor(),
+    }),
+    diagnosis: (ids) => ({
+      ...several(ids),
+      ...(material.value === "" ? {} : { material: library.materials[Number(material.value)].material }),
+      ...factor(),
+    }),
   };
 }
 
 /** Buttons that start work on recordings; `ids()` are theirs. */
 function starters(library, ids, fail, isRaw = false) {
   const chosen = settings(library);
-  const start = (label, cls, kind, body) => h("button", { type: "button", class: `main ${cls}`, onclick: async (event) => {
-    const button = event.currentTarget;
-    button.disabled = true;
-    try { await startJob(kind, body()); } catch (error) { fail(error); button.disabled = false; }
-  } }, label);
-  if (isRaw) return h("div", { class: "row" }, start("Import: unwrap the phases", "import", "imports", () => ({ recording: ids()[0] })));
-  return h("div", { class: "row starters" },
-    start("Calibrate", "calibrate", "calibrations", () => chosen.calibration(ids())), h("div", {}, chosen.terms),
-    start("Diagnose", "diagnose", "diagnoses", () => chosen.diagnosis(ids())), h("div", {}, chosen.material), h("div", {}, chosen.mesh));
+  const start = (label, cls, kind, body) =>
+    h(
+      "button",
+      {
+        type: "button",
+        class: `main ${cls}`,
+        onclick: async (event) => {
+          const button = event.currentTarget;
+          button.disabled = true;
+          try {
+            await startJob(kind, body());
+          } catch (error) {
+            fail(error);
+            button.disabled = false;
+          }
+        },
+      },
+      label,
+    );
+  if (isRaw)
+    return h(
+      "div",
+      { class: "row" },
+      start("Import: unwrap the phases", "import", "imports", () => ({ recording: ids()[0] })),
+    );
+  return h(
+    "div",
+    { class: "row starters" },
+    start("Calibrate", "calibrate", "calibrations", () => chosen.calibration(ids())),
+    h("div", {}, chosen.terms),
+    start("Diagnose", "diagnose", "diagnoses", () => chosen.diagnosis(ids())),
+    h("div", {}, chosen.material),
+    h("div", {}, chosen.mesh),
+  );
 }
 
 export async function recordingsView(content, signal) {
@@ -52,18 +104,37 @@ export async function recordingsView(content, signal) {
   const together = h("div", {});
   const view = h("div", {});
   const problem = h("div", { role: "alert" });
-  const fail = (error) => fill(problem, h("p", { class: "bad" }, error instanceof Failure ? `${error.problem.title}. ${error.message}` : error.message),
-    (error.problem?.errors ?? []).map((e) => h("p", { class: "bad" }, `${e.pointer}: ${e.detail}`)));
+  const fail = (error) =>
+    fill(
+      problem,
+      h("p", { class: "bad" }, error instanceof Failure ? `${error.problem.title}. ${error.message}` : error.message),
+      (error.problem?.errors ?? []).map((e) => h("p", { class: "bad" }, `${e.pointer}: ${e.detail}`)),
+    );
 
   const fits = (r) => recordingName(r).toLowerCase().includes(state.text.toLowerCase());
   function draw() {
     const shown = state.recordings.filter(fits);
-    fill(list, shown.length > 0 ? shown.map(entry)
-      : h("p", { class: "quiet" }, state.recordings.length === 0 ? "No recordings yet." : "No recording fits the filter."));
+    fill(
+      list,
+      shown.length > 0
+        ? shown.map(entry)
+        : h(
+            "p",
+            { class: "quiet" },
+            state.recordings.length === 0 ? "No recordings yet." : "No recording fits the filter.",
+          ),
+    );
   }
   function drawTogether() {
     const ids = [...state.chosen];
-    fill(together, ids.length > 1 && sheet(`${ids.length} recordings together: one material`, starters(library, () => ids, fail)));
+    fill(
+      together,
+      ids.length > 1 &&
+        sheet(
+          `${ids.length} recordings together: one material`,
+          starters(library, () => ids, fail),
+        ),
+    );
   }
   const load = async () => {
     const { recordings } = await getJson("/v1/recordings");
@@ -73,7 +144,12 @@ export async function recordingsView(content, signal) {
   };
 
   async function show(files) {
-    try { fill(view, await look(files)); } catch (error) { fill(view); fail(error); }
+    try {
+      fill(view, await look(files));
+    } catch (error) {
+      fill(view);
+      fail(error);
+    }
   }
   async function take(files) {
     fill(problem);
@@ -81,24 +157,58 @@ export async function recordingsView(content, signal) {
       state.files = await unpacked(files);
       keepButton.disabled = state.files.length === 0;
       if (state.files.length > 0) await show(state.files);
-    } catch (error) { fail(error); }
+    } catch (error) {
+      fail(error);
+    }
   }
-  const input = h("input", { type: "file", webkitdirectory: true, multiple: true, id: "recording", onchange: () => take([...input.files]) });
-  const zipInput = h("input", { type: "file", accept: ".zip", id: "recording-zip", onchange: () => take([...zipInput.files]) });
-  const keepButton = h("button", { type: "button", class: "main", disabled: true, onclick: async () => {
-    fill(problem);
-    keepButton.disabled = true;
-    try {
-      const kept = await upload("/v1/recordings", await tar(state.files));
-      here.set(kept.id, state.files);
-      say("Kept.");
-      fill(view);
-      await load();
-    } catch (error) { fail(error); keepButton.disabled = false; }
-  } }, "Upload");
-  const place = h("div", { class: "drop" },
+  const input = h("input", {
+    type: "file",
+    webkitdirectory: true,
+    multiple: true,
+    id: "recording",
+    onchange: () => take([...input.files]),
+  });
+  const zipInput = h("input", {
+    type: "file",
+    accept: ".zip",
+    id: "recording-zip",
+    onchange: () => take([...zipInput.files]),
+  });
+  const keepButton = h(
+    "button",
+    {
+      type: "button",
+      class: "main",
+      disabled: true,
+      onclick: async () => {
+        fill(problem);
+        keepButton.disabled = true;
+        try {
+          const kept = await upload("/v1/recordings", await tar(state.files));
+          here.set(kept.id, state.files);
+          say("Kept.");
+          fill(view);
+          await load();
+        } catch (error) {
+          fail(error);
+          keepButton.disabled = false;
+        }
+      },
+    },
+    "Upload",
+  );
+  const place = h(
+    "div",
+    { class: "drop" },
     h("p", {}, "Drop a recording's folder or zip file here, or choose it."),
-    h("div", { class: "row" }, h("label", { for: "recording" }, "Folder", input), h("label", { for: "recording-zip" }, "Zip file", zipInput), keepButton));
+    h(
+      "div",
+      { class: "row" },
+      h("label", { for: "recording" }, "Folder", input),
+      h("label", { for: "recording-zip" }, "Zip file", zipInput),
+      keepButton,
+    ),
+  );
   dropPlace(place, take);
 
   function entry(recording) {
@@ -106,30 +216,99 @@ export async function recordingsView(content, signal) {
     const name = recordingName(recording);
     const erase = async () => {
       if (!confirm(`Delete ${name}? Results of jobs that read it stay.`)) return;
-      try { await remove(`/v1/recordings/${recording.id}`); say("Deleted."); state.chosen.delete(recording.id); await load(); } catch (error) { fail(error); }
+      try {
+        await remove(`/v1/recordings/${recording.id}`);
+        say("Deleted.");
+        state.chosen.delete(recording.id);
+        await load();
+      } catch (error) {
+        fail(error);
+      }
     };
     const choose = (event) => {
-      if (event.target.checked) state.chosen.add(recording.id); else state.chosen.delete(recording.id);
+      if (event.target.checked) state.chosen.add(recording.id);
+      else state.chosen.delete(recording.id);
       drawTogether();
     };
-    return h("section", { class: "sheet" },
-      h("div", { class: "row end" }, h("h3", {}, name), h("div", { class: "row tight" },
-        !summary.is_raw && h("label", { class: "tick" }, h("input", { type: "checkbox", checked: state.chosen.has(recording.id), onchange: choose }), "with others"),
-        here.has(recording.id) && h("button", { type: "button", onclick: () => show(here.get(recording.id)) }, "Look"),
-        h("button", { type: "button", onclick: () => { if (askName(recording.id, name)) draw(); } }, "Rename"),
-        h("button", { type: "button", onclick: erase }, "Delete"))),
-      h("p", { class: "quiet" }, `${summary.specimen.name} · ${summary.shape.join(" × ")} voxels of ${summary.voxel_mm.map((v) => plain(v, 3)).join(" × ")} mm, `
-        + `${many(summary.num_voxels)} of them material · ${digits(recording.num_bytes / 1e6, 2)} MB${summary.is_raw ? " · raw phases" : ""}`),
-      table(["Drive, mm", "Force, N"], summary.steps.map((s) => [plain(s.drive_mm, 4), digits(s.force_n)])),
-      starters(library, () => [recording.id], fail, summary.is_raw));
+    return h(
+      "section",
+      { class: "sheet" },
+      h(
+        "div",
+        { class: "row end" },
+        h("h3", {}, name),
+        h(
+          "div",
+          { class: "row tight" },
+          !summary.is_raw &&
+            h(
+              "label",
+              { class: "tick" },
+              h("input", { type: "checkbox", checked: state.chosen.has(recording.id), onchange: choose }),
+              "with others",
+            ),
+          here.has(recording.id) &&
+            h("button", { type: "button", onclick: () => show(here.get(recording.id)) }, "Look"),
+          h(
+            "button",
+            {
+              type: "button",
+              onclick: () => {
+                if (askName(recording.id, name)) draw();
+              },
+            },
+            "Rename",
+          ),
+          h("button", { type: "button", onclick: erase }, "Delete"),
+        ),
+      ),
+      h(
+        "p",
+        { class: "quiet" },
+        `${summary.specimen.name} · ${summary.shape.join(" × ")} voxels of ${summary.voxel_mm.map((v) => plain(v, 3)).join(" × ")} mm, ` +
+          `${many(summary.num_voxels)} of them material · ${digits(recording.num_bytes / 1e6, 2)} MB${summary.is_raw ? " · raw phases" : ""}`,
+      ),
+      table(
+        ["Drive, mm", "Force, N"],
+        summary.steps.map((s) => [plain(s.drive_mm, 4), digits(s.force_n)]),
+      ),
+      starters(library, () => [recording.id], fail, summary.is_raw),
+    );
   }
 
-  fill(content, h("h2", {}, "Recordings"),
-    sheet("Upload a recording",
-      h("p", { class: "quiet" }, "A folder, or a zip file of one, with recording.json and its images: displacements, or raw phases. It is shown first; the service "
-        + "reads and checks it before it keeps it. MATLAB files and images of other programs become such a folder by lambdak import."), place, problem),
+  fill(
+    content,
+    h("h2", {}, "Recordings"),
+    sheet(
+      "Upload a recording",
+      h(
+        "p",
+        { class: "quiet" },
+        "A folder, or a zip file of one, with recording.json and its images: displacements, or raw phases. It is shown first; the service " +
+          "reads and checks it before it keeps it. MATLAB files and images of other programs become such a folder by lambdak import.",
+      ),
+      place,
+      problem,
+    ),
     view,
-    h("div", { class: "fields" }, h("label", {}, "Name contains", h("input", { type: "search", oninput: (e) => { state.text = e.target.value; draw(); } }))),
-    together, list);
+    h(
+      "div",
+      { class: "fields" },
+      h(
+        "label",
+        {},
+        "Name contains",
+        h("input", {
+          type: "search",
+          oninput: (e) => {
+            state.text = e.target.value;
+            draw();
+          },
+        }),
+      ),
+    ),
+    together,
+    list,
+  );
   await load();
 }

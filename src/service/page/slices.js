@@ -8,13 +8,19 @@ import { mostToSee, reach, readImage, rms, slice } from "./nifti.js";
 import { digits } from "./numbers.js";
 
 const AXES = ["x", "y", "z"];
-const PLANES = [[0, 1, 2], [0, 2, 1], [2, 1, 0]]; // across, up, through
+const PLANES = [
+  [0, 1, 2],
+  [0, 2, 1],
+  [2, 1, 0],
+]; // across, up, through
 
 /** The slice as a picture of one pixel per voxel. */
 function painted(cut, limit) {
   const canvas = h("canvas", { width: cut.width, height: cut.height });
   const pixels = new ImageData(cut.width, cut.height);
-  cut.values.forEach((v, i) => { if (Number.isFinite(v)) pixels.data.set([...diverging(v / limit), 255], 4 * i); });
+  cut.values.forEach((v, i) => {
+    if (Number.isFinite(v)) pixels.data.set([...diverging(v / limit), 255], 4 * i);
+  });
   canvas.getContext("2d").putImageData(pixels, 0, 0);
   return canvas.toDataURL();
 }
@@ -34,21 +40,43 @@ function map(image, cut, axes, limit, label, tell) {
   const [width, height] = [scale * (x[1] - x[0]), scale * (y[1] - y[0])];
   const across = (v) => left + scale * (v - x[0]);
   const up = (v) => gap + height - scale * (v - y[0]);
-  const picture = s("image", { x: left, y: gap, width, height, href: painted(cut, limit), preserveAspectRatio: "none" });
+  const picture = s("image", {
+    x: left,
+    y: gap,
+    width,
+    height,
+    href: painted(cut, limit),
+    preserveAspectRatio: "none",
+  });
   picture.addEventListener("pointermove", (event) => {
     const box = picture.getBoundingClientRect();
-    const at = [(event.clientX - box.left) / box.width * cut.width, (event.clientY - box.top) / box.height * cut.height].map(Math.floor);
+    const at = [
+      ((event.clientX - box.left) / box.width) * cut.width,
+      ((event.clientY - box.top) / box.height) * cut.height,
+    ].map(Math.floor);
     tell(cut.values[at[1] * cut.width + at[0]]);
   });
-  return s("svg", { class: "map", viewBox: `0 0 ${left + wide + gap} ${gap + height + bottom}`, role: "img", "aria-label": label },
-    s("rect", { class: "paper", x: left, y: gap, width, height }), picture,
+  return s(
+    "svg",
+    { class: "map", viewBox: `0 0 ${left + wide + gap} ${gap + height + bottom}`, role: "img", "aria-label": label },
+    s("rect", { class: "paper", x: left, y: gap, width, height }),
+    picture,
     s("rect", { class: "frame", x: left, y: gap, width, height }),
-    ticks(...x, 5).map(([v, text]) => [s("line", { class: "tick", x1: across(v), x2: across(v), y1: gap + height, y2: gap + height + 4 }),
-      s("text", { x: across(v), y: gap + height + 15, "text-anchor": "middle" }, text)]),
-    ticks(...y, Math.max(2, Math.min(5, height / 40))).map(([v, text]) => [s("line", { class: "tick", x1: left - 4, x2: left, y1: up(v), y2: up(v) }),
-      s("text", { x: left - 6, y: up(v) + 4, "text-anchor": "end" }, text)]),
+    ticks(...x, 5).map(([v, text]) => [
+      s("line", { class: "tick", x1: across(v), x2: across(v), y1: gap + height, y2: gap + height + 4 }),
+      s("text", { x: across(v), y: gap + height + 15, "text-anchor": "middle" }, text),
+    ]),
+    ticks(...y, Math.max(2, Math.min(5, height / 40))).map(([v, text]) => [
+      s("line", { class: "tick", x1: left - 4, x2: left, y1: up(v), y2: up(v) }),
+      s("text", { x: left - 6, y: up(v) + 4, "text-anchor": "end" }, text),
+    ]),
     s("text", { x: left + width / 2, y: gap + height + 30, "text-anchor": "middle" }, `${AXES[axes[0]]}, mm`),
-    s("text", { x: 10, y: gap + height / 2, "text-anchor": "middle", transform: `rotate(-90 10 ${gap + height / 2})` }, `${AXES[axes[1]]}, mm`));
+    s(
+      "text",
+      { x: 10, y: gap + height / 2, "text-anchor": "middle", transform: `rotate(-90 10 ${gap + height / 2})` },
+      `${AXES[axes[1]]}, mm`,
+    ),
+  );
 }
 
 /** The colour scale. */
@@ -57,7 +85,14 @@ function scaleOf(limit) {
   const bar = new ImageData(101, 1);
   for (let i = 0; i < 101; i += 1) bar.data.set([...diverging(i / 50 - 1), 255], 4 * i);
   ramp.getContext("2d").putImageData(bar, 0, 0);
-  return [ramp, h("div", { class: "ends" }, [-1, -0.5, 0, 0.5, 1].map((t) => h("span", {}, t === 0 ? "0 mm" : `${digits(t * limit, 2)} mm`)))];
+  return [
+    ramp,
+    h(
+      "div",
+      { class: "ends" },
+      [-1, -0.5, 0, 0.5, 1].map((t) => h("span", {}, t === 0 ? "0 mm" : `${digits(t * limit, 2)} mm`)),
+    ),
+  ];
 }
 
 /** The part of a map that lies beyond its scale, in words. */
@@ -75,7 +110,7 @@ export function slicesView(title, sets, { note, scale = 0, aimed = 0 } = {}) {
   const images = new Map();
   const load = (panel) => {
     const key = panel.href ?? panel.blob;
-    if (!images.has(key)) images.set(key, (async () => readImage(panel.blob ?? await getBlob(panel.href)))());
+    if (!images.has(key)) images.set(key, (async () => readImage(panel.blob ?? (await getBlob(panel.href))))());
     return images.get(key);
   };
   const panels = h("div", { class: "maps" });
@@ -83,11 +118,29 @@ export function slicesView(title, sets, { note, scale = 0, aimed = 0 } = {}) {
   const legend = h("div", { class: "scale" });
   const where = h("output", {});
   const under = h("p", { class: "quiet reading" });
-  const range = h("input", { type: "range", min: 0, step: 1, "aria-label": "Slice", oninput: (e) => { state.index = Number(e.target.value); show(); } });
+  const range = h("input", {
+    type: "range",
+    min: 0,
+    step: 1,
+    "aria-label": "Slice",
+    oninput: (e) => {
+      state.index = Number(e.target.value);
+      show();
+    },
+  });
   const choosers = {};
   const pick = (label, options, key) => {
-    choosers[key] = h("select", { onchange: (e) => { state[key] = Number(e.target.value); if (key === "plane") state.index = null; show(); } },
-      options.map((text, i) => h("option", { value: i, selected: i === state[key] }, text)));
+    choosers[key] = h(
+      "select",
+      {
+        onchange: (e) => {
+          state[key] = Number(e.target.value);
+          if (key === "plane") state.index = null;
+          show();
+        },
+      },
+      options.map((text, i) => h("option", { value: i, selected: i === state[key] }, text)),
+    );
     return h("label", {}, label, choosers[key]);
   };
   let turn = 0;
@@ -100,7 +153,7 @@ export function slicesView(title, sets, { note, scale = 0, aimed = 0 } = {}) {
   }
 
   async function show() {
-    const mine = turn += 1;
+    const mine = (turn += 1);
     const set = sets[state.set];
     try {
       const loaded = await Promise.all(set.panels.map(load));
@@ -122,13 +175,22 @@ export function slicesView(title, sets, { note, scale = 0, aimed = 0 } = {}) {
     const at = Math.round(1e4 * (first.origin[axes[2]] + state.index * first.voxel[axes[2]])) / 1e4;
     where.textContent = `${AXES[axes[2]]} = ${digits(at, 3)} mm (${state.index - low + 1} of ${high - low + 1})`;
     const limit = reach(loaded[Math.min(state.scale, loaded.length - 1)], state.component) || 1;
-    const tell = (v) => { under.textContent = Number.isFinite(v) ? `Under the pointer: ${digits(v, 3)} mm` : ""; };
-    fill(panels, loaded.map((image, i) => {
-      const cut = slice(image, state.component, axes, state.index);
-      const label = set.panels[i].label;
-      return h("figure", {}, map(image, cut, axes, limit, `${label}, u ${AXES[state.component]}, ${where.textContent}`, tell),
-        h("figcaption", {}, `${label}: rms in this slice ${digits(rms(cut.values), 3)} mm${beyond(cut, limit)}`));
-    }));
+    const tell = (v) => {
+      under.textContent = Number.isFinite(v) ? `Under the pointer: ${digits(v, 3)} mm` : "";
+    };
+    fill(
+      panels,
+      loaded.map((image, i) => {
+        const cut = slice(image, state.component, axes, state.index);
+        const label = set.panels[i].label;
+        return h(
+          "figure",
+          {},
+          map(image, cut, axes, limit, `${label}, u ${AXES[state.component]}, ${where.textContent}`, tell),
+          h("figcaption", {}, `${label}: rms in this slice ${digits(rms(cut.values), 3)} mm${beyond(cut, limit)}`),
+        );
+      }),
+    );
     fill(legend, scaleOf(limit));
   }
 
@@ -146,15 +208,38 @@ export function slicesView(title, sets, { note, scale = 0, aimed = 0 } = {}) {
   }
 
   const names = sets[0].panels.map((p) => p.label.toLowerCase());
-  const element = h("section", { class: "sheet slices" }, h("h3", {}, title), note && h("p", { class: "quiet" }, note),
-    h("div", { class: "fields" },
-      pick("Map", sets.map((one) => one.label), "set"),
-      pick("Component", AXES.map((a) => `u along ${a}`), "component"),
-      pick("Plane", PLANES.map(([a, b]) => `${AXES[a]} and ${AXES[b]}`), "plane"),
+  const element = h(
+    "section",
+    { class: "sheet slices" },
+    h("h3", {}, title),
+    note && h("p", { class: "quiet" }, note),
+    h(
+      "div",
+      { class: "fields" },
+      pick(
+        "Map",
+        sets.map((one) => one.label),
+        "set",
+      ),
+      pick(
+        "Component",
+        AXES.map((a) => `u along ${a}`),
+        "component",
+      ),
+      pick(
+        "Plane",
+        PLANES.map(([a, b]) => `${AXES[a]} and ${AXES[b]}`),
+        "plane",
+      ),
       names.length > 1 && pick("Colours reach to the values", ["on the left", "on the right"], "scale"),
-      h("label", { class: "wide" }, "Slice ", where, range)),
-    panels, legend, under,
-    sets.length > 1 && h("p", {}, h("button", { type: "button", onclick: play }, "Play the maps")), problem);
+      h("label", { class: "wide" }, "Slice ", where, range),
+    ),
+    panels,
+    legend,
+    under,
+    sets.length > 1 && h("p", {}, h("button", { type: "button", onclick: play }, "Play the maps")),
+    problem,
+  );
   show();
   return element;
 }

@@ -12,9 +12,22 @@ export async function startJob(kind, body) {
 
 /** A button that starts a job; `body` makes its request. */
 export function startButton(label, kind, body, attributes = { class: "main" }) {
-  return h("button", { type: "button", ...attributes, onclick: async (event) => {
-    const button = event.currentTarget;
-    button.disabled = true;
-    try { await startJob(kind, body()); } catch (error) { say(error.message); button.disabled = false; }
-  } }, label);
+  return h(
+    "button",
+    {
+      type: "button",
+      ...attributes,
+      onclick: async (event) => {
+        const button = event.currentTarget;
+        button.disabled = true;
+        try {
+          await startJob(kind, body());
+        } catch (error) {
+          say(error.message);
+          button.disabled = false;
+        }
+      },
+    },
+    label,
+  );
 }

@@ -12,7 +12,13 @@ export async function tar(files) {
     put(148, "        ");
     put(156, "0");
     put(257, "ustar\u000000");
-    put(148, `${header.reduce((a, b) => a + b, 0).toString(8).padStart(6, "0")}\0 `);
+    put(
+      148,
+      `${header
+        .reduce((a, b) => a + b, 0)
+        .toString(8)
+        .padStart(6, "0")}\0 `,
+    );
     parts.push(header, file, new Uint8Array((512 - (file.size % 512)) % 512));
   }
   parts.push(new Uint8Array(1024));

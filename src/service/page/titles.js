@@ -5,14 +5,23 @@ import { getJson } from "./api.js";
 const KEY = "lambdak names";
 
 function named() {
-  try { return JSON.parse(localStorage.getItem(KEY)) ?? {}; } catch { return {}; }
+  try {
+    return JSON.parse(localStorage.getItem(KEY)) ?? {};
+  } catch {
+    return {};
+  }
 }
 
 /** Names something in this browser; an empty name takes the name back. */
 export function rename(id, name) {
   const all = named();
-  if (name) all[id] = name; else delete all[id];
-  try { localStorage.setItem(KEY, JSON.stringify(all)); } catch { /* a browser may keep nothing */ }
+  if (name) all[id] = name;
+  else delete all[id];
+  try {
+    localStorage.setItem(KEY, JSON.stringify(all));
+  } catch {
+    /* a browser may keep nothing */
+  }
 }
 
 let recordings = new Map();

@@ -27,16 +27,39 @@ const CAUSE_PARAMETERS = [
   [/^([xyz])_mm_at_full_drive$/, (m) => `moved along ${m[1]} at full drive`, "mm", same],
   [/^([xyz])_mm$/, (m) => `shifted along ${m[1]}`, "mm", same],
   [/^step_(\d+)_(fixed|moved)_([xyz])_mm$/, (m) => `drive ${m[1]}: ${m[2]} plate moved along ${m[3]}`, "mm", same],
-  [/^step_(\d+)_(fixed|moved)_degrees_about_([xyz])$/, (m) => `drive ${m[1]}: ${m[2]} plate turned about ${m[3]}`, "°",
-    same],
+  [
+    /^step_(\d+)_(fixed|moved)_degrees_about_([xyz])$/,
+    (m) => `drive ${m[1]}: ${m[2]} plate turned about ${m[3]}`,
+    "°",
+    same,
+  ],
   [/^(fixed|moved)_plate_mm_per_kpa$/, (m) => `bond at the ${m[1]} plate gives`, "mm/kPa", same],
-  [/^(fixed|moved)_depth_?(.*)_mm$/, (m) => `layer at the ${m[1]} plate, depth${m[2] ? ` (part ${m[2]})` : ""}`, "mm",
-    same],
-  [/^(low|high)_([xyz])_slope_([xyz])_mm$/, (m) => `${SIDES[m[1]]} face along ${m[2]}, slope along ${m[3]}`, "mm", same],
+  [
+    /^(fixed|moved)_depth_?(.*)_mm$/,
+    (m) => `layer at the ${m[1]} plate, depth${m[2] ? ` (part ${m[2]})` : ""}`,
+    "mm",
+    same,
+  ],
+  [
+    /^(low|high)_([xyz])_slope_([xyz])_mm$/,
+    (m) => `${SIDES[m[1]]} face along ${m[2]}, slope along ${m[3]}`,
+    "mm",
+    same,
+  ],
   [/^(low|high)_([xyz])_bow_([xyz]+)_mm$/, (m) => `${SIDES[m[1]]} face along ${m[2]}, bow ${m[3]}`, "mm", same],
-  [/^u_([xyz])_(.+)_mm$/, (m) => `background of the displacement along ${m[1]}, ${m[2].replaceAll("_", " ")}`, "mm", same],
+  [
+    /^u_([xyz])_(.+)_mm$/,
+    (m) => `background of the displacement along ${m[1]}, ${m[2].replaceAll("_", " ")}`,
+    "mm",
+    same,
+  ],
   [/^relative_gain_error_([xyz])$/, (m) => `displacement along ${m[1]} reads too much by`, "%", toPercent],
-  [/^relative_change_center_to_face_([xyz])$/, (m) => `modulus, from the centre to the face along ${m[1]}`, "%", toPercent],
+  [
+    /^relative_change_center_to_face_([xyz])$/,
+    (m) => `modulus, from the centre to the face along ${m[1]}`,
+    "%",
+    toPercent,
+  ],
   [/^g$/, () => "part of the stress that relaxes", "%", toPercent],
   [/^tau_s$/, () => "time in which it relaxes", "s", same],
   [/^rho$/, () => "part of the stiffness lost at most", "%", toPercent],
@@ -56,7 +79,10 @@ export function causeParameter(name) {
 
 /** Where a cause acts. */
 export const CATEGORIES = {
-  material: "the material", boundary: "plates and bonds", geometry: "the sample's shape", acquisition: "the scan",
+  material: "the material",
+  boundary: "plates and bonds",
+  geometry: "the sample's shape",
+  acquisition: "the scan",
   load: "drive and load cell",
 };
 
@@ -69,39 +95,67 @@ export const ORIGINS = {
 
 /** How a diagnosis ended: words, and whether they warn. */
 export const VERDICTS = {
-  no_mismatch: ["Nothing was found to be wrong: the experiment as told explains the recording up to its noise and what "
-    + "meshes leave.", "good"],
+  no_mismatch: [
+    "Nothing was found to be wrong: the experiment as told explains the recording up to its noise and what " +
+      "meshes leave.",
+    "good",
+  ],
   explained: ["The misfit is explained: with what was found, nothing is left but noise and what meshes leave.", "good"],
-  explained_ambiguously: ["The misfit is explained, but not by one cause alone: this recording cannot tell the causes "
-    + "below apart.", "warn"],
-  unexplained: ["Something is left that no known cause explains. The material below can be wrong by more than its "
-    + "intervals say.", "bad"],
+  explained_ambiguously: [
+    "The misfit is explained, but not by one cause alone: this recording cannot tell the causes " + "below apart.",
+    "warn",
+  ],
+  unexplained: [
+    "Something is left that no known cause explains. The material below can be wrong by more than its " +
+      "intervals say.",
+    "bad",
+  ],
 };
 
 /** Kinds of job: one of them, and what it is called in a title. */
 export const KINDS = {
-  evaluations: "evaluation", designs: "design search", sweeps: "sweep", "sweep-studies": "sweep study", scans: "synthetic scan",
-  imports: "import", calibrations: "calibration", diagnoses: "diagnosis", solves: "solution",
-  "load-curve-diagnoses": "load-curve diagnosis", "curve-fits": "fit of curves", "uniaxial-fits": "uniaxial fit",
-  "material-exports": "material export", "model-exports": "model export", comparisons: "comparison",
-  "paper-tables": "tables", proofs: "proof",
+  evaluations: "evaluation",
+  designs: "design search",
+  sweeps: "sweep",
+  "sweep-studies": "sweep study",
+  scans: "synthetic scan",
+  imports: "import",
+  calibrations: "calibration",
+  diagnoses: "diagnosis",
+  solves: "solution",
+  "load-curve-diagnoses": "load-curve diagnosis",
+  "curve-fits": "fit of curves",
+  "uniaxial-fits": "uniaxial fit",
+  "material-exports": "material export",
+  "model-exports": "model export",
+  comparisons: "comparison",
+  "paper-tables": "tables",
+  proofs: "proof",
 };
 
 /** What can be maximised. */
 export const OBJECTIVES = [
-  ["integrated_sensitivity", "integrated sensitivity 𝒮"], ["sensitivity_and_promised_sd", "𝒮 and promised deviation"],
-  ["d_optimal", "D-optimal"], ["a_optimal", "A-optimal"], ["e_optimal", "E-optimal"],
-  ["worst_relative_sd", "worst relative deviation"], ["tell_apart", "telling materials apart"],
+  ["integrated_sensitivity", "integrated sensitivity 𝒮"],
+  ["sensitivity_and_promised_sd", "𝒮 and promised deviation"],
+  ["d_optimal", "D-optimal"],
+  ["a_optimal", "A-optimal"],
+  ["e_optimal", "E-optimal"],
+  ["worst_relative_sd", "worst relative deviation"],
+  ["tell_apart", "telling materials apart"],
 ];
 
 /** Limits: words, unit, and the side that is allowed. */
 export const LIMITS = {
   min_ligament_hole_hole_mm: ["ligament between holes", "mm", "at least"],
   min_ligament_hole_edge_mm: ["ligament to an edge", "mm", "at least"],
-  "diameter_mm.min": ["diameter", "mm", "at least"], "diameter_mm.max": ["diameter", "mm", "at most"],
+  "diameter_mm.min": ["diameter", "mm", "at least"],
+  "diameter_mm.max": ["diameter", "mm", "at most"],
   min_voxels_across_ligament: ["voxels across a ligament", "", "at least"],
-  max_holes: ["holes", "", "at most"], max_drive_mm: ["drive", "mm", "at most"],
-  max_force_n: ["force", "N", "at most"], max_local_stretch: ["local stretch", "", "at most"], symmetry: ["symmetry", "", ""],
+  max_holes: ["holes", "", "at most"],
+  max_drive_mm: ["drive", "mm", "at most"],
+  max_force_n: ["force", "N", "at most"],
+  max_local_stretch: ["local stretch", "", "at most"],
+  symmetry: ["symmetry", "", ""],
 };
 
 export function limitWords(name) {
@@ -111,18 +165,24 @@ export function limitWords(name) {
 
 /** The terms of the field. */
 export const GLOSSARY = {
-  "stretch amplitude λ": "How far the material is stretched at a place, whatever the direction: 1 is unstretched, 2 is twice "
-    + "as long in the direction of most stretch.",
-  "mode k": "How the material is deformed at a place: 0 is uniaxial tension, 0.5 is pure or simple shear, 1 is equibiaxial "
-    + "tension. Tests of one mode tell less of a material than a specimen whose voxels spread over k.",
-  "integrated sensitivity 𝒮": "How much the displacement of the scan changes with a parameter, summed over its voxels. More is "
-    + "better: the parameter leaves a larger mark.",
-  "promised deviation": "The standard deviation with which a parameter would come out of a calibration on one scan, from the "
-    + "noise of voxels and load cell alone. Less is better.",
-  "χ² per datum": "The squared misfit in units of the noise, per number measured. Noise alone gives 1; more means that the "
-    + "model or the data leave something out.",
-  "95 % interval": "Nineteen times out of twenty the true value lies in it, from noise, discretisation and what the misfit "
-    + "could hide. Read the interval, not the estimate alone.",
+  "stretch amplitude λ":
+    "How far the material is stretched at a place, whatever the direction: 1 is unstretched, 2 is twice " +
+    "as long in the direction of most stretch.",
+  "mode k":
+    "How the material is deformed at a place: 0 is uniaxial tension, 0.5 is pure or simple shear, 1 is equibiaxial " +
+    "tension. Tests of one mode tell less of a material than a specimen whose voxels spread over k.",
+  "integrated sensitivity 𝒮":
+    "How much the displacement of the scan changes with a parameter, summed over its voxels. More is " +
+    "better: the parameter leaves a larger mark.",
+  "promised deviation":
+    "The standard deviation with which a parameter would come out of a calibration on one scan, from the " +
+    "noise of voxels and load cell alone. Less is better.",
+  "χ² per datum":
+    "The squared misfit in units of the noise, per number measured. Noise alone gives 1; more means that the " +
+    "model or the data leave something out.",
+  "95 % interval":
+    "Nineteen times out of twenty the true value lies in it, from noise, discretisation and what the misfit " +
+    "could hide. Read the interval, not the estimate alone.",
   "median stretch": "Half of the voxels are stretched more than this, half less.",
   "largest stretch": "The largest principal stretch anywhere in the sample. Where it is too large, the sample tears.",
   gain: "How much more a design tells than the base specimen, by the chosen objective: 1 is as much, 2 is twice as much.",
@@ -130,10 +190,14 @@ export const GLOSSARY = {
   "A-optimal": "The sum of the parameters' relative variances.",
   "E-optimal": "The combination of parameters that would be known worst.",
   "worst relative deviation": "The parameter that would be known worst, relative to its value.",
-  "telling materials apart": "How far each material's scan is from the closest fit of a simpler one, in standard deviations.",
-  evidence: "How much better a model with the cause fits: the fall of the deviance, less a price for every parameter. Above "
-    + "about ten there is something to it.",
-  "data kept back": "Voxels that were not used in the fit. What is predicted of them is a test that a model cannot bend to.",
-  "κ, μ, α": "Parameters of the Ogden material: κ resists a change of volume (kPa); every term has a modulus μ (kPa) and an "
-    + "exponent α. The initial shear modulus is ½ Σ μα.",
+  "telling materials apart":
+    "How far each material's scan is from the closest fit of a simpler one, in standard deviations.",
+  evidence:
+    "How much better a model with the cause fits: the fall of the deviance, less a price for every parameter. Above " +
+    "about ten there is something to it.",
+  "data kept back":
+    "Voxels that were not used in the fit. What is predicted of them is a test that a model cannot bend to.",
+  "κ, μ, α":
+    "Parameters of the Ogden material: κ resists a change of volume (kPa); every term has a modulus μ (kPa) and an " +
+    "exponent α. The initial shear modulus is ½ Σ μα.",
 };

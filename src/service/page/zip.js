@@ -28,7 +28,18 @@ export async function zip(files) {
     const bytes = new Uint8Array(await blob.arrayBuffer());
     const title = new TextEncoder().encode(name);
     // Version 2.0, names in UTF-8, stored, 1 January 1980.
-    const common = [[2, 20], [2, 0x800], [2, 0], [2, 0], [2, 0x21], [4, checksum(bytes)], [4, bytes.length], [4, bytes.length], [2, title.length], [2, 0]];
+    const common = [
+      [2, 20],
+      [2, 0x800],
+      [2, 0],
+      [2, 0],
+      [2, 0x21],
+      [4, checksum(bytes)],
+      [4, bytes.length],
+      [4, bytes.length],
+      [2, title.length],
+      [2, 0],
+    ];
     const head = record([[4, 0x04034b50], ...common]);
     const entry = record([[4, 0x02014b50], [2, 20], ...common, [2, 0], [2, 0], [2, 0], [4, 0], [4, offset]]);
     parts.push(head, title, bytes);
@@ -36,11 +47,21 @@ export async function zip(files) {
     offset += head.length + title.length + bytes.length;
     indexSize += entry.length + title.length;
   }
-  const end = record([[4, 0x06054b50], [2, 0], [2, 0], [2, files.length], [2, files.length], [4, indexSize], [4, offset], [2, 0]]);
+  const end = record([
+    [4, 0x06054b50],
+    [2, 0],
+    [2, 0],
+    [2, files.length],
+    [2, files.length],
+    [4, indexSize],
+    [4, offset],
+    [2, 0],
+  ]);
   return new Blob([...parts, ...index, end], { type: "application/zip" });
 }
 
-const inflate = (bytes) => new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw"))).blob();
+const inflate = (bytes) =>
+  new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw"))).blob();
 
 /** The files of a zip file, folders left out: [File]. */
 export async function unzip(file) {
@@ -60,7 +81,8 @@ export async function unzip(file) {
     entry += 46 + title + u16(30) + u16(32);
     if (name.endsWith("/") || name.startsWith("__MACOSX")) continue;
     const body = bytes.subarray(data, data + size);
-    if (method !== 0 && method !== 8) throw new Error(`${name} in ${file.name} is packed in a way that this page does not read.`);
+    if (method !== 0 && method !== 8)
+      throw new Error(`${name} in ${file.name} is packed in a way that this page does not read.`);
     found.push(new File([method === 8 ? await inflate(body) : body], name.split("/").at(-1)));
   }
   return found;

@@ -49,6 +49,7 @@ const ASSETS: &[(&str, &str, &str)] = &[
     asset!("scan.js", "text/javascript; charset=utf-8"),
     asset!("calibration.js", "text/javascript; charset=utf-8"),
     asset!("diagnosis.js", "text/javascript; charset=utf-8"),
+    asset!("together.js", "text/javascript; charset=utf-8"),
     asset!("evidence.js", "text/javascript; charset=utf-8"),
     asset!("compare.js", "text/javascript; charset=utf-8"),
     asset!("recordings.js", "text/javascript; charset=utf-8"),
