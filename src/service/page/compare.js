@@ -7,7 +7,7 @@ import { digits, interval, known, percent, symbol, unitOf, withUnit } from "./nu
 import { shapes, table } from "./parts.js";
 import { readResult } from "./result.js";
 import { jobName, learnTitles } from "./titles.js";
-import { GLOSSARY, KINDS, VERDICTS } from "./words.js";
+import { COMPARED, GLOSSARY, KINDS, VERDICTS } from "./words.js";
 
 /** A line of the comparison: key, words, meaning; then the number, its text, and whether less is better (null: neither). */
 const line = (key, words, value, text, isLessBetter = null, meaning = "") => ({
@@ -93,13 +93,15 @@ const LINES = {
 /** Surfaces, and figures that stand side by side. */
 const SURFACES = ["surface.json", "surface-best.json"];
 const FIGURES = [
-  ["histogram.svg", "Voxels in (λ, k)"],
-  ["specimen.svg", "Drawing"],
-  ["best-specimen.svg", "Drawing"],
-  ["map-stretch-and-mode.svg", "λ and k"],
-  ["residual-histogram.svg", "Residuals"],
-  ["correlation.svg", "Correlation"],
+  [["histogram.svg"], "voxels in (λ, k)"],
+  [["specimen.svg", "best-specimen.svg"], "drawing"],
+  [["map-stretch-and-mode.svg"], "λ and k"],
+  [["residual-histogram.svg"], "misfit in units of the noise"],
+  [["correlation.svg"], "correlation of the estimates"],
 ];
+
+/** What a column is called. */
+const called = ({ job }) => `${jobName(job)} (${KINDS[job.kind] ?? job.kind})`;
 
 function difference(one, first) {
   if (!first || one === first || !Number.isFinite(one.value) || !Number.isFinite(first.value) || first.value === 0)
@@ -142,11 +144,16 @@ function figuresTable(columns) {
 
 async function pictures(columns) {
   const rows = await Promise.all(
-    FIGURES.map(async ([name, caption]) => {
-      const found = (
-        await Promise.all(columns.map((c) => figure(c.files, name, `${jobName(c.job)}: ${caption}`)))
-      ).filter(Boolean);
-      return found.length > 0 && h("section", { class: "sheet" }, h("div", { class: "halves" }, found));
+    FIGURES.map(async ([names, caption]) => {
+      const of = (c) =>
+        figure(
+          c.files,
+          names.find((name) => c.files.has(name)),
+          `${called(c)}: ${caption}`,
+        );
+      const found = (await Promise.all(columns.map(of))).filter(Boolean);
+      // One alone has nothing to stand beside.
+      return found.length > 1 && h("section", { class: "sheet" }, h("div", { class: "halves" }, found));
     }),
   );
   return rows;
@@ -160,13 +167,13 @@ async function surfaces(columns) {
   );
   return shapes(
     new Map(wanted.map(([c, n]) => [c.job.id, c.files.get(n)])),
-    wanted.map(([c]) => [c.job.id, jobName(c.job)]),
+    wanted.map(([c]) => [c.job.id, called(c)]),
   );
 }
 
 /** A chooser of a further job to stand beside. */
 function adder(ids, jobs) {
-  const free = jobs.filter((j) => j.state === "succeeded" && LINES_OF_KINDS.has(j.kind) && !ids.includes(j.id));
+  const free = jobs.filter((j) => j.state === "succeeded" && COMPARED.has(j.kind) && !ids.includes(j.id));
   return h(
     "label",
     {},
@@ -184,7 +191,6 @@ function adder(ids, jobs) {
     ),
   );
 }
-const LINES_OF_KINDS = new Set(["evaluations", "designs", "calibrations", "diagnoses"]);
 
 export async function compareView(content, text) {
   const ids = text.split(",").filter(Boolean);

@@ -12,7 +12,12 @@ import { together } from "./together.js";
 import { CATEGORIES, GLOSSARY, ORIGINS, VERDICTS, causeParameter } from "./words.js";
 
 const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1);
-const change = (pair, unit) => withUnit(`${digits(pair.before, 3)} → ${digits(pair.after, 3)}`, unit);
+/** Before and after; one number where nothing changed. */
+const change = (pair, unit) =>
+  withUnit(
+    pair.before === pair.after ? digits(pair.after, 3) : `${digits(pair.before, 3)} → ${digits(pair.after, 3)}`,
+    unit,
+  );
 
 /** A cause's parameter as a row: words, value, interval. */
 function parameterRow(p) {
@@ -92,7 +97,8 @@ async function materialSheet(result, recording) {
       "p",
       {},
       isWeighed
-        ? `The initial shear modulus changes by ${percent(to / from - 1, 2)} when what was found is taken into account.`
+        ? result.causes.length > 0 &&
+            `The initial shear modulus changes by ${percent(to / from - 1, 2)} when what was found is taken into account.`
         : "No force was recorded: displacements tell exponents and ratios of moduli, and no modulus.",
     ),
     h(
@@ -141,7 +147,7 @@ function summary(result) {
         `${result.is_noise_estimated ? ", estimated from the recording" : ", as the recording states it"}; meshes may leave ` +
         `${digits(result.allowance_mm, 2)} mm rms.`,
       result.num_outlying_voxels > 0 &&
-        ` ${result.num_outlying_voxels} voxels agree with hardly any neighbour and were left out.`,
+        ` Voxels left out, since they agree with hardly any neighbour: ${result.num_outlying_voxels}.`,
     ),
     result.left_at && result.verdict === "unexplained" && h("p", {}, `Most is left here. ${place(result.left_at)}`),
   );

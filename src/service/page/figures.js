@@ -69,7 +69,7 @@ export function figureOf(text, caption) {
 
 /** The figure in a job's file; nothing where it left none. */
 export async function figure(files, name, caption) {
-  if (!files.has(name)) return null;
+  if (!name || !files.has(name)) return null;
   return figureOf(await (await getBlob(files.get(name).href)).text(), caption);
 }
 

@@ -8,7 +8,7 @@ import { progressView, usualTime } from "./progress.js";
 import { resultView } from "./result.js";
 import { startButton } from "./start.js";
 import { askName, jobName, learnTitles } from "./titles.js";
-import { KINDS } from "./words.js";
+import { COMPARED, KINDS } from "./words.js";
 
 const PLANNED = ["evaluations", "designs", "solves", "scans"];
 
@@ -48,7 +48,9 @@ function actions(job, request, reload) {
     ["failed", "cancelled"].includes(job.state) &&
       h("button", { type: "button", onclick: act("resume", "Back in the queue.") }, "Resume"),
     PLANNED.includes(job.kind) && h("a", { class: "button", href: `#/plan/${job.id}` }, "Plan from here"),
-    job.state === "succeeded" && h("a", { class: "button", href: `#/compare/${job.id}` }, "Compare with …"),
+    job.state === "succeeded" &&
+      COMPARED.has(job.kind) &&
+      h("a", { class: "button", href: `#/compare/${job.id}` }, "Compare with …"),
     !isOpen(job) &&
       startButton("Run again", job.kind, () => request, {
         title: "The same request, with this version of the program",

@@ -96,7 +96,9 @@ export function view3d(surfaces) {
     ),
   );
   requestAnimationFrame(recolour);
-  new ResizeObserver(() => views.forEach((v) => v.draw())).observe(element);
+  const redraw = () => views.forEach((v) => v.draw());
+  new ResizeObserver(redraw).observe(element);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   return element;
 }
 

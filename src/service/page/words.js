@@ -133,6 +133,9 @@ export const KINDS = {
   proofs: "proof",
 };
 
+/** Kinds whose results stand side by side. */
+export const COMPARED = new Set(["evaluations", "designs", "calibrations", "diagnoses"]);
+
 /** What can be maximised. */
 export const OBJECTIVES = [
   ["integrated_sensitivity", "integrated sensitivity 𝒮"],
