@@ -87,7 +87,7 @@ export async function jobView(content, id, signal) {
     learnTitles().catch(() => {}),
   ]);
   const others = isOpen(first) ? (await getJson("/v1/jobs?limit=50").catch(() => ({ jobs: [] }))).jobs : [];
-  const live = progressView(request, usualTime(others, first.kind));
+  const live = progressView(request, usualTime(others, first.kind, request.recordings?.length ?? 1));
   const head = h("section", { class: "sheet" });
   const result = h("div", {});
   const title = `${KINDS[first.kind] ?? first.kind}`;

@@ -13,15 +13,19 @@ const SEARCH = {
   verify: ["calibrating on synthetic noisy scans", (b, draws) => 10 * draws],
 };
 
-/** Stages of a diagnosis in their order: how it begins, and the part of the whole that is done by then. */
+/** Stages of a diagnosis: a pattern, and the part of the whole that is done by then; `n` is the round of the search. */
+const byRound = (n) => 0.15 + 0.6 * (1 - 0.6 ** (n - 1));
 const DIAGNOSIS = [
-  ["fitting the nominal model", 0.02],
-  ["testing", 0.1],
-  ["looking", 0.2],
-  ["fitting the set-up", 0.3],
-  ["fitting", 0.35],
-  ["predicting on a finer mesh", 0.8],
-  ["predicting voxel blocks", 0.93],
+  [/^fitting the nominal model/, () => 0.02],
+  [/^reading the load curve/, () => 0.04],
+  [/^predicting on a finer mesh/, () => 0.06],
+  [/^interior test/, () => 0.1],
+  [/^round (\d+): testing/, byRound],
+  [/^round (\d+): fitting/, (n) => byRound(n) + 0.1],
+  [/^fitting the set-up as a whole/, () => 0.5],
+  [/^testing whether the material is compressible/, () => 0.75],
+  [/^correcting by a finer mesh/, () => 0.78],
+  [/^predicting voxel blocks/, () => 0.92],
 ];
 
 const WORDS = {
@@ -50,8 +54,15 @@ function searchPart(progress, request) {
   return null;
 }
 
-const diagnosisPart = (progress) =>
-  DIAGNOSIS.reduce((part, [start, at]) => (progress.stage.startsWith(start) ? at : part), null);
+/** Several recordings are diagnosed one after the other, and it is not told which one it is. */
+function diagnosisPart(progress, request) {
+  if (request?.recordings?.length > 1) return null;
+  for (const [pattern, part] of DIAGNOSIS) {
+    const found = progress.stage.match(pattern);
+    if (found) return part(Number(found[1] ?? 1));
+  }
+  return null;
+}
 
 const PARTS = { designs: searchPart, diagnoses: diagnosisPart };
 
@@ -73,18 +84,23 @@ function left(part, spent, usual) {
 
 function leftWords(ms) {
   if (ms === null) return "";
+  if (ms < -2000) return "longer than earlier ones took";
   return ms < 2000 ? "almost done" : `about ${duration(ms)} left`;
 }
 
 /** The live view of a job: `show(job)` for every change. */
 export function progressView(request, usual) {
   const element = h("div", {});
+  const steps = h("ol", { class: "quiet" });
+  const done = h("details", {}, h("summary", {}, "What it has done"), steps);
   const past = [];
   const gains = [];
+  let most = null; // What is done is not undone: a search that goes back a stage does not go back in the whole.
   const remember = (p, spent) => {
     const words = stageWords(p.stage);
     if (past.at(-1)?.words !== words) past.push({ words, at: spent });
-    if (p.best && gains.at(-1) !== p.best) gains.push(p.best);
+    const gain = p.best ? digits(p.best, 3) : null;
+    if (gain && gains.at(-1) !== gain) gains.push(gain);
   };
   const now = (job) => {
     const p = job.progress;
@@ -96,7 +112,13 @@ export function progressView(request, usual) {
   function show(job) {
     const spent = job.started_ms ? Date.now() - job.started_ms : 0;
     if (job.progress) remember(job.progress, spent);
-    const part = partDone(job, request);
+    const reached = partDone(job, request);
+    if (reached !== null) most = Math.max(most ?? 0, reached);
+    const part = most;
+    fill(
+      steps,
+      past.slice(-12).map((one) => h("li", {}, `after ${duration(one.at)}: ${one.words}`)),
+    );
     fill(
       element,
       h(
@@ -117,37 +139,19 @@ export function progressView(request, usual) {
           .filter(Boolean)
           .join(" · "),
       ),
-      gains.length > 1 &&
-        h(
-          "p",
-          { class: "quiet" },
-          `Gains found: ${gains
-            .slice(-8)
-            .map((v) => digits(v, 3))
-            .join(" → ")}`,
-        ),
-      past.length > 1 &&
-        h(
-          "details",
-          {},
-          h("summary", {}, "What it has done"),
-          h(
-            "ol",
-            { class: "quiet" },
-            past.slice(-12).map((one) => h("li", {}, `after ${duration(one.at)}: ${one.words}`)),
-          ),
-        ),
+      gains.length > 1 && h("p", { class: "quiet" }, `Gains found: ${gains.slice(-8).join(" → ")}`),
+      past.length > 1 && done,
     );
   }
   return { element, show };
 }
 
-/** What jobs of a kind usually take, milliseconds; nothing where none has ended. */
-export function usualTime(jobs, kind) {
+/** What `count` jobs of a kind usually take, milliseconds; nothing where none has ended. */
+export function usualTime(jobs, kind, count) {
   const times = jobs
     .filter((j) => j.kind === kind && j.state === "succeeded" && j.started_ms)
     .map((j) => j.finished_ms - j.started_ms)
     .filter((ms) => ms > 1000)
     .sort((a, b) => a - b);
-  return times.length ? times[Math.floor(times.length / 2)] : null;
+  return times.length ? count * times[Math.floor(times.length / 2)] : null;
 }
