@@ -52,7 +52,7 @@ function darkened(text) {
 }
 
 /** A figure from SVG text. */
-export function figureOf(text, caption) {
+function figureOf(text, caption) {
   const image = h("img", { alt: caption });
   const show = () => {
     URL.revokeObjectURL(image.src);

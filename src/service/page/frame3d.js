@@ -58,11 +58,11 @@ export function frameOf(surface) {
   const others = [0, 1, 2].filter((k) => k !== axis).map((k) => 1.12 * half[k]);
   const fixed = closed(rectangle(axis, -1.01 * half[axis], others));
   const moving = closed(rectangle(axis, 1.01 * half[axis], others));
-  const start = axis === 1 ? [0, 1.01 * half[1], 1.25 * half[2]] : [half[0], 0, 1.4 * half[2]];
+  const start = axis === 1 ? [0, 1.01 * half[1], 1.25 * half[2]] : [0.75 * half[0], 0, 1.4 * half[2]];
   const drive = [surface.drive_mm, 0, 0];
   const lines = [
     ...fixed.map((p) => [p, [0, 0, 0]]),
-    ...[...moving, ...arrow(start, Math.max(0.3 * half[0], surface.drive_mm))].map((p) => [p, drive]),
+    ...[...moving, ...arrow(start, 0.3 * half[0])].map((p) => [p, drive]),
   ];
   return { at: new Float32Array(lines.flatMap((l) => l[0])), moved: new Float32Array(lines.flatMap((l) => l[1])) };
 }

@@ -1,8 +1,7 @@
 // Images (NIfTI-1, compressed): a scalar or a vector per voxel.
 
 /** Uncompresses a blob. */
-export const unzipped = async (blob) =>
-  new Response(blob.stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
+const unzipped = async (blob) => new Response(blob.stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
 
 const READERS = {
   2: ["getUint8", 1],

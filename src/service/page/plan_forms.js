@@ -1,6 +1,6 @@
 // The forms of a plan: specimen, material, scan, limits, goal of a search.
 
-import { h, fill } from "./dom.js";
+import { h } from "./dom.js";
 import { choice, field } from "./field.js";
 import { sectionOf } from "./outline.js";
 import { GLOSSARY, OBJECTIVES } from "./words.js";

@@ -38,7 +38,7 @@ const WORDS = {
 };
 
 /** What a job does now, in words. */
-export const stageWords = (stage) => SEARCH[stage]?.[0] ?? WORDS[stage] ?? stage;
+const stageWords = (stage) => SEARCH[stage]?.[0] ?? WORDS[stage] ?? stage;
 
 function searchPart(progress, request) {
   const budget = request?.budget ?? {};

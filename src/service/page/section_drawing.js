@@ -6,11 +6,15 @@ import { digits, plain } from "./numbers.js";
 import { outlinePath, sectionOf } from "./outline.js";
 
 /** Sizes of a drawing, mm of the specimen: `text` is the height of letters, `margin` the room for dimensions. */
-function layout(section) {
+function layout(section, isSheared) {
   const text = Math.max(section.length / 34, section.height / 22);
   const margin = 3.4 * text;
   const gap = 5.4 * text;
-  return { text, margin, side: section.height / 2 + gap + section.depth / 2 };
+  // Plates seen from their edge stand above and below the section; they and their words need room there.
+  const isEdge = isSheared && section.up === "y";
+  const below = isEdge ? 3.2 * text : 1.7 * text;
+  const side = section.height / 2 + gap + (isEdge ? 1.6 * text : 0) + section.depth / 2;
+  return { text, margin, top: isEdge ? 3.4 * text : 2 * text, below, side };
 }
 
 const line = (cls, [x1, y1], [x2, y2]) => s("line", { class: cls, x1, y1, x2, y2 });
@@ -145,16 +149,16 @@ function marks(model, section, { text }) {
 /** Everything but the holes; `svg` takes its frame. */
 export function drawSection(svg, model) {
   const section = sectionOf(model.specimen);
-  const at = layout(section);
-  const { text, margin, side } = at;
+  const at = layout(section, model.specimen.test !== "uniaxial");
+  const { text, margin, top, below, side } = at;
   const { length, height, depth } = section;
   svg.setAttribute(
     "viewBox",
     [
       -length / 2 - margin,
-      -height / 2 - 2 * text,
+      -height / 2 - top,
       length + margin + 4.5 * text,
-      height / 2 + 2 * text + side + depth / 2 + 2.4 * text,
+      height / 2 + top + side + depth / 2 + 2.4 * text,
     ]
       .map((v) => v.toFixed(3))
       .join(" "),
@@ -164,12 +168,7 @@ export function drawSection(svg, model) {
     sideView(model, section, at),
     s("path", { class: "outline", d: outlinePath(model.specimen, section) }),
     held(model, section, at),
-    dimension(
-      text,
-      [-length / 2, height / 2 + 1.7 * text],
-      [length / 2, height / 2 + 1.7 * text],
-      `x ${plain(length)} mm`,
-    ),
+    dimension(text, [-length / 2, height / 2 + below], [length / 2, height / 2 + below], `x ${plain(length)} mm`),
     dimension(
       text,
       [-length / 2 - 1.3 * text, height / 2],

@@ -4,7 +4,7 @@ import { fill, h } from "./dom.js";
 import { digits, symbol } from "./numbers.js";
 
 /** What of an evaluation can vary: pointer, words, value now. */
-export function variables(model) {
+function variables(model) {
   const { specimen, material, scan } = model;
   const found = [];
   const add = (pointer, words, value) => found.push({ pointer, words, value });

@@ -13,7 +13,7 @@ function named() {
 }
 
 /** Names something in this browser; an empty name takes the name back. */
-export function rename(id, name) {
+function rename(id, name) {
   const all = named();
   if (name) all[id] = name;
   else delete all[id];
