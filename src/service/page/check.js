@@ -34,7 +34,8 @@ const cost = (c, volume) =>
     "p",
     { class: "quiet" },
     `${many(c.num_voxels)} voxels, ${many(c.num_elements)} elements; an evaluation takes about ` +
-      `${duration(1000 * c.seconds)} (a job of this service at most ${duration(1000 * c.most_seconds)}). ${digits(volume, 4)} mm³ of material.`,
+      `${duration(1000 * c.seconds)} (a job of this service at most ${duration(1000 * c.most_seconds)}). ` +
+      `${digits(volume, 4)} mm³ of material.`,
   );
 
 /** Shows what was found; `others` are the errors that have no field. */

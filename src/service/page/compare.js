@@ -9,7 +9,7 @@ import { readResult } from "./result.js";
 import { jobName, learnTitles } from "./titles.js";
 import { COMPARED, GLOSSARY, KINDS, VERDICTS } from "./words.js";
 
-/** A line of the comparison: key, words, meaning; then the number, its text, and whether less is better (null: neither). */
+/** A line of the comparison: key, words, number, text, whether less is better (null: neither), meaning. */
 const line = (key, words, value, text, isLessBetter = null, meaning = "") => ({
   key,
   words,

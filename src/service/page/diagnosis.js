@@ -98,7 +98,7 @@ async function materialSheet(result, recording) {
       {},
       isWeighed
         ? result.causes.length > 0 &&
-            `The initial shear modulus changes by ${percent(to / from - 1, 2)} when what was found is taken into account.`
+            `With what was found taken into account the initial shear modulus changes by ${percent(to / from - 1, 2)}.`
         : "No force was recorded: displacements tell exponents and ratios of moduli, and no modulus.",
     ),
     h(
@@ -111,9 +111,9 @@ async function materialSheet(result, recording) {
         "p",
         {},
         `The sample is ${percent(Math.abs(belief.as_relative_cell_gain_error), 2)} ` +
-          `${belief.as_relative_cell_gain_error > 0 ? "stiffer" : "softer"} than believed (${digits(belief.found_kpa, 3)} against ` +
-          `${digits(belief.believed_kpa, 3)} kPa). A load cell that reads as much wrong would look the same: a known weight hung on ` +
-          "it tells.",
+          `${belief.as_relative_cell_gain_error > 0 ? "stiffer" : "softer"} than believed ` +
+          `(${digits(belief.found_kpa, 3)} against ${digits(belief.believed_kpa, 3)} kPa). A load cell that reads as much ` +
+          "wrong would look the same: a known weight hung on it tells.",
       ),
   );
 }
@@ -144,8 +144,8 @@ function summary(result) {
       "p",
       { class: "quiet" },
       `Noise along x, y, z ${result.noise_sd_mm.map((v) => digits(v, 2)).join(", ")} mm` +
-        `${result.is_noise_estimated ? ", estimated from the recording" : ", as the recording states it"}; meshes may leave ` +
-        `${digits(result.allowance_mm, 2)} mm rms.`,
+        `${result.is_noise_estimated ? ", estimated from the recording" : ", as the recording states it"}; ` +
+        `meshes may leave ${digits(result.allowance_mm, 2)} mm rms.`,
       result.num_outlying_voxels > 0 &&
         ` Voxels left out, since they agree with hardly any neighbour: ${result.num_outlying_voxels}.`,
     ),

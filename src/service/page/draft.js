@@ -112,7 +112,8 @@ export function planOfFile(text) {
   const read = FORMATS[content.schema];
   if (!read)
     throw new Error(
-      `Files of the formats ${Object.keys(FORMATS).join(", ")} can be opened; this one is ${content.schema ?? "none of them"}.`,
+      `Files of the formats ${Object.keys(FORMATS).join(", ")} can be opened; ` +
+        `this one is ${content.schema ?? "none of them"}.`,
     );
   const parts = read(content);
   if (typeof parts.specimen === "string" || typeof parts.material === "string") {

@@ -115,7 +115,9 @@ export function editor(model, change) {
       r: hole.diameter_mm / 2,
       tabindex: 0,
       role: "button",
-      "aria-label": `Hole ${index + 1}, ${plain(hole.diameter_mm)} mm at ${plain(x)}, ${plain(y)} mm${wrong ? ", breaks a limit" : ""}`,
+      "aria-label":
+        `Hole ${index + 1}, ${plain(hole.diameter_mm)} mm at ${plain(x)}, ${plain(y)} mm` +
+        `${wrong ? ", breaks a limit" : ""}`,
       onpointerdown: (event) => {
         const at = toMm(event);
         dragging = { index, dx: at[0] - x, dy: at[1] - y };

@@ -38,8 +38,8 @@ const READERS = {
 let made = 0;
 
 /**
- * A field: `kind` of READERS; `pointer` of what it holds, by which errors of the service find it; `put` takes the value that
- * was read. A value that cannot be read changes nothing.
+ * A field: `kind` of READERS; `pointer` of what it holds, by which errors of the service find it; `put` takes the value
+ * that was read. A value that cannot be read changes nothing.
  */
 export function field({ label, kind = "number", value, put, example = "5", pointer, meaning, wide, changed, ...more }) {
   const id = `field-${(made += 1)}`;

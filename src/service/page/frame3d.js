@@ -50,7 +50,7 @@ function heldAxis(surface, half) {
   return [1, 0].find(isHeld);
 }
 
-/** Lines of the frame: places at rest and their displacement, mm; nothing where the surface does not show how it is held. */
+/** Lines of the frame: places at rest and their displacement, mm; nothing where it is not seen how it is held. */
 export function frameOf(surface) {
   const half = halves(surface.reference_mm);
   const axis = heldAxis(surface, half);

@@ -87,7 +87,7 @@ function change([, , , value, , isLessBetter], base) {
   return h("span", { class: kind }, `${part > 0 ? "+" : "−"}${digits(Math.abs(100 * part), 2)} %${word}`);
 }
 
-/** The panel: `element`; `hold()` after an edit, `update()` once it was checked. `isSound()`: it can be evaluated at all. */
+/** The panel: `element`; `hold()` after an edit, `update()` once it was checked. `isSound()`: it can be evaluated. */
 export function livePanel(model, signal, isSound) {
   const state = { isOn: true, hasMap: false, turn: 0, base: { key: "", figures: null } };
   const body = h("div", { "aria-live": "polite" }, h("p", { class: "quiet" }, "The figures follow."));

@@ -66,7 +66,8 @@ export async function look(files) {
       h(
         "p",
         { class: "quiet" },
-        `${recording.specimen?.name ?? "a specimen"}, ${files.length} files, ${digits(files.reduce((sum, f) => sum + f.size, 0) / 1e6, 3)} MB`,
+        `${recording.specimen?.name ?? "a specimen"}, ${files.length} files, ` +
+          `${digits(files.reduce((sum, f) => sum + f.size, 0) / 1e6, 3)} MB`,
       ),
       table(
         ["Drive, mm", "Force, N", "± N"],

@@ -17,7 +17,7 @@ export function sectionOf(specimen) {
 
 const isDumbbell = (specimen, section) => specimen.outline === "iso37_type4" && section.up === "z";
 
-/** ISO 37 type 4, mm: half of the narrow length, half-widths, radius of both arcs of a transition and their length along x. */
+/** ISO 37 type 4, mm: half of the narrow length, half-widths, radius of both arcs of a transition, and their length. */
 const NARROW = 6;
 const [HALF_NARROW, HALF_END, RADIUS] = [1, 3, 3];
 const ARC = Math.sqrt(RADIUS ** 2 - (RADIUS - (HALF_END - HALF_NARROW) / 2) ** 2);

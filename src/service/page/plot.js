@@ -4,7 +4,7 @@ import { ticks } from "./axis.js";
 import { fill, h, s } from "./dom.js";
 import { digits } from "./numbers.js";
 
-/** A plot of `rows` (objects) with selectable columns `across` and `up`: [[key, label]]; a click on a point opens its row. */
+/** A plot of `rows` with selectable columns `across` and `up`: [[key, label]]; a click on a point opens its row. */
 export function scatter(rows, across, up, open) {
   const picture = h("div", {});
   const state = { across: across[0][0], up: up[0][0] };

@@ -113,7 +113,8 @@ const inputs = (request, result, job) =>
     h(
       "p",
       { class: "quiet" },
-      `Computed by lambdak ${result.version ?? job.version}${result.input_hash ? `, inputs ${result.input_hash.slice(0, 12)}` : ""}.`,
+      `Computed by lambdak ${result.version ?? job.version}` +
+        `${result.input_hash ? `, inputs ${result.input_hash.slice(0, 12)}` : ""}.`,
     ),
     more(
       "What it was computed from",

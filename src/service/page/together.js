@@ -6,7 +6,9 @@ import { callout, table } from "./parts.js";
 
 /** Whether recordings agree, in words. */
 function agreement({ agrees, deviance_rise: rise, parameters_saved: saved, deviance_limit: limit }) {
-  const numbers = `The deviance rises by ${digits(rise, 3)} where ${saved} parameters are saved; more than ${digits(limit, 3)} would be too much.`;
+  const numbers =
+    `The deviance rises by ${digits(rise, 3)} where ${saved} parameters are saved; ` +
+    `more than ${digits(limit, 3)} would be too much.`;
   return agrees
     ? callout("good", "One material serves all recordings.", h("p", {}, numbers))
     : callout("bad", "No one material serves all recordings.", h("p", {}, numbers));

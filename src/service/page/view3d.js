@@ -1,4 +1,4 @@
-// The deformed surface in WebGL, coloured by λ or k. Drag or use the arrow keys to turn, wheel or + and − to come nearer.
+// The deformed surface in WebGL, coloured by λ or k: drag or arrow keys turn it, wheel or + and − bring it nearer.
 
 import { h } from "./dom.js";
 import { frameOf } from "./frame3d.js";
@@ -11,11 +11,17 @@ const RAMP = [
   [94, 201, 98],
   [253, 231, 37],
 ].map((c) => c.map((v) => v / 255));
-const VERTEX = `attribute vec3 at; attribute vec3 moved; attribute vec3 tint; uniform mat4 view; uniform float amount; varying vec3 colour; varying vec3 place;
+const VERTEX = `attribute vec3 at; attribute vec3 moved; attribute vec3 tint;
+uniform mat4 view; uniform float amount; varying vec3 colour; varying vec3 place;
 void main() { vec3 p = at + amount * moved; gl_Position = view * vec4(p, 1.0); colour = tint; place = p; }`;
 const FRAGMENT = `#extension GL_OES_standard_derivatives : enable
 precision mediump float; varying vec3 colour; varying vec3 place; uniform float plain;
-void main() { if (plain > 0.5) { gl_FragColor = vec4(colour, 1.0); return; } vec3 n = normalize(cross(dFdx(place), dFdy(place))); float light = 0.62 + 0.38 * abs(dot(n, normalize(vec3(0.4, 0.55, 0.75)))); gl_FragColor = vec4(colour * light, 1.0); }`;
+void main() {
+  if (plain > 0.5) { gl_FragColor = vec4(colour, 1.0); return; }
+  vec3 n = normalize(cross(dFdx(place), dFdy(place)));
+  float light = 0.62 + 0.38 * abs(dot(n, normalize(vec3(0.4, 0.55, 0.75))));
+  gl_FragColor = vec4(colour * light, 1.0);
+}`;
 
 function colour(value, low, high) {
   if (value === null) return [0.6, 0.6, 0.6];

@@ -188,7 +188,7 @@ export const GLOSSARY = {
     "could hide. Read the interval, not the estimate alone.",
   "median stretch": "Half of the voxels are stretched more than this, half less.",
   "largest stretch": "The largest principal stretch anywhere in the sample. Where it is too large, the sample tears.",
-  gain: "How much more a design tells than the base specimen, by the chosen objective: 1 is as much, 2 is twice as much.",
+  gain: "How much more a design tells than the base specimen, by the chosen objective: 1 is as much, 2 twice as much.",
   "D-optimal": "The volume of the region in which all parameters together would lie, per parameter.",
   "A-optimal": "The sum of the parameters' relative variances.",
   "E-optimal": "The combination of parameters that would be known worst.",
