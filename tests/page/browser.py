@@ -30,10 +30,22 @@ class Page:
         self.number, self.errors, self.num_shots, self.num_checked = 0, [], 0, 0
         self.folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         self.process = subprocess.Popen(
-            [chromium, "--headless=new", "--no-sandbox", "--disable-gpu-sandbox", "--use-gl=angle", "--use-angle=swiftshader",
-             "--enable-unsafe-swiftshader", "--remote-debugging-port=0", "--remote-allow-origins=*",
-             f"--user-data-dir={self.folder.name}", "about:blank"],
-            stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+            [
+                chromium,
+                "--headless=new",
+                "--no-sandbox",
+                "--disable-gpu-sandbox",
+                "--use-gl=angle",
+                "--use-angle=swiftshader",
+                "--enable-unsafe-swiftshader",
+                "--remote-debugging-port=0",
+                "--remote-allow-origins=*",
+                f"--user-data-dir={self.folder.name}",
+                "about:blank",
+            ],
+            stderr=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+        )
         port_file = pathlib.Path(self.folder.name) / "DevToolsActivePort"
         end = time.monotonic() + 120
         while not (port_file.exists() and port_file.read_text().strip()):
@@ -100,18 +112,35 @@ class Page:
 
     def click(self, text, within="document"):
         """Clicks the button or link of this text."""
-        self.js(f"[...{within}.querySelectorAll('button, a')].find((b) => b.textContent.trim() === {json.dumps(text)}).click()")
+        self.js(
+            f"[...{within}.querySelectorAll('button, a')]"
+            f".find((b) => b.textContent.trim() === {json.dumps(text)}).click()"
+        )
 
     def put(self, label, value):
         """Puts a value into the field whose label begins so."""
-        self.js(f"""(() => {{ const i = [...document.querySelectorAll('label')].find((l) => l.textContent.startsWith({json.dumps(label)})).control;
-          i.value = {json.dumps(value)}; i.dispatchEvent(new Event('change')); }})()""")
+        self.js(
+            f"""(() => {{ const i = [...document.querySelectorAll('label')]
+          .find((l) => l.textContent.startsWith({json.dumps(label)})).control;
+          i.value = {json.dumps(value)}; i.dispatchEvent(new Event('change')); }})()"""
+        )
+
+    def choose(self, selector, value):
+        """Puts a value into the field of this selector."""
+        self.js(
+            f"""(() => {{ const e = document.querySelector({json.dumps(selector)}); e.value = {json.dumps(value)};
+          e.dispatchEvent(new Event('change')); }})()"""
+        )
 
     def files(self, selector, files):
         """Puts files (base64 by name) into a field, as the browser's own dialogue would."""
-        self.js(f"""(() => {{ const all = new DataTransfer(); for (const [name, text] of Object.entries({json.dumps(files)}))
+        self.js(
+            f"""(() => {{ const all = new DataTransfer();
+          for (const [name, text] of Object.entries({json.dumps(files)}))
           all.items.add(new File([Uint8Array.from(atob(text), (c) => c.charCodeAt(0))], name));
-          const i = document.querySelector({json.dumps(selector)}); i.files = all.files; i.dispatchEvent(new Event('change')); }})()""")
+          const i = document.querySelector({json.dumps(selector)}); i.files = all.files;
+          i.dispatchEvent(new Event('change')); }})()"""
+        )
 
     def size(self, name):
         width, height = SIZES[name]
@@ -121,7 +150,7 @@ class Page:
         self.send("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": name}])
 
     def screen(self, name):
-        """Pictures of the whole page in every size and scheme, the rules of accessibility among them, nothing wider than the screen."""
+        """Pictures of the whole page in all sizes and schemes, held against the rules; none wider than the screen."""
         for size in SIZES:
             self.size(size)
             for scheme in SCHEMES:
@@ -144,8 +173,11 @@ class Page:
     def accessible(self, name):
         if not self.js("!!globalThis.axe"):
             self.js(f"{RULES}; 1")
-        found = self.js("axe.run(document, { resultTypes: ['violations'] }).then((r) => r.violations.map((v) => "
-                        "({ id: v.id, impact: v.impact, nodes: v.nodes.slice(0, 4).map((n) => n.html.slice(0, 160) + ' | ' + n.any.map((a) => a.message).join(' ')) })))")
+        found = self.js(
+            "axe.run(document, { resultTypes: ['violations'] }).then((r) => r.violations.map((v) => "
+            "({ id: v.id, impact: v.impact, nodes: v.nodes.slice(0, 4).map((n) =>"
+            " n.html.slice(0, 160) + ' | ' + n.any.map((a) => a.message).join(' ')) })))"
+        )
         bad = [v for v in found if v["impact"] in ("serious", "critical")]
         self.num_checked += 1
         assert not bad, f"{name}: {json.dumps(bad, indent=1)}"

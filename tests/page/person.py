@@ -1,6 +1,6 @@
-"""A person's path through the service's page in Chromium: plan, break a limit, mend it, undo, keep, share; evaluate, search, sweep,
-compare; look at a recording, calibrate on it, diagnose it; the same by keyboard alone. Every screen is pictured light and dark, wide
-and narrow, and held against the rules of axe-core.
+"""A person's path through the service's page in Chromium: plan, break a limit, mend it, undo, keep, share; evaluate,
+search, sweep, compare; look at a recording, calibrate on it, diagnose it; the same by keyboard alone. Every screen is
+pictured light and dark, wide and narrow, and held against the rules of axe-core.
 
     python person.py http://127.0.0.1:8080/ SHOTS [chromium]
 
@@ -22,8 +22,10 @@ address = sys.argv[1].rstrip("/")
 shots = pathlib.Path(sys.argv[2])
 shots.mkdir(parents=True, exist_ok=True)
 
-HOLE = ("(() => { const r = document.querySelectorAll('svg.section .hole')[%d].getBoundingClientRect();"
-        " return [r.x + r.width / 2, r.y + r.height / 2]; })()")
+HOLE = (
+    "(() => { const r = document.querySelectorAll('svg.section .hole')[%d].getBoundingClientRect();"
+    " return [r.x + r.width / 2, r.y + r.height / 2]; })()"
+)
 CX = "Number(document.querySelectorAll('svg.section .hole')[0].getAttribute('cx'))"
 CHECK = "document.querySelector('[aria-label=\"Limits and cost\"]').innerText"
 KEPT = f"{CHECK}.includes('Every limit is kept')"
@@ -43,14 +45,24 @@ def call(path, body=None):
 def zipped_recording():
     """A zip file of a small recording that the service does not know yet."""
     library = json.loads(call("/v1/library"))
-    body = {"specimen": {**library["specimens"][1], "drive_mm": [4.0]}, "material": library["materials"][0]["material"],
-            "mesh": "2.5", "voxel_mm": [2.0, 0.7, 2.0], "mm_per_radian": [0.4] * 3, "noise_sd_mm": [0.01, 0.01, 0.01], "seed": 11}
+    body = {
+        "specimen": {**library["specimens"][1], "drive_mm": [4.0]},
+        "material": library["materials"][0]["material"],
+        "mesh": "2.5",
+        "voxel_mm": [2.0, 0.7, 2.0],
+        "mm_per_radian": [0.4] * 3,
+        "noise_sd_mm": [0.01, 0.01, 0.01],
+        "seed": 11,
+    }
     job = json.loads(call("/v1/scans", body))["id"]
     end = time.monotonic() + LONG_S
     while json.loads(call(f"/v1/jobs/{job}"))["state"] in ("queued", "running"):
         assert time.monotonic() < end, "no scan"
         time.sleep(0.2)
-    content = {name: call(f"/v1/jobs/{job}/artefacts/{name}") for name in ["recording.json", "mask.nii.gz", "u_1.nii.gz", "load.csv"]}
+    content = {
+        name: call(f"/v1/jobs/{job}/artefacts/{name}")
+        for name in ["recording.json", "mask.nii.gz", "u_1.nii.gz", "load.csv"]
+    }
     recording = json.loads(content["recording.json"])
     recording["id"] = "a-persons-upload"
     content["recording.json"] = json.dumps(recording).encode()
@@ -62,7 +74,8 @@ def zipped_recording():
 
 
 def plan(page):
-    """A hole dragged breaks a limit at once; undo brings it back; words at the field; the draft survives, as a file and a link too."""
+    """A hole dragged breaks a limit at once; undo brings it back; words at the field; the draft survives, also as a
+    file and as a link."""
     page.open(f"{address}/")
     page.until("document.querySelectorAll('svg.section .hole').length === 2")
     page.until(KEPT)
@@ -86,7 +99,9 @@ def plan(page):
     page.put("Drives", "five")
     page.says("give numbers such as 5, 9")
     page.put("Drives", "5, 4")
-    page.until("document.querySelector('[data-pointer=\"/specimen/drive_mm\"]').getAttribute('aria-invalid') === 'true'")
+    page.until(
+        "document.querySelector('[data-pointer=\"/specimen/drive_mm\"]').getAttribute('aria-invalid') === 'true'"
+    )
     page.screen("plan-words-at-the-field")
     page.put("Drives", "5")
     page.put("Name", "a person's specimen")
@@ -94,10 +109,13 @@ def plan(page):
     page.open(f"{address}/#/plan")
     page.until("[...document.querySelectorAll('input')].some((i) => i.value === \"a person's specimen\")")
 
-    page.js("(() => { const s = document.querySelector('select[aria-label=\"Save as a file\"]'); s.value = 2; s.dispatchEvent(new Event('change')); })()")
+    page.choose("select[aria-label='Save as a file']", 2)
     study = page.downloaded("a-person-s-specimen-study.json").read_text()
     assert json.loads(study)["schema"] == "study/1"
-    link = page.js(f"import('/assets/draft.js').then((m) => m.linkOf({{ ...m.kept(), specimen: {{ ...m.kept().specimen, name: 'linked' }} }}))")
+    link = page.js(
+        "import('/assets/draft.js').then((m) =>"
+        " m.linkOf({ ...m.kept(), specimen: { ...m.kept().specimen, name: 'linked' } }))"
+    )
     page.open(link)
     page.until("[...document.querySelectorAll('input')].some((i) => i.value === 'linked')")
     page.files("#plan-file", {"study.json": base64.b64encode(study.encode()).decode()})
@@ -106,33 +124,49 @@ def plan(page):
 
 def evaluate(page):
     """One drive and the coarse mesh; follow; read; take home."""
-    page.js("(() => { const m = document.querySelector('select[aria-label=Mesh]'); m.value = 'search'; m.dispatchEvent(new Event('change')); })()")
+    page.choose("select[aria-label=Mesh]", "search")
     page.js("document.getElementById('evaluate').click()")
     page.until("location.hash.startsWith('#/job/')")
     page.says("What the scan promises", LONG_S)
     page.until(f"document.querySelectorAll('canvas').length === 1 && {PICTURES}")
     page.screen("evaluation")
-    drawn = page.js("""(() => { const c = document.querySelector('canvas'); const gl = c.getContext('webgl'); if (!gl) return -1;
-      const p = new Uint8Array(4 * c.width * c.height); gl.readPixels(0, 0, c.width, c.height, gl.RGBA, gl.UNSIGNED_BYTE, p);
-      let n = 0; for (let i = 3; i < p.length; i += 4) n += p[i] > 0; return n / (c.width * c.height); })()""")
+    drawn = page.js(
+        """(() => { const c = document.querySelector('canvas'); const gl = c.getContext('webgl'); if (!gl) return -1;
+      const p = new Uint8Array(4 * c.width * c.height);
+      gl.readPixels(0, 0, c.width, c.height, gl.RGBA, gl.UNSIGNED_BYTE, p);
+      let n = 0; for (let i = 3; i < p.length; i += 4) n += p[i] > 0; return n / (c.width * c.height); })()"""
+    )
     assert drawn > 0.05, f"the 3D view is empty: {drawn}"
     page.click("specimen.dxf")
     assert "ENTITIES" in page.downloaded("specimen.dxf").read_text()
     page.js("document.getElementById('download-all').click()")
     with zipfile.ZipFile(page.downloaded("a-person-s-specimen.zip")) as archive:
-        assert archive.testzip() is None and {"result.json", "request.json", "specimen.stl"} <= set(archive.namelist()), archive.namelist()
+        assert archive.testzip() is None and {"result.json", "request.json", "specimen.stl"} <= set(
+            archive.namelist()
+        ), archive.namelist()
 
 
 def search(page):
     """A design with the smallest budget, watched live; base against chosen; the chosen one as the next plan."""
     page.go("plan")
     page.until("document.getElementById('design')")
-    for label, value in [("Designs sampled", "6"), ("Designs improved", "1"), ("Steps of each", "1"), ("Designs confirmed", "1")]:
+    for label, value in [
+        ("Designs sampled", "6"),
+        ("Designs improved", "1"),
+        ("Steps of each", "1"),
+        ("Designs confirmed", "1"),
+    ]:
         page.put(label, value)
     page.js("document.getElementById('design').click()")
     # On a service that knows the study already there is no progress to see.
-    page.until("document.querySelector('progress') || document.body.innerText.includes('gain over the base specimen')", LONG_S)
-    page.until("document.body.innerText.includes('of the whole') || document.body.innerText.includes('gain over the base specimen')", LONG_S)
+    page.until(
+        "document.querySelector('progress') || document.body.innerText.includes('gain over the base specimen')", LONG_S
+    )
+    page.until(
+        "document.body.innerText.includes('of the whole')"
+        " || document.body.innerText.includes('gain over the base specimen')",
+        LONG_S,
+    )
     page.screen("design-running")
     page.says("gain over the base specimen", LONG_S)
     page.until(f"document.querySelectorAll('canvas').length === 2 && {PICTURES}")
@@ -145,7 +179,7 @@ def search(page):
 def sweep(page):
     """One axis, three points; a point opened as a plan."""
     page.until("document.querySelector('#sweep-form input')")
-    page.js("(() => { const m = document.querySelector('select[aria-label=Mesh]'); m.value = 'search'; m.dispatchEvent(new Event('change')); })()")
+    page.choose("select[aria-label=Mesh]", "search")
     page.put("Evaluations", 3)
     page.until("document.getElementById('sweep-form').innerText.includes('3 evaluations')")
     page.js("document.getElementById('sweep').click()")
@@ -165,12 +199,19 @@ def recordings(page):
     page.until(f"{MAPS} === 1 && document.body.innerText.includes('The load cell')")
     page.screen("recording-looked-at")
     page.click("Upload")
-    mine = "[...document.querySelectorAll('section.sheet')].find((s) => s.querySelector('h3')?.textContent === 'a-persons-upload' && s.querySelector('.calibrate'))"
+    mine = (
+        "[...document.querySelectorAll('section.sheet')].find((s) =>"
+        " s.querySelector('h3')?.textContent === 'a-persons-upload' && s.querySelector('.calibrate'))"
+    )
     page.until(mine)
     page.screen("recordings")
 
     def start(button, settings):
-        page.js(f"(() => {{ const s = {mine}; for (const [label, value] of {json.dumps(settings)}) {{ const e = s.querySelector(`select[aria-label='${{label}}']`); e.value = value; e.dispatchEvent(new Event('change')); }} s.querySelector('button.{button}').click(); }})()")
+        page.js(
+            f"""(() => {{ const s = {mine}; for (const [label, value] of {json.dumps(settings)}) {{
+          const e = s.querySelector(`select[aria-label='${{label}}']`); e.value = value;
+          e.dispatchEvent(new Event('change')); }} s.querySelector('button.{button}').click(); }})()"""
+        )
         page.until("location.hash.startsWith('#/job/')")
 
     start("calibrate", [["Mesh", "2"], ["Number of terms", "1"]])
@@ -178,7 +219,9 @@ def recordings(page):
     assert page.js("!!document.querySelector('.callout')"), "a calibration says first whether it can be believed"
     before = page.js("document.querySelector('.slices output').textContent")
     page.js("document.querySelector('.slices input[type=range]').focus()")
-    is_first = page.js("(() => { const r = document.querySelector('.slices input[type=range]'); return r.value === r.min; })()")
+    is_first = page.js(
+        "(() => { const r = document.querySelector('.slices input[type=range]'); return r.value === r.min; })()"
+    )
     page.key("ArrowRight" if is_first else "ArrowLeft")
     page.until(f"document.querySelector('.slices output').textContent !== {json.dumps(before)}")
     page.screen("calibration")
@@ -206,8 +249,11 @@ def compare_and_tidy(page):
     page.says("the first evaluation")
     page.put("Kind", "")
     page.screen("jobs")
-    page.js("(() => { const rows = [...document.querySelectorAll('tbody tr')]; for (const kind of ['evaluation', 'design search'])"
-            " rows.find((r) => r.cells[2].textContent === kind).querySelector('input').click(); })()")
+    page.js(
+        "(() => { const rows = [...document.querySelectorAll('tbody tr')];"
+        " for (const kind of ['evaluation', 'design search'])"
+        " rows.find((r) => r.cells[2].textContent === kind).querySelector('input').click(); })()"
+    )
     page.js("document.getElementById('compare').click()")
     page.says("Promised deviation of")
     page.until(f"document.querySelectorAll('canvas').length === 2 && {PICTURES}")
@@ -215,7 +261,10 @@ def compare_and_tidy(page):
     page.go("jobs")
     page.until("document.querySelectorAll('tbody tr').length >= 4")
     count = page.js("document.querySelectorAll('tbody tr').length")
-    page.js("[...document.querySelectorAll('tbody tr')].find((r) => r.cells[2].textContent === 'sweep').querySelector('button[aria-label^=Delete]').click()")
+    page.js(
+        "[...document.querySelectorAll('tbody tr')].find((r) => r.cells[2].textContent === 'sweep')"
+        ".querySelector('button[aria-label^=Delete]').click()"
+    )
     page.until(f"document.querySelectorAll('tbody tr').length === {count - 1}")
 
 
@@ -253,4 +302,7 @@ try:
     assert not errors, errors
 finally:
     page.close()
-print(f"a person's path: {page.num_shots} screenshots, {page.num_checked} checks of accessibility without serious findings, no errors in the browser")
+print(
+    f"a person's path: {page.num_shots} screenshots, {page.num_checked} checks of accessibility without serious"
+    " findings, no errors in the browser"
+)

@@ -36,9 +36,9 @@ function verdict(result, request) {
       "p",
       {},
       `χ² per datum is ${chi2}, where noise alone gives 1: the misfit is ` +
-        `${digits(Math.sqrt(result.chi2_per_datum), 2)} times the noise. Something that was not told of the experiment ` +
-        "moved the sample, or the material is another one. The intervals below say how far that can have shifted every " +
-        "parameter.",
+        `${digits(Math.sqrt(result.chi2_per_datum), 2)} times the noise. Something that was not told of the ` +
+        "experiment moved the sample, or the material is another one. The intervals below say how far that can have " +
+        "shifted every parameter.",
     ),
     diagnoseButton(request),
   );

@@ -112,8 +112,8 @@ async function materialSheet(result, recording) {
         {},
         `The sample is ${percent(Math.abs(belief.as_relative_cell_gain_error), 2)} ` +
           `${belief.as_relative_cell_gain_error > 0 ? "stiffer" : "softer"} than believed ` +
-          `(${digits(belief.found_kpa, 3)} against ${digits(belief.believed_kpa, 3)} kPa). A load cell that reads as much ` +
-          "wrong would look the same: a known weight hung on it tells.",
+          `(${digits(belief.found_kpa, 3)} against ${digits(belief.believed_kpa, 3)} kPa). A load cell that reads ` +
+          "as much wrong would look the same: a known weight hung on it tells.",
       ),
   );
 }

@@ -266,8 +266,9 @@ export async function recordingsView(content, signal) {
         "p",
         { class: "quiet" },
         `${summary.specimen.name} · ${summary.shape.join(" × ")} voxels of ` +
-          `${summary.voxel_mm.map((v) => plain(v, 3)).join(" × ")} mm, ${many(summary.num_voxels)} of them material · ` +
-          `${digits(recording.num_bytes / 1e6, 2)} MB${summary.is_raw ? " · raw phases" : ""}`,
+          `${summary.voxel_mm.map((v) => plain(v, 3)).join(" × ")} mm, ` +
+          `${many(summary.num_voxels)} of them material · ${digits(recording.num_bytes / 1e6, 2)} MB` +
+          `${summary.is_raw ? " · raw phases" : ""}`,
       ),
       table(
         ["Drive, mm", "Force, N"],
@@ -285,9 +286,9 @@ export async function recordingsView(content, signal) {
       h(
         "p",
         { class: "quiet" },
-        "A folder, or a zip file of one, with recording.json and its images: displacements, or raw phases. It is shown " +
-          "first; the service reads and checks it before it keeps it. MATLAB files and images of other programs become " +
-          "such a folder by lambdak import.",
+        "A folder, or a zip file of one, with recording.json and its images: displacements, or raw phases. It is " +
+          "shown first; the service reads and checks it before it keeps it. MATLAB files and images of other " +
+          "programs become such a folder by lambdak import.",
       ),
       place,
       problem,
