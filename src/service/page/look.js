@@ -47,19 +47,38 @@ async function loadCurve(file, steps) {
   );
 }
 
+/** Maps of what the recording holds: displacements, or the phases that become displacements by an import. */
+function maps(steps, byName, mask) {
+  const there = (names) => [names].flat().filter((n) => typeof n === "string" && byName.has(n));
+  const drive = (s) => `drive ${plain(s.drive_mm, 4)} mm`;
+  const displacements = steps.flatMap((s) =>
+    there(s.displacement).map((name) => ({
+      label: drive(s),
+      panels: [{ label: "Displacement as recorded", blob: byName.get(name) }],
+    })),
+  );
+  const phases = steps.flatMap((s) =>
+    there(s.raw?.phase).map((name, i) => ({
+      label: `${drive(s)}, phase along ${"xyz"[i]}`,
+      panels: [{ label: "Phase as recorded", blob: byName.get(name), mask: byName.get(mask) }],
+    })),
+  );
+  return [
+    slicesView("The displacement, drive by drive", displacements),
+    slicesView("The phases, drive by drive", phases, {
+      unit: "rad",
+      components: ["phase"],
+      note: "They become displacements by an import, which can be started once the recording is kept.",
+    }),
+  ];
+}
+
 /** What the files of a recording hold. */
 export async function look(files) {
   const byName = new Map(files.map((f) => [f.name, f]));
   if (!byName.has("recording.json")) throw new Error("There is no recording.json among these files.");
   const recording = JSON.parse(await byName.get("recording.json").text());
   const steps = recording.steps ?? [];
-  const named = (s) => [s.displacement].flat().filter((n) => typeof n === "string" && byName.has(n));
-  const sets = steps.flatMap((s) =>
-    named(s).map((name) => ({
-      label: `drive ${plain(s.drive_mm, 4)} mm`,
-      panels: [{ label: "Displacement as recorded", blob: byName.get(name) }],
-    })),
-  );
   return [
     sheet(
       recording.id ?? "Recording",
@@ -74,12 +93,7 @@ export async function look(files) {
         steps.map((s) => [plain(s.drive_mm, 4), digits(s.force_n), digits(s.force_sd_n, 2)]),
       ),
     ),
-    sets.length > 0
-      ? slicesView("The displacement, drive by drive", sets)
-      : sheet(
-          "Maps",
-          h("p", { class: "quiet" }, "This recording holds raw phases; they become displacements by an import."),
-        ),
+    maps(steps, byName, recording.mask),
     byName.has("load.csv") && (await loadCurve(byName.get("load.csv"), steps)),
   ];
 }

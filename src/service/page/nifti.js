@@ -41,6 +41,13 @@ export async function readImage(blob) {
   };
 }
 
+/** The image where a mask is not zero; outside there is nothing to see. */
+export function masked(image, mask) {
+  const count = mask.values.length;
+  const values = image.values.map((v, i) => (mask.values[i % count] > 0 ? v : NaN));
+  return { ...image, values, bounds: bounds(values, image.shape) };
+}
+
 /** First and last place along each axis where there is a value: maps leave out the empty margin. */
 function bounds(values, [nx, ny, nz]) {
   const found = [

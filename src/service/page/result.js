@@ -6,8 +6,11 @@ import { design } from "./design.js";
 import { diagnoses, diagnosis } from "./diagnosis.js";
 import { fill, h, more, sheet } from "./dom.js";
 import { evaluation } from "./evaluation.js";
+import { figureSheet } from "./figures.js";
 import { evaluationList } from "./evaluation_list.js";
-import { scan } from "./scan.js";
+import { numbered } from "./parts.js";
+import { onward, scan } from "./scan.js";
+import { slicesView } from "./slices.js";
 import { zip } from "./zip.js";
 
 const VIEWS = {
@@ -20,8 +23,24 @@ const VIEWS = {
   "diagnoses/1": diagnoses,
 };
 
-/** What has no view of its own is shown as it is. */
-const plainView = (result) => [sheet("Result", h("pre", {}, JSON.stringify(result, null, 2).slice(0, 20000)))];
+/** What has no view of its own is shown as it is: its figures, its maps, its content. */
+function plainView(result, files) {
+  const pictures = [...files.keys()].filter((f) => f.endsWith(".svg"));
+  const maps = numbered(files, /^u_(\d+)\.nii\.gz$/).map(([name, n]) => ({
+    label: `drive ${n}`,
+    panels: [{ label: "Displacement", href: files.get(name).href }],
+  }));
+  const text = JSON.stringify(result, null, 2).slice(0, 20000);
+  return [
+    result.recording && sheet("The recording that was made", onward(result.recording)),
+    slicesView("Displacements", maps),
+    figureSheet(
+      files,
+      pictures.map((f) => [f, f.slice(0, -4).replaceAll("-", " ")]),
+    ),
+    sheet("Result", h("pre", { tabindex: 0 }, text)),
+  ];
+}
 
 /** Result, request and files of a job that has succeeded. */
 export async function readResult(id) {

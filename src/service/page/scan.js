@@ -1,10 +1,21 @@
-// A synthetic scan: what the scanner would give.
+// A recording that a job made: a synthetic scan, or an import of raw phases.
 
 import { h } from "./dom.js";
 import { digits, many } from "./numbers.js";
 import { bigNumbers, numbered, table } from "./parts.js";
 import { slicesView } from "./slices.js";
 import { startButton } from "./start.js";
+
+/** The ways on from a recording that was made. */
+export const onward = (recording) =>
+  recording &&
+  h(
+    "div",
+    { class: "row" },
+    startButton("Calibrate on it", "calibrations", () => ({ recordings: [recording] })),
+    startButton("Diagnose it", "diagnoses", () => ({ recording }), {}),
+    h("a", { href: "#/recordings" }, "All recordings"),
+  );
 
 export function scan(result, files) {
   const drives = numbered(files, /^u_(\d+)\.nii\.gz$/).map(([name, n]) => ({
@@ -32,14 +43,7 @@ export function scan(result, files) {
           s.error ? s.error.map((e) => digits(e.rms_mm, 2)).join(", ") : "raw phases",
         ]),
       ),
-      result.recording &&
-        h(
-          "div",
-          { class: "row" },
-          startButton("Calibrate on it", "calibrations", () => ({ recordings: [result.recording] })),
-          startButton("Diagnose it", "diagnoses", () => ({ recording: result.recording }), {}),
-          h("a", { href: "#/recordings" }, "All recordings"),
-        ),
+      onward(result.recording),
     ),
     slicesView("Displacements as scanned", drives),
   ];

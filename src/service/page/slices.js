@@ -4,10 +4,11 @@ import { getBlob } from "./api.js";
 import { ticks } from "./axis.js";
 import { diverging } from "./colors.js";
 import { fill, h, s } from "./dom.js";
-import { mostToSee, reach, readImage, rms, slice } from "./nifti.js";
+import { masked, mostToSee, reach, readImage, rms, slice } from "./nifti.js";
 import { digits } from "./numbers.js";
 
 const AXES = ["x", "y", "z"];
+const DISPLACEMENT = AXES.map((a) => `u along ${a}`);
 const PLANES = [
   [0, 1, 2],
   [0, 2, 1],
@@ -66,7 +67,7 @@ function map(image, cut, axes, limit, label, tell) {
       s("line", { class: "tick", x1: across(v), x2: across(v), y1: gap + height, y2: gap + height + 4 }),
       s("text", { x: across(v), y: gap + height + 15, "text-anchor": "middle" }, text),
     ]),
-    ticks(...y, Math.max(2, Math.min(5, height / 40))).map(([v, text]) => [
+    ticks(...y, Math.max(3, Math.min(5, height / 40))).map(([v, text]) => [
       s("line", { class: "tick", x1: left - 4, x2: left, y1: up(v), y2: up(v) }),
       s("text", { x: left - 6, y: up(v) + 4, "text-anchor": "end" }, text),
     ]),
@@ -80,7 +81,7 @@ function map(image, cut, axes, limit, label, tell) {
 }
 
 /** The colour scale. */
-function scaleOf(limit) {
+function scaleOf(limit, unit) {
   const ramp = h("canvas", { class: "ramp", width: 101, height: 1, "aria-hidden": "true" });
   const bar = new ImageData(101, 1);
   for (let i = 0; i < 101; i += 1) bar.data.set([...diverging(i / 50 - 1), 255], 4 * i);
@@ -90,9 +91,15 @@ function scaleOf(limit) {
     h(
       "div",
       { class: "ends" },
-      [-1, -0.5, 0, 0.5, 1].map((t) => h("span", {}, t === 0 ? "0 mm" : `${digits(t * limit, 2)} mm`)),
+      [-1, -0.5, 0, 0.5, 1].map((t) => h("span", {}, `${t === 0 ? 0 : digits(t * limit, 2)} ${unit}`)),
     ),
   ];
+}
+
+/** The image of a panel, within its mask where it has one. */
+async function imageOf({ href, blob, mask }) {
+  const image = await readImage(blob ?? (await getBlob(href)));
+  return mask ? masked(image, await readImage(mask)) : image;
 }
 
 /** The part of a map that lies beyond its scale, in words. */
@@ -102,15 +109,17 @@ function beyond(cut, limit) {
   return part > 0.02 ? `; ${Math.round(100 * part)} % of it lies beyond the colours` : "";
 }
 
-/** Maps of `sets`: [{ label, panels: [{ label, href or blob }] }]. A set's panels share the scale of panel `scale`; the
- * slice shown first is the one with the most to see in panel `aimed`. */
-export function slicesView(title, sets, { note, scale = 0, aimed = 0 } = {}) {
+/**
+ * Maps of `sets`: [{ label, panels: [{ label, href or blob, mask }] }]. A set's panels share the scale of panel `scale`;
+ * the slice shown first is the one with the most to see in panel `aimed`. `components` names what an image holds.
+ */
+export function slicesView(title, sets, { note, scale = 0, aimed = 0, unit = "mm", components = DISPLACEMENT } = {}) {
   if (sets.length === 0) return null;
   const state = { set: sets.length - 1, component: null, plane: null, index: null, scale };
   const images = new Map();
   const load = (panel) => {
     const key = panel.href ?? panel.blob;
-    if (!images.has(key)) images.set(key, (async () => readImage(panel.blob ?? (await getBlob(panel.href))))());
+    if (!images.has(key)) images.set(key, imageOf(panel));
     return images.get(key);
   };
   const panels = h("div", { class: "maps" });
@@ -148,7 +157,7 @@ export function slicesView(title, sets, { note, scale = 0, aimed = 0 } = {}) {
   function aim(image) {
     if (state.component !== null) return;
     Object.assign(state, mostToSee(image, PLANES));
-    choosers.component.value = state.component;
+    if (choosers.component) choosers.component.value = state.component;
     choosers.plane.value = state.plane;
   }
 
@@ -176,7 +185,7 @@ export function slicesView(title, sets, { note, scale = 0, aimed = 0 } = {}) {
     where.textContent = `${AXES[axes[2]]} = ${digits(at, 3)} mm (${state.index - low + 1} of ${high - low + 1})`;
     const limit = reach(loaded[Math.min(state.scale, loaded.length - 1)], state.component) || 1;
     const tell = (v) => {
-      under.textContent = Number.isFinite(v) ? `Under the pointer: ${digits(v, 3)} mm` : "";
+      under.textContent = Number.isFinite(v) ? `Under the pointer: ${digits(v, 3)} ${unit}` : "";
     };
     fill(
       panels,
@@ -186,12 +195,12 @@ export function slicesView(title, sets, { note, scale = 0, aimed = 0 } = {}) {
         return h(
           "figure",
           {},
-          map(image, cut, axes, limit, `${label}, u ${AXES[state.component]}, ${where.textContent}`, tell),
-          h("figcaption", {}, `${label}: rms in this slice ${digits(rms(cut.values), 3)} mm${beyond(cut, limit)}`),
+          map(image, cut, axes, limit, `${label}, ${components[state.component]}, ${where.textContent}`, tell),
+          h("figcaption", {}, `${label}: rms in this slice ${digits(rms(cut.values), 3)} ${unit}${beyond(cut, limit)}`),
         );
       }),
     );
-    fill(legend, scaleOf(limit));
+    fill(legend, scaleOf(limit, unit));
   }
 
   /** Goes through the maps one after the other, as a film. */
@@ -221,11 +230,7 @@ export function slicesView(title, sets, { note, scale = 0, aimed = 0 } = {}) {
         sets.map((one) => one.label),
         "set",
       ),
-      pick(
-        "Component",
-        AXES.map((a) => `u along ${a}`),
-        "component",
-      ),
+      components.length > 1 && pick("Component", components, "component"),
       pick(
         "Plane",
         PLANES.map(([a, b]) => `${AXES[a]} and ${AXES[b]}`),
