@@ -164,6 +164,7 @@ class Page:
         self.scheme("light")
 
     def picture(self, name):
+        self.js("scrollTo(0, 0)")
         size = self.send("Page.getLayoutMetrics")["cssContentSize"]
         clip = {"x": 0, "y": 0, "width": size["width"], "height": min(size["height"], 6000), "scale": 1}
         data = self.send("Page.captureScreenshot", format="png", captureBeyondViewport=True, clip=clip)["data"]

@@ -98,6 +98,8 @@ def plan(page):
 
     page.put("Drives", "five")
     page.says("give numbers such as 5, 9")
+    page.js("document.getElementById('evaluate').click()")
+    page.until("document.activeElement.value === 'five'")
     page.put("Drives", "5, 4")
     page.until(
         "document.querySelector('[data-pointer=\"/specimen/drive_mm\"]').getAttribute('aria-invalid') === 'true'"

@@ -2,7 +2,7 @@
 
 import { fill, h } from "./dom.js";
 import { digits, duration, many, plain } from "./numbers.js";
-import { LIMITS, limitWords } from "./words.js";
+import { LIMITS, inWords, limitWords } from "./words.js";
 
 /** The verdict: class and words. */
 function verdict(found) {
@@ -44,7 +44,8 @@ export function showCheck(element, found, others) {
   fill(
     element,
     h("p", { class: kind, role: "status" }, words),
-    others.map((e) => h("p", { class: "bad" }, e.detail)),
+    others.map((e) => h("p", { class: "bad" }, inWords(e, e.pointer))),
+    others.length < found.errors.length && h("p", { class: "bad" }, "What is wrong is said at the field."),
     found.margins.map(meter),
     found.unchecked.map((u) =>
       h("p", { class: "quiet" }, `${limitWords(u.name)} (limit ${digits(u.limit, 3)}) was not checked: ${u.detail}`),

@@ -1,6 +1,7 @@
 // Fields of forms: what is wrong with one is said below it, in words.
 
 import { fill, h, term } from "./dom.js";
+import { inWords } from "./words.js";
 
 /** A number; an error in words where it is none. */
 const number = (example) => (text) => {
@@ -53,13 +54,18 @@ export function field({ label, kind = "number", value, put, example = "5", point
     inputmode: kind === "text" ? null : "decimal",
     ...more,
     onchange: () => {
+      let read;
       try {
-        put(READERS[kind](example)(input.value));
-        mark(input, "");
-        changed?.();
+        read = READERS[kind](example)(input.value);
       } catch (error) {
+        input.dataset.unread = "";
         mark(input, `${name}: ${error.message}`);
+        return;
       }
+      delete input.dataset.unread;
+      mark(input, "");
+      put(read);
+      changed?.();
     },
   });
   return h(
@@ -78,21 +84,20 @@ function mark(input, words) {
   fill(document.getElementById(`${input.id}-wrong`) ?? input.nextElementSibling, words);
 }
 
-/** The service's words about a field: its value, what is allowed, what to change. */
-const wordsOf = (error) =>
-  error.detail ||
-  [error.value && `${error.value} is not allowed`, error.allowed, error.remedy].filter(Boolean).join("; ");
+/** A field whose text could not be read: what would be sent is not what is seen. */
+export const unreadField = (root) => root.querySelector("[data-unread]");
 
 /** Shows errors of the service at their fields; the ones that have no field are given back. */
 export function markErrors(root, errors) {
   const inputs = [...root.querySelectorAll("[data-pointer]")];
-  for (const input of inputs) if (input.hasAttribute("aria-invalid")) mark(input, "");
+  const isMarked = (input) => input.hasAttribute("aria-invalid") && input.dataset.unread === undefined;
+  for (const input of inputs) if (isMarked(input)) mark(input, "");
   return errors.filter((error) => {
     const pointer = (error.pointer ?? "").replace(/^\/base(?=\/|$)/, "/specimen").replace(/^\/materials\/0/, "");
     const input = inputs.find(
       (one) => pointer === one.dataset.pointer || pointer.startsWith(`${one.dataset.pointer}/`),
     );
-    if (input) mark(input, wordsOf(error));
+    if (input) mark(input, inWords(error, "It"));
     return !input;
   });
 }

@@ -5,12 +5,13 @@ import { showCheck } from "./check.js";
 import { fill, h, more, sheet } from "./dom.js";
 import { Past, apart, keep, kept, planOfFile, planOfLink } from "./draft.js";
 import { editor } from "./editor.js";
-import { markErrors } from "./field.js";
+import { markErrors, unreadField } from "./field.js";
 import { livePanel } from "./live.js";
 import { planBar, undoKeys } from "./plan_bar.js";
 import { goalForm, limitsForm, materialForm, scanForm, specimenForm } from "./plan_forms.js";
 import { startJob } from "./start.js";
 import { sweepForm } from "./sweep.js";
+import { inWords } from "./words.js";
 
 const CHECK_WAIT_MS = 180;
 
@@ -170,7 +171,7 @@ export async function planView(content, signal, from) {
         { class: "bad" },
         errors.length > others.length ? "Some fields hold what is not allowed; it is said at each." : error.message,
       ),
-      others.map((e) => h("p", { class: "bad" }, `${e.pointer || "The whole"}: ${e.detail ?? ""}`)),
+      others.map((e) => h("p", { class: "bad" }, inWords(e, e.pointer || "The whole"))),
     );
   }
 
@@ -184,8 +185,13 @@ export async function planView(content, signal, from) {
         id,
         onclick: async (event) => {
           const button = event.currentTarget;
-          button.disabled = true;
           fill(problem);
+          const unread = unreadField(content);
+          if (unread) {
+            unread.focus();
+            return;
+          }
+          button.disabled = true;
           try {
             await startJob(kind, body());
           } catch (error) {

@@ -110,8 +110,9 @@ function beyond(cut, limit) {
 }
 
 /**
- * Maps of `sets`: [{ label, panels: [{ label, href or blob, mask }] }]. A set's panels share the scale of panel `scale`;
- * the slice shown first is the one with the most to see in panel `aimed`. `components` names what an image holds.
+ * Maps of `sets`: [{ label, panels: [{ label, href or blob, mask }] }]. A set's panels share the scale of panel
+ * `scale`; the slice shown first is the one with the most to see in panel `aimed`. `components` names what an image
+ * holds.
  */
 export function slicesView(title, sets, { note, scale = 0, aimed = 0, unit = "mm", components = DISPLACEMENT } = {}) {
   if (sets.length === 0) return null;

@@ -133,6 +133,17 @@ export const KINDS = {
   proofs: "proof",
 };
 
+/** What a place in a request is called; its number counts from 1, as in the drawing. */
+const place = (pointer, other) =>
+  pointer.replace(/^\/(?:specimen|base)\/holes\/(\d+).*$/, (_, n) => `Hole ${Number(n) + 1}`).replace(/^\/.*$/, other);
+
+/** An error of the service in words; `other` stands for places that have no name. */
+export function inWords({ pointer, detail, allowed, remedy }, other) {
+  const name = place(pointer ?? "", other);
+  const text = detail || [allowed, remedy].filter(Boolean).join("; ");
+  return text.replace(pointer || /^$/, name).replace(/holes\[(\d+)\]/g, (_, n) => `hole ${Number(n) + 1}`);
+}
+
 /** Kinds whose results stand side by side. */
 export const COMPARED = new Set(["evaluations", "designs", "calibrations", "diagnoses"]);
 
