@@ -3,7 +3,7 @@
 import { getJson } from "./api.js";
 import { fill, h, sheet, term } from "./dom.js";
 import { figure } from "./figures.js";
-import { digits, interval, known, percent, symbol, unitOf, withUnit } from "./numbers.js";
+import { digits, interval, known, percent, sensitivityUnit, symbol, unitOf, withUnit } from "./numbers.js";
 import { shapes, table } from "./parts.js";
 import { readResult } from "./result.js";
 import { jobName, learnTitles } from "./titles.js";
@@ -37,7 +37,7 @@ function ofEvaluation(evaluation) {
         `s ${s.parameter}`,
         `𝒮 of ${symbol(s.parameter)}`,
         s.sum,
-        digits(s.sum, 3),
+        withUnit(digits(s.sum, 3), sensitivityUnit(s.parameter)),
         false,
         GLOSSARY["integrated sensitivity 𝒮"],
       ),

@@ -2,7 +2,7 @@
 
 import { getBlob, getJson, post, remove } from "./api.js";
 import { fill, h, term } from "./dom.js";
-import { digits, percent, symbol } from "./numbers.js";
+import { digits, percent, sensitivityUnit, symbol, withUnit } from "./numbers.js";
 import { GLOSSARY } from "./words.js";
 import { view3d } from "./view3d.js";
 
@@ -61,7 +61,7 @@ function figures(result) {
       `𝒮 of ${symbol(one.parameter)}`,
       GLOSSARY["integrated sensitivity 𝒮"],
       one.sum,
-      digits(one.sum, 3),
+      withUnit(digits(one.sum, 3), sensitivityUnit(one.parameter)),
       false,
     ]);
   }

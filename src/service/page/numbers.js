@@ -81,5 +81,8 @@ export function symbol(name) {
   return number ? letter + "₀₁₂₃₄₅₆₇₈₉"[Number(number)] : letter;
 }
 
+/** The unit of a displacement's sensitivity summed over voxels: none for a modulus, kPa for an exponent. */
+export const sensitivityUnit = (name) => ({ alpha: "kPa" })[name.split("_")[0]] ?? "";
+
 /** The unit of a material's parameter. */
 export const unitOf = (name) => ({ mu: "kPa", kappa: "kPa" })[name.split("_")[0]] ?? "";

@@ -2,7 +2,7 @@
 
 import { getBlob } from "./api.js";
 import { h, term } from "./dom.js";
-import { digits, known, percent, symbol, unitOf, withUnit } from "./numbers.js";
+import { digits, known, percent, sensitivityUnit, symbol, unitOf, withUnit } from "./numbers.js";
 import { GLOSSARY } from "./words.js";
 import { view3d } from "./view3d.js";
 
@@ -76,12 +76,12 @@ export function promised(list) {
 /** Integrated sensitivities of a drive. */
 export function sensitivities(step) {
   return table(
-    ["Parameter", term("𝒮, sum", GLOSSARY["integrated sensitivity 𝒮"]), "Mean per voxel", "Volume integral, mm³"],
+    ["Parameter", term("𝒮, sum", GLOSSARY["integrated sensitivity 𝒮"]), "Mean per voxel", "Volume integral"],
     step.integrated_sensitivity.map((v) => [
       symbol(v.parameter),
-      digits(v.sum, 3),
-      digits(v.mean_per_voxel, 3),
-      digits(v.volume_integral, 3),
+      withUnit(digits(v.sum, 3), sensitivityUnit(v.parameter)),
+      withUnit(digits(v.mean_per_voxel, 3), sensitivityUnit(v.parameter)),
+      withUnit(digits(v.volume_integral, 3), [sensitivityUnit(v.parameter), "mm³"].filter(Boolean).join(" ")),
     ]),
   );
 }
