@@ -260,12 +260,10 @@ def compare_and_tidy(page):
     page.screen("compare")
     page.go("jobs")
     page.until("document.querySelectorAll('tbody tr').length >= 4")
-    count = page.js("document.querySelectorAll('tbody tr').length")
-    page.js(
-        "[...document.querySelectorAll('tbody tr')].find((r) => r.cells[2].textContent === 'sweep')"
-        ".querySelector('button[aria-label^=Delete]').click()"
-    )
-    page.until(f"document.querySelectorAll('tbody tr').length === {count - 1}")
+    sweep = "[...document.querySelectorAll('tbody tr')].find((r) => r.cells[2].textContent === 'sweep')"
+    link = page.js(f"{sweep}.querySelector('a').hash")
+    page.js(f"{sweep}.querySelector('button[aria-label^=Delete]').click()")
+    page.until(f"![...document.querySelectorAll('tbody a')].some((a) => a.hash === {json.dumps(link)})")
 
 
 def keyboard_only(page):

@@ -128,7 +128,9 @@ function fitPerDrive(result) {
         s.rms_mm.map((v) => digits(v, 2)).join(", "),
         digits(s.force_n, 4),
         digits(s.model_force_n, 4),
-        s.force_n && s.model_force_n !== null ? (100 * (s.model_force_n / s.force_n - 1)).toFixed(1) : "–",
+        s.force_n && s.model_force_n !== null
+          ? (100 * (s.model_force_n / s.force_n - 1)).toFixed(1).replace(/^-(0\.0)$/, "$1")
+          : "–",
       ]),
     ),
   );

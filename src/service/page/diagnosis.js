@@ -121,7 +121,10 @@ async function materialSheet(result, recording) {
 /** What was wrong, in a few sentences. */
 function summary(result) {
   const [words, kind] = VERDICTS[result.verdict] ?? [result.verdict, "warn"];
-  const found = result.causes.map((c) => c.description);
+  const found = [...new Set(result.causes.map((c) => c.description))].map((words) => {
+    const count = result.causes.filter((c) => c.description === words).length;
+    return count > 1 ? `${words} (${count} times)` : words;
+  });
   return h(
     "section",
     { class: "sheet" },
