@@ -23,7 +23,11 @@ async function send(path, options = {}) {
   }
   if (!answer.ok) {
     let problem;
-    try { problem = await answer.json(); } catch { problem = { title: answer.statusText, detail: `status ${answer.status}`, errors: [] }; }
+    try {
+      problem = await answer.json();
+    } catch {
+      problem = { title: answer.statusText, detail: `status ${answer.status}`, errors: [] };
+    }
     throw new Failure(problem);
   }
   return answer;
@@ -34,19 +38,28 @@ let asking;
 function askToken(wrong) {
   asking ??= new Promise((resolve) => {
     const input = h("input", { type: "password", autocomplete: "off", required: true });
-    const dialog = h("dialog", {},
-      h("form", { method: "dialog", onsubmit: () => {
-        token = input.value.trim();
-        sessionStorage.setItem("token", token);
-        dialog.remove();
-        asking = undefined;
-        resolve();
-      } },
-      h("h3", {}, "A token is needed"),
-      wrong && h("p", { class: "bad", role: "alert" }, wrong),
-      h("p", { class: "quiet" }, "The person who runs this service makes one with lambdak serve --add-token."),
-      h("label", {}, "Token", input),
-      h("p", {}, h("button", { class: "main" }, "Go on"))));
+    const dialog = h(
+      "dialog",
+      {},
+      h(
+        "form",
+        {
+          method: "dialog",
+          onsubmit: () => {
+            token = input.value.trim();
+            sessionStorage.setItem("token", token);
+            dialog.remove();
+            asking = undefined;
+            resolve();
+          },
+        },
+        h("h3", {}, "A token is needed"),
+        wrong && h("p", { class: "bad", role: "alert" }, wrong),
+        h("p", { class: "quiet" }, "The person who runs this service makes one with lambdak serve --add-token."),
+        h("label", {}, "Token", input),
+        h("p", {}, h("button", { class: "main" }, "Go on")),
+      ),
+    );
     dialog.addEventListener("cancel", (event) => event.preventDefault());
     document.body.append(dialog);
     dialog.showModal();
@@ -57,7 +70,13 @@ function askToken(wrong) {
 export const getJson = async (path) => (await send(path)).json();
 export const getBlob = async (path) => (await send(path)).blob();
 export const post = async (path, body, more = {}) =>
-  (await send(path, { method: "POST", headers: { "content-type": "application/json", ...more }, body: JSON.stringify(body ?? {}) })).json();
+  (
+    await send(path, {
+      method: "POST",
+      headers: { "content-type": "application/json", ...more },
+      body: JSON.stringify(body ?? {}),
+    })
+  ).json();
 
 export const upload = async (path, blob) =>
   (await send(path, { method: "POST", headers: { "content-type": "application/x-tar" }, body: blob })).json();
@@ -80,7 +99,11 @@ export async function follow(id, show, signal) {
         const events = rest.split("\n\n");
         rest = events.pop();
         for (const event of events) {
-          const data = event.split("\n").filter((l) => l.startsWith("data: ")).map((l) => l.slice(6)).join("");
+          const data = event
+            .split("\n")
+            .filter((l) => l.startsWith("data: "))
+            .map((l) => l.slice(6))
+            .join("");
           if (!data || !event.includes("event: job")) continue;
           const job = JSON.parse(data);
           show(job);
@@ -98,17 +121,22 @@ export async function follow(id, show, signal) {
         const job = await getJson(`/v1/jobs/${id}`);
         show(job);
         if (hasEnded(job)) return;
-      } catch { /* the service may be restarting */ }
+      } catch {
+        /* the service may be restarting */
+      }
     }
   }
 }
 
-/** Offers a file for download. */
-export async function download(path, name) {
-  const url = URL.createObjectURL(await getBlob(path));
+/** Offers a blob as a file. */
+export function save(blob, name) {
+  const url = URL.createObjectURL(blob);
   const link = h("a", { href: url, download: name });
   document.body.append(link);
   link.click();
   link.remove();
   setTimeout(() => URL.revokeObjectURL(url), 60000);
 }
+
+/** Offers a file of the service for download. */
+export const download = async (path, name) => save(await getBlob(path), name);

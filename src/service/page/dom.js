@@ -21,7 +21,7 @@ function set(element, attributes) {
     if (value === null || value === undefined || value === false) continue;
     if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
     else if (name === "value" && "value" in element) element.value = value;
-    else if (name === "width_percent") element.style.width = value + "%";
+    else if (name === "width_percent") element.style.width = `${value}%`;
     else element.setAttribute(name, value === true ? "" : value);
   }
 }
@@ -44,27 +44,34 @@ export function say(text) {
   const line = document.getElementById("message");
   line.textContent = text;
   clearTimeout(timer);
-  timer = setTimeout(() => { line.textContent = ""; }, 6000);
+  timer = setTimeout(() => {
+    line.textContent = "";
+  }, 6000);
 }
 
-/** A number with so many significant digits. */
-export function digits(value, count = 4) {
-  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
-  const magnitude = Math.abs(value);
-  if (magnitude !== 0 && (magnitude >= 1e6 || magnitude < 1e-3)) return value.toExponential(count - 1);
-  return String(Number(value.toPrecision(count)));
+let count = 0;
+/** A term with its meaning: shown on hover and focus, read by screen readers. */
+export function term(text, meaning) {
+  if (!meaning) return text;
+  const id = `term-${(count += 1)}`;
+  const tip = h("span", { class: "tip", role: "tooltip", id }, meaning);
+  const button = h("button", { type: "button", "aria-describedby": id }, text);
+  // Placed on the screen, so that no scrolling part of the page cuts it off.
+  const place = () => {
+    const box = button.getBoundingClientRect();
+    tip.style.left = `${Math.max(8, Math.min(box.left, innerWidth - Math.min(336, 0.9 * innerWidth)))}px`;
+    tip.style.top = `${box.bottom + 4}px`;
+  };
+  button.addEventListener("pointerenter", place);
+  button.addEventListener("focus", place);
+  button.addEventListener("keydown", (event) => {
+    if (event.key === "Escape") button.blur();
+  });
+  return h("span", { class: "term" }, button, tip);
 }
 
-/** The symbol of a parameter. */
-export function symbol(name) {
-  const [kind, number] = name.split("_");
-  const letter = { mu: "μ", alpha: "α", kappa: "κ" }[kind] ?? name;
-  return number ? letter + "₀₁₂₃₄₅₆₇₈₉"[Number(number)] : letter;
-}
+/** A sheet with a heading. */
+export const sheet = (title, ...children) => h("section", { class: "sheet" }, title && h("h3", {}, title), children);
 
-/** Milliseconds as words. */
-export function duration(ms) {
-  const seconds = ms / 1000;
-  if (seconds < 90) return `${seconds.toFixed(seconds < 10 ? 1 : 0)} s`;
-  return `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
-}
+/** A part that is closed until someone wants it. */
+export const more = (summary, ...children) => h("details", {}, h("summary", {}, summary), children);

@@ -1,87 +1,205 @@
-// Jobs: the list, and one job followed live.
+// The list of jobs: found by name, kind and state; named, compared and deleted.
 
-import { download, follow, getJson, post, remove } from "./api.js";
-import { digits, duration, fill, h, say } from "./dom.js";
-import { resultView } from "./result.js";
+import { getJson, post, remove } from "./api.js";
+import { fill, h, say } from "./dom.js";
+import { partDone } from "./progress.js";
+import { askName, jobName, learnTitles } from "./titles.js";
+import { KINDS } from "./words.js";
 
 const when = (ms) => new Date(ms).toLocaleString("en-GB", { dateStyle: "short", timeStyle: "medium" });
-const badge = (state) => h("span", { class: `state ${state}` }, state);
-const isOpen = (job) => ["queued", "running"].includes(job.state);
+export const badge = (state) => h("span", { class: `state ${state}` }, state);
+export const isOpen = (job) => ["queued", "running"].includes(job.state);
+const STATES = ["queued", "running", "succeeded", "failed", "cancelled"];
 
-export async function jobsView(content, signal) {
-  let before = null;
-  const body = h("tbody", {});
-  const more = h("button", { onclick: () => load() }, "Older jobs");
-  const line = (job) => h("tr", {},
-    h("td", {}, h("a", { href: `#/job/${job.id}` }, job.title || job.id.slice(0, 8))),
-    h("td", {}, job.kind), h("td", {}, badge(job.state)), h("td", { class: "number" }, `${job.num_done} / ${job.num_tasks}`),
-    h("td", {}, job.owner), h("td", {}, when(job.created_ms)),
-    h("td", {}, isOpen(job) ? h("button", { onclick: () => act(job, "cancel") }, "Cancel")
-      : ["failed", "cancelled"].includes(job.state) ? h("button", { onclick: () => act(job, "resume") }, "Resume") : null));
-  const act = async (job, verb) => {
-    try { await post(`/v1/jobs/${job.id}/${verb}`); say(verb === "cancel" ? "Cancelled." : "Back in the queue."); } catch (error) { say(error.message); }
-    refresh();
-  };
-  async function load() {
-    const page = await getJson(`/v1/jobs?limit=50${before ? `&before=${before}` : ""}`);
-    body.append(...page.jobs.map(line));
-    before = page.next;
-    more.hidden = !before;
-    if (body.childElementCount === 0) fill(body, h("tr", {}, h("td", { colspan: 7, class: "quiet" }, "No jobs yet.")));
-  }
-  async function refresh() {
-    if (before === null || body.childElementCount <= 50) {
-      const page = await getJson("/v1/jobs?limit=50");
-      if (!signal.aborted && page.jobs.length) fill(body, page.jobs.map(line));
-    }
-  }
-  fill(content, h("h2", {}, "Jobs"),
-    h("section", { class: "sheet scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ["Job", "Kind", "State", "Tasks", "By", "Submitted", ""].map((t) => h("th", {}, t)))), body), h("p", {}, more)));
-  await load();
-  const timer = setInterval(() => { if (!body.contains(document.activeElement)) refresh().catch(() => {}); }, 3000);
-  signal.addEventListener("abort", () => clearInterval(timer));
+function howFar(job) {
+  const part = isOpen(job) ? partDone(job) : null;
+  if (job.num_tasks > 1) return `${job.num_done} / ${job.num_tasks} tasks`;
+  return part === null ? "" : `${Math.round(100 * part)} %`;
 }
 
-export async function jobView(content, id, signal) {
-  const first = await getJson(`/v1/jobs/${id}`);
-  const head = h("section", { class: "sheet" });
-  const result = h("div", {});
-  const history = [];
-  fill(content, h("h2", {}, first.title || "Job"), head, result);
-  let shown = "";
+export async function jobsView(content, signal) {
+  await learnTitles().catch(() => {});
+  const state = { jobs: [], next: null, text: "", kind: "", state: "", chosen: new Set() };
+  const body = h("tbody", {});
+  const older = h("button", { type: "button", onclick: () => load(state.next) }, "Older jobs");
+  const compare = h(
+    "button",
+    {
+      type: "button",
+      id: "compare",
+      onclick: () => {
+        location.hash = `#/compare/${[...state.chosen].join(",")}`;
+      },
+    },
+    "Compare",
+  );
 
-  const act = (verb, word) => async () => {
-    try { await post(`/v1/jobs/${id}/${verb}`); say(word); if (verb === "resume") jobView(content, id, signal); } catch (error) { say(error.message); }
-  };
-  const show = (job) => {
-    const p = job.progress;
-    if (p?.best && history.at(-1) !== p.best) history.push(p.best);
-    const share = job.num_tasks > 1 ? [job.num_done, job.num_tasks] : p && p.total > 0 ? [p.done, p.total] : null;
-    const end = job.finished_ms ?? Date.now();
-    fill(head,
-      h("div", { class: "row end" },
-        h("div", { class: "row" }, badge(job.state), h("span", { class: "quiet" }, job.kind), job.started_ms && h("span", { class: "quiet" }, duration(Math.max(0, end - job.started_ms)))),
-        h("div", { class: "row" },
-          isOpen(job) && h("button", { onclick: act("cancel", "Cancelled; what was found is kept.") }, "Cancel"),
-          ["failed", "cancelled"].includes(job.state) && h("button", { onclick: act("resume", "Back in the queue.") }, "Resume"),
-          !isOpen(job) && h("button", { id: "delete", onclick: async () => {
-            if (!confirm("Delete this job with its results and files?")) return;
-            try { await remove(`/v1/jobs/${id}`); say("Deleted."); location.hash = "#/jobs"; } catch (error) { say(error.message); }
-          } }, "Delete"),
-          h("button", { onclick: async () => { try { await navigator.clipboard.writeText(location.href); say("The link is copied."); } catch { say(location.href); } } }, "Copy link"),
-          ["evaluations", "designs"].includes(job.kind) && h("a", { class: "button", href: `#/plan/${id}` }, "Plan from here"))),
-      isOpen(job) && share && h("div", {},
-        h("p", { role: "status" }, job.num_tasks > 1 ? `${share[0]} of ${share[1]} tasks` : `${p.stage}: ${share[0]} of ${share[1]}`, p?.best ? `, best gain so far ${digits(p.best)}` : ""),
-        h("progress", { max: share[1], value: share[0], "aria-label": "Progress" })),
-      isOpen(job) && !share && p && h("p", { role: "status" }, p.stage),
-      isOpen(job) && !share && !p && h("p", { class: "quiet", role: "status" }, job.state === "queued" ? "Waiting for a free place." : "Starting."),
-      history.length > 1 && isOpen(job) && h("p", { class: "quiet" }, `Best gain: ${history.map((v) => digits(v)).join(" → ")}`),
-      job.problem && h("div", { role: "alert" }, h("p", { class: "bad" }, `${job.problem.title}. ${job.problem.detail}`)));
-    if (job.state === "succeeded" && shown !== job.state) {
-      shown = job.state;
-      resultView(result, job, download).catch((error) => fill(result, h("p", { class: "bad" }, error.message)));
+  const act = async (work, word) => {
+    try {
+      await work();
+      say(word);
+    } catch (error) {
+      say(error.message);
     }
+    refresh().catch(() => {});
   };
-  show(first);
-  if (isOpen(first)) follow(id, show, signal).catch((error) => say(error.message));
+  const deleted = (job) =>
+    confirm(`Delete ${jobName(job)} with its results and files?`) &&
+    act(() => remove(`/v1/jobs/${job.id}`), "Deleted.");
+  const button = (label, job, onclick) =>
+    h("button", { type: "button", onclick, "aria-label": `${label} ${jobName(job)}` }, label);
+
+  const line = (job) =>
+    h(
+      "tr",
+      {},
+      h(
+        "td",
+        {},
+        job.state === "succeeded" &&
+          h("input", {
+            type: "checkbox",
+            checked: state.chosen.has(job.id),
+            "aria-label": `Choose ${jobName(job)} to compare`,
+            onchange: (e) => {
+              if (e.target.checked) state.chosen.add(job.id);
+              else state.chosen.delete(job.id);
+              tell();
+            },
+          }),
+      ),
+      h("td", {}, h("a", { href: `#/job/${job.id}` }, jobName(job))),
+      h("td", {}, KINDS[job.kind] ?? job.kind),
+      h("td", {}, badge(job.state)),
+      h("td", {}, howFar(job)),
+      h("td", {}, job.owner),
+      h("td", {}, when(job.created_ms)),
+      h("td", {}, job.version),
+      h(
+        "td",
+        {},
+        h(
+          "div",
+          { class: "row tight" },
+          isOpen(job) && button("Cancel", job, () => act(() => post(`/v1/jobs/${job.id}/cancel`), "Cancelled.")),
+          ["failed", "cancelled"].includes(job.state) &&
+            button("Resume", job, () => act(() => post(`/v1/jobs/${job.id}/resume`), "Back in the queue.")),
+          button("Rename", job, () => {
+            if (askName(job.id, jobName(job))) draw();
+          }),
+          !isOpen(job) && button("Delete", job, () => deleted(job)),
+        ),
+      ),
+    );
+
+  const fits = (job) =>
+    (!state.kind || job.kind === state.kind) &&
+    (!state.state || job.state === state.state) &&
+    jobName(job).toLowerCase().includes(state.text.toLowerCase());
+  function tell() {
+    compare.disabled = state.chosen.size < 2;
+    compare.textContent =
+      state.chosen.size < 2 ? "Compare (choose two or more)" : `Compare ${state.chosen.size} results`;
+  }
+  function draw() {
+    const shown = state.jobs.filter(fits);
+    const none = state.jobs.length === 0 ? "No jobs yet." : "No job fits the filter.";
+    fill(body, shown.length > 0 ? shown.map(line) : h("tr", {}, h("td", { colspan: 9, class: "quiet" }, none)));
+    older.hidden = !state.next;
+    tell();
+  }
+  async function load(before) {
+    const page = await getJson(`/v1/jobs?limit=50${before ? `&before=${before}` : ""}`);
+    state.jobs.push(...page.jobs);
+    state.next = page.next;
+    draw();
+  }
+  async function refresh() {
+    const page = await getJson("/v1/jobs?limit=50");
+    if (signal.aborted) return;
+    const last = page.jobs.at(-1)?.created_ms ?? Infinity;
+    state.jobs = [
+      ...page.jobs,
+      ...state.jobs.filter((j) => j.created_ms < last && !page.jobs.some((p) => p.id === j.id)),
+    ];
+    draw();
+  }
+
+  const pick = (label, options, key) =>
+    h(
+      "label",
+      {},
+      label,
+      h(
+        "select",
+        {
+          onchange: (e) => {
+            state[key] = e.target.value;
+            draw();
+          },
+        },
+        options.map(([value, text]) => h("option", { value }, text)),
+      ),
+    );
+  fill(
+    content,
+    h("h2", {}, "Jobs"),
+    h(
+      "section",
+      { class: "sheet" },
+      h(
+        "div",
+        { class: "fields" },
+        h(
+          "label",
+          {},
+          "Name contains",
+          h("input", {
+            type: "search",
+            oninput: (e) => {
+              state.text = e.target.value;
+              draw();
+            },
+          }),
+        ),
+        pick("Kind", [["", "every kind"], ...Object.entries(KINDS)], "kind"),
+        pick("State", [["", "every state"], ...STATES.map((s) => [s, s])], "state"),
+      ),
+      h("p", {}, compare),
+      h(
+        "div",
+        { class: "scroll", tabindex: 0, role: "region", "aria-label": "Jobs" },
+        h(
+          "table",
+          {},
+          h(
+            "thead",
+            {},
+            h(
+              "tr",
+              {},
+              [
+                h("span", { class: "hidden" }, "Compare"),
+                "Job",
+                "Kind",
+                "State",
+                "Done",
+                "By",
+                "Submitted",
+                "Version",
+                h("span", { class: "hidden" }, "Actions"),
+              ].map((t) => h("th", { scope: "col" }, t)),
+            ),
+          ),
+          body,
+        ),
+      ),
+      h("p", {}, older),
+    ),
+  );
+  await load();
+  const timer = setInterval(() => {
+    if (!body.contains(document.activeElement)) refresh().catch(() => {});
+  }, 3000);
+  signal.addEventListener("abort", () => clearInterval(timer));
 }

@@ -1,77 +1,317 @@
-// Recordings: upload a folder, look at what it holds, calibrate on it, diagnose it.
+// Recordings: dropped or chosen, looked at, kept; then one or several are calibrated on or diagnosed.
 
-import { Failure, getJson, post, remove, upload } from "./api.js";
-import { digits, fill, h, say } from "./dom.js";
+import { Failure, getJson, remove, upload } from "./api.js";
+import { fill, h, say, sheet } from "./dom.js";
+import { dropPlace, unpacked } from "./drop.js";
+import { look } from "./look.js";
+import { digits, many, plain } from "./numbers.js";
+import { table } from "./parts.js";
+import { startJob } from "./start.js";
+import { tar } from "./tar.js";
+import { askName, recordingName } from "./titles.js";
 
-/** A tar file of plain files. */
-async function tar(files) {
-  const parts = [];
-  for (const file of files) {
-    const header = new Uint8Array(512);
-    const put = (at, text) => header.set(new TextEncoder().encode(text), at);
-    put(0, file.name);
-    put(100, "0000644\0");
-    put(124, file.size.toString(8).padStart(11, "0"));
-    put(148, "        ");
-    put(156, "0");
-    put(257, "ustar\u000000");
-    put(148, `${header.reduce((a, b) => a + b, 0).toString(8).padStart(6, "0")}\0 `);
-    parts.push(header, file, new Uint8Array((512 - (file.size % 512)) % 512));
-  }
-  parts.push(new Uint8Array(1024));
-  return new Blob(parts, { type: "application/x-tar" });
+/** Recordings that were uploaded from this page, to look at again: files by identifier. */
+const here = new Map();
+
+/** What several recordings are started with, and one. */
+const several = (ids) => (ids.length === 1 ? { recording: ids[0] } : { recordings: ids });
+
+const options = (label, list) =>
+  h(
+    "select",
+    { "aria-label": label },
+    list.map(([value, text]) => h("option", { value }, text)),
+  );
+
+/** What a fit can be told: mesh, number of terms, material as believed. */
+function settings(library) {
+  const mesh = options("Mesh", [
+    ["", "default mesh"],
+    ["2", "coarse mesh"],
+    ["1", "standard mesh"],
+  ]);
+  const terms = options("Number of terms", [
+    ["", "number of terms: chosen"],
+    ["1", "one term"],
+    ["2", "two terms"],
+    ["3", "three terms"],
+  ]);
+  const material = options("Material as believed", [
+    ["", "material unknown"],
+    ...library.materials.map((m, i) => [i, m.name]),
+  ]);
+  const factor = () => (mesh.value === "" ? {} : { mesh_factor: Number(mesh.value) });
+  return {
+    mesh,
+    terms,
+    material,
+    calibration: (ids) => ({
+      recordings: ids,
+      ...(terms.value === "" ? {} : { num_terms: Number(terms.value) }),
+      ...factor(),
+    }),
+    diagnosis: (ids) => ({
+      ...several(ids),
+      ...(material.value === "" ? {} : { material: library.materials[Number(material.value)].material }),
+      ...factor(),
+    }),
+  };
+}
+
+/** Buttons that start work on recordings; `ids()` are theirs. */
+function starters(library, ids, fail, isRaw = false) {
+  const chosen = settings(library);
+  const start = (label, cls, kind, body) =>
+    h(
+      "button",
+      {
+        type: "button",
+        class: `main ${cls}`,
+        onclick: async (event) => {
+          const button = event.currentTarget;
+          button.disabled = true;
+          try {
+            await startJob(kind, body());
+          } catch (error) {
+            fail(error);
+            button.disabled = false;
+          }
+        },
+      },
+      label,
+    );
+  if (isRaw)
+    return h(
+      "div",
+      { class: "row" },
+      start("Import: unwrap the phases", "import", "imports", () => ({ recording: ids()[0] })),
+    );
+  return h(
+    "div",
+    { class: "row starters" },
+    start("Calibrate", "calibrate", "calibrations", () => chosen.calibration(ids())),
+    h("div", {}, chosen.terms),
+    start("Diagnose", "diagnose", "diagnoses", () => chosen.diagnosis(ids())),
+    h("div", {}, chosen.material),
+    h("div", {}, chosen.mesh),
+  );
 }
 
 export async function recordingsView(content, signal) {
   const library = await getJson("/v1/library");
+  const state = { recordings: [], text: "", chosen: new Set(), files: [] };
   const list = h("div", {});
+  const together = h("div", {});
+  const view = h("div", {});
   const problem = h("div", { role: "alert" });
-  const input = h("input", { type: "file", webkitdirectory: true, multiple: true, id: "recording" });
-  const show = async () => {
+  const fail = (error) =>
+    fill(
+      problem,
+      h("p", { class: "bad" }, error instanceof Failure ? `${error.problem.title}. ${error.message}` : error.message),
+      (error.problem?.errors ?? []).map((e) => h("p", { class: "bad" }, `${e.pointer}: ${e.detail}`)),
+    );
+
+  const fits = (r) => recordingName(r).toLowerCase().includes(state.text.toLowerCase());
+  function draw() {
+    const shown = state.recordings.filter(fits);
+    fill(
+      list,
+      shown.length > 0
+        ? shown.map(entry)
+        : h(
+            "p",
+            { class: "quiet" },
+            state.recordings.length === 0 ? "No recordings yet." : "No recording fits the filter.",
+          ),
+    );
+  }
+  function drawTogether() {
+    const ids = [...state.chosen];
+    fill(
+      together,
+      ids.length > 1 &&
+        sheet(
+          `${ids.length} recordings together: one material`,
+          starters(library, () => ids, fail),
+        ),
+    );
+  }
+  const load = async () => {
     const { recordings } = await getJson("/v1/recordings");
     if (signal.aborted) return;
-    fill(list, recordings.length === 0 ? h("p", { class: "quiet" }, "No recordings yet.") : recordings.map(entry));
+    state.recordings = recordings;
+    draw();
   };
-  const fail = (error) => fill(problem, h("p", { class: "bad" }, error instanceof Failure ? `${error.problem.title}. ${error.message}` : error.message));
-  const send = async (event) => {
+
+  async function show(files) {
+    try {
+      fill(view, await look(files));
+    } catch (error) {
+      fill(view);
+      fail(error);
+    }
+  }
+  async function take(files) {
     fill(problem);
-    const files = [...input.files].filter((f) => !f.name.startsWith("."));
-    if (files.length === 0) { say("Choose the recording's folder first."); return; }
-    event.target.disabled = true;
-    try { await upload("/v1/recordings", await tar(files)); say("Kept."); await show(); } catch (error) { fail(error); }
-    event.target.disabled = false;
-  };
+    try {
+      state.files = await unpacked(files);
+      keepButton.disabled = state.files.length === 0;
+      if (state.files.length > 0) await show(state.files);
+    } catch (error) {
+      fail(error);
+    }
+  }
+  const input = h("input", {
+    type: "file",
+    webkitdirectory: true,
+    multiple: true,
+    id: "recording",
+    onchange: () => take([...input.files]),
+  });
+  const zipInput = h("input", {
+    type: "file",
+    accept: ".zip",
+    id: "recording-zip",
+    onchange: () => take([...zipInput.files]),
+  });
+  const keepButton = h(
+    "button",
+    {
+      type: "button",
+      class: "main",
+      disabled: true,
+      onclick: async () => {
+        fill(problem);
+        keepButton.disabled = true;
+        try {
+          const kept = await upload("/v1/recordings", await tar(state.files));
+          here.set(kept.id, state.files);
+          say("Kept.");
+          fill(view);
+          await load();
+        } catch (error) {
+          fail(error);
+          keepButton.disabled = false;
+        }
+      },
+    },
+    "Upload",
+  );
+  const place = h(
+    "div",
+    { class: "drop" },
+    h("p", {}, "Drop a recording's folder or zip file here, or choose it."),
+    h(
+      "div",
+      { class: "row" },
+      h("label", { for: "recording" }, "Folder", input),
+      h("label", { for: "recording-zip" }, "Zip file", zipInput),
+      keepButton,
+    ),
+  );
+  dropPlace(place, take);
 
   function entry(recording) {
     const { summary } = recording;
-    const material = h("select", { "aria-label": "Material as believed" }, h("option", { value: "" }, "material unknown"), library.materials.map((m, i) => h("option", { value: i }, m.name)));
-    const mesh = h("select", { "aria-label": "Mesh" }, [["", "default mesh"], ["2", "coarse mesh"], ["1", "standard mesh"]].map(([v, t]) => h("option", { value: v }, t)));
-    const terms = h("select", { "aria-label": "Number of terms" }, [["", "number of terms: chosen"], ["1", "one term"], ["2", "two terms"], ["3", "three terms"]].map(([v, t]) => h("option", { value: v }, t)));
-    const start = (kind, body) => async (event) => {
-      event.target.disabled = true;
-      try { location.hash = `#/job/${(await post(`/v1/${kind}`, body())).id}`; } catch (error) { fail(error); event.target.disabled = false; }
+    const name = recordingName(recording);
+    const erase = async () => {
+      if (!confirm(`Delete ${name}? Results of jobs that read it stay.`)) return;
+      try {
+        await remove(`/v1/recordings/${recording.id}`);
+        say("Deleted.");
+        state.chosen.delete(recording.id);
+        await load();
+      } catch (error) {
+        fail(error);
+      }
     };
-    const factor = () => (mesh.value === "" ? {} : { mesh_factor: Number(mesh.value) });
-    const calibrate = start("calibrations", () => ({ recordings: [recording.id], ...(terms.value === "" ? {} : { num_terms: Number(terms.value) }), ...factor() }));
-    const diagnose = start("diagnoses", () => ({ recording: recording.id, ...(material.value === "" ? {} : { material: library.materials[Number(material.value)].material }), ...factor() }));
-    return h("section", { class: "sheet" },
-      h("h3", {}, recording.title || recording.id.slice(0, 12)),
-      h("p", { class: "quiet" }, `${summary.specimen.name} · ${summary.shape.join(" × ")} voxels of ${summary.voxel_mm.map((v) => digits(v)).join(" × ")} mm, ${summary.num_voxels.toLocaleString("en")} of them material · ${(recording.num_bytes / 1e6).toFixed(1)} MB`),
-      h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ["Drive, mm", "Force, N"].map((t) => h("th", {}, t)))),
-        h("tbody", {}, summary.steps.map((s) => h("tr", {}, h("td", {}, digits(s.drive_mm)), h("td", {}, digits(s.force_n))))))),
-      h("div", { class: "row" }, h("div", {}, mesh)),
-      h("div", { class: "row" }, h("button", { class: "main calibrate", onclick: calibrate }, "Calibrate"), h("div", {}, terms)),
-      h("div", { class: "row" }, h("button", { onclick: async () => {
-        if (!confirm("Delete this recording? Results of jobs that read it stay.")) return;
-        try { await remove(`/v1/recordings/${recording.id}`); say("Deleted."); await show(); } catch (error) { fail(error); }
-      } }, "Delete")),
-      h("div", { class: "row" }, h("button", { class: "main diagnose", onclick: diagnose }, "Diagnose"), h("div", {}, material)));
+    const choose = (event) => {
+      if (event.target.checked) state.chosen.add(recording.id);
+      else state.chosen.delete(recording.id);
+      drawTogether();
+    };
+    return h(
+      "section",
+      { class: "sheet" },
+      h(
+        "div",
+        { class: "row end" },
+        h("h3", {}, name),
+        h(
+          "div",
+          { class: "row tight" },
+          !summary.is_raw &&
+            h(
+              "label",
+              { class: "tick" },
+              h("input", { type: "checkbox", checked: state.chosen.has(recording.id), onchange: choose }),
+              "with others",
+            ),
+          here.has(recording.id) &&
+            h("button", { type: "button", onclick: () => show(here.get(recording.id)) }, "Look"),
+          h(
+            "button",
+            {
+              type: "button",
+              onclick: () => {
+                if (askName(recording.id, name)) draw();
+              },
+            },
+            "Rename",
+          ),
+          h("button", { type: "button", onclick: erase }, "Delete"),
+        ),
+      ),
+      h(
+        "p",
+        { class: "quiet" },
+        `${summary.specimen.name} · ${summary.shape.join(" × ")} voxels of ` +
+          `${summary.voxel_mm.map((v) => plain(v, 3)).join(" × ")} mm, ` +
+          `${many(summary.num_voxels)} of them material · ${digits(recording.num_bytes / 1e6, 2)} MB` +
+          `${summary.is_raw ? " · raw phases" : ""}`,
+      ),
+      table(
+        ["Drive, mm", "Force, N"],
+        summary.steps.map((s) => [plain(s.drive_mm, 4), digits(s.force_n)]),
+      ),
+      starters(library, () => [recording.id], fail, summary.is_raw),
+    );
   }
 
-  fill(content, h("h2", {}, "Recordings"),
-    h("section", { class: "sheet" }, h("h3", {}, "Upload a recording"),
-      h("p", { class: "quiet" }, "A folder with recording.json and its images. It is read and checked before it is kept."),
-      h("div", { class: "row" }, h("label", { for: "recording" }, "Folder", input), h("button", { onclick: send }, "Upload")), problem),
-    list);
-  await show();
+  fill(
+    content,
+    h("h2", {}, "Recordings"),
+    sheet(
+      "Upload a recording",
+      h(
+        "p",
+        { class: "quiet" },
+        "A folder, or a zip file of one, with recording.json and its images: displacements, or raw phases. It is " +
+          "shown first; the service reads and checks it before it keeps it. MATLAB files and images of other " +
+          "programs become such a folder by lambdak import.",
+      ),
+      place,
+      problem,
+    ),
+    view,
+    h(
+      "div",
+      { class: "fields" },
+      h(
+        "label",
+        {},
+        "Name contains",
+        h("input", {
+          type: "search",
+          oninput: (e) => {
+            state.text = e.target.value;
+            draw();
+          },
+        }),
+      ),
+    ),
+    together,
+    list,
+  );
+  await load();
 }

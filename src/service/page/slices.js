@@ -1,155 +1,251 @@
-// Slices through images (NIfTI): a component of a vector field before and after, on one colour scale.
+// Slices through images: a component of a vector field before and after, on one colour scale, with ticks in mm.
 
 import { getBlob } from "./api.js";
-import { digits, fill, h } from "./dom.js";
-
-/** A compressed NIfTI-1 image of floats: shape, components, voxel sizes, values (x fastest, components last). */
-async function readImage(href) {
-  const blob = await getBlob(href);
-  const bytes = await new Response(blob.stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
-  const view = new DataView(bytes);
-  if (view.getInt32(0, true) !== 348 || view.getInt16(70, true) !== 16) throw new Error("The image is not NIfTI-1 with single-precision values.");
-  const dim = (n) => (view.getInt16(40, true) >= n ? Math.max(1, view.getInt16(40 + 2 * n, true)) : 1);
-  const shape = [dim(1), dim(2), dim(3)];
-  const offset = view.getFloat32(108, true);
-  const values = new Float32Array(bytes, offset, shape[0] * shape[1] * shape[2] * dim(5));
-  return {
-    shape, components: dim(5), bounds: bounds(values, shape), voxel: [1, 2, 3].map((n) => view.getFloat32(76 + 4 * n, true)),
-    origin: [0, 1, 2].map((n) => view.getFloat32(292 + 16 * n, true)),
-    values,
-  };
-}
-
-/** First and last place along each axis where there is a value: maps leave out the empty margin. */
-function bounds(values, [nx, ny, nz]) {
-  const found = [[nx, -1], [ny, -1], [nz, -1]];
-  for (let z = 0, i = 0; z < nz; z += 1) {
-    for (let y = 0; y < ny; y += 1) {
-      for (let x = 0; x < nx; x += 1, i += 1) {
-        if (!Number.isFinite(values[i])) continue;
-        [x, y, z].forEach((p, a) => { found[a] = [Math.min(found[a][0], p), Math.max(found[a][1], p)]; });
-      }
-    }
-  }
-  return found.map(([low, high], a) => (high < low ? [0, [nx, ny, nz][a] - 1] : [low, high]));
-}
+import { ticks } from "./axis.js";
+import { diverging } from "./colors.js";
+import { fill, h, s } from "./dom.js";
+import { masked, mostToSee, reach, readImage, rms, slice } from "./nifti.js";
+import { digits } from "./numbers.js";
 
 const AXES = ["x", "y", "z"];
-const PLANES = [[0, 1, 2], [0, 2, 1], [2, 1, 0]]; // across, up, through
+const DISPLACEMENT = AXES.map((a) => `u along ${a}`);
+const PLANES = [
+  [0, 1, 2],
+  [0, 2, 1],
+  [2, 1, 0],
+]; // across, up, through
 
-/** Blue over white to red; t from -1 to 1. */
-function color(t) {
-  const s = Math.max(-1, Math.min(1, t));
-  const end = s < 0 ? [33, 82, 168] : [178, 32, 38];
-  const w = Math.abs(s) ** 0.8;
-  return end.map((c) => Math.round(255 + (c - 255) * w));
-}
-
-/** The slice's values of one component, row by row from the top, and its width and height. */
-function slice(image, component, [across, up, through], index) {
-  const { shape, bounds } = image;
-  const [nx, ny] = shape;
-  const size = nx * ny * shape[2];
-  const [width, height] = [across, up].map((a) => bounds[a][1] - bounds[a][0] + 1);
-  const values = new Float32Array(width * height);
-  const place = [0, 0, 0];
-  place[through] = index;
-  for (let row = 0; row < height; row += 1) {
-    place[up] = bounds[up][1] - row;
-    for (let column = 0; column < width; column += 1) {
-      place[across] = bounds[across][0] + column;
-      values[row * width + column] = image.values[component * size + place[0] + nx * (place[1] + ny * place[2])];
-    }
-  }
-  return { width, height, values };
-}
-
-function draw(canvas, image, cut, axes, limit) {
-  canvas.width = cut.width;
-  canvas.height = cut.height;
-  // Voxels are not cubes: the picture has the sample's proportions.
-  const ratio = (cut.width * image.voxel[axes[0]]) / (cut.height * image.voxel[axes[1]]);
-  canvas.style.aspectRatio = String(ratio);
+/** The slice as a picture of one pixel per voxel. */
+function painted(cut, limit) {
+  const canvas = h("canvas", { width: cut.width, height: cut.height });
   const pixels = new ImageData(cut.width, cut.height);
   cut.values.forEach((v, i) => {
-    if (!Number.isFinite(v)) return;
-    const [r, g, b] = color(v / limit);
-    pixels.data.set([r, g, b, 255], 4 * i);
+    if (Number.isFinite(v)) pixels.data.set([...diverging(v / limit), 255], 4 * i);
   });
   canvas.getContext("2d").putImageData(pixels, 0, 0);
+  return canvas.toDataURL();
 }
 
-const rms = (values) => {
-  let sum = 0;
-  let count = 0;
-  for (const v of values) if (Number.isFinite(v)) { sum += v * v; count += 1; }
-  return count ? Math.sqrt(sum / count) : NaN;
-};
-
-/** The 99th percentile of |value| of a component. */
-function reach(image, component) {
-  const size = image.values.length / image.components;
-  const all = image.values.subarray(component * size, (component + 1) * size).filter(Number.isFinite).map(Math.abs).sort();
-  return all.length ? all[Math.floor(0.99 * (all.length - 1))] : 0;
+/** Ends of the picture along an axis, mm: the outer edges of its first and last voxel. */
+function ends(image, axis) {
+  const at = (i) => image.origin[axis] + i * image.voxel[axis];
+  const [first, last] = image.bounds[axis];
+  return [at(first - 0.5), at(last + 0.5)];
 }
 
-/** Maps of `sets`: [{ label, panels: [{ label, href }] }]; all panels of a set share the colour scale. */
-export function slicesView(title, sets, note) {
+/** A map with its axes; `tell` is given the value under the pointer. */
+function map(image, cut, axes, limit, label, tell) {
+  const [x, y] = [ends(image, axes[0]), ends(image, axes[1])];
+  const [left, bottom, gap, wide] = [38, 34, 8, 420];
+  const scale = Math.min(wide / (x[1] - x[0]), 340 / (y[1] - y[0]));
+  const [width, height] = [scale * (x[1] - x[0]), scale * (y[1] - y[0])];
+  const across = (v) => left + scale * (v - x[0]);
+  const up = (v) => gap + height - scale * (v - y[0]);
+  const picture = s("image", {
+    x: left,
+    y: gap,
+    width,
+    height,
+    href: painted(cut, limit),
+    preserveAspectRatio: "none",
+  });
+  picture.addEventListener("pointermove", (event) => {
+    const box = picture.getBoundingClientRect();
+    const at = [
+      ((event.clientX - box.left) / box.width) * cut.width,
+      ((event.clientY - box.top) / box.height) * cut.height,
+    ].map(Math.floor);
+    tell(cut.values[at[1] * cut.width + at[0]]);
+  });
+  return s(
+    "svg",
+    { class: "map", viewBox: `0 0 ${left + wide + gap} ${gap + height + bottom}`, role: "img", "aria-label": label },
+    s("rect", { class: "paper", x: left, y: gap, width, height }),
+    picture,
+    s("rect", { class: "frame", x: left, y: gap, width, height }),
+    ticks(...x, 5).map(([v, text]) => [
+      s("line", { class: "tick", x1: across(v), x2: across(v), y1: gap + height, y2: gap + height + 4 }),
+      s("text", { x: across(v), y: gap + height + 15, "text-anchor": "middle" }, text),
+    ]),
+    ticks(...y, Math.max(3, Math.min(5, height / 40))).map(([v, text]) => [
+      s("line", { class: "tick", x1: left - 4, x2: left, y1: up(v), y2: up(v) }),
+      s("text", { x: left - 6, y: up(v) + 4, "text-anchor": "end" }, text),
+    ]),
+    s("text", { x: left + width / 2, y: gap + height + 30, "text-anchor": "middle" }, `${AXES[axes[0]]}, mm`),
+    s(
+      "text",
+      { x: 10, y: gap + height / 2, "text-anchor": "middle", transform: `rotate(-90 10 ${gap + height / 2})` },
+      `${AXES[axes[1]]}, mm`,
+    ),
+  );
+}
+
+/** The colour scale. */
+function scaleOf(limit, unit) {
+  const ramp = h("canvas", { class: "ramp", width: 101, height: 1, "aria-hidden": "true" });
+  const bar = new ImageData(101, 1);
+  for (let i = 0; i < 101; i += 1) bar.data.set([...diverging(i / 50 - 1), 255], 4 * i);
+  ramp.getContext("2d").putImageData(bar, 0, 0);
+  return [
+    ramp,
+    h(
+      "div",
+      { class: "ends" },
+      [-1, -0.5, 0, 0.5, 1].map((t) => h("span", {}, `${t === 0 ? 0 : digits(t * limit, 2)} ${unit}`)),
+    ),
+  ];
+}
+
+/** The image of a panel, within its mask where it has one. */
+async function imageOf({ href, blob, mask }) {
+  const image = await readImage(blob ?? (await getBlob(href)));
+  return mask ? masked(image, await readImage(mask)) : image;
+}
+
+/** The part of a map that lies beyond its scale, in words. */
+function beyond(cut, limit) {
+  const there = cut.values.filter(Number.isFinite);
+  const part = there.filter((v) => Math.abs(v) > limit).length / (there.length || 1);
+  return part > 0.02 ? `; ${Math.round(100 * part)} % of it lies beyond the colours` : "";
+}
+
+/**
+ * Maps of `sets`: [{ label, panels: [{ label, href or blob, mask }] }]. A set's panels share the scale of panel
+ * `scale`; the slice shown first is the one with the most to see in panel `aimed`. `components` names what an image
+ * holds.
+ */
+export function slicesView(title, sets, { note, scale = 0, aimed = 0, unit = "mm", components = DISPLACEMENT } = {}) {
   if (sets.length === 0) return null;
-  const state = { set: sets.length - 1, component: 0, plane: 0, index: null, scale: 0 };
+  const state = { set: sets.length - 1, component: null, plane: null, index: null, scale };
   const images = new Map();
-  const load = (href) => { if (!images.has(href)) images.set(href, readImage(href)); return images.get(href); };
+  const load = (panel) => {
+    const key = panel.href ?? panel.blob;
+    if (!images.has(key)) images.set(key, imageOf(panel));
+    return images.get(key);
+  };
   const panels = h("div", { class: "maps" });
   const problem = h("div", { role: "alert" });
   const legend = h("div", { class: "scale" });
   const where = h("output", {});
-  const range = h("input", { type: "range", min: 0, step: 1, "aria-label": "Slice", oninput: (e) => { state.index = Number(e.target.value); show(); } });
-  const pick = (label, options, key) => h("label", {}, label, h("select", { onchange: (e) => { state[key] = Number(e.target.value); if (key === "plane") state.index = null; show(); } },
-    options.map((text, i) => h("option", { value: i, selected: i === state[key] }, text))));
+  const under = h("p", { class: "quiet reading" });
+  const range = h("input", {
+    type: "range",
+    min: 0,
+    step: 1,
+    "aria-label": "Slice",
+    oninput: (e) => {
+      state.index = Number(e.target.value);
+      show();
+    },
+  });
+  const choosers = {};
+  const pick = (label, options, key) => {
+    choosers[key] = h(
+      "select",
+      {
+        onchange: (e) => {
+          state[key] = Number(e.target.value);
+          if (key === "plane") state.index = null;
+          show();
+        },
+      },
+      options.map((text, i) => h("option", { value: i, selected: i === state[key] }, text)),
+    );
+    return h("label", {}, label, choosers[key]);
+  };
   let turn = 0;
 
+  function aim(image) {
+    if (state.component !== null) return;
+    Object.assign(state, mostToSee(image, PLANES));
+    if (choosers.component) choosers.component.value = state.component;
+    choosers.plane.value = state.plane;
+  }
+
   async function show() {
-    const mine = turn += 1;
+    const mine = (turn += 1);
     const set = sets[state.set];
     try {
-      const loaded = await Promise.all(set.panels.map((p) => load(p.href)));
+      const loaded = await Promise.all(set.panels.map(load));
       if (mine !== turn) return;
-      const axes = PLANES[state.plane];
-      const first = loaded[0];
-      const [low, high] = first.bounds[axes[2]];
-      state.index = Math.max(low, Math.min(state.index ?? Math.floor((low + high) / 2), high));
-      range.min = low;
-      range.max = high;
-      range.value = state.index;
-      const at = Math.round(1e4 * (first.origin[axes[2]] + state.index * first.voxel[axes[2]])) / 1e4;
-      where.textContent = `${AXES[axes[2]]} = ${digits(at, 3)} mm (${state.index - low + 1} of ${high - low + 1})`;
-      const limit = reach(loaded[Math.min(state.scale, loaded.length - 1)], state.component) || 1;
-      fill(panels, loaded.map((image, i) => {
-        const cut = slice(image, state.component, axes, state.index);
-        const canvas = h("canvas", { class: "slice", role: "img", "aria-label": `${set.panels[i].label}, u ${AXES[state.component]}, ${where.textContent}` });
-        draw(canvas, image, cut, axes, limit);
-        return h("figure", {}, canvas, h("figcaption", {}, `${set.panels[i].label}: rms in this slice ${digits(rms(cut.values), 3)} mm`));
-      }));
-      const ramp = h("canvas", { class: "ramp", width: 101, height: 1, "aria-hidden": "true" });
-      const bar = new ImageData(101, 1);
-      for (let i = 0; i < 101; i += 1) bar.data.set([...color(i / 50 - 1), 255], 4 * i);
-      ramp.getContext("2d").putImageData(bar, 0, 0);
-      fill(legend, h("span", {}, `${digits(-limit, 3)} mm`), ramp, h("span", {}, `${digits(limit, 3)} mm`));
+      aim(loaded[Math.min(aimed, loaded.length - 1)]);
+      draw(set, loaded);
       fill(problem);
     } catch (error) {
       if (mine === turn) fill(problem, h("p", { class: "bad" }, error.message));
     }
   }
 
-  const widest = Math.max(...sets.map((s) => s.panels.length));
-  const sheet = h("section", { class: "sheet slices" }, h("h3", {}, title), note && h("p", { class: "quiet" }, note),
-    h("div", { class: "fields" },
-      pick("Map", sets.map((s) => s.label), "set"),
-      pick("Component", AXES.map((a) => `u along ${a}`), "component"),
-      pick("Plane", PLANES.map(([a, b]) => `${AXES[a]} and ${AXES[b]}`), "plane"),
-      widest > 1 && pick("Colours reach to", ["the left map's values", "the right map's values"], "scale"),
-      h("label", { class: "wide" }, "Slice ", where, range)),
-    panels, legend, problem);
+  function draw(set, loaded) {
+    const axes = PLANES[state.plane];
+    const first = loaded[0];
+    const [low, high] = first.bounds[axes[2]];
+    state.index = Math.max(low, Math.min(state.index ?? Math.floor((low + high) / 2), high));
+    Object.assign(range, { min: low, max: high, value: state.index });
+    const at = Math.round(1e4 * (first.origin[axes[2]] + state.index * first.voxel[axes[2]])) / 1e4;
+    where.textContent = `${AXES[axes[2]]} = ${digits(at, 3)} mm (${state.index - low + 1} of ${high - low + 1})`;
+    const limit = reach(loaded[Math.min(state.scale, loaded.length - 1)], state.component) || 1;
+    const tell = (v) => {
+      under.textContent = Number.isFinite(v) ? `Under the pointer: ${digits(v, 3)} ${unit}` : "";
+    };
+    fill(
+      panels,
+      loaded.map((image, i) => {
+        const cut = slice(image, state.component, axes, state.index);
+        const label = set.panels[i].label;
+        return h(
+          "figure",
+          {},
+          map(image, cut, axes, limit, `${label}, ${components[state.component]}, ${where.textContent}`, tell),
+          h("figcaption", {}, `${label}: rms in this slice ${digits(rms(cut.values), 3)} ${unit}${beyond(cut, limit)}`),
+        );
+      }),
+    );
+    fill(legend, scaleOf(limit, unit));
+  }
+
+  /** Goes through the maps one after the other, as a film. */
+  async function play(event) {
+    const button = event.currentTarget;
+    button.disabled = true;
+    for (let i = 0; i < sets.length && button.isConnected; i += 1) {
+      state.set = i;
+      choosers.set.value = i;
+      await show();
+      await new Promise((resolve) => setTimeout(resolve, 700));
+    }
+    button.disabled = false;
+  }
+
+  const names = sets[0].panels.map((p) => p.label.toLowerCase());
+  const element = h(
+    "section",
+    { class: "sheet slices" },
+    h("h3", {}, title),
+    note && h("p", { class: "quiet" }, note),
+    h(
+      "div",
+      { class: "fields" },
+      pick(
+        "Map",
+        sets.map((one) => one.label),
+        "set",
+      ),
+      components.length > 1 && pick("Component", components, "component"),
+      pick(
+        "Plane",
+        PLANES.map(([a, b]) => `${AXES[a]} and ${AXES[b]}`),
+        "plane",
+      ),
+      names.length > 1 && pick("Colours reach to the values", ["on the left", "on the right"], "scale"),
+      h("label", { class: "wide" }, "Slice ", where, range),
+    ),
+    panels,
+    legend,
+    under,
+    sets.length > 1 && h("p", {}, h("button", { type: "button", onclick: play }, "Play the maps")),
+    problem,
+  );
   show();
-  return sheet;
+  return element;
 }
