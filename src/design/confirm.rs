@@ -409,7 +409,7 @@ mod tests {
     fn means_are_of_every_entry() {
         let response = |x: f64| Response {
             log_integrated: vec![x, 2.0 * x],
-            log_relative_sd: vec![-x],
+            log_relative_sd: vec![-x, 0.5 * x],
             log_criteria: [x; 4],
             log_separation: 0.0,
             log_force: 3.0 * x,
