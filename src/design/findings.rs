@@ -125,8 +125,8 @@ pub struct Equals<'a> {
     pub simplest: usize,
 }
 
-/// Sentences for the report: first the winner, its equals and its gains, then what holes do for each material, then where the two
-/// measures disagree, then what can and cannot be seen, then what happened at confirmation.
+/// Sentences for the report: first the winner, its equals and its gains, then what holes do for each material, then
+/// where the two measures disagree, then what can and cannot be seen, then what happened at confirmation.
 pub fn findings(
     study: &Study,
     base: &DesignEntry,

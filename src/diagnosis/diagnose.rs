@@ -5,7 +5,7 @@ use super::cause::CauseName;
 use super::cause_fit::CauseFit;
 use super::conclusion::{explain_too_little, kept_back, verdict_on};
 use super::error::DiagnosisError;
-use super::evidence::{EVIDENCE, UNEXPLAINED, is_large_force, penalty};
+use super::evidence::{EVIDENCE, OF_IMAGE_ALONE, UNEXPLAINED, is_large_force, penalty};
 use super::findings::Findings;
 use super::found::FoundCause;
 use super::inference::{Inference, KNOWN_LOG_SD};
@@ -349,16 +349,23 @@ impl<'a> Run<'a> {
             return Ok(());
         }
         let at_boundary = self.registry.clone().without_inside();
-        let everything = Asked { registry: self.registry, with_terms: self.options.prior.is_none() };
+        let everything =
+            Asked { registry: self.registry, with_terms: self.options.prior.is_none(), evidence: EVIDENCE };
         let does_inside_wait = self.interior.as_ref().is_some_and(InteriorTest::inside_fits);
-        let first = if does_inside_wait { Asked { registry: &at_boundary, with_terms: false } } else { everything };
+        let first = if does_inside_wait {
+            Asked { registry: &at_boundary, with_terms: false, evidence: EVIDENCE }
+        } else {
+            everything
+        };
         let Run { inference, findings, observed, .. } = self;
         let left_mm =
             |fitted: &CauseFit, metric: &Metric| leftover(observed, &fitted.residual, metric).structured_rms_mm;
         let before_mm = left_mm(&findings.current, &inference.metric);
-        // What is no more than a mesh's has no cause.
+        // What is no more than a mesh's has no cause but in the image.
         if before_mm < inference.allowance_mm && !is_large_force(observed, &findings.current.residual) {
-            return Ok(());
+            let of_image = self.registry.clone().of_image_alone(&observed.specimen);
+            let asked = Asked { registry: &of_image, with_terms: false, evidence: OF_IMAGE_ALONE * EVIDENCE };
+            return add_causes(inference, findings, &measured, limits, &|_, _| Some(asked));
         }
         let scored = score_round(inference, first, findings, limits)?;
         // What is no more than a mesh's needs no set-up.
@@ -397,7 +404,7 @@ impl<'a> Run<'a> {
     /// Goes on with single causes where they were given up, or not all of them asked.
     fn ask_all(&mut self, measured: &Trace, limits: RoundLimits) -> Result<(), DiagnosisError> {
         let Run { inference, registry, findings, options, .. } = self;
-        let everything = Asked { registry, with_terms: options.prior.is_none() };
+        let everything = Asked { registry, with_terms: options.prior.is_none(), evidence: EVIDENCE };
         add_causes(inference, findings, measured, limits, &|_, _| Some(everything))?;
         self.fit_material_anew(measured, limits)
     }
@@ -419,7 +426,7 @@ impl<'a> Run<'a> {
                     if deviance - anew.deviance - cost > EVIDENCE {
                         self.findings.current = anew;
                         let Run { inference, registry, findings, .. } = self;
-                        let everything = Asked { registry, with_terms: true };
+                        let everything = Asked { registry, with_terms: true, evidence: EVIDENCE };
                         add_causes(inference, findings, measured, limits, &|_, _| Some(everything))?;
                     }
                 }
@@ -520,7 +527,7 @@ impl<'a> Run<'a> {
     fn add_causes_to_set_up(&mut self, measured: &Trace, limits: RoundLimits) -> Result<(), DiagnosisError> {
         self.name_causes_of_fit()?;
         let Run { inference, registry, findings, options, .. } = self;
-        let everything = Asked { registry, with_terms: options.prior.is_none() };
+        let everything = Asked { registry, with_terms: options.prior.is_none(), evidence: EVIDENCE };
         let num_before = findings.current.causes.len();
         add_causes(inference, findings, measured, limits, &|_, _| Some(everything))?;
         if findings.current.causes.len() > num_before {

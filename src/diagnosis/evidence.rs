@@ -8,6 +8,9 @@ use crate::calibration::{Observed, ObservedForce};
 /// A cause must lower the deviance by this much beyond ln n per parameter. For a single cause this would be many times
 /// what counts as very strong evidence; it takes that much because many causes are tried.
 pub(super) const EVIDENCE: f64 = 30.0;
+/// A cause that changes the image alone looks like no mesh's error where it is plain. Where it does no more than a mesh
+/// could, it needs so many times the usual evidence.
+pub(super) const OF_IMAGE_ALONE: f64 = 10.0;
 /// Fits that only compare end where a step would lower the deviance by less than this part of the misfit beyond noise.
 pub(super) const ROUGH_TOLERANCE: f64 = 1e-3;
 /// A cause is fitted where it explains more than this part of what the leading one does, to first order.

@@ -66,6 +66,16 @@ impl Registry {
         self
     }
 
+    /// The causes alone that change nothing but the image, of those for which every recording of a specimen is tested;
+    /// without smooth fields that take up whatever is smooth.
+    pub(super) fn of_image_alone(mut self, specimen: &Specimen) -> Registry {
+        self.entries.retain(|e| match e.origin {
+            Origin::Tested(suspects) => suspects(specimen).iter().all(|c| !(c.changes_sample() || c.is_sponge())),
+            _ => false,
+        });
+        self
+    }
+
     /// Without the causes that act inside the sample.
     pub(super) fn without_inside(mut self) -> Registry {
         self.entries.retain(|e| !INSIDE.contains(&e.name));

@@ -58,6 +58,8 @@ pub(super) struct Scored<'r> {
     known: Vec<Trace>,
     /// Whether a further Ogden term is asked for beside them.
     with_terms: bool,
+    /// The evidence that is called for.
+    evidence: f64,
 }
 
 /// How far rounds go.
@@ -76,6 +78,8 @@ pub(super) struct Asked<'r> {
     pub(super) registry: &'r Registry,
     /// Whether a further Ogden term is asked for beside them.
     pub(super) with_terms: bool,
+    /// How much each must lower the deviance, beyond ln n per parameter.
+    pub(super) evidence: f64,
 }
 
 /// The first half of a round: tests all suspects to first order.
@@ -105,7 +109,7 @@ pub(super) fn score_round<'r>(
     }));
     // The nominal model's few parameters are worked out at every step: they change most with the first cause.
     let known = if findings.current.causes.is_empty() { Vec::new() } else { known };
-    Ok(Scored { registry: asked.registry, candidates, known, with_terms: asked.with_terms })
+    Ok(Scored { registry: asked.registry, candidates, known, with_terms: asked.with_terms, evidence: asked.evidence })
 }
 
 /// The second half of a round: fits the leading candidates and names the best, unless a further Ogden term of the
@@ -130,7 +134,8 @@ pub(super) fn fit_round(
             return Ok(true);
         }
     }
-    Ok(take_best(inference, findings, trials)? && take_out_artefacts(inference, scored.registry, findings, measured)?)
+    Ok(take_best(inference, findings, trials, scored.evidence)?
+        && take_out_artefacts(inference, scored.registry, findings, measured)?)
 }
 
 /// Finds the artefacts of the image in what the fit so far leaves, if none is in it yet, and fits their sizes. Always
@@ -234,12 +239,17 @@ fn gain_of(inference: &Inference, current: &CauseFit, fit: &CauseFit) -> f64 {
 
 /// Names the best trial as a cause where the evidence for it is strong enough, with what cannot be told apart from it;
 /// whether it did.
-fn take_best(inference: &mut Inference, findings: &mut Findings, trials: Vec<Trial>) -> Result<bool, DiagnosisError> {
+fn take_best(
+    inference: &mut Inference,
+    findings: &mut Findings,
+    trials: Vec<Trial>,
+    evidence: f64,
+) -> Result<bool, DiagnosisError> {
     let mut trials = trials.into_iter();
     let Some(best) = trials.next() else { return Ok(false) };
     let effect = best.fit.prediction.trace.plus(-1.0, &findings.current.prediction.trace);
     let share = smallest_share(&findings.current.causes);
-    let least = EVIDENCE.max(share * findings.explained());
+    let least = evidence.max(share * findings.explained());
     (inference.progress)(&format!(
         "round {}: '{}' lowers the deviance by {:.0}; {least:.0} are called for",
         findings.num_rounds,

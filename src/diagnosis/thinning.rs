@@ -9,17 +9,13 @@
 
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
-use super::evidence::{EVIDENCE, UNEXPLAINED, penalty};
+use super::evidence::{EVIDENCE, OF_IMAGE_ALONE, UNEXPLAINED, penalty};
 use super::fit::{derivatives, normal_matrix, prior_scales};
 use super::found::FoundCause;
 use super::inference::Inference;
 use super::supposed::Supposed;
 use super::trace::Trace;
 use nalgebra::{DMatrix, DVector};
-
-/// A cause that changes the image alone looks like no mesh's error where it is plain. Where it does no more than a mesh
-/// could, it needs so many times the usual evidence.
-const OF_IMAGE_ALONE: f64 = 10.0;
 
 /// What a cause must do to stay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

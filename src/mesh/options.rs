@@ -41,6 +41,9 @@ pub(super) const SEARCH_FACTOR: f64 = 1.8;
 /// Element size of [`MeshOptions::fine`] relative to standard.
 pub(super) const FINE_FACTOR: f64 = 0.6;
 
+/// Grading of [`MeshOptions::graded`].
+const STRONG_GRADING: f64 = 0.1;
+
 impl MeshOptions {
     /// Coarse meshes for a search: about 2–4 thousand free unknowns in half of a two-hole block.
     pub fn search(specimen: &Specimen) -> Self {
@@ -79,6 +82,17 @@ impl MeshOptions {
             min_scaled_jacobian: 0.2,
             max_elements: 100_000,
         }
+    }
+
+    /// As [`Self::scaled`] with elements that get thinner toward bonded faces and edges three times as fast, and twice as
+    /// many layers between the plates where holes run through the gap. Along the plates elements are as large as those
+    /// of `scaled`: the free faces' bonded edges are on the brink of folding, and elements small enough to fold do.
+    pub fn graded(specimen: &Specimen, factor: f64) -> Self {
+        let options = Self::scaled(specimen, factor);
+        let along_width = specimen.holes.first().is_some_and(|h| h.axis == crate::specimen::HoleAxis::Width);
+        let is_through_gap = specimen.test == crate::specimen::TestKind::DoubleLapShear && !along_width;
+        let levels = if is_through_gap { 2 * options.levels } else { options.levels };
+        MeshOptions { grading: STRONG_GRADING, levels, ..options }
     }
 
     /// Checks the ranges.

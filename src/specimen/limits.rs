@@ -133,7 +133,7 @@ pub struct ManufacturingLimits {
     /// Mirror planes that the geometry must have.
     #[serde(default)]
     pub symmetry: Symmetry,
-    /// What a mould maker works to, mm: designs are given in multiples of it, but for punches; 0.1 where it is left out.
+    /// What a mould maker works to, mm: designs are given in multiples of it, but for punches; 0.1 where left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<PositiveMm>, nullable = false)]
     pub dimension_step_mm: Option<f64>,
