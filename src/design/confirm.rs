@@ -15,7 +15,7 @@ use super::study::Study;
 use super::tell_apart::{Imitation, log_separation, state_of};
 use crate::fem::{Equilibrium, ForwardModel};
 use crate::kinematics::principal_stretches;
-use crate::mesh::MeshOptions;
+use crate::mesh::{MeshOptions, SEARCH_FACTOR};
 use crate::sensitivity::{
     DriveSelection, Evaluation, EvaluationError, EvaluationMaps, EvaluationOptions, MaterialState, Scanned, Scanner,
     evaluate_scanned,
@@ -172,7 +172,8 @@ pub fn estimate(
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Evaluated, EvaluationFailure> {
     specimen.validate().map_err(|e| EvaluationFailure::Geometry { reason: e.to_string() })?;
-    let mesh = MeshOptions::search(specimen);
+    // As the confirmation's, but for the size: what the edges do to a coarser grading is not what they do there.
+    let mesh = MeshOptions { hole_segments: 8, ..MeshOptions::graded(specimen, SEARCH_FACTOR) };
     let sampling = Sampling::on_elements_of(mesh.section_size_mm, study.scan.voxel_mm);
     let options = EvaluationOptions { mesh, sampling, ..EvaluationOptions::standard(specimen) };
     let by_material = by_material(study, specimen, options, is_cancelled)?;

@@ -37,7 +37,7 @@ pub struct MeshOptions {
 /// Elements in the unmirrored block at standard size.
 const STANDARD_ELEMENTS: f64 = 720.0;
 /// Element size of [`MeshOptions::search`] relative to standard.
-pub(super) const SEARCH_FACTOR: f64 = 1.8;
+pub(crate) const SEARCH_FACTOR: f64 = 1.8;
 /// Element size of [`MeshOptions::fine`] relative to standard.
 pub(super) const FINE_FACTOR: f64 = 0.6;
 
