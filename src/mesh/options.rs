@@ -84,9 +84,10 @@ impl MeshOptions {
         }
     }
 
-    /// As [`Self::scaled`] with elements that get thinner toward bonded faces and edges three times as fast, and twice as
-    /// many layers between the plates where holes run through the gap. Along the plates elements are as large as those
-    /// of `scaled`: the free faces' bonded edges are on the brink of folding, and elements small enough to fold do.
+    /// As [`Self::scaled`] with elements that get thinner toward bonded faces and edges three times as fast, and twice
+    /// as many layers between the plates where holes run through the gap. Along the plates elements are as large as
+    /// those of `scaled`: the free faces' bonded edges are on the brink of folding, and elements small enough to fold
+    /// do.
     pub fn graded(specimen: &Specimen, factor: f64) -> Self {
         let options = Self::scaled(specimen, factor);
         let along_width = specimen.holes.first().is_some_and(|h| h.axis == crate::specimen::HoleAxis::Width);
