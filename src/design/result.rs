@@ -28,8 +28,7 @@ pub struct DesignResult {
     /// Indices in `ranked` of the designs that are equal to the best within what meshes leave open, the best included.
     #[serde(default)]
     pub equal_to_best: Vec<usize>,
-    /// Index in `ranked` of the one of them that is simplest to make: fewest holes, then fewest different diameters,
-    /// then least material.
+    /// Index in `ranked` of the one of them that is simplest to make: fewest holes, then fewest different diameters.
     #[serde(default)]
     pub simplest: usize,
     /// Indices in `ranked` of the trade-off between information (D-optimal figure of the first material) and force:

@@ -8,6 +8,8 @@ use crate::specimen::Specimen;
 /// of its standard errors. With three meshes, chance alone exceeds four with a probability of one in twenty
 /// (Student's t, two degrees of freedom).
 const EQUAL_WITHIN: f64 = 4.0;
+/// Nor are they equal where that mean is larger than this, however large the error.
+const LARGEST_DIFFERENCE: f64 = 0.02;
 /// Differences of ln objectives below this are of no use to anybody.
 const NO_DIFFERENCE: f64 = 0.002;
 
@@ -18,24 +20,20 @@ pub(super) fn equal_to_best(study: &Study, base: &Confirmed, ranked: &[Confirmed
     let is_equal = |c: &Confirmed| {
         let apart: Vec<f64> = of_best.iter().zip(c.log_objectives(study, base)).map(|(a, b)| a - b).collect();
         let mean = apart.iter().sum::<f64>() / (apart.len() as f64).max(1.0);
-        mean.abs() <= (EQUAL_WITHIN * standard_error(&apart)).max(NO_DIFFERENCE)
+        mean.abs() <= (EQUAL_WITHIN * standard_error(&apart)).clamp(NO_DIFFERENCE, LARGEST_DIFFERENCE)
     };
     let within = ranked.iter().enumerate().filter(|(_, c)| c.is_within_limits == best.is_within_limits);
     within.filter(|(place, c)| *place == 0 || is_equal(c)).map(|(place, _)| place).collect()
 }
 
 /// Of the designs at `places`, the place of the one that is simplest to make: fewest holes, then fewest different
-/// diameters, then least material.
+/// diameters; of equals the better one.
 pub(super) fn simplest(ranked: &[Confirmed], places: &[usize]) -> Option<usize> {
-    let key = |place: usize| {
-        let c = &ranked[place];
-        (c.specimen.holes.len(), num_diameters(&c.specimen), c.volume_mm3)
+    let key = |place: &usize| {
+        let specimen = &ranked[*place].specimen;
+        (specimen.holes.len(), num_diameters(specimen), *place)
     };
-    let order = |a: &usize, b: &usize| {
-        let (a, b) = (key(*a), key(*b));
-        a.0.cmp(&b.0).then(a.1.cmp(&b.1)).then(a.2.total_cmp(&b.2))
-    };
-    places.iter().copied().min_by(order)
+    places.iter().copied().min_by_key(key)
 }
 
 /// How many different diameters (to 1 µm) a specimen's holes have.
