@@ -336,7 +336,7 @@ impl<'a> Run<'a> {
     fn take_out_artefacts(&mut self) -> Result<(), DiagnosisError> {
         let measured = self.measured();
         let Run { inference, registry, findings, .. } = self;
-        take_out_artefacts(inference, registry, findings, &measured).map(|_| ())
+        take_out_artefacts(inference, registry, findings, &measured)
     }
 
     /// Tests, fits and names causes, round by round. Where the interior test found that the inside fits, causes there

@@ -134,12 +134,14 @@ pub(super) fn fit_round(
             return Ok(true);
         }
     }
-    Ok(take_best(inference, findings, trials, scored.evidence)?
-        && take_out_artefacts(inference, scored.registry, findings, measured)?)
+    let is_named = take_best(inference, findings, trials, scored.evidence)?;
+    if is_named {
+        take_out_artefacts(inference, scored.registry, findings, measured)?;
+    }
+    Ok(is_named)
 }
 
-/// Finds the artefacts of the image in what the fit so far leaves, if none is in it yet, and fits their sizes. Always
-/// true: a fit with a cause goes on with or without them.
+/// Finds the artefacts of the image in what the fit so far leaves, if none is in it yet, and fits their sizes.
 ///
 /// # Errors
 /// As [`score_round`].
@@ -148,7 +150,7 @@ pub(super) fn take_out_artefacts(
     registry: &Registry,
     findings: &mut Findings,
     measured: &Trace,
-) -> Result<bool, DiagnosisError> {
+) -> Result<(), DiagnosisError> {
     let current = &findings.current;
     if current.causes.iter().all(|c| !c.cause.is_artefact()) {
         let found = registry.artefacts(inference.laboratory.observed(), &current.residual, inference.progress);
@@ -157,7 +159,7 @@ pub(super) fn take_out_artefacts(
             findings.current = inference.fit(measured, &current.material, &causes)?;
         }
     }
-    Ok(true)
+    Ok(())
 }
 
 /// Adds causes round by round, each of those that the next round is `to_ask` for, until no further one is called for,

@@ -147,7 +147,7 @@ pub(super) fn with_plain_motions(
 }
 
 /// The fit with a smooth field that is alike at all drives in place of motions of the plates that are alike at all
-/// drives, too, or free at each: where it explains as much more for its number as a cause without a mechanism must.
+/// drives, too, or free at each: where it leaves less than [`SPONGE_LEAVES`] of what they leave.
 ///
 /// # Errors
 /// As [`fit_set_up`].
