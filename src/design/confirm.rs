@@ -8,6 +8,7 @@
 use super::aim::{Normalisation, ObjectiveKind};
 use super::evaluation_failure::EvaluationFailure;
 use super::evaluator::{Evaluated, Evaluator};
+use super::fidelity::Fidelity;
 use super::material_samples::sample_materials;
 use super::objective::{Judged, Reference};
 use super::response::{Response, criteria_as_relative_sd, log_or_undetermined, normalised, tearing_stretch};
@@ -15,7 +16,7 @@ use super::study::Study;
 use super::tell_apart::{Imitation, log_separation, state_of};
 use crate::fem::{Equilibrium, ForwardModel};
 use crate::kinematics::principal_stretches;
-use crate::mesh::{MeshOptions, SEARCH_FACTOR};
+use crate::mesh::MeshOptions;
 use crate::sensitivity::{
     DriveSelection, Evaluation, EvaluationError, EvaluationMaps, EvaluationOptions, MaterialState, Scanned, Scanner,
     evaluate_scanned,
@@ -26,7 +27,7 @@ use serde::{Deserialize, Serialize};
 
 /// Element sizes along the plates of a confirmation ([`MeshOptions::graded`]), as factors on the standard one; the
 /// last is the one that is reported.
-const MESHES: [f64; 3] = [1.4, 1.2, 1.0];
+const MESHES: [f64; 3] = [1.6, 1.4, 1.2];
 
 /// A confirmed design.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -161,19 +162,19 @@ fn mean_over_meshes(by_mesh: &[Vec<Response>]) -> Vec<Response> {
     (0..num_samples).map(of_sample).collect()
 }
 
-/// What a design is judged by in the search: the same figures from the same voxels, on a coarser mesh; at the priors'
-/// central values, or at their variants too where the study's budget says so.
+/// What a design is judged by in the search: the same figures from the same voxels, on one mesh; at the priors' central
+/// values, or at their variants too where the study's budget says so.
 ///
 /// # Errors
 /// [`EvaluationFailure`].
 pub fn estimate(
     study: &Study,
     specimen: &Specimen,
+    fidelity: Fidelity,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Evaluated, EvaluationFailure> {
     specimen.validate().map_err(|e| EvaluationFailure::Geometry { reason: e.to_string() })?;
-    // As the confirmation's, but for the size: what the edges do to a coarser grading is not what they do there.
-    let mesh = MeshOptions { hole_segments: 8, ..MeshOptions::graded(specimen, SEARCH_FACTOR) };
+    let mesh = fidelity.mesh_options(specimen);
     let sampling = Sampling::on_elements_of(mesh.section_size_mm, study.scan.voxel_mm);
     let options = EvaluationOptions { mesh, sampling, ..EvaluationOptions::standard(specimen) };
     let by_material = by_material(study, specimen, options, is_cancelled)?;
@@ -198,10 +199,11 @@ fn by_material(
     let options = EvaluationOptions { protocol, ..options };
     let mut model = ForwardModel::of_specimen(specimen, &options.mesh)?;
     let scanner = Scanner::new(specimen, model.mesh(), &study.scan, options.sampling).map_err(|e| failure(e.into()))?;
-    let scanned = Scanned { specimen, scan: &study.scan, scanner: &scanner };
+    let mut neighbours: Vec<Equilibrium> = Vec::new();
     let mut solved: Vec<(MaterialState, Equilibrium)> = Vec::new();
     for prior in &study.materials {
         let drives = DriveSelection::DriveMm(specimen.drive_mm.clone());
+        let scanned = Scanned { specimen, scan: &study.scan, scanner: &scanner, neighbours: &neighbours };
         let (evaluation, maps) =
             evaluate_scanned(&mut model, &scanned, &prior.material, &drives, &options, is_cancelled)
                 .map_err(failure)?;
@@ -212,6 +214,7 @@ fn by_material(
             solved.push((state_of(state, &mut tangent)?, state.clone()));
         }
         by_material.push(of_material(&model, &prior.name, &prior.material, evaluation, &maps));
+        neighbours = maps.equilibria;
     }
     for later in 1..solved.len() {
         let mut closest = f64::INFINITY;

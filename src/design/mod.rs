@@ -8,6 +8,7 @@ mod entry;
 mod evaluation_failure;
 mod evaluator;
 mod explore;
+mod fidelity;
 mod finals;
 mod findings;
 #[cfg(test)]
@@ -49,6 +50,7 @@ pub use entry::DesignEntry;
 pub use evaluation_failure::EvaluationFailure;
 pub use evaluator::{Evaluated, Evaluator};
 pub use explore::{geometry_margins, is_makeable, sample};
+pub use fidelity::Fidelity;
 pub use findings::Disagreement;
 pub(crate) use inline::Inline;
 pub use local::{Improved, LocalModel, LocalProblem, LocalSettings, improve};

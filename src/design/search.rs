@@ -1,17 +1,19 @@
-//! The search: explore every structure with samples, improve the best by gradients and by what is learnt, confirm
-//! the best of those on a finer mesh. What is compared is what the confirmation compares, the scan's own voxels
-//! included; gradients alone are of integrals in their place. Deterministic by seed at any number of threads: batches
-//! are fixed, every evaluation depends on its own input alone, results are taken in order.
+//! The search: explore every structure with samples and by what they teach, improve the best by gradients and by what
+//! is learnt, confirm the best of those on finer meshes. What is compared is what the confirmation compares, the scan's
+//! own voxels included; gradients alone are of integrals in their place. Deterministic by seed at any number of
+//! threads: batches are fixed, every evaluation depends on its own input alone, results are taken in order.
 
 use super::candidate::Candidate;
 use super::checkpoint::Checkpoint;
 use super::confirm::Confirmed;
 use super::evaluator::Evaluator;
 use super::explore::{is_makeable, sample};
+use super::fidelity::Fidelity;
 use super::local::{LocalSettings, improve};
 use super::objective::Reference;
+use super::propose::RaceRules;
 use super::search_error::SearchError;
-use super::search_run::{Attempt, Progress, ProgressSink, SearchRun};
+use super::search_run::{Attempt, Judge, Progress, ProgressSink, SearchRun};
 use super::space::{Subspace, subspaces};
 use super::state::State;
 use super::structure_problem::StructureProblem;
@@ -87,14 +89,15 @@ impl SearchRun<'_> {
         report("base", 0, 1, None);
         let base_specimen = base_at_drive(study);
         let mut state = State::default();
-        let reference = self.reference_from(self.estimated(&base_specimen), &state)?;
+        let coarse = self.judge(&base_specimen, Fidelity::Coarse, &state)?;
+        let fine = self.judge(&base_specimen, Fidelity::Fine, &state)?;
         let spaces = subspaces(study);
-        self.explore(&reference, &spaces, &base_specimen, &mut state)?;
+        self.explore(&coarse, &spaces, &base_specimen, &mut state)?;
         if study.budget.refine > 0 {
             let in_integrals = self.reference_from(self.evaluated(&base_specimen, None), &state)?;
-            self.refine([&reference, &in_integrals], &spaces, &mut state)?;
+            self.refine(&fine, &in_integrals, &spaces, &mut state)?;
         }
-        self.propose(&reference, &spaces, &mut state)?;
+        self.race(&RaceRules::of_proposals(study.budget.propose), &fine, &spaces, &mut state)?;
         let (base, ranked) = self.confirm_all(&base_specimen, &spaces, &mut state)?;
         Ok(Found {
             base,
@@ -104,6 +107,11 @@ impl SearchRun<'_> {
             num_evaluations: state.num_evaluations,
             candidates: state.candidates,
         })
+    }
+
+    /// Gains over the base at a fidelity.
+    fn judge(&self, base: &Specimen, fidelity: Fidelity, state: &State) -> Result<Judge<'_>, SearchError> {
+        Ok(Judge { fidelity, reference: self.reference_from(self.estimated(base, fidelity), state)? })
     }
 
     /// Gains over a base with this evaluation.
@@ -117,15 +125,14 @@ impl SearchRun<'_> {
 
     fn explore(
         &self,
-        reference: &Reference,
+        judge: &Judge,
         spaces: &[Subspace],
         base: &Specimen,
         state: &mut State,
     ) -> Result<(), SearchError> {
         let study = self.study;
         let total = study.budget.explore;
-        // The base at every drive limit, if it can be made, then two rounds: all structures alike, then the better
-        // half.
+        // The base at every drive limit, if it can be made, and samples of all structures alike; then the race.
         let mut batch: Vec<(usize, Vec<f64>)> = Vec::new();
         for (index, space) in spaces.iter().enumerate() {
             for drive in [base.drive_mm[0], study.drive_range().max] {
@@ -136,37 +143,25 @@ impl SearchRun<'_> {
                 }
             }
         }
-        let first_round = (total / 2).max(spaces.len());
-        let mut quota = vec![(first_round / spaces.len()).max(1); spaces.len()];
-        for round in 0..2u64 {
-            for (index, space) in spaces.iter().enumerate() {
-                let wanted = if space.structure.num_holes() == 0 { quota[index].min(3) } else { quota[index] };
-                let stream = 2 * index as u64 + round;
-                for vector in sample(space, &study.limits, study.scan.voxel_mm, wanted, study.seed, stream) {
-                    batch.push((index, vector));
-                }
-            }
-            self.evaluate_batch(reference, spaces, ("explore", &std::mem::take(&mut batch), total), state)?;
-            let mut order: Vec<usize> = (0..spaces.len()).collect();
-            let best = |index: usize| state.best_of_space(index);
-            order.sort_by(|a, b| best(*b).total_cmp(&best(*a)).then(a.cmp(b)));
-            quota = vec![0; spaces.len()];
-            let kept = order.len().div_ceil(2);
-            let left = total.saturating_sub(state.candidates.len() + state.failures.len());
-            for index in &order[..kept] {
-                quota[*index] = left / kept;
+        let quota = (total / 2).div_ceil(spaces.len().max(1)).max(1);
+        for (index, space) in spaces.iter().enumerate() {
+            for vector in sample(space, &study.limits, study.scan.voxel_mm, quota, study.seed, index as u64) {
+                batch.push((index, vector));
             }
         }
-        Ok(())
+        self.evaluate_batch(judge, spaces, ("explore", &batch, total), state)?;
+        let left = total.saturating_sub(state.num_evaluations);
+        self.race(&RaceRules::of_samples(left), judge, spaces, state)
     }
 
     fn evaluate_batch(
         &self,
-        reference: &Reference,
+        judge: &Judge,
         spaces: &[Subspace],
         (stage, batch, total): (&'static str, &[(usize, Vec<f64>)], usize),
         state: &mut State,
     ) -> Result<(), SearchError> {
+        let reference = &judge.reference;
         let done = AtomicUsize::new(state.num_evaluations);
         let best_before = state.history.last().copied();
         // Largest merit seen by any thread, for display only.
@@ -174,7 +169,7 @@ impl SearchRun<'_> {
         let results: Vec<Option<Attempt>> = batch
             .par_iter()
             .map(|(space, vector)| {
-                let attempt = self.estimated(&spaces[*space].specimen(vector));
+                let attempt = self.estimated(&spaces[*space].specimen(vector), judge.fidelity);
                 if let (Some(Ok(evaluated)), Ok(mut best)) = (&attempt, best.lock()) {
                     let judged = reference.judge(evaluated);
                     if judged.margins.iter().all(|m| *m >= 0.0) {
@@ -194,7 +189,7 @@ impl SearchRun<'_> {
             match result {
                 None => was_stopped = true,
                 Some(Ok(evaluated)) => {
-                    state.add((*space, vector), specimen, reference, &reference.judge(&evaluated), stage);
+                    state.add((*space, vector), specimen, judge, &reference.judge(&evaluated), stage);
                 }
                 Some(Err(cause)) => state.fail(&specimen, &cause),
             }
@@ -202,10 +197,11 @@ impl SearchRun<'_> {
         if was_stopped { Err(state.stopped(self.study, stage)) } else { Ok(()) }
     }
 
-    /// Improves the best designs by the gradients of `in_integrals`, and judges where that ends by `reference`.
+    /// Improves the best designs by the gradients of `in_integrals`, and judges where that ends by `judge`.
     fn refine(
         &self,
-        [reference, in_integrals]: [&Reference; 2],
+        judge: &Judge,
+        in_integrals: &Reference,
         spaces: &[Subspace],
         state: &mut State,
     ) -> Result<(), SearchError> {
@@ -232,6 +228,6 @@ impl SearchRun<'_> {
         state.num_evaluations += done.load(Ordering::Relaxed);
         let ends: Option<Vec<(usize, Vec<f64>)>> = improved.into_iter().collect();
         let ends = ends.ok_or_else(|| state.stopped(self.study, "refine"))?;
-        self.evaluate_batch(reference, spaces, ("refine", &ends, total), state)
+        self.evaluate_batch(judge, spaces, ("refine", &ends, total), state)
     }
 }

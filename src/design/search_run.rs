@@ -4,6 +4,8 @@ use super::checkpoint::Checkpoint;
 use super::confirm::estimate;
 use super::evaluation_failure::EvaluationFailure;
 use super::evaluator::{Evaluated, Evaluator};
+use super::fidelity::Fidelity;
+use super::objective::Reference;
 use super::space::Subspace;
 use super::study::Study;
 use crate::provenance::input_hash;
@@ -28,6 +30,12 @@ pub type ProgressSink<'a> = &'a (dyn Fn(&Progress) + Sync);
 /// An evaluation, or why there is none.
 pub(super) type Attempt = Result<Evaluated, EvaluationFailure>;
 
+/// What designs are judged by: gains over the base, both solved at one fidelity.
+pub(super) struct Judge<'a> {
+    pub fidelity: Fidelity,
+    pub reference: Reference<'a>,
+}
+
 /// A search at work.
 pub(super) struct SearchRun<'a> {
     pub study: &'a Study,
@@ -39,9 +47,9 @@ pub(super) struct SearchRun<'a> {
 
 impl SearchRun<'_> {
     /// What a design is judged by in the search: from the checkpoint where it is known. `None` where it was cancelled.
-    pub fn estimated(&self, specimen: &Specimen) -> Option<Attempt> {
-        let key = input_hash(&serde_json::json!({ "specimen": specimen, "kind": "estimate" }));
-        self.checkpoint.get_or(&key, || match estimate(self.study, specimen, &|| (self.is_cancelled)()) {
+    pub fn estimated(&self, specimen: &Specimen, fidelity: Fidelity) -> Option<Attempt> {
+        let key = input_hash(&serde_json::json!({ "specimen": specimen, "kind": "estimate", "fidelity": fidelity }));
+        self.checkpoint.get_or(&key, || match estimate(self.study, specimen, fidelity, &|| (self.is_cancelled)()) {
             Err(EvaluationFailure::Cancelled) => None,
             other => Some(other),
         })

@@ -2,11 +2,16 @@
 
 use super::candidate::Candidate;
 use super::evaluation_failure::EvaluationFailure;
-use super::objective::{Judged, Reference};
+use super::fidelity::Fidelity;
+use super::objective::Judged;
 use super::search_error::SearchError;
+use super::search_run::Judge;
 use super::study::Study;
 use super::unfinished::Unfinished;
 use crate::specimen::Specimen;
+
+/// Designs of one structure that are confirmed at most.
+const MOST_OF_A_STRUCTURE: usize = 2;
 
 /// A design on its way to confirmation.
 #[derive(Clone, Debug)]
@@ -26,6 +31,9 @@ pub(super) struct State {
     points: Vec<(usize, Vec<f64>)>,
     /// What each candidate was judged.
     judged: Vec<Judged>,
+    /// How finely each candidate was solved.
+    fidelities: Vec<Fidelity>,
+    /// Largest objective within limits after each evaluation, of the candidates solved as finely.
     pub history: Vec<f64>,
     pub failures: Vec<String>,
     pub num_evaluations: usize,
@@ -36,15 +44,18 @@ impl State {
         &mut self,
         (space, vector): (usize, &[f64]),
         specimen: Specimen,
-        reference: &Reference,
+        judge: &Judge,
         judged: &Judged,
         stage: &str,
     ) {
+        let reference = &judge.reference;
         let objective = reference.objective(judged).exp();
         let is_within_limits = judged.margins.iter().all(|m| *m >= -1e-9);
         self.num_evaluations += 1;
-        let best = self.history.last().copied().unwrap_or(0.0);
+        let is_as_before = self.fidelities.last() == Some(&judge.fidelity);
+        let best = self.history.last().copied().filter(|_| is_as_before).unwrap_or(0.0);
         self.history.push(if is_within_limits { best.max(objective) } else { best });
+        self.fidelities.push(judge.fidelity);
         self.points.push((space, vector.to_vec()));
         self.judged.push(judged.clone());
         self.candidates.push(Candidate {
@@ -61,15 +72,12 @@ impl State {
         self.failures.push(format!("{}: {cause}", specimen.name));
     }
 
-    pub fn best_of_space(&self, space: usize) -> f64 {
-        let merits = self.candidates.iter().zip(&self.points).filter(|(_, p)| p.0 == space).map(|(c, _)| c.merit);
-        merits.fold(f64::NEG_INFINITY, f64::max)
-    }
-
-    /// Candidates by merit, best first.
+    /// Candidates by merit, best first; those that were solved finely before others.
     fn order(&self) -> Vec<usize> {
+        let is_coarse = |index: &usize| self.fidelities[*index] == Fidelity::Coarse;
+        let merit = |index: &usize| self.candidates[*index].merit;
         let mut order: Vec<usize> = (0..self.candidates.len()).collect();
-        order.sort_by(|a, b| self.candidates[*b].merit.total_cmp(&self.candidates[*a].merit).then(a.cmp(b)));
+        order.sort_by(|a, b| is_coarse(a).cmp(&is_coarse(b)).then(merit(b).total_cmp(&merit(a))).then(a.cmp(b)));
         order
     }
 
@@ -102,10 +110,10 @@ impl State {
         found
     }
 
-    /// The designs of a structure and what they were judged, in order.
-    pub fn seen_of(&self, space: usize) -> Vec<(&Vec<f64>, &Judged)> {
-        let all = self.points.iter().zip(&self.judged);
-        all.filter(|(point, _)| point.0 == space).map(|(point, judged)| (&point.1, judged)).collect()
+    /// The designs of a structure, how finely they were solved and what they were judged, in order.
+    pub fn seen_of(&self, space: usize) -> Vec<(&Vec<f64>, Fidelity, &Judged)> {
+        let of_space = (0..self.points.len()).filter(|&index| self.points[index].0 == space);
+        of_space.map(|index| (&self.points[index].1, self.fidelities[index], &self.judged[index])).collect()
     }
 
     /// What the first design was judged.
@@ -127,8 +135,8 @@ impl State {
             }
             by_count.entry(self.candidates[index].specimen.holes.len()).or_insert(index);
             let count: &mut usize = per_space.entry(self.points[index].0).or_default();
-            // Near copies along one refinement teach nothing: four of a structure.
-            if chosen.len() < study.budget.confirm && *count < 4 {
+            // Near copies teach nothing, and what one mesh praises in a structure a finer one may not keep.
+            if chosen.len() < study.budget.confirm && *count < MOST_OF_A_STRUCTURE {
                 *count += 1;
                 chosen.push(index);
             }

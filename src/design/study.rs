@@ -82,7 +82,8 @@ pub struct Range {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Budget {
-    /// Designs sampled.
+    /// Designs solved on the coarse mesh: half of them samples of all structures, the others proposed by what these
+    /// have taught.
     #[schema(value_type = Count)]
     pub explore: usize,
     /// Designs improved with gradients, of integrals in place of voxels; 0 for none.
@@ -91,8 +92,8 @@ pub struct Budget {
     /// Gradient steps of each.
     #[schema(value_type = Count)]
     pub iterations: usize,
-    /// Designs of the best structures that are proposed by what the designs before have taught; none where a budget
-    /// leaves it out.
+    /// Designs of the best structures, solved on the fine mesh, that are proposed by what the designs before have
+    /// taught; none where a budget leaves it out.
     #[serde(default, skip_serializing_if = "is_none")]
     #[schema(value_type = CountOrNone, default = 0)]
     pub propose: usize,

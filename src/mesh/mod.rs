@@ -45,7 +45,6 @@ pub use error::{LigamentEnd, MeshError};
 pub use locator::{Column, Location, Locator};
 pub use morph::{DesignVariable, morphed, shape_velocity};
 pub use options::MeshOptions;
-pub(crate) use options::SEARCH_FACTOR;
 pub use refine::{Refinement, refined};
 pub use size::{MeshSize, SIZE_FACTORS};
 

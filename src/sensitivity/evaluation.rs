@@ -9,7 +9,7 @@ use super::joint_information::JointInformation;
 use super::observation::{DriveMaps, DrivenState, EvaluationStep, Scanner, Unknown};
 use super::protocol::{Nuisance, Protocol, SAME_DRIVE_MM};
 use super::scan_settings::ScanSettings;
-use crate::fem::{Equilibrium, ForwardModel, PrepareError, SolveOptions, Tangent};
+use crate::fem::{Equilibrium, ForwardModel, PrepareError, SolveError, SolveOptions, Tangent};
 use crate::material::{Ogden, Parameter};
 use crate::mesh::MeshOptions;
 use crate::provenance::input_hash;
@@ -184,7 +184,7 @@ pub fn evaluate_model(
 ) -> Result<(Evaluation, EvaluationMaps), EvaluationError> {
     check_drives(drives)?;
     let scanner = Scanner::new(specimen, model.mesh(), scan, options.sampling)?;
-    let scanned = Scanned { specimen, scan, scanner: &scanner };
+    let scanned = Scanned { specimen, scan, scanner: &scanner, neighbours: &[] };
     evaluate_scanned(model, &scanned, material, drives, options, is_cancelled)
 }
 
@@ -197,6 +197,8 @@ pub struct Scanned<'a> {
     pub scan: &'a ScanSettings,
     /// The scan of the specimen on the model's mesh.
     pub scanner: &'a Scanner,
+    /// Equilibria of the model with another material: where one is at a drive asked for, its solution starts there.
+    pub neighbours: &'a [Equilibrium],
 }
 
 /// As [`evaluate_model`], where the scanner is prepared too.
@@ -205,7 +207,7 @@ pub struct Scanned<'a> {
 /// See [`EvaluationError`].
 pub fn evaluate_scanned(
     model: &mut ForwardModel,
-    &Scanned { specimen, scan, scanner }: &Scanned,
+    &Scanned { specimen, scan, scanner, neighbours }: &Scanned,
     material: &Ogden,
     drives: &DriveSelection,
     options: &EvaluationOptions,
@@ -214,7 +216,7 @@ pub fn evaluate_scanned(
     check_drives(drives)?;
     let (equilibria, num_equilibria) = match drives {
         DriveSelection::DriveMm(drives_mm) => {
-            let path = model.solve_path(material, drives_mm, &options.solve, is_cancelled)?;
+            let path = solve_beside(model, material, drives_mm, neighbours, (&options.solve, is_cancelled))?;
             let count = path.len();
             (path, count)
         }
@@ -278,6 +280,27 @@ pub fn evaluate_scanned(
         evaluation,
         EvaluationMaps { mask: scanner.mask.clone(), drives: maps, equilibria, information, information_by_drive },
     ))
+}
+
+/// Equilibria at some drives, each from a neighbour at its drive where there is one and that leads there, else from the
+/// last.
+fn solve_beside(
+    model: &mut ForwardModel,
+    material: &Ogden,
+    drives_mm: &[f64],
+    neighbours: &[Equilibrium],
+    (options, is_cancelled): (&SolveOptions, &dyn Fn() -> bool),
+) -> Result<Vec<Equilibrium>, SolveError> {
+    let mut path: Vec<Equilibrium> = Vec::with_capacity(drives_mm.len());
+    for &drive in drives_mm {
+        let beside = neighbours.iter().find(|n| n.drive_mm == drive);
+        let found = beside.and_then(|start| model.solve(material, drive, Some(start), options, is_cancelled).ok());
+        path.push(match found {
+            Some(found) => found,
+            None => model.solve(material, drive, path.last(), options, is_cancelled)?,
+        });
+    }
+    Ok(path)
 }
 
 /// How the state of a drive changes with each unknown of the set-up.
