@@ -136,7 +136,9 @@ def run_page(path, blocks, prose, program, errors):
         folder, commands = Path(scratch) / "page", Path(scratch) / "bin"
         commands.mkdir()
         (commands / "lambdak").symlink_to(program)
-        (commands / "python3").symlink_to(sys.executable)
+        # A link to the Python of a virtual environment would lose the environment's modules.
+        (commands / "python3").write_text(f'#!/bin/sh\nexec "{sys.executable}" "$@"\n')
+        (commands / "python3").chmod(0o755)
         for name in COPIED:
             shutil.copytree(ROOT / name, folder / name)
         environment = {**os.environ, "PATH": f"{commands}:{os.environ['PATH']}", "PYTHONDONTWRITEBYTECODE": "1"}
