@@ -87,7 +87,7 @@ def is_line(expected, found, tolerance):
 def missing_line(expected, output, tolerance):
     """The first expected line that does not come."""
     at = 0
-    for line in expected:
+    for line in re.sub(r" \\\n\s*", " ", "\n".join(expected)).split("\n"):
         if not line.strip() or line.strip() == "…":
             continue
         found = next((n for n in range(at, len(output)) if is_line(line, output[n], tolerance)), None)
