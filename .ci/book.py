@@ -229,7 +229,7 @@ def check_commands(path, blocks, program, errors):
             continue
         text = "\n".join(block.lines).replace("\\\n", " ")
         for n, line in enumerate(text.splitlines()):
-            for call in re.findall(r"(?:^|[\s;|(])lambdak ((?!-)[^;|#)>]*)", line):
+            for call in re.findall(r"(?:^\s*|[;|(&]\s*)lambdak ((?!-)[^;|#)>]*)", line):
                 words = call.split()
                 command = words[:1]
                 if command and command[0] in ("export", "sweep") and len(words) > 1 and words[1] in ("material", "model", "merge"):
