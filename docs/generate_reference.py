@@ -194,6 +194,17 @@ def wrapped(text, width=138):
     return lines
 
 
+# Where a command is explained.
+EXPLAINED = {
+    "solve": "tutorial-specimen.md#forces-and-fields", "evaluate": "tutorial-specimen.md#what-a-scan-would-tell", "scan": "tutorial-scan.md",
+    "import": "tutorial-import.md", "calibrate": "calibration.md", "diagnose": "diagnosis.md", "design": "tutorial-design.md",
+    "sweep": "sweeps.md", "sweep merge": "sweeps.md#shards-without-a-clusters-scheduler", "compare": "sweeps.md#comparison",
+    "uniaxial": "tutorial-curves.md#one-curve", "curves": "tutorial-curves.md#several-tests-together-one-kept-back",
+    "export material": "export.md", "export model": "export.md#models", "paper-tables": "paper-comparison.md#tables-1-to-3-and-figure-8",
+    "prove-diagnosis": "diagnosis.md#proof", "run": "requests.md", "serve": "service.md", "worker": "service.md#workers",
+}
+
+
 def help_lines(line, width=140):
     """A line of help, broken where it is too long; what follows stands below the description."""
     if len(line) <= width:
@@ -220,12 +231,20 @@ def commands_page(program):
         "* Results go to standard output, progress to standard error, files to `results/NAME/COMMAND` or the folder after `--out`. A command",
         "  ends by saying where its files are. A folder that holds another command's results is not written to.",
         "* `--json` prints the result for machines ([their fields](results.md)); files are then written only where `--out` says so.",
+        "* `--material FILE` takes another material than Ecoflex 00-20, `--mesh search|standard|fine|FACTOR` another element size.",
         "* Options are checked before any work starts, and all that is wrong is said at once.",
         "* Ctrl-C stops a command; `design`, `sweep` and `prove-diagnosis` keep what they have, and the same command goes on.",
         f"* {exit_codes}",
+        "",
+        "| Command | What it does | More |",
+        "|---|---|---|",
     ]
+    texts = {" ".join(words): help_of(*words) for words in COMMANDS}
+    for name, text in texts.items():
+        anchor = "lambdak-" + name.replace(" ", "-")
+        out.append(f"| [`lambdak {name}`](#{anchor}) | {text[0].rstrip('.')} | [explained]({EXPLAINED[name]}) |")
     for words in COMMANDS:
-        text = help_of(*words)
+        text = texts[" ".join(words)]
         out += ["", f"## lambdak {' '.join(words)}", "", "```text", *text, "```"]
     return "\n".join(out) + "\n"
 
