@@ -4,7 +4,7 @@ A block of commands is run where the word `run` follows its language, as in "```
 one temporary folder that holds a copy of geometries/, docs/examples/ and api/python/, with the program first on the PATH. `needs=NAME`
 after `run` is a Python module without which the block is not run, which is said. A block "```text" that follows the commands, with no
 other block between them, holds lines that they must print, in that order; a line "…" stands for any lines. Numbers in them may differ
-by a part of 0.001, or by `tolerance=PART` after `text`, and by one in their last digit.
+by a part of 0.001, or by `tolerance=PART` after `text`, and those with decimals by one in their last digit.
 
 Checked on all pages, run or not: links lead to files and headings that exist, and out of the book to nothing; files of the project that
 are named exist; commands and options are those of the program; every page stands in the table of contents. A table after the comment
