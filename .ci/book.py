@@ -12,6 +12,7 @@ are named exist; commands and options are those of the program; every page stand
 """
 
 import argparse
+import concurrent.futures
 import importlib.util
 import json
 import os
@@ -28,6 +29,8 @@ DOCS = ROOT / "docs"
 COPIED = ["geometries", "docs/examples", "api/python"]
 DEFAULT_TOLERANCE = 1e-3
 SLOWEST_BLOCK_S = 300
+# Pages at a time: a search for a design and a fit are not busy on all cores all the time.
+PAGES_AT_A_TIME = 2
 NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 PROJECT_FILE = re.compile(r"(?<![\w/.-])((?:geometries|docs|src|tests|examples|api|benches|\.ci)/[\w./*+-]*[\w*])")
 
@@ -254,7 +257,7 @@ def main():
     pages = [ROOT / "README.md", ROOT / "ARCHITECTURE.md", *sorted(DOCS.glob("*.md"))]
     contents = (DOCS / "SUMMARY.md").read_text()
     helps = Program(program)
-    num_run = 0
+    to_run, num_run = [], 0
     for path in pages:
         blocks, prose = read_page(path)
         check_links(path, prose, errors)
@@ -265,8 +268,11 @@ def main():
         is_wanted = not options.pages or path.name in options.pages
         marked = sum(b.language == "sh" and "run" in b.words for b in blocks)
         if is_wanted and marked and not options.no_run:
-            run_page(path, blocks, prose, program, errors)
+            to_run.append((path, blocks, prose))
             num_run += marked
+    with concurrent.futures.ThreadPoolExecutor(PAGES_AT_A_TIME) as pool:
+        for done in [pool.submit(run_page, *page, program, errors) for page in to_run]:
+            done.result()
     for error in errors:
         print(error, file=sys.stderr)
     print(f"book: {len(pages)} pages, {num_run} blocks run in {time.monotonic() - start:.0f} s, {len(errors)} errors")
