@@ -115,9 +115,10 @@ class Formats:
         full, name = self.resolve(schema)
         text = sentence(full.get("description", ""))
         own = sentence(self.schemas[name].get("description", "")) if name else ""
-        if self.is_choice(full) and own and own.rstrip(".") not in text:
-            text += f" {own}"
-        return text
+        # A choice may say more of itself than the field that uses it.
+        words = set(text.lower().rstrip(".").split())
+        says_the_same = len(words & set(re.split(r"[\s.:,;]+", own.lower()))) >= 0.6 * len(words)
+        return own if self.is_choice(full) and says_the_same and len(own) > len(text) else text
 
     def is_choice(self, schema):
         return "enum" in schema or any("enum" in form for form in schema.get("oneOf", []))
