@@ -7,7 +7,7 @@ from typing import Any, Mapping, Optional, Tuple
 
 
 class LambdakError(Exception):
-    """Whatever this package raises, but for :class:`Stopped`."""
+    """Whatever this package raises of its own."""
 
 
 class ProgramMissingError(LambdakError):
@@ -48,11 +48,11 @@ class ProgramError(LambdakError):
     """The program ended in a way that it does not know itself, such as by a signal for want of memory."""
 
 
-class TimeLimitError(LambdakError):
-    """The time limit of a search is over.
+class Stopped(LambdakError):
+    """Somebody else than this call stopped the program, such as Ctrl-C while a thread of Python waits for it.
 
-    `folder` holds what was found, and the same call with the same folder goes on from there; `unfinished` is that
-    result, `None` where nothing was kept.
+    (Ctrl-C in the main thread is a `KeyboardInterrupt`.) `folder` holds what was found, and the same call with that
+    folder goes on from there; `unfinished` is that result, `None` where nothing was kept.
     """
 
     def __init__(self, message: str, folder: Path, unfinished: Optional[Mapping[str, Any]]) -> None:
@@ -61,14 +61,5 @@ class TimeLimitError(LambdakError):
         self.unfinished = unfinished
 
 
-class Stopped(KeyboardInterrupt):
-    """Ctrl-C, or the interrupt button of a notebook, after the program has ended in good order.
-
-    It is a `KeyboardInterrupt`, so that a loop that goes on after errors does not go on after Ctrl-C. `folder` and
-    `unfinished` are as those of :class:`TimeLimitError`.
-    """
-
-    def __init__(self, message: str, folder: Path, unfinished: Optional[Mapping[str, Any]]) -> None:
-        super().__init__(message)
-        self.folder = folder
-        self.unfinished = unfinished
+class TimeLimitError(Stopped):
+    """The time limit of a search is over."""

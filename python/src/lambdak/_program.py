@@ -98,6 +98,11 @@ def _delete_temporary_folders() -> None:
             shutil.rmtree(folder, ignore_errors=True)
 
 
+def _keep(folder: Path) -> None:
+    if str(folder) in _temporary and any(folder.iterdir()):
+        _temporary.discard(str(folder))
+
+
 @dataclass(frozen=True)
 class Finished:
     """A run that succeeded."""
@@ -133,17 +138,19 @@ def run_program(
         arguments += [] if threads is None else [f"--threads={threads}"]
         ended = _run(arguments, on_progress)
     message = _message(ended.lines, str(file))
-    if ended.interrupt is not None and not isinstance(ended.interrupt, KeyboardInterrupt):
-        raise ended.interrupt
     # A program that has not yet begun to listen for SIGINT is ended by it.
     is_stopped = ended.exit_code in (EXIT_STOPPED, -signal.SIGINT)
     if ended.interrupt is not None or is_stopped:
         # What was found has to outlive this process: the search can go on from it.
-        _temporary.discard(str(out))
-        unfinished = _unfinished(out) if has_files else None
-        if has_time_limit and ended.interrupt is None:
-            raise TimeLimitError(message, out, unfinished)
-        raise Stopped(message or "stopped", out, unfinished) from None
+        _keep(out)
+    if isinstance(ended.interrupt, KeyboardInterrupt):
+        # No class of this package's own: only of this very class does Python end as shells expect after Ctrl-C.
+        raise KeyboardInterrupt(message) from None
+    if ended.interrupt is not None:
+        raise ended.interrupt
+    if is_stopped:
+        error = TimeLimitError if has_time_limit else Stopped
+        raise error(message or "stopped", out, _unfinished(out) if has_files else None)
     if ended.exit_code != 0:
         _fail(ended.exit_code, message)
     try:
