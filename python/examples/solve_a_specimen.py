@@ -4,7 +4,12 @@
 import lambdak as lk
 
 bar = lk.Specimen(
-    length_mm=40, thickness_mm=4, width_mm=12, test="uniaxial", drive_mm=[4, 8, 14], holes=[lk.Hole((0, 0), diameter_mm=4)]
+    length_mm=40,
+    thickness_mm=4,
+    width_mm=12,
+    test="uniaxial",
+    drive_mm=[4, 8, 14],
+    holes=[lk.Hole((0, 0), diameter_mm=4)],
 )
 ecoflex = lk.Material([(17.0, 1.91)], bulk_kpa=2173)
 

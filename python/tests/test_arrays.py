@@ -67,9 +67,9 @@ class RoundTrip(Scratch):
         # The plate at +y moves by the drive along x; x is component 0, y index 1.
         y = recording.positions_mm[1]
         columns = np.where(recording.mask, recording.displacement_mm[1, ..., 0], np.nan)
-        profile = np.array([np.nanmean(layer) if np.isfinite(layer).any() else np.nan for layer in columns.swapaxes(0, 1)])
-        inside = np.isfinite(profile)
-        slope = np.polyfit(y[inside], profile[inside], 1)[0]
+        layers = [layer[np.isfinite(layer)] for layer in columns.swapaxes(0, 1)]
+        profile = [(place, layer.mean()) for place, layer in zip(y, layers) if len(layer) > 0]
+        slope = np.polyfit(*zip(*profile), 1)[0]
         self.assertAlmostEqual(slope, 5.0 / 6.4, delta=0.03)
 
     def test_arrays_are_the_recordings_own(self):

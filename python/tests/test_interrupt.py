@@ -1,4 +1,4 @@
-"""Ctrl-C, errors of the progress callback, and time limits: the program is stopped, waited for, and what it found kept."""
+"""Ctrl-C, errors of the progress callback, time limits: the program ends in good order, what it found is kept."""
 
 import json
 import os
@@ -75,7 +75,7 @@ class CtrlC(Scratch):
         output, error = process.communicate(timeout=60)
         (line,) = [line for line in output.splitlines() if line.startswith("STOPPED")]
         unfinished = self.folder / "results" / "unfinished-design.json"
-        self.assertRegex(line, f"stopped after .* What was found is in {unfinished}; run the same command again to go on")
+        self.assertRegex(line, f"stopped after .* What was found is in {unfinished}; run the same command again")
         self.assertEqual(json.loads(unfinished.read_text())["is_finished"], False)
         self.assertTrue((self.folder / "results" / "checkpoint.jsonl").is_file())
         self.assertEqual(process.returncode, -signal.SIGINT, "Python ends as by Ctrl-C")

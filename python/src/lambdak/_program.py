@@ -55,8 +55,9 @@ def program_path() -> Path:
         return Path(on_path)
     looked = ", ".join(str(place) for place in places)
     raise ProgramMissingError(
-        f"the program lambdak is neither in {looked} nor on PATH; install it with `pip install --force-reinstall lambdak`, "
-        f"or set {VARIABLE} to the path of one that was built with `cargo build --release`"
+        f"the program lambdak is neither in {looked} nor on PATH; install it with "
+        f"`pip install --force-reinstall lambdak`, or set {VARIABLE} to the path of one that was built with "
+        "`cargo build --release`"
     )
 
 

@@ -258,10 +258,11 @@ def _affine(
             raise InputError((f"affine has the shape {found.shape}; (4, 4) is needed",))
         return found
     if affine is not None or voxel_mm is None or origin_mm is None:
-        problem = "where the voxels lie has to be said in one way"
-        raise InputError((f"{problem}: give affine, or voxel_mm and origin_mm (centered_origin(mask, voxel_mm) helps)",))
+        hint = "give affine, or voxel_mm and origin_mm (centered_origin(mask, voxel_mm) helps)"
+        raise InputError((f"where the voxels lie has to be said in one way: {hint}",))
     if len(voxel_mm) != 3 or len(origin_mm) != 3:
-        raise InputError((f"voxel_mm holds {len(voxel_mm)} and origin_mm {len(origin_mm)} numbers; x, y, z are needed",))
+        found_sizes = f"voxel_mm holds {len(voxel_mm)} and origin_mm {len(origin_mm)} numbers"
+        raise InputError((f"{found_sizes}; three are needed, for x, y, z",))
     found = np.diag([*(float(edge) for edge in voxel_mm), 1.0])
     found[:3, 3] = origin_mm
     return found

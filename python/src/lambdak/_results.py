@@ -234,7 +234,7 @@ class Scan(Result):
 
 @dataclass(frozen=True)
 class Estimate:
-    """An estimated parameter: `kappa` and `mu_1`, `mu_2`, … in kPa, `alpha_1`, `alpha_2`, …; NaN for what is unknown."""
+    """An estimated parameter: `kappa`, `mu_1`, `mu_2`, … in kPa, `alpha_1`, `alpha_2`, …; NaN for what is unknown."""
 
     name: str
     value: float
@@ -328,7 +328,7 @@ class Calibration(Result):
         )
 
     def to_xarray(self, recording: int = 0) -> Any:
-        """A dataset with `measured`, `model` and `misfit` of one of the recordings over its drives and voxels, in mm."""
+        """A dataset with `measured`, `model` and `misfit` of one of the recordings over drives and voxels, in mm."""
         return _images(self, recording, {n: f"{n}_{recording + 1}_{{}}" for n in ("measured", "model", "misfit")})
 
     def _rows(self) -> List[Row]:
