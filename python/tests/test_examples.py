@@ -64,29 +64,27 @@ class Documents(Scratch):
         self.assertEqual([name for name in functions if f"`{name}(" not in text], [])
 
 
+@unittest.skipUnless(importlib.util.find_spec("mypy"), "mypy is not installed")
 class Types(unittest.TestCase):
-    @unittest.skipUnless(importlib.util.find_spec("mypy"), "mypy is not installed")
-    def test_types_hold(self):
-        folder = Path(lk.__file__).parent
-        self.assertTrue((folder / "py.typed").is_file())
+    def check(self, *arguments):
+        # mypy finds installed packages itself, and refuses to be told where they are.
+        place = Path(lk.__file__).parents[1]
+        path = {} if place.name == "site-packages" else {"MYPYPATH": str(place)}
         ended = subprocess.run(
-            [sys.executable, "-m", "mypy", "--strict", "--cache-dir", os.devnull, str(folder)],
+            [sys.executable, "-m", "mypy", "--strict", "--cache-dir", os.devnull, *arguments],
+            env={**os.environ, **path},
             capture_output=True,
             text=True,
             check=False,
         )
         self.assertEqual(ended.returncode, 0, ended.stdout + ended.stderr)
 
-    @unittest.skipUnless(importlib.util.find_spec("mypy"), "mypy is not installed")
+    def test_types_hold(self):
+        self.assertTrue((Path(lk.__file__).parent / "py.typed").is_file())
+        self.check("-p", "lambdak")
+
     def test_examples_use_what_is_typed(self):
-        ended = subprocess.run(
-            [sys.executable, "-m", "mypy", "--strict", "--cache-dir", os.devnull, *map(str, EXAMPLES)],
-            env={**environment(), "MYPYPATH": str(Path(lk.__file__).parents[1])},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        self.assertEqual(ended.returncode, 0, ended.stdout + ended.stderr)
+        self.check(*map(str, EXAMPLES))
 
 
 if __name__ == "__main__":
