@@ -115,6 +115,9 @@ class RoundTrip(Scratch):
         image.write_bytes(b"not an image, but long enough for its header" * 10)
         with self.assertRaisesRegex(lk.InputError, "not a NIfTI-1 image"):
             lk.Recording.read(self.folder)
+        recording.write(self.folder)
+        (self.folder / "recording.json").rename(self.folder / "other.json")
+        self.assertEqual(lk.Recording.read(self.folder / "other.json").drive_mm, recording.drive_mm)
         (self.folder / "recording.json").write_text(json.dumps({"schema": "mru-recording/1"}))
         with self.assertRaisesRegex(lk.InputError, "no mru-recording/1"):
             lk.Recording.read(self.folder)

@@ -44,7 +44,7 @@ class Input(Scratch):
             ("^/specimen is missing", lambda: lk.run("solve", {})),
             ("^/speed must be left out|^/speed is", lambda: lk.run("solve", {"specimen": bar(), "speed": 1})),
             ("^invalid value '-1'", lambda: lk.solve(bar(), threads=-1)),
-            ("cannot read .*nowhere", lambda: lk.calibrate("nowhere")),
+            ("nowhere/recording.json: No such file", lambda: lk.calibrate("nowhere")),
             ("cannot read .*nowhere.csv", lambda: lk.uniaxial("nowhere.csv")),
             ("time-limit", lambda: lk.design(study(), time_limit_min=-1)),
             ("kept_back names shear", lambda: lk.curves({"uniaxial": {"stretch": [1]}}, kept_back=["shear"])),

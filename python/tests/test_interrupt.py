@@ -31,9 +31,10 @@ except KeyboardInterrupt as stopped:
 """
 
 
-def children_of(pid):
-    listed = subprocess.run(["ps", "-o", "pid=", "--ppid", str(pid)], capture_output=True, text=True, check=False)
-    return [int(word) for word in listed.stdout.split()]
+def programs_of(pid):
+    listed = subprocess.run(["ps", "-o", "pid=,comm=", "--ppid", str(pid)], capture_output=True, text=True, check=False)
+    rows = [line.split() for line in listed.stdout.splitlines()]
+    return [int(number) for number, name in rows if name == "lambdak"]
 
 
 def is_running(pid):
@@ -65,7 +66,7 @@ class CtrlC(Scratch):
             if "explore: " in line:
                 break
         self.assertTrue(lines and "explore" in lines[-1], process.stderr.read() if not lines else lines)
-        (program,) = children_of(process.pid)
+        (program,) = programs_of(process.pid)
         return process, program
 
     def test_ctrl_c_ends_the_program_in_good_order_and_keeps_what_was_found(self):
@@ -113,6 +114,18 @@ class CtrlC(Scratch):
 
 
 class Callback(Scratch):
+    @unittest.skipUnless(sys.platform == "linux", "it looks for processes in /proc")
+    def test_a_program_that_somebody_else_stops_is_an_error_of_its_own(self):
+        def on_progress(text):
+            if "explore: " in text:
+                (program,) = programs_of(os.getpid())
+                os.kill(program, signal.SIGINT)
+
+        with self.assertRaisesRegex(lk.Stopped, "stopped after") as caught:
+            lk.design(study(), folder=self.folder, on_progress=on_progress)
+        self.assertNotIsInstance(caught.exception, lk.TimeLimitError)
+        self.assertEqual((caught.exception.folder, caught.exception.unfinished["is_finished"]), (self.folder, False))
+
     def test_an_error_of_the_callback_stops_the_program_and_is_raised(self):
         class Enough(Exception):
             pass

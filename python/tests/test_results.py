@@ -4,13 +4,14 @@ import copy
 import dataclasses
 import importlib.util
 import inspect
+import json
 import math
 import re
 import unittest
 from unittest import mock
 
 import numpy as np
-from shared import COARSE, REPOSITORY, Scratch, bar, block, ecoflex, needs_repository, scanned
+from shared import COARSE, REPOSITORY, Scratch, bar, block, ecoflex, needs_repository, scanned, study
 
 import lambdak as lk
 
@@ -98,6 +99,26 @@ class Results(Scratch):
         if HAS_TABLES:
             self.assertEqual(both.diagnoses[1].to_xarray()["residual_after"].shape, (2, 19, 17, 16, 3))
 
+    def test_a_study_names_files_beside_it(self):
+        (self.folder / "study").mkdir()
+        bar(drive_mm=[14]).to_json(self.folder / "bar.json")
+        ecoflex().to_json(self.folder / "study" / "soft.json")
+        named = {**study(), "base": "../bar.json", "materials": [{"name": "one", "material": "soft.json"}]}
+        named["scan"] = named["scan"].to_dict()
+        (self.folder / "study" / "study.json").write_text(json.dumps(named))
+
+        class Begun(Exception):
+            pass
+
+        def on_progress(text):
+            raise Begun(text)
+
+        with self.assertRaises(Begun):
+            lk.design(self.folder / "study" / "study.json", on_progress=on_progress)
+        with self.assertRaisesRegex(lk.InputError, "soft.json"):
+            (self.folder / "study" / "soft.json").unlink()
+            lk.design(self.folder / "study" / "study.json", on_progress=on_progress)
+
     def test_a_material_for_other_programs(self):
         export = lk.export_material(ecoflex(), formats=["abaqus", "febio"], stress_unit="kpa", name="soft")
         self.assertEqual(set(export.cards), {"abaqus", "febio"})
@@ -130,6 +151,12 @@ class Tables(Scratch):
         evaluation = lk.evaluate(bar(), ecoflex(), mesh="search", has_files=False).to_pandas()
         self.assertEqual(len(evaluation), 6)
         self.assertEqual(evaluation.query("parameter == 'kappa'")["integrated_sensitivity"].isna().sum(), 2)
+        vary = [{"pointer": "/specimen/holes/0/diameter_mm", "values": [3.0, 4.0]}]
+        base = {"specimen": bar(), "mesh": "search", "has_files": False}
+        sweep = lk.run("evaluate-list", {"name": "diameters", "base": base, "vary": vary}).to_pandas()
+        self.assertEqual(sorted(set(sweep["/specimen/holes/0/diameter_mm"])), [3.0, 4.0])
+        with self.assertRaisesRegex(lk.InputError, "its numbers are in raw"):
+            lk.run("solve", {"specimen": bar(), "mesh": "search"}).to_pandas()
         recording = scanned().recording
         points = recording.to_pandas()
         self.assertEqual(len(points), 2 * int(recording.mask.sum()))

@@ -236,9 +236,14 @@ def import_recording(
     return Recording.read(_run("import", request, folder, threads, on_progress).folder)
 
 
-def _recordings(recordings: Union[Recorded, Sequence[Recorded]]) -> Tuple[Recording, ...]:
+def _sources(recordings: Union[Recorded, Sequence[Recorded]]) -> Tuple[Union[Recording, Path], ...]:
     several = [recordings] if isinstance(recordings, (Recording, str, os.PathLike)) else list(recordings)
-    return tuple(one if isinstance(one, Recording) else Recording.read(one) for one in several)
+    return tuple(one if isinstance(one, Recording) else Path(one).resolve() for one in several)
+
+
+def _named(source: Union[Recording, Path]) -> str:
+    """How the program finds a recording."""
+    return str(source.folder() if isinstance(source, Recording) else source)
 
 
 def calibrate(
@@ -261,9 +266,9 @@ def calibrate(
     on_progress: Optional[OnProgress] = None,
 ) -> Calibration:
     """The material, from one recording or several of them together, with its uncertainty."""
-    read = _recordings(recordings)
+    sources = _sources(recordings)
     request = given(
-        recordings=[str(one.folder()) for one in read],
+        recordings=[_named(one) for one in sources],
         num_terms=num_terms,
         rule=rule,
         decrement=decrement,
@@ -278,7 +283,7 @@ def calibrate(
         has_contours=has_contours,
     )
     done = _run("calibrate", request, folder, threads, on_progress)
-    return Calibration.of(done.result, done.folder, read)
+    return Calibration.of(done.result, done.folder, sources)
 
 
 def diagnose(
@@ -298,11 +303,11 @@ def diagnose(
 
     `material` is what it is believed to be, where that is known.
     """
-    read = _recordings(recording)
+    sources = _sources(recording)
     request = _diagnosis(material, mesh_factor, allowance_mm, max_causes, without, boundary)
-    request["recording"] = str(read[0].folder())
+    request["recording"] = _named(sources[0])
     done = _run("diagnose", request, folder, threads, on_progress)
-    return Diagnosis.of(done.result, done.folder, read)
+    return Diagnosis.of(done.result, done.folder, sources)
 
 
 def diagnose_together(
@@ -319,11 +324,11 @@ def diagnose_together(
     on_progress: Optional[OnProgress] = None,
 ) -> Diagnoses:
     """Several recordings of one material: each is diagnosed, and predicted by each other one."""
-    read = _recordings(recordings)
+    sources = _sources(recordings)
     request = _diagnosis(material, mesh_factor, allowance_mm, max_causes, without, boundary)
-    request["recordings"] = [str(one.folder()) for one in read]
+    request["recordings"] = [_named(one) for one in sources]
     done = _run("diagnose", request, folder, threads, on_progress)
-    return Diagnoses.of(done.result, done.folder, read)
+    return Diagnoses.of(done.result, done.folder, sources)
 
 
 def _diagnosis(

@@ -152,13 +152,16 @@ class Recording:
 
     @classmethod
     def read(cls, folder: PathLike) -> "Recording":
-        """Reads a recording's folder."""
+        """Reads a recording's folder, or a recording of which the JSON file has another name than `recording.json`."""
         path = Path(folder).resolve()
-        head = read_json(path / "recording.json")
+        file = path if path.is_file() else path / "recording.json"
+        head = read_json(file)
         try:
-            return cls._of_folder(path, head)
+            recording = cls._of_folder(file.parent, head)
         except (KeyError, TypeError) as error:
-            raise InputError((f"{path / 'recording.json'} is no mru-recording/1: {error!r}",)) from None
+            raise InputError((f"{file} is no mru-recording/1: {error!r}",)) from None
+        recording._folder = path
+        return recording
 
     @classmethod
     def _of_folder(cls, path: Path, head: Dict[str, Any]) -> "Recording":
@@ -172,7 +175,7 @@ class Recording:
         if head.get("load") is not None:
             load = np.loadtxt(path / head["load"], delimiter=",", skiprows=1, ndmin=2)
         acquisition = head["acquisition"]
-        recording = cls(
+        return cls(
             Specimen._of_program(head["specimen"]),
             np.stack([image.values for image in images]),
             mask.values > 0.5,
@@ -187,12 +190,10 @@ class Recording:
             id=head["id"],
             notes=head.get("notes"),
         )
-        recording._folder = path
-        return recording
 
     def folder(self) -> Path:
-        """A folder that holds the recording: the one that it was read from, else one that lasts until Python ends."""
-        if self._folder is None or not self._folder.is_dir():
+        """Where the recording is on disk: what it was read from, else a folder that lasts until Python ends."""
+        if self._folder is None or not self._folder.exists():
             self._folder = self.write(temporary_folder("recording"))
         return self._folder
 

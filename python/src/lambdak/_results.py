@@ -7,7 +7,7 @@ import html
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,7 @@ from ._recording import Recording, grid_dataset
 from ._specimen import Material, Specimen
 
 Row = Dict[str, Any]
+Sources = Tuple[Union[Recording, Path], ...]
 
 
 def _number(value: Optional[float]) -> float:
@@ -39,8 +40,13 @@ class Result:
     """The program's whole result (its `--json`)."""
     folder: Path
     """The files of the result. Where the call named no folder, it is deleted when Python ends."""
-    recordings: Tuple[Recording, ...] = field(repr=False)
-    """The recordings that it is about."""
+    sources: Sources = field(repr=False)
+    """The recordings that it is about, or their folders."""
+
+    @property
+    def recordings(self) -> Tuple[Recording, ...]:
+        """The recordings that it is about."""
+        return tuple(Recording.read(one) if isinstance(one, Path) else one for one in self.sources)
 
     @property
     def pictures(self) -> List[Path]:
@@ -53,15 +59,17 @@ class Result:
         return next(iter(sorted(self.folder.glob("*.html"))), None)
 
     def _rows(self) -> List[Row]:
-        """The table of the result; nothing where it has none."""
+        """The table of the result; nothing where it has none, or where it is a file (sweeps)."""
         return []
 
     def to_pandas(self) -> Any:
         """The table of the result, as a data frame."""
-        rows = self._rows()
-        if not rows:
-            raise InputError((f"{type(self).__name__} has no table; its numbers are in raw",))
-        return optional("pandas").DataFrame(rows)
+        rows, table = self._rows(), self.folder / "table.csv"
+        if rows:
+            return optional("pandas").DataFrame(rows)
+        if table.is_file():
+            return optional("pandas").read_csv(table)
+        raise InputError((f"this {type(self).__name__} has no table; its numbers are in raw",))
 
     def _heading(self) -> str:
         return ""
@@ -302,7 +310,7 @@ class Calibration(Result):
     steps: Tuple[CalibrationStep, ...]
 
     @classmethod
-    def of(cls, raw: Mapping[str, Any], folder: Path, recordings: Tuple[Recording, ...]) -> "Calibration":
+    def of(cls, raw: Mapping[str, Any], folder: Path, sources: Sources) -> "Calibration":
         """From the program's JSON."""
         steps = tuple(
             CalibrationStep(
@@ -318,7 +326,7 @@ class Calibration(Result):
         return cls(
             raw,
             folder,
-            recordings,
+            sources,
             material=Material._of_program(raw["material"]),
             num_terms=raw["num_terms"],
             parameters=_estimates(raw["parameters"]),
@@ -341,7 +349,8 @@ class Calibration(Result):
 
 def _images(result: Result, index: int, names: Mapping[str, str]) -> Any:
     """Images of vectors on the grid and drives of one of a result's recordings."""
-    recording = result.recordings[index]
+    source = result.sources[index]
+    recording = Recording.read(source) if isinstance(source, Path) else source
     numbers = range(1, len(recording.drive_mm) + 1)
     read = {
         name: np.stack([read_image(result.folder / f"{pattern.format(n)}.nii.gz").values for n in numbers])
@@ -425,13 +434,13 @@ class Diagnosis(Result):
 
     @classmethod
     def of(
-        cls, raw: Mapping[str, Any], folder: Path, recordings: Tuple[Recording, ...], prefix: str = ""
+        cls, raw: Mapping[str, Any], folder: Path, sources: Sources, prefix: str = ""
     ) -> "Diagnosis":
         """From the program's JSON."""
         return cls(
             raw,
             folder,
-            recordings,
+            sources,
             verdict=raw["verdict"],
             causes=_causes(raw["causes"]),
             alternatives=_causes(raw["alternatives"]),
@@ -495,15 +504,15 @@ class Diagnoses(Result):
     """Whether one material fits them all."""
 
     @classmethod
-    def of(cls, raw: Mapping[str, Any], folder: Path, recordings: Tuple[Recording, ...]) -> "Diagnoses":
+    def of(cls, raw: Mapping[str, Any], folder: Path, sources: Sources) -> "Diagnoses":
         """From the program's JSON."""
         together = raw["together"]
         return cls(
             raw,
             folder,
-            recordings,
+            sources,
             diagnoses=tuple(
-                Diagnosis.of(one, folder, (recordings[n],), f"{n + 1}-") for n, one in enumerate(raw["diagnoses"])
+                Diagnosis.of(one, folder, (sources[n],), f"{n + 1}-") for n, one in enumerate(raw["diagnoses"])
             ),
             material=Material._of_program(together["material"]),
             parameters=_estimates(together["material_parameters"]),
