@@ -68,8 +68,9 @@ class Input(Scratch):
             lk.evaluate(bar(holes=[lk.Hole((0, 0), d)]), mesh="search", has_files=False).raw for d in (3.0, 6.0)
         )
         request = {"pairs": [{"name": "bar", "base": large, "current": small}], "across_inputs": True}
-        with self.assertRaisesRegex(lk.WorseError, "worse"):
+        with self.assertRaisesRegex(lk.WorseError, "worse") as caught:
             lk.run("compare", request)
+        self.assertEqual(caught.exception.raw["schema"], "comparison/1")
         request["pairs"][0].update(current=large)
         self.assertEqual(lk.run("compare", request).raw["schema"], "comparison/1")
 
@@ -102,6 +103,10 @@ class Program(Scratch):
                     lk.run("solve", {})
                 here = self.script("echo lambdak 9.9.9")
                 self.assertEqual((lk.program_path(), lk.program_version()), (here, "9.9.9"))
+        (self.folder / "lambdak").write_bytes(b"\x7fELF of another machine")
+        with mock.patch.dict(os.environ, {_program.VARIABLE: str(self.folder / "lambdak")}):
+            with self.assertRaisesRegex(lk.ProgramMissingError, "cannot be run: Exec format error"):
+                lk.run("solve", {})
         with mock.patch.dict(os.environ, {_program.VARIABLE: str(self.folder / "gone")}):
             with self.assertRaisesRegex(lk.ProgramMissingError, "gone.*set it to lambdak's path or unset it"):
                 lk.solve(bar())
@@ -125,6 +130,8 @@ class Program(Scratch):
             ("kill -KILL $$", lk.ProgramError, "SIGKILL; there may have been too little memory"),
             ("echo hello", lk.ProgramError, "printed no JSON"),
             ("exit 101", lk.ProgramError, "ended with 101"),
+            ("echo 'lambdak: a panic' >&2; exit 101", lk.ProgramError, "a panic"),
+            ("echo 'version GLIBC_2.99 not found' >&2; exit 1", lk.ProgramError, "ended with 1: .*GLIBC_2.99"),
         ):
             with mock.patch.dict(os.environ, {_program.VARIABLE: str(self.script(text))}):
                 with self.subTest(text), self.assertRaisesRegex(error, words):

@@ -33,7 +33,11 @@ class InputError(LambdakError, ValueError):
 
 
 class WorseError(LambdakError):
-    """A compared result is worse than the one that it is compared with (exit code 1)."""
+    """A compared result is worse than the one that it is compared with (exit code 1); `raw` is the comparison."""
+
+    def __init__(self, message: str, raw: Mapping[str, Any]) -> None:
+        super().__init__(message)
+        self.raw = raw
 
 
 class NoSolutionError(LambdakError):

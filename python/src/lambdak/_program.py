@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import json
+import math
 import os
 import shutil
 import signal
@@ -33,7 +34,6 @@ OnProgress = Callable[[str], None]
 VARIABLE = "LAMBDAK_PROGRAM"
 EXIT_STOPPED = 130
 _ERROR_OF_EXIT_CODE: Dict[int, Callable[[str], LambdakError]] = {
-    1: WorseError,
     3: NoSolutionError,
     4: WriteError,
 }
@@ -153,7 +153,7 @@ def run_program(
         error = TimeLimitError if has_time_limit else Stopped
         raise error(message or "stopped", out, _unfinished(out) if has_files else None)
     if ended.exit_code != 0:
-        _fail(ended.exit_code, message)
+        _fail(ended, message)
     try:
         return Finished(json.loads(ended.output), out)
     except ValueError as error:
@@ -170,7 +170,7 @@ def encoded(request: Mapping[str, Any]) -> str:
 
 def _not_finite(value: Any, where: str) -> List[Any]:
     if isinstance(value, float):
-        return [] if value - value == 0.0 else [(where, value)]
+        return [] if math.isfinite(value) else [(where, value)]
     if isinstance(value, Mapping):
         return [found for key, part in value.items() for found in _not_finite(part, f"{where}/{key}")]
     if isinstance(value, (list, tuple)):
@@ -191,15 +191,18 @@ def _run(arguments: Sequence[str], on_progress: Optional[OnProgress]) -> _Ended:
     # thread Python gets it and passes it on, so the program leaves the group; other threads never see a Ctrl-C, and
     # there the program has to get it from the terminal itself.
     is_main = threading.current_thread() is threading.main_thread()
-    process = subprocess.Popen(
-        arguments,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        encoding="utf-8",
-        errors="replace",
-        start_new_session=is_main,
-    )
+    try:
+        process = subprocess.Popen(
+            arguments,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            encoding="utf-8",
+            errors="replace",
+            start_new_session=is_main,
+        )
+    except OSError as error:
+        raise ProgramMissingError(f"{arguments[0]} cannot be run: {error.strerror}") from None
     lines: List[str] = []
     interrupt: Optional[BaseException] = None
     output: List[str] = []
@@ -255,16 +258,19 @@ def _unfinished(folder: Path) -> Optional[Mapping[str, Any]]:
     return found
 
 
-def _fail(exit_code: int, message: str) -> NoReturn:
-    if exit_code == 2:
-        # Errors of fields are a line each; those of the command line are one text over several lines.
-        problems = (message[len("error: ") :],) if message.startswith("error: ") else tuple(message.splitlines())
-        raise InputError(problems or ("the program refuses the request without a word",))
-    error = _ERROR_OF_EXIT_CODE.get(exit_code)
-    if error is not None:
-        raise error(message)
-    if exit_code < 0:
-        cause = signal.Signals(-exit_code).name
+def _fail(ended: _Ended, message: str) -> NoReturn:
+    code = ended.exit_code
+    if code < 0:
+        cause = signal.Signals(-code).name
         hint = "; there may have been too little memory" if cause == "SIGKILL" else ""
         raise ProgramError(f"the program was ended by {cause}{hint}. {message}".strip())
-    raise ProgramError(f"the program ended with {exit_code}. {message}".strip())
+    if not message:
+        # It did not come so far as to speak: the system says why, such as a library that is too old.
+        raise ProgramError(f"the program ended with {code}: {' '.join(ended.lines[-5:])}")
+    if code == 2:
+        # Errors of fields are a line each; those of the command line are one text over several lines.
+        problems = (message[len("error: ") :],) if message.startswith("error: ") else tuple(message.splitlines())
+        raise InputError(problems)
+    if code == 1:
+        raise WorseError(message, json.loads(ended.output))
+    raise _ERROR_OF_EXIT_CODE.get(code, ProgramError)(message)
