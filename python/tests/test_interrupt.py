@@ -16,12 +16,15 @@ from shared import Scratch, bar, environment, study
 
 import lambdak as lk
 
+# A shell's background jobs ignore SIGINT, and Python with them: these tests may be run in one.
 SEARCH = """
+import signal
 import sys
 from pathlib import Path
 from shared import study
 import lambdak as lk
 
+signal.signal(signal.SIGINT, signal.default_int_handler)
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else None
 try:
     lk.design(study(), folder=folder, on_progress=lambda text: print(text, flush=True))
@@ -58,7 +61,7 @@ class CtrlC(Scratch):
             env=environment(),
             start_new_session=True,
         )
-        self.addCleanup(process.wait)
+        self.addCleanup(process.communicate)
         self.addCleanup(process.kill)
         lines = []
         for line in process.stdout:
@@ -67,6 +70,8 @@ class CtrlC(Scratch):
                 break
         self.assertTrue(lines and "explore" in lines[-1], process.stderr.read() if not lines else lines)
         (program,) = programs_of(process.pid)
+        # Whatever goes wrong in a test, nothing goes on after it.
+        self.addCleanup(lambda: is_running(program) and os.kill(program, signal.SIGKILL))
         return process, program
 
     def test_ctrl_c_ends_the_program_in_good_order_and_keeps_what_was_found(self):
