@@ -80,6 +80,24 @@ class RoundTrip(Scratch):
         with self.assertRaises(ValueError):
             recording.displacement_mm[:] = 1.0
         self.assertTrue(recording.mask.all())
+        with self.assertRaisesRegex(AttributeError, "make a new one"):
+            recording.drive_mm = (5.0,)
+
+    def test_masked_arrays_and_partly_filled_voxels(self):
+        hidden = np.zeros((2, 2, 2, 3), bool)
+        hidden[0, 1, 1] = True
+        u = np.ma.MaskedArray(np.full((2, 2, 2, 3), 9), mask=hidden)
+        place = {"drive_mm": 2.5, "voxel_mm": [1, 1, 1], "origin_mm": [0, 0, 0]}
+        recording = lk.Recording(block(), u, **place)
+        self.assertEqual(np.argwhere(~recording.mask).tolist(), [[0, 1, 1]])
+        self.assertTrue(np.isnan(recording.displacement_mm[0, 0, 1, 1]).all())
+        several = lk.Recording(block(), [u, u], **{**place, "drive_mm": [1, 2]})
+        self.assertTrue(np.isnan(several.displacement_mm[1, 0, 1, 1]).all())
+        self.assertEqual(float(several.displacement_mm[1, 0, 0, 0, 0]), 9.0)
+        parts = np.full((2, 2, 2), 0.5)
+        parts[1, 1, 1] = 0.49
+        recording = lk.Recording(block(), u, parts, **place)
+        self.assertEqual(np.argwhere(~recording.mask).tolist(), [[1, 1, 1]])
 
     def test_the_middle_of_the_masks_box_is_the_origin(self):
         mask = np.zeros((7, 5, 4), bool)

@@ -41,7 +41,7 @@ class Recording:
         specimen: The specimen as drawn.
         displacement_mm: Shape (drives, nx, ny, nz, 3), or (nx, ny, nz, 3) for one drive: the displacement of the
             material that was at the voxel's centre before loading, mm. NaN where nothing was measured.
-        mask: Shape (nx, ny, nz): whether at least half of the voxel is material. Where it is left out, the voxels
+        mask: Shape (nx, ny, nz): whether at least half of the voxel is material, or how large a part of it. Where it is left out, the voxels
             that hold a displacement at any drive.
         drive_mm: What the actuator was told, mm, one for each array.
         affine: 4 × 4, from a voxel's indices to its centre in mm; or else
@@ -75,14 +75,16 @@ class Recording:
         id: str = "recording",
         notes: Optional[Mapping[str, Any]] = None,
     ) -> None:
-        u = np.array(displacement_mm, dtype=np.float32)
+        # Of masked arrays, numpy's own function would take what lies under the mask. (They are not typed everywhere.)
+        masked: Any = np.ma
+        u: Array = masked.array(displacement_mm, dtype=np.float32, copy=True).filled(np.nan)
         u = u[np.newaxis] if u.ndim == 4 else u
         if u.ndim != 5 or u.shape[4] != 3 or u.size == 0:
             raise InputError((f"displacement_mm has the shape {u.shape}; (drives, nx, ny, nz, 3) is needed",))
         drives = np.atleast_1d(np.asarray(drive_mm, dtype=float))
         if drives.shape != (len(u),):
             raise InputError((f"drive_mm holds {drives.size} drives and displacement_mm {len(u)}; give one for each",))
-        inside = np.array(np.isfinite(u).all(axis=4).any(axis=0) if mask is None else mask, dtype=bool)
+        inside = np.asarray(np.isfinite(u).all(axis=4).any(axis=0) if mask is None else np.asarray(mask) >= 0.5)
         if inside.shape != u.shape[1:4]:
             raise InputError((f"mask has the shape {inside.shape}; that of a displacement is {u.shape[1:4]}",))
         u[:, ~inside] = np.nan
@@ -108,6 +110,11 @@ class Recording:
         self.id = id
         self.notes = notes
         self._folder: Optional[Path] = None
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in self.__dict__ and name != "_folder":
+            raise AttributeError(f"a recording stays as it is; make a new one with another {name}")
+        super().__setattr__(name, value)
 
     @property
     def voxel_mm(self) -> Tuple[float, float, float]:
