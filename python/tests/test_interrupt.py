@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -58,7 +57,8 @@ class CtrlC(Scratch):
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            env=environment(),
+            # Python that is killed leaves its request behind.
+            env={**environment(), "TMPDIR": str(self.folder)},
             start_new_session=True,
         )
         self.addCleanup(process.communicate)
@@ -95,7 +95,7 @@ class CtrlC(Scratch):
         found = Path(re.search(r"What was found is in (.*); run", output)[1])
         self.assertTrue(found.is_file())
         self.assertFalse(is_running(program))
-        shutil.rmtree(found.parent)
+        self.assertEqual(found.parents[1], self.folder, "it was made where temporary folders are")
 
     def test_a_program_that_does_not_answer_is_killed_by_the_third_ctrl_c(self):
         process, program = self.searching(str(self.folder))
@@ -145,6 +145,11 @@ class Callback(Scratch):
         with self.assertRaisesRegex(Enough, "explore: "):
             lk.design(study(), folder=self.folder, on_progress=on_progress)
         self.assertTrue((self.folder / "unfinished-design.json").is_file())
+        # The same call with the same folder goes on from there.
+        lines = []
+        with self.assertRaises(Enough):
+            lk.design(study(), folder=self.folder, on_progress=lambda text: (lines.append(text), on_progress(text)))
+        self.assertRegex(lines[0], "resuming: [1-9][0-9]* evaluations taken from the checkpoint")
 
     def test_a_time_limit_is_an_error_with_what_was_found(self):
         with self.assertRaisesRegex(lk.TimeLimitError, "run the same command again to go on") as caught:

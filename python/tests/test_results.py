@@ -114,10 +114,10 @@ class Results(Scratch):
             raise Begun(text)
 
         with self.assertRaises(Begun):
-            lk.design(self.folder / "study" / "study.json", on_progress=on_progress)
+            lk.design(self.folder / "study" / "study.json", folder=self.folder / "d", on_progress=on_progress)
         with self.assertRaisesRegex(lk.InputError, "soft.json"):
             (self.folder / "study" / "soft.json").unlink()
-            lk.design(self.folder / "study" / "study.json", on_progress=on_progress)
+            lk.design(self.folder / "study" / "study.json", folder=self.folder / "d", on_progress=on_progress)
 
     def test_a_material_for_other_programs(self):
         export = lk.export_material(ecoflex(), formats=["abaqus", "febio"], stress_unit="kpa", name="soft")

@@ -41,8 +41,8 @@ class Recording:
         specimen: The specimen as drawn.
         displacement_mm: Shape (drives, nx, ny, nz, 3), or (nx, ny, nz, 3) for one drive: the displacement of the
             material that was at the voxel's centre before loading, mm. NaN where nothing was measured.
-        mask: Shape (nx, ny, nz): whether at least half of the voxel is material, or how large a part of it. Where it is left out, the voxels
-            that hold a displacement at any drive.
+        mask: Shape (nx, ny, nz): whether at least half of the voxel is material, or how large a part of it. Where it is
+            left out, the voxels that hold a displacement at any drive.
         drive_mm: What the actuator was told, mm, one for each array.
         affine: 4 × 4, from a voxel's indices to its centre in mm; or else
         voxel_mm: the edges of a voxel along x, y, z, mm, and
