@@ -76,7 +76,8 @@ class CtrlC(Scratch):
 
     def test_ctrl_c_ends_the_program_in_good_order_and_keeps_what_was_found(self):
         process, program = self.searching(str(self.folder / "results"))
-        # A terminal sends it to the whole group.
+        # A terminal sends it to the whole group; twice, from there and from Python, it would end the program at once.
+        self.assertNotEqual(os.getpgid(program), os.getpgid(process.pid))
         os.killpg(process.pid, signal.SIGINT)
         output, error = process.communicate(timeout=60)
         (line,) = [line for line in output.splitlines() if line.startswith("STOPPED")]
