@@ -1,0 +1,239 @@
+"""Specimens, materials and scans, as the program's files hold them.
+
+What may stand in a field is the program's to say: a new specimen or material is put before it, and what it refuses is
+raised in its own words.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Dict, Iterable, Optional, Sequence, Tuple, Union
+
+from ._errors import InputError
+from ._plain import JsonSource, given, only_known, plain, read_json
+from ._program import PathLike, encoded, run_program
+
+Numbers = Union[float, Iterable[float]]
+
+# A request that holds the part beside little else, so that what is refused is the part, and its answer comes at once.
+_CURVE = "stretch,nominal_stress_kpa\n1,0\n1.1,5\n1.2,9\n1.3,13\n"
+_CHECKS: Dict[str, Tuple[str, Dict[str, Any]]] = {
+    "specimen": ("uniaxial", {"csv": _CURVE, "fit": {"max_terms": 1}}),
+    "material": ("export-material", {}),
+}
+
+
+def _check(part: str, value: Dict[str, Any]) -> None:
+    problems = _problems(part, encoded(value))
+    if problems:
+        raise InputError(problems)
+
+
+@functools.lru_cache(maxsize=1024)
+def _problems(part: str, text: str) -> Tuple[str, ...]:
+    """What the program has against a part. Kept, since loops over designs make the same parts again and again."""
+    kind, rest = _CHECKS[part]
+    try:
+        run_program(["run", kind], {part: json.loads(text), **rest}, name=kind, has_files=False)
+    except InputError as error:
+        return tuple(problem.replace(f"/{part}", "", 1) for problem in error.problems)
+    return ()
+
+
+def _tuple(numbers: Any) -> Tuple[float, ...]:
+    """One number or several; what is neither goes on to the program, which says what it should be."""
+    is_several = isinstance(numbers, Iterable) and not isinstance(numbers, (str, bytes))
+    return tuple(plain(list(numbers))) if is_several else (plain(numbers),)
+
+
+@dataclass(frozen=True)
+class Hole:
+    """A circular hole through the whole block.
+
+    Along the thickness it is centred at (x, z), along the width at (x, y), in mm from the block's centre.
+    """
+
+    center_mm: Tuple[float, float]
+    diameter_mm: float
+    axis: str = "thickness"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center_mm", _tuple(self.center_mm))
+        object.__setattr__(self, "diameter_mm", plain(self.diameter_mm))
+
+    def to_dict(self) -> Dict[str, Any]:
+        """As `specimen/1` holds it."""
+        return {"axis": self.axis, "center_mm": list(self.center_mm), "diameter_mm": self.diameter_mm}
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """A specimen (`specimen/1`): a block with holes, how it is held, and the drives at which it is scanned.
+
+    Lengths are in mm. The frame has its origin at the block's centre: x along the length (the pull direction), y along
+    the thickness, z along the width. `test` is `double_lap_shear` or `uniaxial`.
+    """
+
+    length_mm: float
+    thickness_mm: float
+    width_mm: float
+    test: str
+    drive_mm: Tuple[float, ...]
+    holes: Tuple[Hole, ...] = ()
+    samples_in_parallel: Optional[int] = None
+    outline: Optional[str] = None
+    name: str = "specimen"
+
+    def __init__(
+        self,
+        *,
+        length_mm: float,
+        thickness_mm: float,
+        width_mm: float,
+        test: str,
+        drive_mm: Numbers,
+        holes: Sequence[Hole] = (),
+        samples_in_parallel: Optional[int] = None,
+        outline: Optional[str] = None,
+        name: str = "specimen",
+    ) -> None:
+        values = {"length_mm": length_mm, "thickness_mm": thickness_mm, "width_mm": width_mm, "test": test}
+        self._set(holes=tuple(holes), outline=outline, name=name, drive_mm=_tuple(drive_mm), **plain(values))
+        self._set(samples_in_parallel=plain(samples_in_parallel))
+        _check("specimen", self.to_dict())
+
+    def _set(self, **values: Any) -> None:
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def from_json(cls, source: JsonSource) -> "Specimen":
+        """From a `specimen/1`: a file, its text, or the object itself."""
+        found = read_json(source)
+        _check("specimen", found)
+        return cls._of_program(found)
+
+    @classmethod
+    def _of_program(cls, found: Dict[str, Any]) -> "Specimen":
+        """What the program has written or checked."""
+        own = ("name", "test", "drive_mm", "samples_in_parallel", "outline")
+        only_known(found, (*own, "schema", "block", "holes"), "the specimen")
+        only_known(found["block"], ("length_mm", "thickness_mm", "width_mm"), "the block")
+        holes = []
+        for hole in found.get("holes") or []:
+            only_known(hole, ("axis", "center_mm", "diameter_mm"), "a hole")
+            holes.append(Hole(**hole))
+        specimen = object.__new__(cls)
+        specimen._set(samples_in_parallel=None, outline=None)
+        specimen._set(holes=tuple(holes), **found["block"], **{name: found[name] for name in own if name in found})
+        specimen._set(drive_mm=tuple(found["drive_mm"]))
+        return specimen
+
+    def replace(self, **changes: Any) -> "Specimen":
+        """A specimen with other values of these fields, such as `replace(holes=[Hole((0, 0), 5)])`."""
+        return dataclasses.replace(self, **changes)
+
+    def to_dict(self) -> Dict[str, Any]:
+        """The object of a `specimen/1`."""
+        optional = given(outline=self.outline, samples_in_parallel=self.samples_in_parallel)
+        return {
+            "schema": "specimen/1",
+            "name": self.name,
+            "test": self.test,
+            "block": {"length_mm": self.length_mm, "thickness_mm": self.thickness_mm, "width_mm": self.width_mm},
+            "holes": [hole.to_dict() for hole in self.holes],
+            "drive_mm": list(self.drive_mm),
+            **optional,
+        }
+
+    def to_json(self, file: Optional[PathLike] = None) -> str:
+        """The text of a `specimen/1`, also written to `file`."""
+        return _to_json(self.to_dict(), file)
+
+
+@dataclass(frozen=True)
+class Term:
+    """An Ogden term: μ in kPa and the exponent α."""
+
+    mu_kpa: float
+    alpha: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mu_kpa", plain(self.mu_kpa))
+        object.__setattr__(self, "alpha", plain(self.alpha))
+
+    def to_dict(self) -> Dict[str, Any]:
+        """As `ogden/1` holds it."""
+        return {"mu_kpa": self.mu_kpa, "alpha": self.alpha}
+
+
+@dataclass(frozen=True)
+class Material:
+    """An Ogden material (`ogden/1`): Ψ = Σ μᵢ/αᵢ (Σλ̄^αᵢ − 3) + κ/2 (ln J)², with μᵢ and κ (`bulk_kpa`) in kPa.
+
+    `Material([(17.0, 1.91)], bulk_kpa=2173)`: terms are :class:`Term` or pairs of μ and α.
+    """
+
+    terms: Tuple[Term, ...]
+    bulk_kpa: float
+
+    def __init__(self, terms: Sequence[Union[Term, Tuple[float, float]]], *, bulk_kpa: float) -> None:
+        object.__setattr__(self, "terms", tuple(t if isinstance(t, Term) else Term(*t) for t in terms))
+        object.__setattr__(self, "bulk_kpa", plain(bulk_kpa))
+        _check("material", self.to_dict())
+
+    @classmethod
+    def from_json(cls, source: JsonSource) -> "Material":
+        """From an `ogden/1`, such as the `material.json` of a fit: a file, its text, or the object itself."""
+        found = read_json(source)
+        _check("material", found)
+        return cls._of_program(found)
+
+    @classmethod
+    def _of_program(cls, found: Dict[str, Any]) -> "Material":
+        only_known(found, ("schema", "terms", "bulk_kpa"), "the material")
+        for term in found["terms"]:
+            only_known(term, ("mu_kpa", "alpha"), "a term")
+        material = object.__new__(cls)
+        object.__setattr__(material, "terms", tuple(Term(**term) for term in found["terms"]))
+        object.__setattr__(material, "bulk_kpa", found["bulk_kpa"])
+        return material
+
+    def to_dict(self) -> Dict[str, Any]:
+        """The object of an `ogden/1`."""
+        return {"schema": "ogden/1", "bulk_kpa": self.bulk_kpa, "terms": [term.to_dict() for term in self.terms]}
+
+    def to_json(self, file: Optional[PathLike] = None) -> str:
+        """The text of an `ogden/1`, also written to `file`."""
+        return _to_json(self.to_dict(), file)
+
+
+@dataclass(frozen=True)
+class ScanSettings:
+    """What an evaluation or a study takes the scan to be.
+
+    Edges of a voxel in mm, the standard deviation of its displacement in mm, both along x, y, z, and that of the load
+    cell's force (all samples together) in N.
+    """
+
+    voxel_mm: Tuple[float, float, float]
+    noise_sd_mm: Tuple[float, float, float]
+    force_sd_n: float
+    partial_voxels: Optional[str] = None
+
+    def to_dict(self) -> Dict[str, Any]:
+        """As requests and studies hold it."""
+        fields: Dict[str, Any] = plain(dataclasses.asdict(self))
+        return given(**fields)
+
+
+def _to_json(value: Dict[str, Any], file: Optional[PathLike]) -> str:
+    text = json.dumps(value, indent=2) + "\n"
+    if file is not None:
+        Path(os.fspath(file)).write_text(text, encoding="utf-8")
+    return text
