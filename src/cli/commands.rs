@@ -4,6 +4,7 @@ use super::error::CliError;
 use super::flag::{Flag, Written};
 use super::input::{read_json, read_text};
 use super::job_command::{Asked, JobCommand, files, value, values};
+use super::results::stem;
 use crate::job::kind_of_command;
 use clap::{Arg, ArgAction, ArgMatches, Command};
 use serde_json::{Value, json};
@@ -219,11 +220,6 @@ fn scanned(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliError>
     Ok(path)
 }
 
-/// A file's name without folder and ending.
-fn stem(path: &Path) -> String {
-    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
-}
-
 fn of_files(command: Command) -> Command {
     let help = "A raw recording (folder or JSON file), MATLAB files (.mat), point clouds (.csv, one per drive), or NIfTI images \
                 (.nii, .nii.gz)";
@@ -238,7 +234,7 @@ fn imported(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliError
         Some("mat") => Some("matlab"),
         Some("csv") => Some("points"),
         Some("nii") => Some("nifti"),
-        Some("gz") if ending(Path::new(&stem(&first))).as_deref() == Some("nii") => Some("nifti"),
+        Some("gz") if ending(&first.with_extension("")).as_deref() == Some("nii") => Some("nifti"),
         _ => None,
     };
     match (form, names.get(1)) {

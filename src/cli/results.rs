@@ -34,8 +34,13 @@ const LIST: &str = "-job.json";
 
 /// `--out`, else `results/NAME/COMMAND` with `NAME` from the stem of `input`.
 pub(super) fn default_path(out: Option<&Path>, input: &Path, command: &str) -> PathBuf {
-    let stem = input.file_stem().unwrap_or_default();
-    out.map_or_else(|| Path::new("results").join(stem).join(command), Path::to_path_buf)
+    out.map_or_else(|| Path::new("results").join(stem(input)).join(command), Path::to_path_buf)
+}
+
+/// A file's name without folder and ending; of a compressed file (`u.nii.gz`) without both endings.
+pub(super) fn stem(path: &Path) -> String {
+    let inner = if path.extension().is_some_and(|e| e == "gz") { path.with_extension("") } else { path.to_path_buf() };
+    inner.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 impl ResultsFolder {
@@ -134,6 +139,12 @@ mod tests {
         outcome.input_hash = hash.into();
         names.iter().for_each(|name| outcome.add(*name, *name));
         outcome
+    }
+
+    #[test]
+    fn compressed_files_lose_both_endings() {
+        let names = ["a/u_1.nii.gz", "u_1.nii", "b/study.json", "folder", "v1.2"].map(|n| stem(Path::new(n)));
+        assert_eq!(names, ["u_1", "u_1", "study", "folder", "v1"]);
     }
 
     #[test]

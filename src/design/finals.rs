@@ -10,7 +10,7 @@ use super::rounding::in_steps;
 use super::search_error::SearchError;
 use super::search_run::{Progress, SearchRun};
 use super::space::Subspace;
-use super::state::{Finalist, State};
+use super::state::{Finalist, State, is_same};
 use super::structure_problem::StructureProblem;
 use crate::provenance::input_hash;
 use crate::specimen::Specimen;
@@ -44,7 +44,13 @@ impl SearchRun<'_> {
     ) -> Result<(Confirmed, Vec<Confirmed>), SearchError> {
         let base_specimen = base;
         let study = self.study;
-        let finalists: Vec<Finalist> = state.finalists(study).into_iter().map(|f| self.in_steps(f)).collect();
+        let mut finalists: Vec<Finalist> = Vec::new();
+        for finalist in state.finalists(study).into_iter().map(|f| self.in_steps(f)) {
+            // Two designs may become one when they are rounded.
+            if !finalists.iter().any(|f| is_same(&f.specimen, &finalist.specimen)) {
+                finalists.push(finalist);
+            }
+        }
         let specimens: Vec<&Specimen> = std::iter::once(base).chain(finalists.iter().map(|f| &f.specimen)).collect();
         let (total, done) = (specimens.len(), AtomicUsize::new(0));
         let best = state.history.last().copied();

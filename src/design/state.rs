@@ -161,7 +161,7 @@ impl State {
 }
 
 /// Whether two designs differ by no more than a mould maker can see (1 µm).
-fn is_same(a: &Specimen, b: &Specimen) -> bool {
+pub(super) fn is_same(a: &Specimen, b: &Specimen) -> bool {
     const TOLERANCE_MM: f64 = 1e-3;
     let near = |a: f64, b: f64| (a - b).abs() <= TOLERANCE_MM;
     let lengths = |s: &Specimen| {

@@ -69,11 +69,19 @@ pub fn calibration_report(
         pictures.push((format!("residuals-{}", r + 1), svg));
     }
     let histogram = residual_histogram("Residuals", &whitened(found, observed)).to_svg();
-    let convergence = convergence(found).to_svg();
-    report.figures(&[
-        (&histogram, "Residuals of all voxels and drives over the noise's standard deviation, per component."),
-        (&convergence, "The objective above its last value over the accepted steps of the last fit."),
-    ]);
+    let mut beside = vec![(
+        histogram.clone(),
+        "Residuals of all voxels and drives over the noise's standard deviation, per component.",
+    )];
+    pictures.push(("residual-histogram".to_string(), histogram));
+    // A fit that starts where it ends has no steps to show.
+    if found.fit.history.len() > 1 {
+        let convergence = convergence(found).to_svg();
+        let caption = "The objective above its last value over the accepted steps of the last fit.";
+        beside.push((convergence.clone(), caption));
+        pictures.push(("convergence".to_string(), convergence));
+    }
+    report.figures(&beside);
     report.section("Uncertainty");
     let correlation = CorrelationPlot {
         title: "Correlation of the estimates".into(),
@@ -82,11 +90,7 @@ pub fn calibration_report(
     }
     .to_svg();
     report.figure(&correlation, "Correlation under the noise.");
-    pictures.extend([
-        ("residual-histogram".to_string(), histogram),
-        ("convergence".to_string(), convergence),
-        ("correlation".to_string(), correlation),
-    ]);
+    pictures.push(("correlation".to_string(), correlation));
     if !result.profiles.is_empty() {
         let lines = result
             .profiles
