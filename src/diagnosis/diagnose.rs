@@ -52,6 +52,12 @@ const SET_UP_GAINS: f64 = 0.7;
 /// explains a smaller part of what was left than the one before it did.
 const LEAST_OF_FIRST: f64 = 0.2;
 
+/// Where causes leave a misfit unexplained, one that alone explained at least this part of what the first did is tried
+/// in its place: the greedy choice between two that explain nearly the same may be the wrong one.
+const NEARLY_AS_MUCH: f64 = 0.95;
+/// What is found from there is kept where it leaves less than this part (rms).
+const OTHER_START_GAINS: f64 = 0.9;
+
 /// The interior is tested where the misfit beyond noise exceeds this multiple of the allowance (rms).
 const INTERIOR_ABOVE: f64 = 2.0;
 
@@ -367,6 +373,7 @@ impl<'a> Run<'a> {
             let asked = Asked { registry: &of_image, with_terms: false, evidence: OF_IMAGE_ALONE * EVIDENCE };
             return add_causes(inference, findings, &measured, limits, &|_, _| Some(asked));
         }
+        let begun = findings.current.clone();
         let scored = score_round(inference, first, findings, limits)?;
         // What is no more than a mesh's needs no set-up.
         let is_promising = before_mm > inference.allowance_mm
@@ -387,6 +394,7 @@ impl<'a> Run<'a> {
         }
         let are_all_asked = !(does_inside_wait || are_given_up.get());
         if are_all_asked {
+            self.start_otherwise(begun, &measured, limits)?;
             self.fit_material_anew(&measured, limits)?;
         }
         let Some(with_set_up) = self.with_set_up(&measured, limits, is_promising)? else {
@@ -397,6 +405,41 @@ impl<'a> Run<'a> {
         }
         if self.left_mm(&with_set_up.findings.current) < SET_UP_GAINS * self.left_mm(&self.findings.current) {
             self.go_on_with(with_set_up);
+        }
+        Ok(())
+    }
+
+    /// Where causes leave a misfit unexplained and another cause alone explained nearly as much of it as the first one
+    /// found: adds causes from `begun`, the fit before the first round, without that first one in the first round, and
+    /// goes on from there where that leaves clearly less.
+    fn start_otherwise(
+        &mut self,
+        begun: CauseFit,
+        measured: &Trace,
+        limits: RoundLimits,
+    ) -> Result<(), DiagnosisError> {
+        let Some(first) = self.findings.causes.iter().find(|c| c.is_of_fit()).map(|c| c.name) else { return Ok(()) };
+        let alone = self.findings.ranked.iter().filter(|r| r.round == 1).filter_map(|r| Some((r, r.fitted?)));
+        let best = alone.clone().map(|(_, fitted)| fitted).fold(0.0, f64::max);
+        let has_rival = alone.clone().any(|(r, fitted)| r.identity.name != first && fitted > NEARLY_AS_MUCH * best);
+        if !has_rival || self.is_explained_by(&self.findings) {
+            return Ok(());
+        }
+        self.tell("starting from another cause that explains nearly as much as the first");
+        let others = self.registry.clone().without(&[first])?;
+        let num_begun = begun.causes.len();
+        let from_begun = self.findings.going_on_from(begun);
+        let mut before = std::mem::replace(&mut self.findings, from_begun);
+        let Run { inference, registry, findings, options, .. } = self;
+        let with_terms = options.prior.is_none();
+        add_causes(inference, findings, measured, limits, &|_, findings| {
+            let is_first = findings.current.causes.len() == num_begun;
+            Some(Asked { registry: if is_first { &others } else { registry }, with_terms, evidence: EVIDENCE })
+        })?;
+        if self.left_mm(&self.findings.current) >= OTHER_START_GAINS * self.left_mm(&before.current) {
+            (before.ranked, before.maps) =
+                (std::mem::take(&mut self.findings.ranked), std::mem::take(&mut self.findings.maps));
+            self.findings = before;
         }
         Ok(())
     }
