@@ -115,14 +115,14 @@ pub(super) fn diagnose_among(
     options.check()?;
     let observed = Observed::new(recording, options.force_sd_n)?.with_boundary(options.boundary)?;
     let mut run = Run::begin(&observed, registry, options, progress, is_cancelled)?;
-    run.read_load_curve(recording)?;
-    run.correct_mesh()?;
-    run.test_interior()?;
-    run.question_material()?;
-    run.take_out_artefacts()?;
-    run.add_causes()?;
-    run.read_load_curve_again(recording)?;
-    run.question_material_again()?;
+    run.attempt("the load curve", |run| run.read_load_curve(recording))?;
+    run.attempt("the mesh's error", Run::correct_mesh)?;
+    run.attempt("the interior test", Run::test_interior)?;
+    run.attempt("the material's own law", Run::question_material)?;
+    run.attempt("jumps of phase", Run::take_out_artefacts)?;
+    run.attempt("causes", Run::add_causes)?;
+    run.attempt("the load curve with the causes", |run| run.read_load_curve_again(recording))?;
+    run.attempt("the material's own law with the causes", Run::question_material_again)?;
     run.name_artefacts();
     let seen = run.correct_fits()?;
     run.conclude(&seen)
@@ -221,6 +221,24 @@ impl<'a> Run<'a> {
 
     fn is_cancelled(&self) -> bool {
         (self.inference.is_cancelled)()
+    }
+
+    /// Does a stage. Where it fails, the diagnosis goes on with what was found before: some causes have no equilibrium.
+    ///
+    /// # Errors
+    /// The work was cancelled.
+    fn attempt(
+        &mut self,
+        stage: &str,
+        work: impl FnOnce(&mut Self) -> Result<(), DiagnosisError>,
+    ) -> Result<(), DiagnosisError> {
+        match work(self) {
+            Err(error) if !self.is_cancelled() => {
+                self.tell(&format!("{stage}: given up, and gone on with what was found so far: {error}"));
+                Ok(())
+            }
+            done => done,
+        }
     }
 
     /// Fits the nominal model to `measured` and goes on from it.
@@ -432,16 +450,16 @@ impl<'a> Run<'a> {
         let mut before = std::mem::replace(&mut self.findings, from_begun);
         let Run { inference, registry, findings, options, .. } = self;
         let with_terms = options.prior.is_none();
-        add_causes(inference, findings, measured, limits, &|_, findings| {
+        let added = add_causes(inference, findings, measured, limits, &|_, findings| {
             let is_first = findings.current.causes.len() == num_begun;
             Some(Asked { registry: if is_first { &others } else { registry }, with_terms, evidence: EVIDENCE })
-        })?;
-        if self.left_mm(&self.findings.current) >= OTHER_START_GAINS * self.left_mm(&before.current) {
+        });
+        if added.is_err() || self.left_mm(&self.findings.current) >= OTHER_START_GAINS * self.left_mm(&before.current) {
             (before.ranked, before.maps) =
                 (std::mem::take(&mut self.findings.ranked), std::mem::take(&mut self.findings.maps));
             self.findings = before;
         }
-        Ok(())
+        if self.is_cancelled() { added } else { Ok(()) }
     }
 
     /// Goes on with single causes where they were given up, or not all of them asked.
