@@ -6,16 +6,16 @@ use serde::{Deserialize, Serialize};
 
 /// Element size along the plates of the coarse mesh, as a factor on the standard one.
 const COARSE_FACTOR: f64 = 2.5;
-/// Of the fine one: the coarsest of a confirmation.
+/// Of the fine one: the middle one of a confirmation.
 const FINE_FACTOR: f64 = 1.4;
 
-/// How finely a design is solved while it is searched for. Integrated sensitivities agree to half a per cent between
-/// the two; promised standard deviations of several terms differ by some per cent, and not by the same from design to
-/// design (`examples/mesh_of_edges.rs`). Samples are coarse, proposals fine.
+/// How finely a design is solved while it is searched for. Integrated sensitivities hardly differ between the two;
+/// promised standard deviations of several terms do, and not by the same from design to design. Samples are coarse,
+/// proposals fine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fidelity {
-    /// For samples, which say where to look: a seventh of the time of the fine one.
+    /// For samples, which say where to look.
     Coarse,
     /// For what the search ends with.
     Fine,
