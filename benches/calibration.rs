@@ -40,7 +40,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for (name, text, other_seconds, wanted) in cases {
         let truth = Ogden::from_json(text)?;
         let fine = MeshOptions { grading: 0.4, ..MeshOptions::scaled(&specimen, 0.7) };
-        let synthetic = SyntheticScan::new(&specimen, &truth, &scan, &fine, &SolveOptions::default(), &never)?;
+        let synthetic = SyntheticScan::new(
+            &specimen,
+            &truth,
+            &scan,
+            &lambdak::sensitivity::Protocol::default(),
+            &fine,
+            &SolveOptions::default(),
+            &never,
+        )?;
         let recording = synthetic.recording("bench", &specimen, &synthetic.draw(1, 0), Filter::None)?;
         let observed = [Observed::new(&recording, scan.force_sd_n)?];
         // 30 % off in every parameter.

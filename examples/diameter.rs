@@ -10,12 +10,7 @@ use lambdak::report::{Line, LinePlot};
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut specimen = Specimen::from_json(include_str!("../geometries/uniaxial-bar.json"))?;
     let material = Ogden::new(2173.0, [(17.0, 1.91)])?;
-    let scan = ScanSettings {
-        voxel_mm: [1.0, 0.5, 1.0],
-        noise_sd_mm: [0.05; 3],
-        force_sd_n: 0.02,
-        partial_voxels: PartialVoxels::default(),
-    };
+    let scan = ScanSettings { voxel_mm: [1.0, 0.5, 1.0], ..ScanSettings::default() };
     let drives = DriveSelection::DriveMm(vec![8.0]);
     let mut points = Vec::new();
     for diameter_mm in [2.0, 3.0, 4.0, 5.0, 6.0] {

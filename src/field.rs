@@ -2,18 +2,21 @@
 
 mod path;
 mod read;
+#[cfg(feature = "schema")]
 pub mod schema;
+mod tag;
 mod text;
 
 pub use path::FieldPath;
 pub use read::read;
+pub(crate) use tag::file_tag;
 pub use text::{printable, with_short_numbers};
 
 use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
 
 /// A field that does not hold what it may hold.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[error("{}{} it must be {allowed}{}", self.place(), self.found(), self.advice())]
 pub struct FieldError {
     /// JSON pointer (RFC 6901) to the field, such as `/holes/1/diameter_mm`; empty for the whole.

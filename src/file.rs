@@ -4,14 +4,20 @@
 //! (those of `/proc`) is not what they hold. So the kind is checked before and after opening, and the limit while
 //! reading.
 
+#[cfg(feature = "calibration")]
+mod digest;
 mod memory;
 
+#[cfg(feature = "calibration")]
+pub use digest::{digest_of_file, digest_of_path};
 pub use memory::{MemoryError, MemoryLimit, MemoryPool, ReadingMemory, StopFlag, json_bytes};
 
-use sha2::{Digest, Sha256};
 use std::fs::{self, File};
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// Most files of a folder and below it; a study of a scanner has some thousands.
+const MAX_FILES: usize = 100_000;
 
 /// Why a file was not read.
 #[derive(Debug, thiserror::Error)]
@@ -25,6 +31,12 @@ pub enum ReadError {
     TooLarge {
         /// Most bytes.
         limit: u64,
+    },
+    /// A folder has more files than are read.
+    #[error("more than {limit} files lie in this folder and below; give a folder of the study alone")]
+    TooMany {
+        /// Most files.
+        limit: usize,
     },
     /// What it holds would take more memory than reading may.
     #[error(transparent)]
@@ -89,25 +101,58 @@ pub fn read_json_text(path: &Path, max_bytes: u64) -> Result<String, ReadError> 
     Ok(text)
 }
 
-/// SHA-256 of the content of a regular file, hexadecimal. The file is not held in memory.
+/// The regular files in a folder and below it, sorted by their paths; of a file itself. Links to folders are not
+/// followed: they may lead in circles.
 ///
 /// # Errors
-/// [`ReadError::NotRegular`], [`ReadError::Io`].
-pub fn digest_of_file(path: &Path) -> Result<String, ReadError> {
-    let mut file = open_regular(path)?;
-    let mut hash = Sha256::new();
-    let mut block = vec![0u8; 1 << 16];
-    loop {
-        match file.read(&mut block)? {
-            0 => return Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()),
-            length => hash.update(&block[..length]),
+/// [`ReadError::TooMany`], [`ReadError::NotRegular`] where `path` is neither, [`ReadError::Io`].
+pub fn files_below(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
+    let kind = fs::metadata(path)?;
+    if !kind.is_dir() {
+        return if kind.is_file() { Ok(vec![path.into()]) } else { Err(ReadError::NotRegular) };
+    }
+    let (mut folders, mut files) = (vec![path.to_path_buf()], Vec::new());
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder)? {
+            let entry = entry?;
+            if entry.file_type()?.is_dir() {
+                folders.push(entry.path());
+            } else if fs::metadata(entry.path()).is_ok_and(|kind| kind.is_file()) {
+                files.push(entry.path());
+            }
+            if files.len() + folders.len() > MAX_FILES {
+                return Err(ReadError::TooMany { limit: MAX_FILES });
+            }
         }
     }
+    files.sort();
+    Ok(files)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The digest of a folder is that of its files' names and contents, wherever it lies.
+    #[test]
+    fn a_folder_is_known_by_its_files() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let place = |name: &str| folder.path().join(name);
+        for name in ["a", "b"] {
+            fs::create_dir_all(place(name).join("1/pdata")).expect("made");
+            fs::write(place(name).join("1/pdata/x"), "one").expect("written");
+            fs::write(place(name).join("2"), "two").expect("written");
+        }
+        let digest = |name: &str| digest_of_path(&place(name)).expect("read");
+        assert_eq!(files_below(&place("a")).expect("listed"), [place("a/1/pdata/x"), place("a/2")]);
+        assert_eq!(digest("a"), digest("b"));
+        assert_eq!(digest("a/2"), digest_of_file(&place("b/2")).expect("read"));
+        fs::write(place("b/1/pdata/x"), "One").expect("written");
+        assert_ne!(digest("a"), digest("b"));
+        fs::write(place("b/1/pdata/x"), "one").expect("written");
+        fs::rename(place("b/2"), place("b/3")).expect("renamed");
+        assert_ne!(digest("a"), digest("b"));
+    }
 
     #[test]
     fn a_regular_file_is_read_up_to_its_limit() {

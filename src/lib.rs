@@ -18,51 +18,74 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! More programs are in `examples/`.
+//! More programs are in `examples/`; docs/library.md tells how to depend on the library and what its features are.
 //!
 //! The rooms stand on one another in this order; a room uses only those before it:
 //! [`field`], [`file`](mod@file), [`provenance`], [`optimise`] → [`specimen`] → [`mesh`], [`material`] → [`fem`] →
 //! [`kinematics`], [`homogeneous`], [`rate`], [`voxel`] → [`sensitivity`] → [`recording`], [`acquisition`] →
-//! [`calibration`] → [`diagnosis`], [`design`] → [`proof`] → [`sweep`] → [`slurm`], [`report`], [`export`] →
-//! [`compare`] → [`job`] → [`service`] → [`cli`].
+//! [`calibration`] → [`diagnosis`], [`design`] → [`next`] → [`proof`] → [`sweep`] → [`slurm`], [`report`],
+//! [`export`] → [`compare`] → [`job`] → [`service`] → [`cli`].
 //!
 //! One unit system inside: lengths mm, moduli and stresses kPa, times s. Stress × area is then
 //! kPa·mm² = 10⁻³ N; forces cross every public boundary in N.
 
+#[cfg(feature = "calibration")]
 pub mod acquisition;
+#[cfg(feature = "calibration")]
 pub mod calibration;
+#[cfg(feature = "cli")]
 pub mod cli;
+#[cfg(feature = "design")]
 pub mod compare;
+#[cfg(feature = "design")]
 pub mod design;
+#[cfg(feature = "calibration")]
 pub mod diagnosis;
+#[cfg(feature = "design")]
 pub mod export;
 pub mod fem;
 pub mod field;
 pub mod file;
 pub mod homogeneous;
+#[cfg(feature = "jobs")]
 pub mod job;
 pub mod kinematics;
 pub mod material;
 pub mod mesh;
+#[cfg(feature = "design")]
+pub mod next;
 pub mod optimise;
+#[cfg(feature = "design")]
 pub mod proof;
 pub mod provenance;
 pub mod rate;
+#[cfg(feature = "calibration")]
 pub mod recording;
+#[cfg(feature = "design")]
 pub mod report;
 pub mod sensitivity;
+#[cfg(feature = "service")]
 pub mod service;
+#[cfg(feature = "design")]
 pub mod slurm;
 pub mod specimen;
+#[cfg(feature = "design")]
 pub mod sweep;
 pub mod voxel;
 
 /// What short programs need: `use lambdak::prelude::*`.
 pub mod prelude {
+    #[cfg(feature = "calibration")]
     pub use crate::calibration::{CalibrateOptions, Observed, TermCount, calibrate};
-    pub use crate::fem::{Equilibrium, ForwardModel, SolveOptions};
+    #[cfg(feature = "calibration")]
+    pub use crate::diagnosis::{
+        Category, Cause, CauseName, CauseParameter, DiagnosisOptions, DiagnosisResult, Laboratory, Registry, Scene,
+        diagnose, diagnose_with,
+    };
+    pub use crate::fem::{Equilibrium, Field, ForwardModel, SolveOptions};
     pub use crate::material::{Ogden, OgdenTerm, Parameter};
     pub use crate::mesh::{MeshOptions, MeshSize};
+    #[cfg(feature = "calibration")]
     pub use crate::recording::{Filter, RecordedStep, Recording};
     pub use crate::sensitivity::{DriveSelection, EvaluationOptions, PartialVoxels, ScanSettings, evaluate};
     pub use crate::specimen::Specimen;

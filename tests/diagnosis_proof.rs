@@ -107,7 +107,7 @@ fn a_recording_that_cannot_be_made_is_a_result() {
 #[test]
 fn a_third_left_is_no_explanation() {
     let hidden = draw_cause(HiddenCause::Gradient, 1_003_506);
-    let found = diagnosed_without(&hidden, &["gradient", "travel", "layer", "geometry"], 2.6, 2);
+    let found = diagnosed_without(&hidden, &["gradient", "travel", "layer", "outline"], 2.6, 2);
     assert!(!(found.causes.is_empty() && found.alternatives.is_empty()));
     assert_eq!(found.verdict, Verdict::Unexplained);
 }

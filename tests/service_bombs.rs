@@ -6,7 +6,8 @@ mod service_common;
 use flate2::Compression;
 use flate2::write::{GzEncoder, ZlibEncoder};
 use serde_json::{Value, json};
-use service_common::{Service, lambdak, shipped, tar_entry};
+use service_common::tar::tar_entry;
+use service_common::{Service, lambdak, shipped};
 use std::io::Write;
 use std::path::Path;
 

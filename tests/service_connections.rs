@@ -6,7 +6,7 @@ mod service_common;
 
 use prerequisites::{Missing, Prerequisite};
 use serde_json::json;
-use service_common::{Service, lambdak, shipped};
+use service_common::{Service, add_token, shipped, small_evaluation};
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
@@ -14,17 +14,25 @@ use std::time::{Duration, Instant};
 /// Open connections that would be more than the places of all requests in work.
 const MANY: usize = 520;
 
+/// Files that a process may have to open for [`MANY`] connections of one address: half of all connections are one's.
+const OPEN_FILES: usize = 1400;
+
+/// The limit on open files of this process, which the service inherits, is high enough.
+fn check_open_files() -> Result<(), Missing> {
+    let text = std::fs::read_to_string("/proc/self/limits").unwrap_or_default();
+    let line = text.lines().find_map(|line| line.strip_prefix("Max open files"));
+    let limit = line.and_then(|line| line.split_whitespace().next()?.parse::<usize>().ok()).unwrap_or(usize::MAX);
+    if limit >= OPEN_FILES {
+        return Ok(());
+    }
+    Err(Missing::new(Prerequisite::OpenFiles, format!("a process may open {limit} files, {OPEN_FILES} are needed")))
+}
+
 /// A service with two tokens: of one who reads, and of one who submits.
 fn closed_service(folder: &std::path::Path) -> (Service, [String; 2]) {
     let tokens = folder.join("tokens.json");
-    let tokens = tokens.to_str().unwrap();
-    let make = |name: &str| {
-        let made = lambdak().args(["serve", "--tokens", tokens, "--add-token", name]).output().unwrap();
-        assert!(made.status.success());
-        String::from_utf8(made.stdout).unwrap().trim().to_string()
-    };
-    let secrets = [make("mallory:read"), make("anna:submit")];
-    (Service::start(&folder.join("data"), &["--slots", "0", "--tokens", tokens]), secrets)
+    let secrets = ["mallory:read", "anna:submit"].map(|name| add_token(&tokens, name));
+    (Service::start(&folder.join("data"), &["--slots", "0", "--tokens", tokens.to_str().unwrap()]), secrets)
 }
 
 /// Begins requests with a body of which nothing comes.
@@ -36,8 +44,7 @@ fn slow_bodies(service: &Service, path: &str, secret: &str, count: usize) -> Vec
     );
     let mut open = Vec::new();
     for _ in 0..count {
-        // Where the process may not open so many files, what is open is what there is.
-        let Ok(mut stream) = TcpStream::connect(&service.address) else { break };
+        let mut stream = TcpStream::connect(&service.address).unwrap();
         let _ = stream.write_all(head.as_bytes());
         open.push(stream);
     }
@@ -53,14 +60,12 @@ fn status(stream: &mut TcpStream, wait: Duration) -> Option<u16> {
 }
 
 fn slow_bodies_of_a_reader_shut_nobody_out() -> Result<(), Missing> {
+    check_open_files()?;
     let folder = tempfile::tempdir().unwrap();
     let (mut service, [reader, submitter]) = closed_service(folder.path());
     let begin = Instant::now();
     // A reader may check specimens; what it may not do is refused before a body is waited for.
     let mut open = slow_bodies(&service, "/v1/specimens/check", &reader, MANY);
-    if open.len() < MANY {
-        return Err(Missing::new(Prerequisite::OpenFiles, format!("only {} connections may be open", open.len())));
-    }
     let mut refused = slow_bodies(&service, "/v1/evaluations", &reader, 1);
     assert_eq!(status(&mut refused[0], Duration::from_secs(20)), Some(403));
     for _ in 0..20 {
@@ -125,4 +130,62 @@ fn slow_uploads_shut_nobody_out() -> Result<(), Missing> {
     Ok(())
 }
 
-prerequisites::test_binary!(slow_bodies_of_a_reader_shut_nobody_out, slow_uploads_shut_nobody_out);
+/// Readers that take nothing of megabytes hold places of their own caller alone, and none once their time is up.
+fn slow_readers_are_cut_off() -> Result<(), Missing> {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut service, [reader, submitter]) = closed_service(folder.path());
+    service.token = Some(submitter.clone());
+    let evaluation = small_evaluation(1.0);
+    let count = 3_500_000 / evaluation.to_string().len();
+    let job = service.submit("sweeps", &json!({ "evaluations": vec![evaluation; count] }));
+    let large = format!("{job}/request");
+    let length = service.get(&large).body.len();
+    assert!(length > 3_000_000, "{length} bytes");
+    // Several answers on each connection: together more than what systems hold of a connection that nobody reads.
+    let answers = 8;
+    let head = format!("GET {large} HTTP/1.1\r\nhost: {}\r\nauthorization: Bearer {reader}\r\n\r\n", service.address);
+    let mut open: Vec<TcpStream> = (0..40)
+        .map(|_| {
+            let mut stream = TcpStream::connect(&service.address).unwrap();
+            stream.write_all(head.repeat(answers).as_bytes()).unwrap();
+            stream
+        })
+        .collect();
+    let begin = Instant::now();
+    std::thread::sleep(Duration::from_secs(3));
+    // The reader's places are taken; its small answers and those of others are not concerned.
+    service.token = Some(reader);
+    let reply = service.get(&large);
+    assert_eq!((reply.status, reply.cause().as_str()), (429, "too-many-requests"));
+    assert_eq!(service.get("/v1/jobs").status, 200);
+    service.token = Some(submitter);
+    assert_eq!(service.get(&large).body.len(), length);
+    // Nobody has read a byte: all are cut off when the time that they have saved is spent.
+    while service.get("/v1/jobs").status == 200 && begin.elapsed() < Duration::from_secs(14) {
+        std::thread::sleep(Duration::from_millis(500));
+    }
+    let received: Vec<usize> = open
+        .iter_mut()
+        .map(|stream| {
+            stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+            let mut bytes = Vec::new();
+            // A connection that is cut ends with or without an error.
+            let _ = stream.read_to_end(&mut bytes);
+            bytes.len()
+        })
+        .collect();
+    assert!(received.iter().all(|bytes| *bytes < answers * length), "{received:?} of {}", answers * length);
+    assert!(begin.elapsed() < Duration::from_secs(30), "{:?}", begin.elapsed());
+    eprintln!(
+        "40 readers of nothing were cut off; the most that a system held for one was {:?}",
+        received.iter().max()
+    );
+    assert_eq!(service.get(&large).status, 200);
+    Ok(())
+}
+
+prerequisites::test_binary!(
+    slow_bodies_of_a_reader_shut_nobody_out,
+    slow_uploads_shut_nobody_out,
+    slow_readers_are_cut_off
+);

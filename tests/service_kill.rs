@@ -228,6 +228,7 @@ fn check_fence(store: &Store) {
         owner: "o".into(),
         title: String::new(),
         body: "{}".into(),
+        inputs: Vec::new(),
         tasks: vec![NewTask { input: "{}".into(), cache_key: "k".into() }],
         has_gather: false,
     };

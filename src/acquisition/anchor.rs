@@ -4,6 +4,7 @@ use crate::specimen::{Specimen, TestKind};
 use crate::voxel::VoxelGrid;
 use serde::Serialize;
 use std::f64::consts::TAU;
+use utoipa::ToSchema;
 
 /// Layers of voxels next to a plate from which the displacement is carried on to it.
 const LAYERS: usize = 4;
@@ -25,7 +26,7 @@ pub enum Anchor {
 }
 
 /// What was found at the plates.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, ToSchema)]
 pub struct AnchorReport {
     /// What was added to the unwrapped displacement, mm.
     pub added_mm: f64,

@@ -2,9 +2,10 @@
 
 use super::{AcquisitionError, Complex};
 use std::f64::consts::TAU;
+use utoipa::ToSchema;
 
 /// What part of k-space an image keeps.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, ToSchema)]
 pub struct KSpace {
     /// Part of each axis's half-width that is kept, in (0, 1]; 1 keeps all.
     pub keep: [f64; 3],

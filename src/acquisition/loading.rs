@@ -5,12 +5,13 @@ use crate::recording::LoadCurve;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use utoipa::ToSchema;
 
 /// Streams of the random generator below this are the images'.
 const STREAM: u64 = 1 << 40;
 
 /// How the actuator moves and the load cell reads.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, ToSchema)]
 pub struct LoadProgram {
     /// Rest before the first ramp, s.
     pub rest_s: f64,

@@ -3,6 +3,7 @@
 use super::unwrap::wrapped;
 use crate::recording::{RawRecording, RawStep};
 use serde::Serialize;
+use utoipa::ToSchema;
 
 /// Empty voxels needed to estimate the noise from them.
 const MIN_EMPTY: usize = 200;
@@ -10,7 +11,7 @@ const MIN_EMPTY: usize = 200;
 const EMPTY_DISTANCE: usize = 2;
 
 /// Where a noise level comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NoiseSource {
     /// The mean magnitude of empty voxels: Gaussian noise of standard deviation σ has magnitude σ√(π/2) there.
@@ -20,7 +21,7 @@ pub enum NoiseSource {
 }
 
 /// The noise of a step's complex images.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, ToSchema)]
 pub struct NoiseEstimate {
     /// Where `sd` comes from.
     pub source: NoiseSource,

@@ -7,6 +7,7 @@ use super::{AcquisitionError, hamming_filtered};
 use crate::recording::{Filter, RawRecording, RawStep, RecordedStep, Recording};
 use rayon::prelude::*;
 use serde::Serialize;
+use utoipa::ToSchema;
 
 /// Settings of [`reconstruct`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -33,7 +34,7 @@ pub struct Reconstruction {
 }
 
 /// What became of a step.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
 pub struct StepReport {
     /// Drive, mm.
     pub drive_mm: f64,
@@ -46,7 +47,7 @@ pub struct StepReport {
 }
 
 /// What became of one direction of a step.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, ToSchema)]
 pub struct ComponentReport {
     /// Voxels of the mask.
     pub num_voxels: usize,

@@ -4,9 +4,10 @@ use super::{AcquisitionError, Reconstruction, Scan, ScanOptions, StepReport, ham
 use crate::provenance::VERSION;
 use crate::recording::Filter;
 use serde::Serialize;
+use utoipa::ToSchema;
 
 /// What a synthetic scan holds and what it was made from.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, ToSchema)]
 pub struct ScanResult {
     /// Always `scan/1`.
     pub schema: &'static str,
@@ -35,7 +36,7 @@ pub struct ScanResult {
 }
 
 /// One drive of a [`ScanResult`].
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, ToSchema)]
 pub struct ScanStep {
     /// Drive, mm.
     pub drive_mm: f64,
@@ -52,7 +53,7 @@ pub struct ScanStep {
 }
 
 /// How far reconstructed displacements are from those that were scanned.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, ToSchema)]
 pub struct ErrorReport {
     /// Root mean square, mm.
     pub rms_mm: f64,

@@ -12,9 +12,10 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::Serialize;
+use utoipa::ToSchema;
 
 /// Settings of a scan.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, ToSchema)]
 pub struct ScanOptions {
     /// The images' grid. It should reach beyond the specimen: noise is estimated from the empty voxels.
     pub grid: VoxelGrid,
@@ -29,6 +30,14 @@ pub struct ScanOptions {
     pub load: LoadProgram,
     /// Seed of all noise.
     pub seed: u64,
+    /// Which kind of the specimen's samples is scanned, from 0. The force of all samples is in the recording of the
+    /// first kind alone, so that it counts once where several are compared together.
+    #[serde(skip_serializing_if = "is_first")]
+    pub sample: usize,
+}
+
+fn is_first(sample: &usize) -> bool {
+    *sample == 0
 }
 
 impl ScanOptions {
@@ -80,7 +89,8 @@ pub struct Scan {
     pub num_unknowns: usize,
 }
 
-/// Solves `material` at the specimen's drives on a mesh of its own and scans the result.
+/// Solves `material` at the specimen's drives on a mesh of its own and scans the result. The recording's specimen lists
+/// the sample that is scanned first.
 ///
 /// # Errors
 /// [`AcquisitionError`].
@@ -94,22 +104,33 @@ pub fn scan(
     is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Scan, AcquisitionError> {
     options.check()?;
-    let mask = VoxelMask::of_specimen(specimen, options.grid.clone())?;
-    let mut model = ForwardModel::of_specimen(specimen, mesh)?;
-    let path = model.solve_path(material, &specimen.drive_mm, solve, &|| is_cancelled())?;
+    let samples = specimen.samples();
+    let (Some(sample), Some(recorded)) = (samples.get(options.sample), specimen.with_first(options.sample)) else {
+        let requirement = "the number of a kind of the specimen's samples, from 0";
+        return Err(AcquisitionError::Value { name: "the sample", value: options.sample as f64, requirement });
+    };
+    let mask = VoxelMask::of_specimen(sample, options.grid.clone())?;
+    let mut model = ForwardModel::of_specimen(sample, &mesh.carried(specimen, sample))?;
+    let path = model.solve_path(material, &sample.drive_mm, solve, &|| is_cancelled())?;
     let states: Vec<&[[f64; 3]]> = path.iter().map(|state| &state.displacement[..]).collect();
-    let images = signal_images(specimen, model.mesh(), &states, &options.grid, options.mm_per_radian, is_cancelled)?;
-    let operator = VoxelOperator::new(specimen, model.mesh(), &mask, Sampling::default())?;
+    let images = signal_images(sample, model.mesh(), &states, &options.grid, options.mm_per_radian, is_cancelled)?;
+    let operator = VoxelOperator::new(sample, model.mesh(), &mask, Sampling::default())?;
     let truth = states.iter().map(|u| operator.average(u)).collect::<Result<Vec<_>, _>>()?;
-    let forces_n: Vec<f64> = path.iter().map(|state| state.force_n).collect();
+    let mut forces_n: Vec<f64> = path.iter().map(|state| state.force_n).collect();
+    for (_, other) in samples.iter().enumerate().filter(|(n, _)| *n != options.sample) {
+        let mut model = ForwardModel::of_specimen(other, &mesh.carried(specimen, other))?;
+        let path = model.solve_path(material, &other.drive_mm, solve, &|| is_cancelled())?;
+        forces_n.iter_mut().zip(path).for_each(|(sum, state)| *sum += state.force_n);
+    }
+    let has_force = options.sample == 0;
     let (load, windows) = loading_history(&specimen.drive_mm, &forces_n, &options.load, options.seed)?;
     let mut steps = Vec::with_capacity(images.len());
     for (n, signal) in images.into_iter().enumerate() {
         let (phase, magnitude) = noisy_images(signal, options, n as u64);
         steps.push(RawStep {
             drive_mm: specimen.drive_mm[n],
-            force_n: load.mean_force_n(windows[n]),
-            force_sd_n: (options.load.drift_sd_n > 0.0).then_some(options.load.drift_sd_n),
+            force_n: load.mean_force_n(windows[n]).filter(|_| has_force),
+            force_sd_n: (has_force && options.load.drift_sd_n > 0.0).then_some(options.load.drift_sd_n),
             window_s: Some(windows[n]),
             phase,
             magnitude,
@@ -119,12 +140,12 @@ pub fn scan(
     let factor = options.kspace.map_or(1.0, |k| k.noise_factor(options.grid.shape));
     let raw = RawRecording {
         id: id.into(),
-        specimen: specimen.clone(),
+        specimen: recorded,
         grid: options.grid.clone(),
         mask: mask.spread(&vec![true; mask.num_voxels()], false),
         steps,
         noise_sd_mm: Some([0, 1, 2].map(|a| factor * options.mm_per_radian[a] / options.snr[a])),
-        load: Some(load),
+        load: has_force.then_some(load),
         notes: None,
     };
     Ok(Scan { raw, mask, truth, forces_n, num_unknowns: model.num_unknowns() })
@@ -135,7 +156,8 @@ pub fn scan(
 pub fn noisy_images(mut signal: [Vec<Complex>; 3], options: &ScanOptions, step: u64) -> ([Vec<f64>; 3], Vec<f64>) {
     for (axis, image) in signal.iter_mut().enumerate() {
         let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
-        rng.set_stream(3 * step + axis as u64);
+        // Samples have noise of their own.
+        rng.set_stream(3 * step + axis as u64 + ((options.sample as u64) << 32));
         let sd = 1.0 / options.snr[axis];
         for value in image.iter_mut() {
             let re: f64 = StandardNormal.sample(&mut rng);

@@ -29,6 +29,7 @@ fn options(specimen: &Specimen, snr: f64, seed: u64) -> ScanOptions {
         kspace: None,
         load: LoadProgram::default(),
         seed,
+        sample: 0,
     }
 }
 

@@ -5,7 +5,7 @@
 
 use super::error::CalibrationError;
 use super::problem::CalibrationProblem;
-use crate::fem::SolveOptions;
+use crate::fem::{Equilibrium, SolveOptions};
 use crate::material::Ogden;
 
 impl CalibrationProblem<'_> {
@@ -19,34 +19,41 @@ impl CalibrationProblem<'_> {
         solve: &SolveOptions,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<(f64, Vec<f64>), CalibrationError> {
+        self.refuse_unlike_samples("the adjoint gradient")?;
         let objective = self.objective();
         let (observed, models, views) = self.parts();
         let targets = super::target::Target::of_recordings(observed, views, objective)?;
         let mut value = 0.0;
         let mut gradient = vec![0.0; material.parameters().len()];
         for (((recording, model), view), target) in observed.iter().zip(models).zip(views).zip(&targets) {
-            let mut last = None;
-            for (drive, step) in recording.steps.iter().map(|s| s.drive_mm).zip(&target.steps) {
-                let state = model.solve(material, drive, last.as_ref(), solve, is_cancelled)?;
+            let mut states: Vec<Equilibrium> = Vec::new();
+            for drive in recording.all_drives_mm() {
+                states.push(model.solve(material, drive, states.last(), solve, is_cancelled)?);
+            }
+            let forces_n: Vec<f64> = states.iter().map(|s| s.force_n).collect();
+            let misfits = target.force_misfits(&forces_n);
+            let weighed = target.force_weights() * &misfits;
+            value += misfits.dot(&weighed);
+            let mut by_forces = vec![0.0; states.len()];
+            for ((place, _), weighed) in target.forces().zip(&weighed) {
+                by_forces[place] = -2.0 * weighed;
+            }
+            for ((state, step), by_force) in states.iter().zip(&target.steps).zip(by_forces) {
                 let seen = view.average(&state.displacement)?;
                 let mut load = vec![[0.0; 3]; seen.len()];
-                for (v, (u, m)) in seen.iter().zip(step.measured).enumerate().filter(|(v, _)| step.weights[*v] > 0.0) {
+                let measured = seen.iter().zip(step.measured).enumerate();
+                for (v, (u, m)) in measured.filter(|(v, _)| step.weights[*v] > 0.0) {
                     for c in 0..3 {
                         let weight = step.weights[v] * step.component_weights[c];
                         value += weight * (u[c] - m[c]).powi(2);
                         load[v][c] = 2.0 * weight * (u[c] - m[c]);
                     }
                 }
-                let by_force = step.force.map_or(0.0, |f| {
-                    value += f.weight * (state.force_n - f.value_n).powi(2);
-                    2.0 * f.weight * (state.force_n - f.value_n)
-                });
                 let nodal = view.average_transposed(&load)?;
-                let of_step = model.tangent(material, &state)?.adjoint_gradient(&nodal, by_force)?;
+                let of_step = model.tangent(material, state)?.adjoint_gradient(&nodal, by_force)?;
                 for (g, d) in gradient.iter_mut().zip(of_step) {
                     *g += d;
                 }
-                last = Some(state);
             }
         }
         Ok((value, gradient))
@@ -60,12 +67,13 @@ mod tests {
     use super::*;
     use crate::calibration::{Objective, Observed, PAPER_BETA};
     use crate::recording::Filter;
+    use crate::sensitivity::Protocol;
 
     /// Adjoint and sensitivities give one gradient, and the Taylor remainder of the objective falls with h²; χ² and the
     /// paper's loss, plain and filtered, on the whole and on a mirrored mesh.
     #[test]
     fn adjoint_agrees_with_sensitivities_and_differences() {
-        let (_, _, synthetic) = same_mesh(&ogden(200.0, &[[17.0, 1.91]]));
+        let (_, synthetic) = same_mesh(&ogden(200.0, &[[17.0, 1.91]]));
         let specimen = super::super::test_problem::block();
         let at = ogden(260.0, &[[12.0, 1.7], [0.6, 5.0]]);
         let solve = tight().solve;
@@ -74,7 +82,10 @@ mod tests {
             (Objective::Paper { beta: PAPER_BETA }, Filter::Hamming2, false),
         ] {
             let recording = synthetic.recording("adjoint", &specimen, &synthetic.draw(1, 0), filter).unwrap();
-            let observed = [Observed::new(&recording, 0.01).unwrap()];
+            // The forces are coupled by a load cell that is not perfect.
+            let cell = Protocol { force_gain_sd: 0.02, force_zero_sd_n: 0.1, ..Protocol::default() };
+            let plain = Observed::new(&recording, 0.01).unwrap();
+            let observed = [plain.with_protocol(&recording, &cell, 0.01).unwrap()];
             let mesh = |s: &_| crate::mesh::MeshOptions { use_mirror, ..coarse(s) };
             let mut problem = CalibrationProblem::new(&observed, &mesh, objective).unwrap();
             let (value, gradient) = problem.objective_and_adjoint_gradient(&at, &solve, &|| false).unwrap();

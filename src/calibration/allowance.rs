@@ -9,7 +9,7 @@
 //! Weighing data down where meshes differ does not help: errors of meshes look like changes of the exponents to a few
 //! micrometres, so that what is weighed down in the misfit is weighed down in the sensitivities too.
 
-use super::problem::RecordingFit;
+use super::recording_fit::RecordingFit;
 use super::target::Target;
 
 /// Error left on the finer mesh over the difference of the two, at the order 1.4 that singular edges leave:
@@ -52,10 +52,9 @@ impl Allowance {
                         }
                     }
                 }
-                if let Some(force) = step.force {
-                    objective += force.weight * (theirs.states[d].force_n - ours.states[d].force_n).powi(2);
-                }
             }
+            let apart = target.force_misfits(&ours.forces_n) - target.force_misfits(&theirs.forces_n);
+            objective += apart.dot(&(target.force_weights() * &apart));
         }
         Allowance {
             factor,

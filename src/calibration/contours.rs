@@ -1,10 +1,12 @@
 //! ℓ_u, ℓ_F and ℓ around an estimate over pairs of κ, μ₁ and α₁ (the paper's figure 8).
 
 use super::error::CalibrationError;
-use super::problem::{CalibrationProblem, RecordingFit};
+use super::problem::CalibrationProblem;
+use super::recording_fit::RecordingFit;
 use crate::fem::{Equilibrium, SolveOptions};
 use crate::material::{Ogden, Parameter};
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// How far to go and how fine.
 #[derive(Clone, Copy, Debug)]
@@ -28,7 +30,7 @@ impl Default for ContourOptions {
 }
 
 /// The three losses over two parameters.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Contour {
     /// Names of the horizontal and the vertical parameter.
@@ -53,6 +55,7 @@ pub fn contours(
     options: &ContourOptions,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Vec<Contour>, CalibrationError> {
+    problem.refuse_unlike_samples("contours of the losses")?;
     let n = options.num_values.max(2);
     let part = |i: usize| 2.0 * i as f64 / (n - 1) as f64 - 1.0;
     let values = |parameter: Parameter| -> Vec<f64> {

@@ -3,7 +3,7 @@
 use crate::fem::{PrepareError, SolveError};
 use crate::material::MaterialError;
 use crate::optimise::SolverStatus;
-use crate::sensitivity::InformationError;
+use crate::sensitivity::{InformationError, ProtocolMismatch};
 use crate::voxel::VoxelError;
 
 /// Why a calibration has no result.
@@ -16,6 +16,15 @@ pub enum CalibrationError {
     /// No equilibrium at the start, or the work was cancelled.
     #[error(transparent)]
     Solve(#[from] SolveError),
+    /// The protocol does not suit the specimen.
+    #[error(transparent)]
+    Protocol(#[from] ProtocolMismatch),
+    /// The load cell carries unlike samples, for which something is not done.
+    #[error("{what}: not supported where the force is that of unlike samples (other_samples); leave it out")]
+    UnlikeSamples {
+        /// What is not supported.
+        what: &'static str,
+    },
     /// Grid and specimen do not fit.
     #[error(transparent)]
     Voxel(#[from] VoxelError),
@@ -41,6 +50,14 @@ pub enum CalibrationError {
     /// What was measured at the boundary cannot be imposed.
     #[error("the measured boundary cannot be imposed: {reason}; take the plates as commanded")]
     NoMeasuredBoundary {
+        /// Why.
+        reason: &'static str,
+    },
+    /// A force that was to be read on the way to a scan is not in the recording.
+    #[error("the force at {drive_mm} mm cannot be read: {reason}; give the load curve, or drives that it passes")]
+    NoForceReading {
+        /// The drive, mm.
+        drive_mm: f64,
         /// Why.
         reason: &'static str,
     },

@@ -9,6 +9,7 @@
 //! standard deviation, in every combination of parameters. A small step alone proves nothing: damping makes steps
 //! small. Where the misfit is more than noise the standard deviation is that of the misfit.
 
+use super::bench::Bench;
 use super::descend::{Descent, Start, descend};
 use super::error::CalibrationError;
 use super::options::{Bulk, FitOptions, check_options};
@@ -18,10 +19,9 @@ use super::stress_path::StressPath;
 use super::synthetic::Measurement;
 use super::system::NormalSystem;
 use super::target::Target;
-use crate::fem::{Equilibrium, ForwardModel};
+use crate::fem::Equilibrium;
 use crate::material::{Ogden, Parameter};
 use crate::sensitivity::{FisherInformation, ScanSettings};
-use crate::voxel::VoxelOperator;
 
 /// A fitted material. Its existence means that the fit converged; one that did not is a [`CalibrationError`].
 #[derive(Clone, Debug)]
@@ -42,8 +42,12 @@ pub struct Fit {
     pub distance: f64,
     /// Limits at which the estimate stands, in words. Where there are any, the covariance is too wide.
     pub reached_limits: Vec<String>,
-    /// Equilibria of the estimate, one per drive.
+    /// Equilibria of the estimate, one per drive; of several kinds of samples the first one's.
     pub states: Vec<Equilibrium>,
+    /// What it predicts of the voxels per drive, mm.
+    pub(super) displacements: Vec<Vec<[f64; 3]>>,
+    /// Its forces, all samples together, N.
+    pub(super) forces_n: Vec<f64>,
     pub(super) is_bulk_held: bool,
 }
 
@@ -72,8 +76,7 @@ impl FitStart {
     /// # Errors
     /// [`CalibrationError`]: an invalid material or option, exponents too close, no equilibrium.
     pub fn new(
-        model: &mut ForwardModel,
-        operator: &VoxelOperator,
+        bench: &mut Bench,
         drives_mm: &[f64],
         material: &Ogden,
         options: &FitOptions,
@@ -81,8 +84,8 @@ impl FitStart {
     ) -> Result<FitStart, CalibrationError> {
         check_options(options)?;
         let constraints = Constraints::new(material, options)?;
-        let prediction = Prediction::new(model, operator, drives_mm, material, None, &options.solve, is_cancelled)?;
-        let path = StressPath::new(model, material, &prediction.states);
+        let prediction = bench.predict(drives_mm, material, None, &options.solve, is_cancelled)?;
+        let path = bench.stress_path(material, &prediction);
         Ok(FitStart { constraints, prediction, path, options: *options })
     }
 
@@ -92,25 +95,23 @@ impl FitStart {
     }
 
     /// Fits `data`, which must be of the start's drives. The result depends on the data and the start alone, not on
-    /// what `model` solved before.
+    /// what `bench` solved before.
     ///
     /// # Errors
     /// [`CalibrationError`].
     pub fn fit(
         &self,
-        model: &mut ForwardModel,
-        operator: &VoxelOperator,
+        bench: &mut Bench,
         scan: &ScanSettings,
         data: &Measurement,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Fit, CalibrationError> {
         let options = &self.options;
-        data.check(operator.num_voxels(), self.prediction.states.len())?;
+        data.check(bench.num_voxels(), self.prediction.states.len().saturating_sub(data.on_the_way.len()))?;
+        let drives_mm = data.all_drives_mm();
         let targets = [Target::of_measurement(data, scan)];
         let mut predict = |material: &Ogden, near: &[Prediction]| {
-            let near = near.first().map(|p| &p.states[..]);
-            let solve = &options.solve;
-            Ok(vec![Prediction::new(model, operator, &data.drives_mm, material, near, solve, is_cancelled)?])
+            Ok(vec![bench.predict(&drives_mm, material, near.first(), &options.solve, is_cancelled)?])
         };
         let system = |p: &[Prediction]| NormalSystem::new(p, &targets, options.bulk, options.held);
         let start = Start { predictions: vec![self.prediction.clone()], path: self.path.clone() };
@@ -132,6 +133,8 @@ impl FitStart {
             distance,
             reached_limits: reached,
             states: prediction.states,
+            displacements: prediction.displacements,
+            forces_n: prediction.forces_n,
             is_bulk_held: options.bulk == Bulk::Held,
         })
     }
@@ -142,17 +145,16 @@ impl FitStart {
 /// # Errors
 /// [`CalibrationError`].
 pub fn fit(
-    model: &mut ForwardModel,
-    operator: &VoxelOperator,
+    bench: &mut Bench,
     scan: &ScanSettings,
     data: &Measurement,
     start: &Ogden,
     options: &FitOptions,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Fit, CalibrationError> {
-    data.check(operator.num_voxels(), data.drives_mm.len())?;
-    let start = FitStart::new(model, operator, &data.drives_mm, start, options, is_cancelled)?;
-    start.fit(model, operator, scan, data, is_cancelled)
+    data.check(bench.num_voxels(), data.drives_mm.len())?;
+    let start = FitStart::new(bench, &data.all_drives_mm(), start, options, is_cancelled)?;
+    start.fit(bench, scan, data, is_cancelled)
 }
 
 #[cfg(test)]

@@ -1,5 +1,4 @@
 use super::super::options::Held;
-use super::super::prediction::Prediction;
 use super::super::system::NormalSystem;
 use super::super::test_problem::{ogden, same_mesh, scan, tight, truth};
 use super::*;
@@ -10,10 +9,10 @@ use nalgebra::DVector;
 #[test]
 fn truth_is_recovered_without_noise() {
     let truth = truth();
-    let (mut model, operator, synthetic) = same_mesh(&truth);
+    let (mut bench, synthetic) = same_mesh(&truth);
     for start in [ogden(400.0, &[[22.1, 1.34]]), ogden(90.0, &[[11.0, 2.9]])] {
         let data = synthetic.noiseless();
-        let found = fit(&mut model, &operator, &scan(), data, &start, &tight(), &|| false).unwrap();
+        let found = fit(&mut bench, &scan(), data, &start, &tight(), &|| false).unwrap();
         for p in truth.parameters() {
             // Equilibria are good to 10⁻¹¹ of the force; the worst combination loses three digits of them.
             let error = found.material.value(p) / truth.value(p) - 1.0;
@@ -27,13 +26,12 @@ fn truth_is_recovered_without_noise() {
 /// χ²(s + h d) − χ²(s) + 2h g·d falls with h², for a free κ and with a prior.
 #[test]
 fn gradient_of_the_misfit() {
-    let (mut model, operator, synthetic) = same_mesh(&truth());
+    let (mut bench, synthetic) = same_mesh(&truth());
     let data = synthetic.draw(3, 0);
     let at = ogden(260.0, &[[19.0, 1.7]]);
     for bulk in [Bulk::Free, Bulk::LogPrior { center_kpa: 150.0, log_sd: 0.1 }] {
         let mut system = |m: &Ogden| {
-            let p =
-                Prediction::new(&mut model, &operator, &data.drives_mm, m, None, &tight().solve, &|| false).unwrap();
+            let p = bench.predict(&data.drives_mm, m, None, &tight().solve, &|| false).unwrap();
             NormalSystem::new(&[p], &[Target::of_measurement(&data, &scan())], bulk, Held::default()).unwrap()
         };
         let base = system(&at);
@@ -56,11 +54,11 @@ fn gradient_of_the_misfit() {
 /// What cannot work says why, in types.
 #[test]
 fn failures_are_typed() {
-    let (mut model, operator, synthetic) = same_mesh(&truth());
+    let (mut bench, synthetic) = same_mesh(&truth());
     let data = synthetic.draw(3, 0);
     let start = ogden(400.0, &[[22.1, 1.34]]);
     let mut run = |data: &Measurement, start: &Ogden, options: &FitOptions, scan: &ScanSettings, stop: bool| {
-        fit(&mut model, &operator, scan, data, start, options, &|| stop).unwrap_err()
+        fit(&mut bench, scan, data, start, options, &|| stop).unwrap_err()
     };
     let usual = FitOptions::default();
 
@@ -102,7 +100,7 @@ fn failures_are_typed() {
 #[test]
 fn missing_voxels_are_left_out() {
     let truth = truth();
-    let (mut model, operator, synthetic) = same_mesh(&truth);
+    let (mut bench, synthetic) = same_mesh(&truth);
     let mut data = synthetic.noiseless().clone();
     for (v, u) in data.displacements[0].iter_mut().enumerate() {
         if v % 3 == 0 {
@@ -110,8 +108,8 @@ fn missing_voxels_are_left_out() {
         }
     }
     let start = ogden(300.0, &[[20.0, 1.6]]);
-    let found = fit(&mut model, &operator, &scan(), &data, &start, &tight(), &|| false).unwrap();
-    let all = fit(&mut model, &operator, &scan(), synthetic.noiseless(), &start, &tight(), &|| false).unwrap();
+    let found = fit(&mut bench, &scan(), &data, &start, &tight(), &|| false).unwrap();
+    let all = fit(&mut bench, &scan(), synthetic.noiseless(), &start, &tight(), &|| false).unwrap();
     for p in truth.parameters() {
         // As above.
         assert!((found.material.value(p) / truth.value(p) - 1.0).abs() < 1e-6);
@@ -123,12 +121,12 @@ fn missing_voxels_are_left_out() {
 /// κ where the caller wants it: held, drawn to a prior, free.
 #[test]
 fn bulk_is_free_drawn_or_held() {
-    let (mut model, operator, synthetic) = same_mesh(&truth());
+    let (mut bench, synthetic) = same_mesh(&truth());
     let data = synthetic.noiseless();
     let start = ogden(260.0, &[[20.0, 1.6]]);
     let mut with = |bulk| {
         let options = FitOptions { bulk, ..tight() };
-        fit(&mut model, &operator, &scan(), data, &start, &options, &|| false).unwrap()
+        fit(&mut bench, &scan(), data, &start, &options, &|| false).unwrap()
     };
     let free = with(Bulk::Free);
     let held = with(Bulk::Held);
@@ -150,11 +148,11 @@ fn bulk_is_free_drawn_or_held() {
 /// A prior so strong that nothing else counts pulls κ against its range, and the fit says so.
 #[test]
 fn limits_are_reported() {
-    let (mut model, operator, synthetic) = same_mesh(&truth());
+    let (mut bench, synthetic) = same_mesh(&truth());
     let start = ogden(260.0, &[[20.0, 1.6]]);
     let bulk = Bulk::LogPrior { center_kpa: 1.0, log_sd: 1e-3 };
     let options = FitOptions { bulk, max_iterations: 60, ..FitOptions::default() };
-    let found = fit(&mut model, &operator, &scan(), synthetic.noiseless(), &start, &options, &|| false).unwrap();
+    let found = fit(&mut bench, &scan(), synthetic.noiseless(), &start, &options, &|| false).unwrap();
     // Five times the start's shear modulus ½ · 20 · 1.6 kPa; the exponential rounds.
     assert!((found.material.bulk_kpa / 80.0 - 1.0).abs() < 1e-6, "{}", found.material.bulk_kpa);
     assert_eq!(found.reached_limits, ["kappa: smallest"]);

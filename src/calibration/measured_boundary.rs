@@ -239,7 +239,7 @@ mod tests {
     #[test]
     fn planes_move_as_was_measured() {
         let specimen = block();
-        let (_, _, synthetic) = same_mesh(&truth());
+        let (_, synthetic) = same_mesh(&truth());
         let recording = synthetic.recording("planes", &specimen, synthetic.noiseless(), Filter::None).unwrap();
         let observed = Observed::new(&recording, 0.01).unwrap();
         let part = observed.between_measured_planes(CUT_PART).unwrap();

@@ -3,13 +3,18 @@
 
 mod adjoint;
 mod allowance;
+mod bench;
+mod box_means;
 mod calibrate;
 mod calibrate_options;
 mod contours;
 mod descend;
+mod doubt;
 mod error;
 mod fit;
+mod force_readings;
 mod measured_boundary;
+mod mesh_correction;
 mod noise;
 mod observed;
 mod options;
@@ -18,6 +23,7 @@ mod outliers;
 mod prediction;
 mod problem;
 mod profile;
+mod recording_fit;
 mod result;
 mod run;
 mod stand_ins;
@@ -34,19 +40,23 @@ mod test_problem;
 mod verify;
 
 pub use allowance::Allowance;
+pub use bench::Bench;
+pub use box_means::{BoxMeans, WorstBox};
 pub use calibrate::calibrate;
 pub use calibrate_options::{CalibrateOptions, TermCount};
 pub use contours::{Contour, ContourOptions, contours};
 pub use error::CalibrationError;
 pub use fit::{Fit, FitStart, fit};
+pub use force_readings::{ForceOnTheWay, LoadCell, ObservedForce};
 pub use measured_boundary::{Boundary, CUT_PART};
 pub use noise::estimate_noise_sd_mm;
-pub use observed::{Observed, ObservedForce, ObservedStep, Placing, View};
+pub use observed::{Observed, ObservedStep, Placing, View};
 pub use options::{Bulk, FitOptions, Held};
 pub use outcome::{Calibration, Estimate, MeshComparison};
 pub use prediction::SolverWork;
-pub use problem::{CalibrationProblem, RecordingFit};
+pub use problem::CalibrationProblem;
 pub use profile::{Profile, bulk_lower_bound_kpa, profile};
+pub use recording_fit::RecordingFit;
 pub use result::{
     CalibrationResult, DiscretisationResult, ObjectiveResult, ParameterResult, RatioResult, StepResult,
     ValueWithInterval, rms_misfit_mm,

@@ -2,26 +2,19 @@
 //! scan saw the sample.
 
 use super::error::CalibrationError;
+use super::force_readings::{ForceOnTheWay, LoadCell, ObservedForce, read_on_the_way};
 use super::noise::estimate_noise_sd_mm;
 use super::outliers::{lost_voxels, outlying_voxels};
 use crate::fem::{VectorField, turned_by};
 use crate::mesh::{BlockShape, Mesh, half_extents_mm};
 use crate::recording::{Filter, Recording};
+use crate::sensitivity::Protocol;
 use crate::specimen::Specimen;
 use crate::voxel::{HammingFilter, Sampling, VoxelGrid, VoxelMask, VoxelOperator};
 
 /// Least filled part of a voxel that is compared: the average over a sliver is that of a place on the wall, where the
 /// made sample may differ from the drawing.
 const LEAST_FRACTION: f64 = 0.3;
-
-/// A force with its uncertainty.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ObservedForce {
-    /// All samples together, N.
-    pub value_n: f64,
-    /// Standard deviation, N.
-    pub sd_n: f64,
-}
 
 /// One drive of an [`Observed`] recording.
 #[derive(Clone, Debug)]
@@ -46,6 +39,10 @@ pub struct Observed {
     pub mask: VoxelMask,
     /// One per drive.
     pub steps: Vec<ObservedStep>,
+    /// Forces read at other drives, where nothing was scanned.
+    pub on_the_way: Vec<ForceOnTheWay>,
+    /// What is unknown of the load cell.
+    pub load_cell: LoadCell,
     /// Noise of a value as given or estimated, per component, mm.
     pub noise_sd_mm: [f64; 3],
     /// Whether the noise was estimated because the recording does not state it.
@@ -110,9 +107,37 @@ impl Observed {
             specimen,
             mask,
             steps,
+            on_the_way: Vec::new(),
+            load_cell: LoadCell::default(),
             noise_sd_mm,
             flags,
         })
+    }
+
+    /// With the forces that `recording`, which this is, has in its load curve at the drives of `protocol`, and a load
+    /// cell as unknown as it says. Forces without a standard deviation get `force_sd_n`.
+    ///
+    /// # Errors
+    /// [`CalibrationError::NoForceReading`].
+    pub fn with_protocol(
+        self,
+        recording: &Recording,
+        protocol: &Protocol,
+        force_sd_n: f64,
+    ) -> Result<Observed, CalibrationError> {
+        let on_the_way = read_on_the_way(recording, protocol, force_sd_n)?;
+        Ok(Observed { on_the_way, load_cell: LoadCell::of_protocol(protocol), ..self })
+    }
+
+    /// Drives of the scans, then those of the forces read on the way, mm.
+    pub(super) fn all_drives_mm(&self) -> Vec<f64> {
+        let scanned = self.steps.iter().map(|s| s.drive_mm);
+        scanned.chain(self.on_the_way.iter().map(|r| r.drive_mm)).collect()
+    }
+
+    /// Forces compared.
+    pub(super) fn num_forces(&self) -> usize {
+        self.steps.iter().filter(|s| s.force.is_some()).count() + self.on_the_way.len()
     }
 
     /// The same recording with other steps.
@@ -341,7 +366,7 @@ mod tests {
     #[test]
     fn shifted_voxels_see_what_lies_there() {
         let specimen = block();
-        let (_, _, synthetic) = same_mesh(&truth());
+        let (_, synthetic) = same_mesh(&truth());
         let recording = synthetic.recording("shift", &specimen, synthetic.noiseless(), Filter::None).unwrap();
         let observed = Observed::new(&recording, 0.01).unwrap();
         let mesh = crate::mesh::mesh_specimen(&specimen, &coarse(&specimen)).unwrap();

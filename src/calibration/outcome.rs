@@ -3,8 +3,8 @@
 use super::allowance::Allowance;
 use super::contours::Contour;
 use super::prediction::SolverWork;
-use super::problem::RecordingFit;
 use super::profile::Profile;
+use super::recording_fit::RecordingFit;
 use super::terms::TermSelection;
 use crate::material::{Ogden, Parameter};
 

@@ -2,11 +2,10 @@
 
 use super::error::CalibrationError;
 use super::observed::View;
-use super::options::Bulk;
 use crate::fem::{Equilibrium, ForwardModel, SolveError, SolveOptions};
-use crate::material::{Ogden, Parameter};
-use crate::sensitivity::{FisherInformation, ScanSettings};
+use crate::material::Ogden;
 use crate::voxel::VoxelOperator;
+use utoipa::ToSchema;
 
 /// A held parameter counts in the information as known to this relative standard deviation: exact to its square.
 pub(super) const HELD_LOG_SD: f64 = 1e-6;
@@ -23,6 +22,15 @@ impl Averages for VoxelOperator {
     }
 }
 
+/// Of a sample that is not scanned: nothing is seen of it.
+pub(super) struct Unseen;
+
+impl Averages for Unseen {
+    fn averages(&self, _: &[[f64; 3]]) -> Result<Vec<[f64; 3]>, CalibrationError> {
+        Ok(Vec::new())
+    }
+}
+
 impl Averages for View {
     fn averages(&self, field: &[[f64; 3]]) -> Result<Vec<[f64; 3]>, CalibrationError> {
         self.average(field)
@@ -30,7 +38,7 @@ impl Averages for View {
 }
 
 /// What solving took.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SolverWork {
     /// Equilibria found.
@@ -54,6 +62,10 @@ impl SolverWork {
 pub(super) struct Prediction {
     pub(super) material: Ogden,
     pub(super) states: Vec<Equilibrium>,
+    /// Equilibria of the kinds of samples that were joined to it.
+    joined: Vec<Vec<Equilibrium>>,
+    /// Force per drive, all samples together, N.
+    pub(super) forces_n: Vec<f64>,
     /// Voxel displacements per drive, mm.
     pub(super) displacements: Vec<Vec<[f64; 3]>>,
     /// ∂ū/∂ξ per drive and parameter, mm per unit.
@@ -78,6 +90,8 @@ impl Prediction {
         let mut prediction = Prediction {
             material: material.clone(),
             states: Vec::with_capacity(drives_mm.len()),
+            joined: Vec::new(),
+            forces_n: Vec::with_capacity(drives_mm.len()),
             displacements: Vec::new(),
             sensitivities: Vec::new(),
             force_sensitivities: Vec::new(),
@@ -106,34 +120,39 @@ impl Prediction {
                 .sensitivities
                 .push(sensitivities.iter().map(|s| seen.averages(&s.displacement)).collect::<Result<Vec<_>, _>>()?);
             prediction.force_sensitivities.push(sensitivities.iter().map(|s| s.force_n).collect());
+            prediction.forces_n.push(state.force_n);
             prediction.states.push(state);
         }
         prediction.work.factorisations = model.num_factorisations() - before;
         Ok(prediction)
     }
 
+    /// Joins what another kind of sample of the same test does at the same drives: its voxels stand behind those that
+    /// are there, its force adds.
+    pub(super) fn join(&mut self, other: Prediction) {
+        for (own, theirs) in self.displacements.iter_mut().zip(other.displacements) {
+            own.extend(theirs);
+        }
+        let fields = self.sensitivities.iter_mut().flatten().zip(other.sensitivities.into_iter().flatten());
+        fields.for_each(|(own, theirs)| own.extend(theirs));
+        let forces = self.force_sensitivities.iter_mut().flatten().zip(other.force_sensitivities.iter().flatten());
+        forces.for_each(|(own, theirs)| *own += theirs);
+        self.forces_n.iter_mut().zip(&other.forces_n).for_each(|(own, theirs)| *own += theirs);
+        self.work.add(other.work);
+        self.joined.push(other.states);
+        self.joined.extend(other.joined);
+    }
+
+    /// Equilibria of the kind of sample with this index, in the order in which they were joined; the first is 0.
+    pub(super) fn states_of(&self, index: usize) -> Option<&[Equilibrium]> {
+        match index {
+            0 => Some(&self.states),
+            other => self.joined.get(other - 1).map(|s| &s[..]),
+        }
+    }
+
     /// Per drive: ∂ū/∂ξ of every parameter, and ∂F/∂ξ.
     pub(super) fn derivatives(&self) -> impl Iterator<Item = (&Vec<Vec<[f64; 3]>>, &Vec<f64>)> {
         self.sensitivities.iter().zip(&self.force_sensitivities)
-    }
-
-    /// Information of all drives with the voxel weights `weights` (one list per drive), and of the prior.
-    pub(super) fn information(
-        &self,
-        scan: &ScanSettings,
-        weights: &[Vec<f64>],
-        bulk: Bulk,
-    ) -> Result<FisherInformation, CalibrationError> {
-        let mut information = FisherInformation::none(&self.material);
-        for ((fields, forces), weights) in self.sensitivities.iter().zip(&self.force_sensitivities).zip(weights) {
-            let of_drive = FisherInformation::of_drive(&self.material, fields, weights, forces, &scan.noise())?;
-            information.add(&of_drive)?;
-        }
-        match bulk {
-            Bulk::Free => {}
-            Bulk::LogPrior { log_sd, .. } => information.add_log_prior(Parameter::Kappa, log_sd)?,
-            Bulk::Held => information.add_log_prior(Parameter::Kappa, HELD_LOG_SD)?,
-        }
-        Ok(information)
     }
 }

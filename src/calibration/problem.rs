@@ -3,17 +3,17 @@
 use super::descend::{Descent, Start, descend};
 use super::error::CalibrationError;
 use super::observed::{Observed, View};
-use super::options::{Bulk, FitOptions, Held, check_options};
-use super::prediction::{Prediction, SolverWork};
+use super::options::{Bulk, FitOptions, check_options};
+use super::prediction::{Prediction, SolverWork, Unseen};
+use super::recording_fit::RecordingFit;
 use super::step::Constraints;
 use super::stress_path::StressPath;
 use super::system::NormalSystem;
 use super::target::{Objective, Target};
-use crate::fem::{Departures, Equilibrium, ForwardModel, SolveOptions};
+use crate::fem::{Departures, ForwardModel, SolveOptions};
 use crate::kinematics::IDENTITY;
-use crate::material::{Ogden, Parameter};
+use crate::material::Ogden;
 use crate::mesh::MeshOptions;
-use crate::sensitivity::{Covariance, FisherInformation};
 use crate::specimen::Specimen;
 use nalgebra::DMatrix;
 
@@ -23,94 +23,12 @@ const MISFIT_LIMIT: f64 = 4.0;
 /// Recordings with a model of each.
 pub struct CalibrationProblem<'a> {
     observed: &'a [Observed],
+    /// Of the sample that was scanned, the first that each recording's specimen lists.
     models: Vec<ForwardModel>,
+    /// Of the other samples that share each recording's load cell, where it has forces.
+    others: Vec<Vec<ForwardModel>>,
     views: Vec<View>,
     objective: Objective,
-}
-
-/// A material fitted to recordings.
-#[derive(Clone, Debug)]
-pub struct RecordingFit {
-    /// The estimate.
-    pub material: Ogden,
-    /// Fisher information at the estimate with the objective's weights, prior included.
-    pub information: FisherInformation,
-    /// Covariance of the estimate under the noise: the inverse information, or the sandwich where weights and noise
-    /// differ.
-    pub covariance: Covariance,
-    /// χ²: values by their variances, filtered ones once per acquired voxel.
-    pub chi2: f64,
-    /// χ² over its expectation: 1 where model and noise are right.
-    pub chi2_per_datum: f64,
-    /// What the covariance is to be multiplied with because the misfit is more than noise; 1 where it is not.
-    pub misfit_factor: f64,
-    /// √(objective − its expectation) where the misfit is more than noise, else zero: the size of the structured misfit
-    /// in units of the noise. An error of that size and of the shape of a parameter's sensitivity would shift the
-    /// parameter by this times its standard deviation (Cauchy–Schwarz).
-    pub structured_misfit: f64,
-    /// Numbers compared.
-    pub num_data: usize,
-    /// The paper's ℓ_u, mean over drives.
-    pub loss_u: f64,
-    /// The paper's ℓ_F, mean over drives with a force; none without forces.
-    pub loss_f: Option<f64>,
-    /// Whether the optimum was reached within the iterations allowed.
-    pub is_converged: bool,
-    /// Iterations made, rejected ones included.
-    pub iterations: usize,
-    /// Distance from the optimum of the linear model, in standard deviations.
-    pub distance: f64,
-    /// Limits at which the estimate stands, in words.
-    pub reached_limits: Vec<String>,
-    /// The objective at the start and after every accepted step.
-    pub history: Vec<f64>,
-    /// What the fit took, its start included.
-    pub work: SolverWork,
-    /// Parameters that were not fitted.
-    pub held: Held,
-    pub(super) predictions: Vec<Prediction>,
-}
-
-impl RecordingFit {
-    /// Standard deviation of a parameter from the noise, widened where the misfit is more than noise; none where the
-    /// data do not determine it or it was held.
-    pub fn sd(&self, parameter: Parameter) -> Option<f64> {
-        let index = self.information.index_of(parameter).ok()?;
-        if self.held.contains(index) {
-            return None;
-        }
-        Some(self.covariance.sd(index)? * self.misfit_factor.sqrt())
-    }
-
-    /// The largest shift of a parameter that a structured error as large as the structured misfit could make.
-    pub fn possible_shift(&self, parameter: Parameter) -> Option<f64> {
-        let index = self.information.index_of(parameter).ok()?;
-        let plain = self.information.covariance().sd(index).filter(|_| !self.held.contains(index))?;
-        Some(plain * self.structured_misfit)
-    }
-
-    /// ½ Σ μᵢαᵢ, kPa, and its standard deviation by the delta method.
-    pub fn initial_shear_modulus(&self) -> (f64, Option<f64>) {
-        let terms = &self.material.terms;
-        let value = self.material.initial_shear_modulus_kpa();
-        let mut gradient = vec![0.0];
-        for term in terms {
-            gradient.extend([0.5 * term.alpha, 0.5 * term.mu_kpa]);
-        }
-        let is_known = !self.held.contains(1);
-        let sd = self.covariance.sd_along(&gradient).filter(|_| is_known);
-        (value, sd.map(|sd| sd * self.misfit_factor.sqrt()))
-    }
-
-    /// Equilibria of one recording, one per drive.
-    pub fn states(&self, recording: usize) -> &[Equilibrium] {
-        &self.predictions[recording].states
-    }
-
-    /// What the estimate predicts of a drive: displacements of the compared voxels, mm.
-    pub fn predicted(&self, recording: usize, step: usize) -> &[[f64; 3]] {
-        &self.predictions[recording].displacements[step]
-    }
 }
 
 impl<'a> CalibrationProblem<'a> {
@@ -124,12 +42,18 @@ impl<'a> CalibrationProblem<'a> {
         mesh: &dyn Fn(&Specimen) -> MeshOptions,
         objective: Objective,
     ) -> Result<CalibrationProblem<'a>, CalibrationError> {
-        let mut problem = CalibrationProblem { observed, models: Vec::new(), views: Vec::new(), objective };
+        let (models, others, views) = (Vec::new(), Vec::new(), Vec::new());
+        let mut problem = CalibrationProblem { observed, models, others, views, objective };
         for recording in observed {
-            let specimen = &recording.specimen;
+            let mut samples = recording.specimen.samples();
+            // Others are felt in the force alone.
+            let others = if recording.num_forces() > 0 { samples.split_off(1) } else { Vec::new() };
+            let specimen = &samples[0];
             let model = ForwardModel::of_specimen(specimen, &mesh(specimen))?;
             problem.views.push(recording.view(specimen, model.mesh())?);
             problem.models.push(with_boundary(model, recording)?);
+            let of_other = |sample: &Specimen| ForwardModel::of_specimen(sample, &mesh(sample));
+            problem.others.push(others.iter().map(of_other).collect::<Result<_, _>>()?);
         }
         Ok(problem)
     }
@@ -146,8 +70,8 @@ impl<'a> CalibrationProblem<'a> {
         for (new, old) in observed.iter().zip(self.observed) {
             length("list of compared voxels", new.mask.num_voxels(), old.mask.num_voxels())?;
         }
-        let CalibrationProblem { models, views, objective, .. } = self;
-        Ok(CalibrationProblem { observed, models, views, objective })
+        let CalibrationProblem { models, others, views, objective, .. } = self;
+        Ok(CalibrationProblem { observed, models, others, views, objective })
     }
 
     /// The recordings.
@@ -157,7 +81,20 @@ impl<'a> CalibrationProblem<'a> {
 
     /// Whether any step has a force. Without one only ratios of moduli are determined.
     pub fn has_force(&self) -> bool {
-        self.observed.iter().flat_map(|o| &o.steps).any(|s| s.force.is_some())
+        self.observed.iter().any(|o| o.num_forces() > 0)
+    }
+
+    /// An error where a recording's force is that of unlike samples, of which `what` is not supported.
+    ///
+    /// # Errors
+    /// [`CalibrationError::UnlikeSamples`].
+    pub fn refuse_unlike_samples(&self, what: &'static str) -> Result<(), CalibrationError> {
+        if self.others.iter().all(Vec::is_empty) { Ok(()) } else { Err(CalibrationError::UnlikeSamples { what }) }
+    }
+
+    /// The model of each recording's specimen and how the scan sees it, in the order of the recordings.
+    pub fn models_and_views(&mut self) -> impl Iterator<Item = (&mut ForwardModel, &View)> {
+        self.models.iter_mut().zip(&self.views)
     }
 
     /// Free displacement unknowns of each model.
@@ -184,7 +121,8 @@ impl<'a> CalibrationProblem<'a> {
         solve: &SolveOptions,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Vec<Prediction>, CalibrationError> {
-        predict(self.observed, &mut self.models, &self.views, material, near, solve, is_cancelled)
+        let mut models = Models { scanned: &mut self.models, others: &mut self.others, views: &self.views };
+        models.predict(self.observed, material, near, solve, is_cancelled)
     }
 
     /// Fits from `start`; `near` is an earlier fit of this problem whose equilibria are used as first guesses. A fit
@@ -227,15 +165,16 @@ impl<'a> CalibrationProblem<'a> {
         let constraints = Constraints::new(start, options)?;
         let mut work = SolverWork::default();
         first.iter().for_each(|p| work.add(p.work));
-        let CalibrationProblem { observed, models, views, objective } = self;
+        let CalibrationProblem { observed, models, others, views, objective } = self;
         let path = first
             .iter()
             .zip(models.iter())
             .map(|(prediction, model)| StressPath::new(model, start, &prediction.states))
             .fold(StressPath::default(), StressPath::join);
         let targets = Target::of_recordings(observed, views, *objective)?;
+        let mut models = Models { scanned: models, others, views };
         let mut trial = |material: &Ogden, near: &[Prediction]| {
-            predict(observed, models, views, material, Some(near), &options.solve, is_cancelled)
+            models.predict(observed, material, Some(near), &options.solve, is_cancelled)
         };
         let evaluate = |p: &[Prediction]| NormalSystem::new(p, &targets, options.bulk, options.held);
         let (expected, _) = sum_of_expectations(&targets);
@@ -267,7 +206,7 @@ impl<'a> CalibrationProblem<'a> {
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Vec<Vec<f64>>, CalibrationError> {
         let found = self.predict(material, None, &SolveOptions::default(), is_cancelled)?;
-        Ok(found.iter().map(|p| p.states.iter().map(|s| s.force_n).collect()).collect())
+        Ok(found.into_iter().map(|p| p.forces_n).collect())
     }
 
     /// The isochoric principal stretches that a fit's voxels visit, all recordings and drives together.
@@ -276,8 +215,8 @@ impl<'a> CalibrationProblem<'a> {
     /// [`CalibrationError::Voxel`].
     pub fn visited_stretches(&self, fit: &RecordingFit) -> Result<Vec<[f64; 3]>, CalibrationError> {
         let mut all = Vec::new();
-        for (view, prediction) in self.views.iter().zip(&fit.predictions) {
-            for state in &prediction.states {
+        for ((view, recording), prediction) in self.views.iter().zip(self.observed).zip(&fit.predictions) {
+            for state in prediction.states.iter().take(recording.steps.len()) {
                 for slope in view.gradients(&state.displacement)? {
                     let f = [0, 1, 2].map(|i| [0, 1, 2].map(|j| IDENTITY[i][j] + slope[i][j]));
                     let seen = crate::kinematics::decompose(&f);
@@ -295,6 +234,10 @@ impl<'a> CalibrationProblem<'a> {
 fn with_boundary(model: ForwardModel, recording: &Observed) -> Result<ForwardModel, CalibrationError> {
     match &recording.steps[..] {
         _ if !recording.has_measured_faces() => Ok(model),
+        _ if !recording.specimen.other_samples.is_empty() => {
+            let reason = "other samples share the load cell, and nothing was measured at their boundaries";
+            Err(CalibrationError::NoMeasuredBoundary { reason })
+        }
         [step] => Ok(model.departed(&Departures { faces_per_mm: step.faces_per_mm.clone(), ..Departures::default() })),
         _ => {
             let reason = "several steps share a model; take the steps apart";
@@ -303,22 +246,39 @@ fn with_boundary(model: ForwardModel, recording: &Observed) -> Result<ForwardMod
     }
 }
 
-fn predict(
-    observed: &[Observed],
-    models: &mut [ForwardModel],
-    views: &[View],
-    material: &Ogden,
-    near: Option<&[Prediction]>,
-    solve: &SolveOptions,
-    is_cancelled: &dyn Fn() -> bool,
-) -> Result<Vec<Prediction>, CalibrationError> {
-    let mut predictions = Vec::with_capacity(observed.len());
-    for (index, ((recording, model), view)) in observed.iter().zip(models).zip(views).enumerate() {
-        let drives: Vec<f64> = recording.steps.iter().map(|s| s.drive_mm).collect();
-        let near = near.and_then(|n| n.get(index)).map(|p| &p.states[..]);
-        predictions.push(Prediction::new(model, view, &drives, material, near, solve, is_cancelled)?);
+/// The models of all recordings.
+struct Models<'m> {
+    scanned: &'m mut [ForwardModel],
+    others: &'m mut [Vec<ForwardModel>],
+    views: &'m [View],
+}
+
+impl Models<'_> {
+    /// What `material` predicts of every recording.
+    fn predict(
+        &mut self,
+        observed: &[Observed],
+        material: &Ogden,
+        near: Option<&[Prediction]>,
+        solve: &SolveOptions,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Vec<Prediction>, CalibrationError> {
+        let mut predictions = Vec::with_capacity(observed.len());
+        for (index, recording) in observed.iter().enumerate() {
+            let drives = recording.all_drives_mm();
+            let near = near.and_then(|n| n.get(index));
+            let view = &self.views[index];
+            let states = near.and_then(|n| n.states_of(0));
+            let model = &mut self.scanned[index];
+            let mut prediction = Prediction::new(model, view, &drives, material, states, solve, is_cancelled)?;
+            for (place, other) in self.others[index].iter_mut().enumerate() {
+                let states = near.and_then(|n| n.states_of(place + 1));
+                prediction.join(Prediction::new(other, &Unseen, &drives, material, states, solve, is_cancelled)?);
+            }
+            predictions.push(prediction);
+        }
+        Ok(predictions)
     }
-    Ok(predictions)
 }
 
 fn finished(
@@ -356,7 +316,7 @@ fn finished(
     let prior = f64::from(u8::from(matches!(options.bulk, Bulk::LogPrior { .. })));
     let (expected, num_data) = expected;
     let chi2_per_datum = chi2 / (expected + prior - absorbed).max(1.0);
-    let num_forces = observed.iter().flat_map(|o| &o.steps).filter(|s| s.force.is_some()).count();
+    let num_forces: usize = observed.iter().map(Observed::num_forces).sum();
     // Values that share noise make χ² scatter more.
     let independent = num_data as f64 / observed.iter().map(Observed::noise_correlation).fold(1.0, f64::max);
     let is_noise = chi2_per_datum < 1.0 + MISFIT_LIMIT * (2.0 / independent).sqrt();
@@ -389,3 +349,7 @@ fn finished(
 fn sum_of_expectations(targets: &[Target]) -> (f64, usize) {
     targets.iter().map(Target::expectation).fold((0.0, 0), |(a, n), (b, m)| (a + b, n + m))
 }
+
+#[cfg(test)]
+#[path = "problem_tests.rs"]
+mod tests;

@@ -2,9 +2,11 @@
 
 use super::error::CalibrationError;
 use super::options::FitOptions;
-use super::problem::{CalibrationProblem, RecordingFit};
+use super::problem::CalibrationProblem;
+use super::recording_fit::RecordingFit;
 use crate::material::Parameter;
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// Distances from the optimum, in standard deviations.
 const PLACES: [f64; 6] = [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0];
@@ -16,7 +18,7 @@ pub const ONE_SIDED_95: f64 = 1.644_854;
 const MAX_HALVINGS: usize = 8;
 
 /// The profile of one parameter.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Profile {
     /// `kappa`, `mu_1`, …

@@ -9,9 +9,10 @@ use super::target::{Objective, PAPER_BETA};
 use super::terms::TermSelection;
 use crate::material::Ogden;
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// `calibration/1`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CalibrationResult {
     /// Always `calibration/1`.
@@ -61,7 +62,8 @@ pub struct CalibrationResult {
 }
 
 /// One parameter.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = CalibratedParameter)]
 #[serde(deny_unknown_fields)]
 pub struct ParameterResult {
     /// `kappa` (kPa), `mu_1` (kPa), `alpha_1`, …
@@ -84,7 +86,7 @@ pub struct ParameterResult {
 }
 
 /// A value with its interval.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ValueWithInterval {
     /// The value.
@@ -94,7 +96,7 @@ pub struct ValueWithInterval {
 }
 
 /// A ratio that displacements alone determine.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RatioResult {
     /// Such as `kappa/mu_1`.
@@ -106,7 +108,7 @@ pub struct RatioResult {
 }
 
 /// Both objectives.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ObjectiveResult {
     /// `weighted` or `paper`.
@@ -122,7 +124,7 @@ pub struct ObjectiveResult {
 }
 
 /// Two meshes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DiscretisationResult {
     /// Free displacement unknowns of the coarser and the finer mesh.
@@ -136,7 +138,7 @@ pub struct DiscretisationResult {
 }
 
 /// One drive of one recording.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StepResult {
     /// The recording.
@@ -203,7 +205,7 @@ impl CalibrationResult {
                     num_voxels,
                     rms_mm,
                     force_n: step.force.map(|f| f.value_n),
-                    model_force_n: calibration.has_force.then(|| fit.states(r)[s].force_n),
+                    model_force_n: calibration.has_force.then(|| fit.force_n(r, s)),
                 });
             }
         }

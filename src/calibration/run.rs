@@ -6,7 +6,8 @@ use super::observed::Observed;
 use super::options::FitOptions;
 use super::outcome::MeshComparison;
 use super::prediction::SolverWork;
-use super::problem::{CalibrationProblem, RecordingFit};
+use super::problem::CalibrationProblem;
+use super::recording_fit::RecordingFit;
 use super::starts::{first_starts, further_starts};
 use super::target::{Objective, PAPER_BETA};
 use super::terms::{TermRow, compare, degeneracies, is_kept};
@@ -90,8 +91,9 @@ impl<'a> Run<'a> {
         let fit = problem.fit(start, near, &self.fit_options, self.is_cancelled)?;
         self.work.add(fit.work);
         (self.on_stage)(&format!(
-            "  {} terms from α {:?}: χ² {:.1} in {} iterations",
+            "  {} term{} from α {:?}: χ² {:.1} in {} iterations",
             start.terms.len(),
+            if start.terms.len() == 1 { "" } else { "s" },
             start.terms.iter().map(|t| (100.0 * t.alpha).round() / 100.0).collect::<Vec<_>>(),
             fit.chi2,
             fit.iterations

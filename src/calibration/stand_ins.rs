@@ -14,7 +14,7 @@ use crate::fem::SolveOptions;
 use crate::material::Ogden;
 use crate::mesh::MeshOptions;
 use crate::recording::Filter;
-use crate::sensitivity::ScanSettings;
+use crate::sensitivity::{Protocol, ScanSettings};
 use crate::specimen::Specimen;
 
 /// Drives of the published fits, mm.
@@ -33,6 +33,19 @@ pub struct StandInOptions {
     pub seed: u64,
     /// What is minimised.
     pub objective: Objective,
+}
+
+impl Default for StandInOptions {
+    /// The paper's scan and objective, on elements of 1.4 times the standard size with a truth on finer ones.
+    fn default() -> Self {
+        StandInOptions {
+            truth_factor: 0.75 * 1.4,
+            fit_factor: 1.4,
+            scan: ScanSettings::default(),
+            seed: 1,
+            objective: Objective::Paper { beta: PAPER_BETA },
+        }
+    }
 }
 
 /// One stand-in.
@@ -65,7 +78,8 @@ pub fn stand_ins(
         for drive in STAND_IN_DRIVES_MM {
             on_stage(&format!("{drive} mm, {filter:?}"));
             let driven = Specimen { drive_mm: vec![drive], ..specimen.clone() };
-            let synthetic = SyntheticScan::new(&driven, truth, &options.scan, &truth_mesh, &solve, is_cancelled)?;
+            let (scan, plain) = (&options.scan, Protocol::default());
+            let synthetic = SyntheticScan::new(&driven, truth, scan, &plain, &truth_mesh, &solve, is_cancelled)?;
             let recording =
                 synthetic.recording("stand-in", &driven, &synthetic.draw(options.seed, drive.to_bits()), filter)?;
             let observed = [Observed::new(&recording, options.scan.force_sd_n)?];

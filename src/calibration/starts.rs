@@ -4,11 +4,12 @@ use super::error::CalibrationError;
 use super::observed::Observed;
 use super::options::{FitOptions, Held};
 use super::prediction::Prediction;
-use super::problem::{CalibrationProblem, RecordingFit};
+use super::problem::CalibrationProblem;
+use super::recording_fit::RecordingFit;
 use super::system::raw_sums;
 use super::target::Target;
 use crate::material::{MAX_TERMS, Ogden, OgdenTerm};
-use crate::specimen::TestKind;
+use crate::specimen::{Specimen, TestKind};
 use nalgebra::DVector;
 
 /// Shear modulus at the start where no force tells it, kPa. Displacements do not depend on it.
@@ -29,15 +30,18 @@ const FIRST_SHARE: [f64; 2] = [2e-3, 0.3];
 /// shear, 3 G A d / l in tension.
 fn shear_modulus_kpa(observed: &[Observed]) -> f64 {
     for recording in observed {
-        let specimen = &recording.specimen;
-        let block = &specimen.block;
         for step in &recording.steps {
             let Some(force) = step.force else { continue };
-            let (area, strain) = match specimen.test {
-                TestKind::DoubleLapShear => (block.length_mm * block.width_mm, step.drive_mm / block.thickness_mm),
-                TestKind::Uniaxial => (block.thickness_mm * block.width_mm, 3.0 * step.drive_mm / block.length_mm),
+            // Newton per kilopascal: areas in mm².
+            let of_sample = |specimen: &Specimen| {
+                let block = &specimen.block;
+                let (area, strain) = match specimen.test {
+                    TestKind::DoubleLapShear => (block.length_mm * block.width_mm, step.drive_mm / block.thickness_mm),
+                    TestKind::Uniaxial => (block.thickness_mm * block.width_mm, 3.0 * step.drive_mm / block.length_mm),
+                };
+                1e-3 * area * strain * f64::from(specimen.samples_in_parallel)
             };
-            let modulus = 1e3 * force.value_n / (area * strain * f64::from(specimen.samples_in_parallel));
+            let modulus = force.value_n / recording.specimen.samples().iter().map(of_sample).sum::<f64>();
             if modulus.is_finite() && modulus > 0.0 {
                 return modulus;
             }
@@ -150,8 +154,11 @@ impl Candidates {
     /// The decrease of the objective that a further term promises where the data are what `other`, a fit on another
     /// mesh, predicts: a term that the meshes' difference asks for.
     pub(super) fn promise_of_mesh(&self, targets: &[Target], other: &RecordingFit) -> f64 {
-        let moved: Vec<Target> =
-            targets.iter().zip(&other.predictions).map(|(t, p)| t.with_measured(&p.displacements, &p.states)).collect();
+        let moved: Vec<Target> = targets
+            .iter()
+            .zip(&other.predictions)
+            .map(|(t, p)| t.with_measured(&p.displacements, &p.forces_n))
+            .collect();
         self.ranked(&moved, 1).first().map_or(0.0, |(gain, _)| *gain)
     }
 }

@@ -16,8 +16,9 @@ use super::calibrate::MESH_RATIO;
 use super::calibrate_options::CalibrateOptions;
 use super::error::CalibrationError;
 use super::observed::Observed;
-use super::problem::{CalibrationProblem, RecordingFit};
+use super::problem::CalibrationProblem;
 use super::profile::TWO_SIDED_95;
+use super::recording_fit::RecordingFit;
 use super::run::{Run, with_falling_exponents};
 use super::starts::Candidates;
 use super::synthetic::SyntheticScan;
@@ -25,7 +26,7 @@ use super::terms::{Rule, SETTLED, choose, compare};
 use crate::material::Ogden;
 use crate::mesh::MeshOptions;
 use crate::recording::Filter;
-use crate::sensitivity::ScanSettings;
+use crate::sensitivity::{Protocol, ScanSettings};
 use crate::specimen::Specimen;
 use rayon::prelude::*;
 use std::fmt;
@@ -181,7 +182,15 @@ pub fn study(
 ) -> Result<Study, CalibrationError> {
     let stop = || is_cancelled();
     let solve = &case.options.fit.solve;
-    let synthetic = SyntheticScan::new(&case.specimen, &case.truth, &case.scan, &case.truth_mesh, solve, &stop)?;
+    let synthetic = SyntheticScan::new(
+        &case.specimen,
+        &case.truth,
+        &case.scan,
+        &Protocol::default(),
+        &case.truth_mesh,
+        solve,
+        &stop,
+    )?;
     let observe = |data: &super::Measurement| -> Result<[Observed; 1], CalibrationError> {
         let recording = synthetic.recording("draw", &case.specimen, data, case.filter)?;
         Ok([Observed::new(&recording, case.scan.force_sd_n)?])

@@ -1,11 +1,12 @@
 //! Synthetic measurements: the truth solved on a mesh of its own, averaged over the scan's voxels, with noise added.
 
 use super::error::CalibrationError;
+use super::force_readings::{ForceOnTheWay, LoadCell, ObservedForce};
 use crate::fem::{ForwardModel, SolveOptions};
 use crate::material::Ogden;
 use crate::mesh::MeshOptions;
-use crate::recording::{Filter, RecordedStep, Recording};
-use crate::sensitivity::ScanSettings;
+use crate::recording::{Filter, LoadCurve, RecordedStep, Recording};
+use crate::sensitivity::{Protocol, ScanSettings};
 use crate::specimen::Specimen;
 use crate::voxel::{HammingFilter, Sampling, VoxelMask, VoxelOperator};
 use rand::SeedableRng;
@@ -21,18 +22,34 @@ pub struct Measurement {
     pub displacements: Vec<Vec<[f64; 3]>>,
     /// Forces, N.
     pub forces_n: Vec<f64>,
-    /// Weight of each voxel (see [`crate::sensitivity::PartialVoxels`]); its noise variance is σ²/weight.
+    /// Weight of each voxel (see [`crate::sensitivity::PartialVoxels`]); its noise variance is σ²/weight. A voxel of
+    /// equal blocks scanned together is their mean, and weighs as many times as much.
     pub weights: Vec<f64>,
+    /// The part of a scan's time that each drive got: its weights are as much smaller. Whole scans where it is empty.
+    pub shares: Vec<f64>,
+    /// Forces read at other drives, where nothing was scanned.
+    pub on_the_way: Vec<ForceOnTheWay>,
+    /// What is unknown of the load cell.
+    pub load_cell: LoadCell,
 }
 
 impl Measurement {
+    /// Drives of the scans, then those of the forces read on the way, mm.
+    pub fn all_drives_mm(&self) -> Vec<f64> {
+        self.drives_mm.iter().copied().chain(self.on_the_way.iter().map(|r| r.drive_mm)).collect()
+    }
+
     /// Weights of the voxels at one drive: zero where a component is missing (not finite).
     pub(super) fn weights_of(&self, drive_index: usize) -> Vec<f64> {
         self.displacements[drive_index]
             .iter()
             .zip(&self.weights)
-            .map(|(u, w)| if u.iter().all(|x| x.is_finite()) { *w } else { 0.0 })
+            .map(|(u, w)| if u.iter().all(|x| x.is_finite()) { *w * self.share(drive_index) } else { 0.0 })
             .collect()
+    }
+
+    fn share(&self, drive_index: usize) -> f64 {
+        self.shares.get(drive_index).copied().unwrap_or(1.0)
     }
 
     /// Checks lengths and numbers. Missing voxels are allowed, missing forces are not.
@@ -53,6 +70,10 @@ impl Measurement {
         for &w in &self.weights {
             value("a voxel weight", w, w.is_finite() && w >= 0.0, "finite and not negative")?;
         }
+        for reading in &self.on_the_way {
+            let force = reading.force.value_n;
+            value("a force (N) on the way", force, force.is_finite(), "finite")?;
+        }
         for (d, field) in self.displacements.iter().enumerate() {
             length("displacement field", field.len(), num_voxels)?;
             let force = self.forces_n[d];
@@ -67,8 +88,10 @@ impl Measurement {
 /// The noiseless scan of a true material, from which noisy measurements are drawn.
 #[derive(Clone, Debug)]
 pub struct SyntheticScan {
-    /// Voxels measured.
+    /// Voxels measured of a sample of the first kind.
     pub mask: VoxelMask,
+    /// Those of the other kinds; `None` where none is scanned.
+    other_masks: Vec<Option<VoxelMask>>,
     /// Grid and noise.
     pub scan: ScanSettings,
     truth: Measurement,
@@ -76,7 +99,8 @@ pub struct SyntheticScan {
 
 impl SyntheticScan {
     /// Solves `material` at the specimen's drives on a mesh with `mesh` settings, which should be finer than, and other
-    /// than, the one used for fitting.
+    /// than, the one used for fitting. Samples are scanned and forces read as `protocol` says, these on the way to the
+    /// largest drive; the drive's own zero is taken to be known.
     ///
     /// # Errors
     /// [`CalibrationError`].
@@ -84,23 +108,61 @@ impl SyntheticScan {
         specimen: &Specimen,
         material: &Ogden,
         scan: &ScanSettings,
+        protocol: &Protocol,
         mesh: &MeshOptions,
         solve: &SolveOptions,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<SyntheticScan, CalibrationError> {
-        let mut model = ForwardModel::of_specimen(specimen, mesh)?;
-        let mask = VoxelMask::covering(specimen, scan.voxel_mm)?;
-        let operator = VoxelOperator::new(specimen, model.mesh(), &mask, Sampling::default())?;
-        let path = model.solve_path(material, &specimen.drive_mm, solve, is_cancelled)?;
-        let displacements =
-            path.iter().map(|state| operator.average(&state.displacement)).collect::<Result<Vec<_>, _>>()?;
-        let truth = Measurement {
+        protocol.suits(specimen, specimen.drive_mm.len())?;
+        let is_scanned = |drive_mm: f64| specimen.drive_mm.iter().any(|d| Protocol::is_same_drive(*d, drive_mm));
+        let largest_mm = specimen.drive_mm.iter().copied().fold(0.0, f64::max);
+        let mut forces_mm = protocol.on_the_way_to(largest_mm).force_drives_mm();
+        forces_mm.retain(|d| !is_scanned(*d));
+        let reading =
+            |&drive_mm: &f64| ForceOnTheWay { drive_mm, force: ObservedForce { value_n: 0.0, sd_n: scan.force_sd_n } };
+        let num_drives = specimen.drive_mm.len();
+        let mut truth = Measurement {
             drives_mm: specimen.drive_mm.clone(),
-            displacements,
-            forces_n: path.iter().map(|state| state.force_n).collect(),
-            weights: scan.partial_voxels.weights(&mask),
+            displacements: vec![Vec::new(); num_drives],
+            forces_n: vec![0.0; num_drives],
+            weights: Vec::new(),
+            shares: protocol.scan_share.clone(),
+            on_the_way: forces_mm.iter().map(reading).collect(),
+            load_cell: LoadCell::of_protocol(protocol),
         };
-        Ok(SyntheticScan { mask, scan: *scan, truth })
+        let mut masks = Vec::new();
+        for (sample, count) in specimen.samples().iter().zip(specimen.num_scanned(protocol.blocks_scanned)) {
+            let mut model = ForwardModel::of_specimen(sample, &mesh.carried(specimen, sample))?;
+            let path = model.solve_path(material, &sample.drive_mm, solve, is_cancelled)?;
+            truth.forces_n.iter_mut().zip(&path).for_each(|(sum, state)| *sum += state.force_n);
+            for reading in &mut truth.on_the_way {
+                let state = model.solve(material, reading.drive_mm, None, solve, is_cancelled)?;
+                reading.force.value_n += state.force_n;
+            }
+            if count == 0 {
+                masks.push(None);
+                continue;
+            }
+            let mask = VoxelMask::covering(sample, scan.voxel_mm)?;
+            let operator = VoxelOperator::new(sample, model.mesh(), &mask, Sampling::default())?;
+            for (voxels, state) in truth.displacements.iter_mut().zip(&path) {
+                voxels.extend(operator.average(&state.displacement)?);
+            }
+            truth.weights.extend(scan.partial_voxels.weights(&mask).iter().map(|w| f64::from(count) * w));
+            masks.push(Some(mask));
+        }
+        let other_masks = masks.split_off(1);
+        // The first block is always scanned.
+        let Some(mask) = masks.pop().flatten() else {
+            let name = "the number of scanned blocks";
+            return Err(CalibrationError::InvalidValue { name, value: 0.0, requirement: "positive" });
+        };
+        Ok(SyntheticScan { mask, other_masks, scan: *scan, truth })
+    }
+
+    /// Voxels measured of each kind of sample; `None` where none is scanned.
+    pub fn masks(&self) -> Vec<Option<VoxelMask>> {
+        std::iter::once(Some(self.mask.clone())).chain(self.other_masks.iter().cloned()).collect()
     }
 
     /// The measurement without noise.
@@ -108,8 +170,8 @@ impl SyntheticScan {
         &self.truth
     }
 
-    /// `data` of this scan as a recording of `specimen`, filtered or not. After the filter the noise stated is that of
-    /// a mean of eight.
+    /// `data` of this scan as a recording of `specimen`, a specimen of one kind of sample, filtered or not. After the
+    /// filter the noise stated is that of a mean of eight.
     ///
     /// # Errors
     /// [`CalibrationError::Voxel`] where the filter has nothing to average.
@@ -148,9 +210,23 @@ impl SyntheticScan {
             steps,
             noise_sd_mm: Some(noise),
             filter,
-            load: None,
+            load: self.load_curve(data),
             notes: None,
         })
+    }
+
+    /// Rest, then all forces in the order of their drives, a second apart; none where forces were read at scans alone.
+    fn load_curve(&self, data: &Measurement) -> Option<LoadCurve> {
+        let mut readings: Vec<(f64, f64)> = data.on_the_way.iter().map(|r| (r.drive_mm, r.force.value_n)).collect();
+        if readings.is_empty() {
+            return None;
+        }
+        readings.push((0.0, 0.0));
+        readings.extend(data.drives_mm.iter().copied().zip(data.forces_n.iter().copied()));
+        readings.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let time_s = (0..readings.len()).map(|n| n as f64).collect();
+        let (drive_mm, force_n) = readings.into_iter().unzip();
+        Some(LoadCurve { time_s, drive_mm, force_n })
     }
 
     /// A standard normal number for draw `draw`, independent of the noise of all draws.
@@ -170,16 +246,24 @@ impl SyntheticScan {
             sd * x
         };
         let mut noisy = self.truth.clone();
-        for displacements in &mut noisy.displacements {
-            for (u, weight) in displacements.iter_mut().zip(&self.truth.weights) {
+        for (drive, displacements) in noisy.displacements.iter_mut().enumerate() {
+            for (u, weight) in displacements.iter_mut().zip(self.truth.weights_of(drive)) {
                 for (value, sd) in u.iter_mut().zip(self.scan.noise_sd_mm) {
                     // A voxel without weight is not measured; what stands there does not count.
-                    *value += if *weight > 0.0 { normal(sd / weight.sqrt()) } else { 0.0 };
+                    *value += if weight > 0.0 { normal(sd / weight.sqrt()) } else { 0.0 };
                 }
             }
         }
         for force in &mut noisy.forces_n {
             *force += normal(self.scan.force_sd_n);
+        }
+        for reading in &mut noisy.on_the_way {
+            reading.force.value_n += normal(reading.force.sd_n);
+        }
+        let LoadCell { gain_sd, zero_sd_n } = self.truth.load_cell;
+        let (gain, zero_n) = (1.0 + normal(gain_sd), normal(zero_sd_n));
+        for force in noisy.forces_n.iter_mut().chain(noisy.on_the_way.iter_mut().map(|r| &mut r.force.value_n)) {
+            *force = *force * gain + zero_n;
         }
         noisy
     }

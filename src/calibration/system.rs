@@ -128,8 +128,8 @@ struct Sums {
 impl Sums {
     fn add(&mut self, prediction: &Prediction, target: &Target) {
         let n = self.gradient.len();
-        for (d, (step, state)) in target.steps.iter().zip(&prediction.states).enumerate() {
-            let (fields, forces) = (&prediction.sensitivities[d], &prediction.force_sensitivities[d]);
+        for (d, step) in target.steps.iter().enumerate() {
+            let fields = &prediction.sensitivities[d];
             let (mut squares, mut largest, mut num_voxels) = (0.0, 0.0f64, 0usize);
             for (v, (model, measured)) in prediction.displacements[d].iter().zip(step.measured).enumerate() {
                 // Missing voxels have no weight; their NaN must not enter a product.
@@ -154,25 +154,25 @@ impl Sums {
                 largest = largest.max(measured.iter().map(|x| x * x).sum());
                 num_voxels += 1;
             }
-            self.loss_u += squares / (num_voxels as f64 * largest);
-            self.num_drives += 1;
-            if let Some(force) = step.force {
-                let misfit = force.value_n - state.force_n;
-                self.chi2 += force.weight * misfit * misfit;
-                for i in 0..n {
-                    self.gradient[i] += force.weight * misfit * forces[i];
-                    for j in 0..=i {
-                        self.matrix[(i, j)] += force.weight * forces[i] * forces[j];
-                    }
-                }
-                self.loss_f += (misfit / force.value_n).powi(2);
-                self.num_forces += 1;
+            if step.is_scanned() {
+                self.loss_u += squares / (num_voxels as f64 * largest);
+                self.num_drives += 1;
             }
         }
         for i in 0..n {
             for j in 0..i {
                 self.matrix[(j, i)] = self.matrix[(i, j)];
             }
+        }
+        let (misfits, slopes) = (target.force_misfits(&prediction.forces_n), target.force_slopes(prediction, n));
+        let weights = target.force_weights();
+        let weighed = &weights * &misfits;
+        self.chi2 += misfits.dot(&weighed);
+        self.gradient += slopes.transpose() * weighed;
+        self.matrix += slopes.transpose() * weights * &slopes;
+        for ((_, force), misfit) in target.forces().zip(&misfits) {
+            self.loss_f += (misfit / force.value_n).powi(2);
+            self.num_forces += 1;
         }
     }
 }

@@ -1,16 +1,17 @@
 //! What a fit compares with: measured values, their weights in the objective, and the noise that they carry.
 //!
-//! The objective is Σ_drives [ Σ_voxels w Σ_c p_c (u_c − ū_c)² + p_F (F − F_model)² ]. With p = 1/σ² it is χ²; with
-//! other p (the paper's ℓ_u + βℓ_F, or values that share their noise with their neighbours) the covariance of the
-//! estimate is a sandwich of the objective's curvature and the noise's true covariance.
+//! The objective is Σ_drives [ Σ_voxels w Σ_c p_c (u_c − ū_c)² + p_F (F − F_model)² ]. With p = 1/σ² it is χ²; what is
+//! unknown of the load cell then couples the forces (see [`super::force_readings`]). With other p (the paper's
+//! ℓ_u + βℓ_F, or values that share their noise with their neighbours) the covariance of the estimate is a sandwich of
+//! the objective's curvature and the noise's true covariance.
 
 use super::error::CalibrationError;
+use super::force_readings::{ForceOnTheWay, LoadCell};
 use super::observed::{Observed, View};
 use super::prediction::Prediction;
 use super::synthetic::Measurement;
-use crate::fem::Equilibrium;
 use crate::sensitivity::ScanSettings;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// What a fit minimises.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -48,11 +49,36 @@ pub(super) struct TargetStep<'a> {
     pub(super) force: Option<TargetForce>,
 }
 
+impl<'a> TargetStep<'a> {
+    /// A force alone.
+    fn of_force(reading: &ForceOnTheWay) -> TargetStep<'a> {
+        let sd_n = reading.force.sd_n;
+        let force = TargetForce { value_n: reading.force.value_n, sd_n, weight: 1.0 / (sd_n * sd_n) };
+        TargetStep { measured: &[], weights: Vec::new(), component_weights: [0.0; 3], force: Some(force) }
+    }
+
+    /// Whether anything but a force was measured.
+    pub(super) fn is_scanned(&self) -> bool {
+        !self.weights.is_empty()
+    }
+
+    /// Gives the force the weight of the paper's loss.
+    fn weigh_force_by_paper(&mut self, scale: f64) {
+        if let Some(force) = &mut self.force {
+            force.weight = scale / (force.value_n * force.value_n);
+        }
+    }
+}
+
 /// All of one recording.
 #[derive(Clone, Debug)]
 pub(super) struct Target<'a> {
+    /// Those of the scans, then those at which the force alone was read.
     pub(super) steps: Vec<TargetStep<'a>>,
     noise_sd_mm: [f64; 3],
+    load_cell: LoadCell,
+    /// Whether the weights of the forces are the inverse of their covariance.
+    is_weighed_by_noise: bool,
     /// Of filtered data.
     view: Option<&'a View>,
 }
@@ -68,8 +94,10 @@ impl<'a> Target<'a> {
                 component_weights: scan.noise_sd_mm.map(|sd| 1.0 / (sd * sd)),
                 force: Some(TargetForce { value_n: data.forces_n[d], sd_n: scan.force_sd_n, weight }),
             })
+            .chain(data.on_the_way.iter().map(TargetStep::of_force))
             .collect();
-        Target { steps, noise_sd_mm: scan.noise_sd_mm, view: None }
+        let (load_cell, noise_sd_mm) = (data.load_cell, scan.noise_sd_mm);
+        Target { steps, noise_sd_mm, load_cell, is_weighed_by_noise: true, view: None }
     }
 
     /// Of recordings. The paper's objective is multiplied by a constant that gives it the size of χ².
@@ -100,41 +128,85 @@ impl<'a> Target<'a> {
                     }),
                 });
             }
+            steps.extend(recording.on_the_way.iter().map(TargetStep::of_force));
             let view = view.is_filtered().then_some(view);
-            targets.push(Target { steps, noise_sd_mm: recording.noise_sd_mm, view });
+            let (load_cell, noise_sd_mm) = (recording.load_cell, recording.noise_sd_mm);
+            targets.push(Target { steps, noise_sd_mm, load_cell, is_weighed_by_noise: true, view });
         }
         if let Objective::Paper { beta } = objective {
-            let num_steps: usize = targets.iter().map(|t| t.steps.len()).sum();
+            let num_steps: usize = targets.iter().flat_map(|t| &t.steps).filter(|s| s.is_scanned()).count();
             let num_forces = targets.iter().flat_map(|t| &t.steps).filter(|s| s.force.is_some()).count();
             // ℓ × scale is χ² where the noise is the mean one and |u|_max that of the first step.
             let mut scale = None;
             for target in &mut targets {
                 let precision = target.noise_sd_mm.iter().map(|sd| 1.0 / (sd * sd)).sum::<f64>() / 3.0;
+                target.is_weighed_by_noise = false;
                 for step in &mut target.steps {
+                    if !step.is_scanned() {
+                        // Its force weighs as those of the scans do.
+                        let scale = scale.unwrap_or(1.0);
+                        step.weigh_force_by_paper(scale * beta / num_forces as f64);
+                        continue;
+                    }
                     let used = step.weights.iter().filter(|w| **w > 0.0).count() as f64;
                     let squares = step.measured.iter().filter(|u| is_whole(u)).map(|u| u.iter().map(|x| x * x).sum());
                     let largest: f64 = squares.fold(f64::MIN_POSITIVE, f64::max);
                     let scale = *scale.get_or_insert(precision * used * largest * num_steps as f64);
                     step.component_weights = [scale / (used * largest * num_steps as f64); 3];
-                    if let Some(force) = &mut step.force {
-                        force.weight = scale * beta / (force.value_n * force.value_n * num_forces as f64);
-                    }
+                    step.weigh_force_by_paper(scale * beta / num_forces as f64);
                 }
             }
         }
         Ok(targets)
     }
 
-    /// The same weights for other values: displacements per drive, and forces of `states` where there were forces.
-    pub(super) fn with_measured(&self, displacements: &'a [Vec<[f64; 3]>], states: &[Equilibrium]) -> Target<'a> {
+    /// The same weights for other values: displacements per drive, and forces (N) where there were forces.
+    pub(super) fn with_measured(&self, displacements: &'a [Vec<[f64; 3]>], forces_n: &[f64]) -> Target<'a> {
         let mut other = self.clone();
-        for ((step, field), state) in other.steps.iter_mut().zip(displacements).zip(states) {
-            step.measured = field;
+        for ((step, field), force_n) in other.steps.iter_mut().zip(displacements).zip(forces_n) {
+            if step.is_scanned() {
+                step.measured = field;
+            }
             if let Some(force) = &mut step.force {
-                force.value_n = state.force_n;
+                force.value_n = *force_n;
             }
         }
         other
+    }
+
+    /// The forces that are compared, with the place of each among the steps.
+    pub(super) fn forces(&self) -> impl Iterator<Item = (usize, TargetForce)> {
+        self.steps.iter().enumerate().filter_map(|(d, step)| Some((d, step.force?)))
+    }
+
+    fn values_and_sds(&self) -> (Vec<f64>, Vec<f64>) {
+        self.forces().map(|(_, f)| (f.value_n, f.sd_n)).unzip()
+    }
+
+    /// Weights of the products of the forces' misfits in the objective, N⁻².
+    pub(super) fn force_weights(&self) -> DMatrix<f64> {
+        if self.is_weighed_by_noise && self.load_cell != LoadCell::default() {
+            let (values, sds) = self.values_and_sds();
+            return self.load_cell.precision(&values, &sds);
+        }
+        DMatrix::from_diagonal(&DVector::from_vec(self.forces().map(|(_, f)| f.weight).collect()))
+    }
+
+    /// Covariance of the forces, N².
+    fn force_covariance(&self) -> DMatrix<f64> {
+        let (values, sds) = self.values_and_sds();
+        self.load_cell.covariance(&values, &sds)
+    }
+
+    /// Derivatives of the forces (rows) by the `num` parameters, N per unit.
+    pub(super) fn force_slopes(&self, prediction: &Prediction, num: usize) -> DMatrix<f64> {
+        let rows: Vec<usize> = self.forces().map(|(d, _)| d).collect();
+        DMatrix::from_fn(rows.len(), num, |row, i| prediction.force_sensitivities[rows[row]][i])
+    }
+
+    /// Misfits of the forces, N: measured minus those predicted, `forces_n` of every step.
+    pub(super) fn force_misfits(&self, forces_n: &[f64]) -> DVector<f64> {
+        DVector::from_vec(self.forces().map(|(d, f)| f.value_n - forces_n[d]).collect())
     }
 
     /// Expected objective of pure noise, and the number of data.
@@ -162,7 +234,10 @@ impl<'a> Target<'a> {
     /// Adds the covariance of the objective's half gradient under the noise, in the parameters' units.
     pub(super) fn add_score(&self, prediction: &Prediction, score: &mut DMatrix<f64>) -> Result<(), CalibrationError> {
         let n = score.nrows();
-        for (step, (fields, forces)) in self.steps.iter().zip(prediction.derivatives()) {
+        let forces = self.force_slopes(prediction, n);
+        let weighed = self.force_weights() * &forces;
+        *score += weighed.transpose() * self.force_covariance() * &weighed;
+        for (step, (fields, _)) in self.steps.iter().zip(prediction.derivatives()).filter(|(s, _)| s.is_scanned()) {
             let weighted: Vec<Vec<[f64; 3]>> =
                 fields
                     .iter()
@@ -201,9 +276,6 @@ impl<'a> Target<'a> {
                         for c in 0..3 {
                             sum += variance * self.noise_sd_mm[c] * self.noise_sd_mm[c] * a[c] * b[c];
                         }
-                    }
-                    if let Some(force) = step.force {
-                        sum += (force.weight * force.sd_n).powi(2) * forces[i] * forces[j];
                     }
                     score[(i, j)] += sum;
                     if i != j {

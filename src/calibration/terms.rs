@@ -7,9 +7,10 @@
 //! * The Bayesian information criterion: Δχ²/s² against 2 ln n, with s² the misfit per datum of the largest model. It
 //!   needs no noise level and, with n in the ten thousands, is the strictest.
 
-use super::problem::RecordingFit;
+use super::recording_fit::RecordingFit;
 use crate::material::{Ogden, OgdenTerm};
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// Which rule decides.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
@@ -38,7 +39,7 @@ const SMALL_EXPONENT: f64 = 0.1;
 const CORRELATION_LIMIT: f64 = 0.999;
 
 /// One number of terms.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TermRow {
     /// Number of terms.
@@ -78,7 +79,7 @@ pub struct TermRow {
 }
 
 /// The choice.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TermSelection {
     /// One row per number of terms tried.

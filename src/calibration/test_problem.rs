@@ -1,11 +1,12 @@
 //! A small problem for the tests of this room: a solid block, sheared to 1, on a coarse mesh.
 
+use super::bench::Bench;
 use super::options::FitOptions;
 use super::synthetic::SyntheticScan;
 use crate::fem::{ForwardModel, SolveOptions};
 use crate::material::{Ogden, OgdenTerm};
 use crate::mesh::MeshOptions;
-use crate::sensitivity::{PartialVoxels, ScanSettings};
+use crate::sensitivity::{PartialVoxels, Protocol, ScanSettings};
 use crate::specimen::{Block, Outline, Specimen, TestKind};
 use crate::voxel::{Sampling, VoxelOperator};
 
@@ -18,6 +19,7 @@ pub(super) fn block() -> Specimen {
         holes: vec![],
         drive_mm: vec![4.0],
         samples_in_parallel: 2,
+        other_samples: Vec::new(),
     }
 }
 
@@ -49,12 +51,13 @@ pub(super) fn tight() -> FitOptions {
     FitOptions { tolerance: 1e-6, solve, ..FitOptions::default() }
 }
 
-/// A model, its voxels, and the scan of `material` made on the same mesh.
-pub(super) fn same_mesh(material: &Ogden) -> (ForwardModel, VoxelOperator, SyntheticScan) {
+/// A model with its voxels, and the scan of `material` made on the same mesh.
+pub(super) fn same_mesh(material: &Ogden) -> (Bench, SyntheticScan) {
     let specimen = block();
     let mesh = coarse(&specimen);
     let model = ForwardModel::of_specimen(&specimen, &mesh).unwrap();
-    let synthetic = SyntheticScan::new(&specimen, material, &scan(), &mesh, &tight().solve, &|| false).unwrap();
+    let plain = Protocol::default();
+    let synthetic = SyntheticScan::new(&specimen, material, &scan(), &plain, &mesh, &tight().solve, &|| false).unwrap();
     let operator = VoxelOperator::new(&specimen, model.mesh(), &synthetic.mask, Sampling::default()).unwrap();
-    (model, operator, synthetic)
+    (Bench::of_one(model, operator), synthetic)
 }

@@ -6,22 +6,24 @@
 //! apart: the scatter over the draws, which the Fisher information promises, and the shift that the fitting mesh makes,
 //! which is what a fit to the noiseless scan misses the truth by.
 
+use super::bench::Bench;
 use super::error::CalibrationError;
 use super::fit::{Fit, FitStart};
+use super::mesh_correction::FinerMesh;
 use super::options::{Bulk, FitOptions};
-use super::prediction::Prediction;
 use super::synthetic::SyntheticScan;
-use crate::fem::ForwardModel;
+use super::system::NormalSystem;
+use super::target::Target;
 use crate::material::{Ogden, Parameter};
 use crate::mesh::MeshOptions;
-use crate::sensitivity::{FisherInformation, IDENTIFIABILITY_LIMIT, ScanSettings};
+use crate::sensitivity::{FisherInformation, IDENTIFIABILITY_LIMIT, Protocol, ScanSettings};
 use crate::specimen::Specimen;
-use crate::voxel::{Sampling, VoxelOperator};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// One parameter over all draws.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ParameterSpread {
     /// `kappa`, `mu_1`, …
@@ -44,12 +46,19 @@ pub struct ParameterSpread {
     pub failed_draws: usize,
     /// The estimates, in the order of the draws.
     pub estimates: Vec<f64>,
-    /// What a fit to the noiseless scan misses the truth by: the fitting mesh's error. Null where that fit failed.
+    /// What a fit to the noiseless scan misses the truth by: the mesh's error. Null where that fit failed.
     #[serde(default)]
     pub discretisation_bias: Option<f64>,
+    /// Whether the fits were corrected by a mesh finer than the one fitted on.
+    #[serde(default)]
+    pub is_mesh_corrected: bool,
     /// Draws whose estimate stands at a limit of the fit; their scatter is not the promised one.
     #[serde(default)]
     pub limited_draws: usize,
+    /// Why what is promised of the parameter is not to be trusted, in words; empty where it is, or where nothing is
+    /// promised.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub doubts: Vec<String>,
 }
 
 /// JSON has no NaN.
@@ -68,13 +77,22 @@ mod nan_as_null {
 /// A weakly determined second term makes a long valley: the way along it may take more than the usual iterations.
 const MAX_ITERATIONS: usize = 60;
 
+/// Elements of the correcting mesh over standard ones: finer than the fit's, coarser than the truth's and graded
+/// otherwise.
+const CORRECTION_FACTOR: f64 = 0.8;
+
 /// Settings of [`verify`].
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct VerifyOptions {
     /// Mesh of the truth.
     pub truth_mesh: MeshOptions,
     /// Mesh of the fit.
     pub fit_mesh: MeshOptions,
+    /// A finer mesh by which the fits are corrected, where one is given and has the equilibria.
+    pub correction_mesh: Option<MeshOptions>,
+    /// Which samples are scanned and for how long, forces read on the way, and a load cell whose gain and zero are
+    /// drawn anew for every draw.
+    pub protocol: Protocol,
     /// Noise draws.
     pub draws: usize,
     /// Seed of the noise.
@@ -85,12 +103,15 @@ pub struct VerifyOptions {
 }
 
 impl VerifyOptions {
-    /// Truth on a mesh finer than standard with another grading, fit on the standard one.
+    /// Truth on a mesh finer than standard with another grading, fit on the standard one, corrected by one between the
+    /// two.
     pub fn new(specimen: &Specimen, draws: usize, seed: u64) -> VerifyOptions {
         let fine = MeshOptions::scaled(specimen, 0.7);
         VerifyOptions {
             truth_mesh: MeshOptions { grading: 0.4, ..fine },
             fit_mesh: MeshOptions::scaled(specimen, 1.0),
+            correction_mesh: Some(MeshOptions::scaled(specimen, CORRECTION_FACTOR)),
+            protocol: Protocol::default(),
             draws,
             seed,
             fit: FitOptions { max_iterations: MAX_ITERATIONS, ..FitOptions::default() },
@@ -156,17 +177,19 @@ pub fn verify_in_full(
     // A model per thread, made one after another: the library that orders the unknowns shares its random state between
     // threads, and another order means other last digits.
     let num_models = options.draws.div_ceil(chunk).max(1);
-    let mut models = (0..num_models)
-        .map(|_| ForwardModel::of_specimen(specimen, &options.fit_mesh))
-        .collect::<Result<Vec<_>, _>>()?;
     let solve = &options.fit.solve;
-    let synthetic = SyntheticScan::new(specimen, truth, scan, &options.truth_mesh, solve, &|| is_cancelled())?;
-    verify_with(&mut models, specimen, truth, &synthetic, options, on_draw, is_cancelled)
+    let (protocol, mesh) = (&options.protocol, &options.truth_mesh);
+    let synthetic = SyntheticScan::new(specimen, truth, scan, protocol, mesh, solve, &|| is_cancelled())?;
+    let masks = synthetic.masks();
+    let mut benches = (0..num_models)
+        .map(|_| Bench::of_specimen(specimen, &options.fit_mesh, &masks))
+        .collect::<Result<Vec<_>, _>>()?;
+    verify_with(&mut benches, specimen, truth, &synthetic, options, on_draw, is_cancelled)
 }
 
-/// Draws shared out to `models`, which are alike.
+/// Draws shared out to `benches`, which are alike.
 fn verify_with(
-    models: &mut [ForwardModel],
+    benches: &mut [Bench],
     specimen: &Specimen,
     truth: &Ogden,
     synthetic: &SyntheticScan,
@@ -176,12 +199,11 @@ fn verify_with(
 ) -> Result<Verification, CalibrationError> {
     let scan = &synthetic.scan;
     let stop = || is_cancelled();
-    let chunk = options.draws.div_ceil(models.len().max(1)).max(1);
-    let Some(model) = models.first_mut() else {
+    let chunk = options.draws.div_ceil(benches.len().max(1)).max(1);
+    let Some(bench) = benches.first_mut() else {
         let requirement = "positive";
         return Err(CalibrationError::InvalidValue { name: "the number of models", value: 0.0, requirement });
     };
-    let operator = VoxelOperator::new(specimen, model.mesh(), &synthetic.mask, Sampling::default())?;
     let data = synthetic.noiseless();
     // The noiseless scan's prior is centred on the truth.
     let centred = match options.fit.bulk {
@@ -190,23 +212,42 @@ fn verify_with(
     };
     let fit_options = FitOptions { bulk: centred, ..options.fit };
     let blind = blind_start(truth, centred);
-    let start = FitStart::new(model, &operator, &data.drives_mm, &blind, &fit_options, &stop)?;
-    let noiseless = match start.fit(model, &operator, scan, data, &stop) {
+    let drives_mm = data.all_drives_mm();
+    let start = FitStart::new(bench, &drives_mm, &blind, &fit_options, &stop)?;
+    let noiseless = match start.fit(bench, scan, data, &stop) {
         Err(e) if !e.is_of_the_data() => return Err(e),
         other => other,
     };
+    let correction = match (&options.correction_mesh, &noiseless) {
+        (Some(mesh), Ok(first)) => {
+            let solver = (&fit_options.solve, &stop as &dyn Fn() -> bool);
+            let corrected = FinerMesh::new(specimen, mesh, synthetic)
+                .and_then(|mut finer| finer.correct(&start, bench, synthetic, first, solver));
+            match corrected {
+                Err(e) if is_cancelled() || !e.is_of_the_data() => return Err(e),
+                // A finer model may have no equilibrium: the estimates are then those of the fitting mesh.
+                other => other.ok(),
+            }
+        }
+        _ => None,
+    };
+    let (defect, noiseless) = match correction {
+        Some((defect, fit)) => (Some(defect), Ok(fit)),
+        None => (None, noiseless),
+    };
     // The promise holds at the truth, as an evaluation's does.
-    let at_truth = Prediction::new(model, &operator, &data.drives_mm, truth, None, &fit_options.solve, &stop)?;
-    let weights = vec![data.weights.clone(); data.drives_mm.len()];
-    let promised = at_truth.information(scan, &weights, centred)?;
+    let at_truth = bench.predict(&drives_mm, truth, None, &fit_options.solve, &stop)?;
+    let target = Target::of_measurement(data, scan);
+    let promised = NormalSystem::new(&[at_truth], &[target], centred, fit_options.held)?.information;
     let draws: Vec<u64> = (0..options.draws as u64).collect();
-    let fits: Vec<Vec<Result<Fit, CalibrationError>>> = models
+    let fits: Vec<Vec<Result<Fit, CalibrationError>>> = benches
         .par_iter_mut()
         .zip(draws.par_chunks(chunk))
-        .map(|(model, chunk)| {
+        .map(|(bench, chunk)| {
             let mut fits = Vec::with_capacity(chunk.len());
             for &draw in chunk {
-                let noisy = synthetic.draw(options.seed, draw);
+                let drawn = synthetic.draw(options.seed, draw);
+                let noisy = defect.as_ref().map_or_else(|| drawn.clone(), |d| d.taken_off(&drawn));
                 let own = match centred {
                     Bulk::LogPrior { center_kpa, log_sd } => start.with_bulk(Bulk::LogPrior {
                         center_kpa: center_kpa * (log_sd * SyntheticScan::prior_draw(options.seed, draw)).exp(),
@@ -214,7 +255,7 @@ fn verify_with(
                     }),
                     _ => start.clone(),
                 };
-                let result = own.fit(model, &operator, scan, &noisy, &|| is_cancelled());
+                let result = own.fit(bench, scan, &noisy, &|| is_cancelled());
                 on_draw();
                 match result {
                     Err(e) if !e.is_of_the_data() => return Err(e),
@@ -225,7 +266,11 @@ fn verify_with(
         })
         .collect::<Result<_, _>>()?;
     let fits: Vec<Result<Fit, CalibrationError>> = fits.into_iter().flatten().collect();
-    let spreads = spread(truth, &fits, noiseless.as_ref().ok(), &promised, centred == Bulk::Held);
+    let mut spreads = spread(truth, &fits, noiseless.as_ref().ok(), &promised, centred == Bulk::Held);
+    for spread in &mut spreads {
+        spread.is_mesh_corrected = defect.is_some();
+        spread.doubts = spread.reasons_for_doubt();
+    }
     Ok(Verification { spreads, noiseless, fits })
 }
 
@@ -262,7 +307,9 @@ fn spread(
                 failed_draws: fits.len() - good.len(),
                 estimates: values,
                 discretisation_bias: noiseless.map(|f| f.material.value(parameter) - truth.value(parameter)),
+                is_mesh_corrected: false,
                 limited_draws: good.iter().filter(|f| !f.reached_limits.is_empty()).count(),
+                doubts: Vec::new(),
             }
         })
         .collect()

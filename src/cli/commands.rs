@@ -2,7 +2,7 @@
 
 use super::error::CliError;
 use super::flag::{Flag, Written};
-use super::input::{read_json, read_text};
+use super::input::{read_json, read_study, read_text};
 use super::job_command::{Asked, JobCommand, files, value, values};
 use super::results::stem;
 use crate::job::kind_of_command;
@@ -20,6 +20,7 @@ pub(super) static COMMANDS: &[JobCommand] = &[
     JobCommand { name: "import", arguments: of_files, flags: IMPORT, fill: imported },
     JobCommand { name: "calibrate", arguments: of_recordings, flags: CALIBRATE, fill: recordings },
     JobCommand { name: "diagnose", arguments: of_recordings_or_curves, flags: DIAGNOSE, fill: diagnosed },
+    JobCommand { name: "next", arguments: of_campaign, flags: NEXT, fill: campaign },
     JobCommand { name: "curves", arguments: of_curves, flags: CURVES, fill: curves },
     JobCommand { name: "uniaxial", arguments: of_curve, flags: UNIAXIAL, fill: curve },
     JobCommand { name: "paper-tables", arguments: of_nothing, flags: PAPER_TABLES, fill: paper_tables },
@@ -64,10 +65,13 @@ const EVALUATE: &[Flag] = &[
     Flag::of("force-gain-sd", "protocol/force_gain_sd"),
     Flag::of("force-zero-sd", "protocol/force_zero_sd_n"),
     Flag::of("drive-zero-sd", "protocol/drive_zero_sd_mm"),
+    Flag::of("blocks-scanned", "protocol/blocks_scanned"),
+    Flag::of("scan-shares", "protocol/scan_share"),
 ];
 const SCAN: &[Flag] = &[
     Flag::read("material", "material", JsonFile),
     Flag::of("drive", "drive_mm"),
+    Flag::of("sample", "sample"),
     Flag::of("mesh", "mesh"),
     Flag::of("full", "is_whole"),
     Flag::of("voxel", "voxel_mm"),
@@ -84,6 +88,10 @@ const SCAN: &[Flag] = &[
 ];
 const IMPORT: &[Flag] = &[
     Flag::read("specimen", "specimen", JsonFile),
+    Flag::of("form", "form"),
+    Flag::read("series", "series", JsonFile),
+    Flag::of("phase-range", "phase_range"),
+    Flag::of("raw", "is_raw"),
     Flag::of("drive", "drive_mm"),
     Flag::of("unit", "unit"),
     Flag::of("axes", "axes"),
@@ -105,6 +113,9 @@ const CALIBRATE: &[Flag] = &[
     Flag::of("decrement", "decrement"),
     Flag::of("objective", "objective"),
     Flag::of("boundary", "boundary"),
+    Flag::of("force-drives", "protocol/force_drive_mm"),
+    Flag::of("force-gain-sd", "protocol/force_gain_sd"),
+    Flag::of("force-zero-sd", "protocol/force_zero_sd_n"),
     Flag::of("beta", "beta"),
     Flag::read("mesh", "mesh_factor", MeshFactor),
     Flag::read("one-mesh", "has_mesh_allowance", Off),
@@ -120,6 +131,16 @@ const DIAGNOSE: &[Flag] = &[
     Flag::of("max-causes", "max_causes"),
     Flag::of("without", "without"),
     Flag::of("boundary", "boundary"),
+];
+const NEXT: &[Flag] = &[
+    Flag::of("drive", "drive_mm"),
+    Flag::of("drives", "num_drives"),
+    Flag::read("terms", "num_terms", OrAuto),
+    Flag::of("precision", "precision"),
+    Flag::of("scan-minutes", "scan_minutes"),
+    Flag::of("change-minutes", "change_minutes"),
+    Flag::read("mesh", "mesh_factor", MeshFactor),
+    Flag::read("no-mesh-correction", "has_mesh_correction", Off),
 ];
 /// Options of commands that read curves.
 const COLUMNS: [Flag; 5] = [
@@ -221,8 +242,8 @@ fn scanned(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliError>
 }
 
 fn of_files(command: Command) -> Command {
-    let help = "A raw recording (folder or JSON file), MATLAB files (.mat), point clouds (.csv, one per drive), or NIfTI images \
-                (.nii, .nii.gz)";
+    let help = "A raw recording (folder or JSON file), MATLAB files (.mat), point clouds (.csv, one per drive), NIfTI images \
+                (.nii, .nii.gz), DICOM images (.dcm, .ima), or, with --form dicom or paravision, files and folders of a scanner";
     command.arg(files("FILE", "FILE", help))
 }
 
@@ -234,10 +255,12 @@ fn imported(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliError
         Some("mat") => Some("matlab"),
         Some("csv") => Some("points"),
         Some("nii") => Some("nifti"),
+        Some("dcm" | "ima") => Some("dicom"),
         Some("gz") if ending(&first.with_extension("")).as_deref() == Some("nii") => Some("nifti"),
         _ => None,
     };
-    match (form, names.get(1)) {
+    let stated = matches.get_one::<String>("form").map(String::as_str);
+    match (stated.or(form), names.get(1)) {
         (Some(form), _) => {
             asked.set("form", form, "FILE");
             asked.set("name", stem(&first), "FILE");
@@ -245,7 +268,9 @@ fn imported(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliError
         }
         (None, Some(second)) => {
             let message =
-                "only one recording at a time; MATLAB files, point clouds and images alone may be several".into();
+                "only one recording at a time; MATLAB files, point clouds, images and, with --form, the files of scanners \
+                 may be several"
+                    .into();
             return Err(CliError::Input { path: second.into(), message });
         }
         (None, None) => asked.set("recording", names[0].clone(), first.display().to_string()),
@@ -262,6 +287,39 @@ fn recordings(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliErr
     let first = PathBuf::from(names.first().cloned().unwrap_or_default());
     asked.set("recordings", names, "RECORDING");
     Ok(first)
+}
+
+fn of_campaign(command: Command) -> Command {
+    let help = "Study file (study/1): base specimen, drives, scan, protocol and limits of the candidates";
+    let study = Arg::new("study").long("study").value_name("FILE").help(help).required(true);
+    let help =
+        "A further specimen that could be scanned (specimen/1), such as a design's best-specimen.json; may be repeated";
+    let specimen = Arg::new("specimen").long("specimen").value_name("FILE").help(help).action(ArgAction::Append);
+    let help = "Largest relative standard deviation of one parameter, in place of --precision; may be repeated";
+    let precision = Arg::new("precision-of").long("precision-of").value_name("NAME=SD").help(help);
+    of_recordings(command).arg(study).arg(specimen).arg(precision.action(ArgAction::Append))
+}
+
+fn campaign(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliError> {
+    recordings(matches, asked)?;
+    let study = PathBuf::from(value(matches, "study"));
+    asked.set("study", read_study(&study)?, study.display().to_string());
+    let names = values(matches, "specimen");
+    if !names.is_empty() {
+        let specimens = names.iter().map(|name| read_json(Path::new(name))).collect::<Result<Vec<Value>, _>>()?;
+        asked.set("specimens", specimens, "--specimen");
+    }
+    for text in values(matches, "precision-of") {
+        let parsed = text.split_once('=').and_then(|(name, sd)| Some((name, sd.parse::<f64>().ok()?)));
+        let Some((name, sd)) = parsed else {
+            let message = format!("'{text}' is not NAME=SD, such as alpha_2=0.05");
+            return Err(CliError::Option { option: "precision-of", message });
+        };
+        let all = &mut asked.request["precision_by_parameter"];
+        all[name] = sd.into();
+        asked.sources.push(("/precision_by_parameter".into(), "--precision-of".into()));
+    }
+    Ok(study)
 }
 
 fn of_recordings_or_curves(command: Command) -> Command {

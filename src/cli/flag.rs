@@ -76,6 +76,7 @@ impl Flag {
         let name = match (self.written, &field.form) {
             (Written::JsonFile | Written::TextFile, _) => "FILE",
             (Written::MeshFactor, _) => "SIZE",
+            (_, FieldForm::Tuple(2)) => "LOW,HIGH",
             (_, FieldForm::Tuple(_)) => "X,Y,Z",
             (_, FieldForm::Numbers | FieldForm::Texts | FieldForm::Choices(_)) => "LIST",
             (_, FieldForm::Number | FieldForm::Integer) => "NUMBER",

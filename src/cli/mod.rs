@@ -16,11 +16,13 @@ mod job_command;
 mod output;
 mod results;
 mod run;
+#[cfg(feature = "service")]
 mod serve;
 mod slurm;
 mod sweep;
 mod task_bar;
 mod terminal;
+#[cfg(feature = "service")]
 mod worker;
 
 use clap::{ArgMatches, Args, Command, FromArgMatches};
@@ -55,11 +57,15 @@ fn program() -> Command {
         compare::clap(),
         run::RunArguments::augment_args(Command::new("run"))
             .about("Any kind of job from a request as the service takes it"),
+    ];
+    let program = program.subcommands(job).subcommands(own);
+    #[cfg(feature = "service")]
+    let program = program.subcommands([
         serve::ServeArguments::augment_args(Command::new("serve"))
             .about("The service: REST, jobs, and a page for planners"),
         worker::WorkerArguments::augment_args(Command::new("worker")).about("A worker of a service on PostgreSQL"),
-    ];
-    program.subcommands(job).subcommands(own)
+    ]);
+    program
 }
 
 /// A command that says of itself what its kind of job does.
@@ -112,7 +118,9 @@ fn read<T: FromArgMatches>(matches: &ArgMatches) -> Result<T, CliError> {
 fn run_command(name: &str, matches: &ArgMatches) -> Result<(), CliError> {
     // The service and its workers end gracefully by signals of their own.
     match name {
+        #[cfg(feature = "service")]
         "serve" => return serve::run(&read(matches)?),
+        #[cfg(feature = "service")]
         "worker" => return worker::run(&read(matches)?),
         _ => interrupt::listen(),
     }

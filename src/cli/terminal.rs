@@ -66,7 +66,7 @@ impl Surroundings for Terminal {
 
     fn file(&self, name: &str) -> Result<InputFile, JobError> {
         let path = PathBuf::from(name);
-        let digest = crate::file::digest_of_file(&path).map_err(|e| unreadable(name, &e))?;
+        let digest = crate::file::digest_of_path(&path).map_err(|e| unreadable(name, &e))?;
         Ok(InputFile { path, digest })
     }
 

@@ -1,9 +1,10 @@
 //! One number of a result, and how its change is judged.
 
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// Which way is better.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Direction {
     /// Larger magnitude: integrated sensitivities, gains.
@@ -26,7 +27,7 @@ pub struct Figure {
 }
 
 /// What became of a figure.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Judgement {
     /// Within the tolerance.
@@ -40,7 +41,7 @@ pub enum Judgement {
 }
 
 /// A figure in both results.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Line {
     /// Where it stands.

@@ -62,6 +62,7 @@ pub fn subject_of(path: &Path, value: &Value) -> Result<Subject, CompareError> {
 
 fn conditions_of(e: &Evaluation) -> Vec<(String, String)> {
     let scan = &e.scan;
+    let forces_mm: Vec<f64> = e.force_steps.iter().map(|s| s.drive_mm).collect();
     let parameters: Vec<&str> = e.promised_sd.iter().map(|p| p.parameter.as_str()).collect();
     [
         ("voxel size in mm", format!("{:?}", scan.voxel_mm)),
@@ -72,6 +73,9 @@ fn conditions_of(e: &Evaluation) -> Vec<(String, String)> {
         ("meaning of the promised standard deviations", e.notes.promised_sd.clone()),
         ("parameters of the material", parameters.join(", ")),
         ("number of drives", e.steps.len().to_string()),
+        ("number of blocks scanned", e.blocks_scanned.to_string()),
+        ("shares of a scan's time", format!("{:?}", e.scan_share)),
+        ("drives in mm at which the force alone is read", format!("{forces_mm:?}")),
     ]
     .map(|(name, value)| (name.to_string(), value))
     .into()
@@ -110,6 +114,9 @@ fn figures_of(prefix: &str, e: &Evaluation, figures: &mut Vec<Figure>) {
     for (index, step) in e.steps.iter().enumerate() {
         let at = format!("step {}", index + 1);
         add(format!("{at}: force in N"), Some(step.force_n), Direction::Neutral);
+        for (kind, force_n) in step.force_by_kind_n.iter().enumerate() {
+            add(format!("{at}: force of sample {} in N", kind + 1), Some(*force_n), Direction::Neutral);
+        }
         add(format!("{at}: median stretch"), Some(step.median_stretch), Direction::Neutral);
         for s in &step.integrated_sensitivity {
             let p = &s.parameter;
@@ -142,6 +149,7 @@ fn of_design(d: &DesignResult) -> Subject {
     ];
     let mut conditions =
         vec![("objective".into(), format!("{:?}", d.objective)), ("base specimen".into(), d.base.specimen.to_json())];
+    conditions.push(("protocol".into(), format!("{:?}", d.protocol)));
     for (label, entry) in [("base", &d.base), ("best", &d.best)] {
         for m in &entry.by_material {
             let prefix = format!("{label}, material \"{}\": ", m.material);

@@ -5,6 +5,7 @@ use super::figure::{Judgement, Line};
 use super::read::Subject;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
+use utoipa::ToSchema;
 
 /// Longest value shown when two conditions differ, characters.
 const SHOWN: usize = 120;
@@ -29,7 +30,7 @@ impl Default for CompareOptions {
 }
 
 /// Two results compared (`comparison/1`).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Comparison {
     /// Name of what was compared.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// One design that the search has seen.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Candidate {
-    /// The design; its only drive is the one it is scanned at.
+    /// The design; its drives are those it is scanned at.
     pub specimen: Specimen,
     /// Gain over the base at search fidelity.
     pub objective: f64,

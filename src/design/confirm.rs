@@ -14,16 +14,17 @@ use super::objective::{Judged, Reference};
 use super::response::{Response, criteria_as_relative_sd, log_or_undetermined, normalised, tearing_stretch};
 use super::study::Study;
 use super::tell_apart::{Imitation, log_separation, state_of};
-use crate::fem::{Equilibrium, ForwardModel};
+use crate::fem::Equilibrium;
 use crate::kinematics::principal_stretches;
 use crate::mesh::MeshOptions;
 use crate::sensitivity::{
-    DriveSelection, Evaluation, EvaluationError, EvaluationMaps, EvaluationOptions, MaterialState, Scanned, Scanner,
-    evaluate_scanned,
+    DriveSelection, Evaluation, EvaluationError, EvaluationMaps, EvaluationOptions, Fixture, MaterialState, SharedTime,
+    best_shares, evaluate_fixture,
 };
 use crate::specimen::{LimitMargin, Specimen};
 use crate::voxel::Sampling;
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// Element sizes along the plates of a confirmation ([`MeshOptions::graded`]), as factors on the standard one; the
 /// last is the one that is reported.
@@ -33,7 +34,7 @@ const MESHES: [f64; 3] = [1.6, 1.4, 1.2];
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Confirmed {
-    /// The design; its only drive is the one it is scanned at.
+    /// The design; its drives are those it is scanned at.
     pub specimen: Specimen,
     /// The evaluation with each prior's central values.
     pub by_material: Vec<MaterialEvaluation>,
@@ -52,7 +53,7 @@ pub struct Confirmed {
     pub limits: Vec<LimitMargin>,
     /// Whether all of them, and the guard if the study asks for it, are kept with every material sample.
     pub is_within_limits: bool,
-    /// Volume of material, mm³.
+    /// Volume of the scanned material, mm³.
     pub volume_mm3: f64,
     /// What is to be known about how it came here: a limit that only the fine mesh broke, or a repair.
     #[serde(default)]
@@ -60,7 +61,7 @@ pub struct Confirmed {
 }
 
 /// One prior's evaluation.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MaterialEvaluation {
     /// Name of the prior.
@@ -70,7 +71,7 @@ pub struct MaterialEvaluation {
     /// D-, A-, E-optimal and worst-parameter figures of all μᵢ and αᵢ, as relative standard deviations; null where
     /// undetermined.
     pub relative_sd_by_criterion: CriterionValues,
-    /// Principal stretch exceeded in 0.2 % of the volume.
+    /// Principal stretch exceeded in 0.2 % of the volume of the sample where it is largest.
     pub tearing_stretch: f64,
     /// Force, N.
     pub force_n: f64,
@@ -81,7 +82,7 @@ pub struct MaterialEvaluation {
 }
 
 /// The optimality criteria, as relative standard deviations: smaller is better.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CriterionValues {
     /// (det C)^(1/2n).
@@ -95,7 +96,7 @@ pub struct CriterionValues {
 }
 
 /// One gain over the base.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Gain {
     /// Name of the prior.
@@ -145,7 +146,7 @@ pub fn confirm(
         gains: Vec::new(),
         is_within_limits: limits.iter().all(|m| m.is_satisfied),
         limits,
-        volume_mm3: specimen.volume_mm3(),
+        volume_mm3: specimen.scanned_volume_mm3(study.protocol.blocks_scanned),
         remark: None,
     })
 }
@@ -193,36 +194,44 @@ fn by_material(
     options: EvaluationOptions,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Vec<MaterialEvaluation>, EvaluationFailure> {
-    let mut by_material: Vec<MaterialEvaluation> = Vec::new();
+    let mut evaluated: Vec<(Evaluation, EvaluationMaps)> = Vec::new();
     let scanned_mm = specimen.drive_mm.last().copied().unwrap_or(0.0);
     let protocol = study.protocol.on_the_way_to(scanned_mm);
     let options = EvaluationOptions { protocol, ..options };
-    let mut model = ForwardModel::of_specimen(specimen, &options.mesh)?;
-    let scanner = Scanner::new(specimen, model.mesh(), &study.scan, options.sampling).map_err(|e| failure(e.into()))?;
-    let mut neighbours: Vec<Equilibrium> = Vec::new();
+    let mut fixture = Fixture::new(specimen, &study.scan, &options).map_err(failure)?;
+    let mut neighbours: Vec<Vec<Equilibrium>> = Vec::new();
     let mut solved: Vec<(MaterialState, Equilibrium)> = Vec::new();
     for prior in &study.materials {
         let drives = DriveSelection::DriveMm(specimen.drive_mm.clone());
-        let scanned = Scanned { specimen, scan: &study.scan, scanner: &scanner, neighbours: &neighbours };
         let (evaluation, maps) =
-            evaluate_scanned(&mut model, &scanned, &prior.material, &drives, &options, is_cancelled)
+            evaluate_fixture(&mut fixture, &prior.material, &drives, &neighbours, &options, is_cancelled)
                 .map_err(failure)?;
+        // A study that tells materials apart has one block: its check sees to it.
         if study.objective.kind == ObjectiveKind::TellApart
-            && let Some(state) = maps.equilibria.last()
+            && let (Some(part), Some(sample)) = (fixture.parts_mut().first_mut(), maps.samples.first())
+            && let Some(state) = sample.equilibria.last()
         {
-            let mut tangent = model.tangent(&prior.material, state)?;
+            let mut tangent = part.model.tangent(&prior.material, state)?;
             solved.push((state_of(state, &mut tangent)?, state.clone()));
         }
-        by_material.push(of_material(&model, &prior.name, &prior.material, evaluation, &maps));
-        neighbours = maps.equilibria;
+        neighbours = maps.equilibria();
+        evaluated.push((evaluation, maps));
+    }
+    if specimen.drive_mm.len() > 1 {
+        share_time(&mut evaluated, options.identifiability_limit).map_err(failure)?;
+    }
+    let mut by_material: Vec<MaterialEvaluation> = Vec::new();
+    for (prior, (evaluation, maps)) in study.materials.iter().zip(evaluated) {
+        by_material.push(of_material(&fixture, &prior.name, &prior.material, evaluation, &maps));
     }
     for later in 1..solved.len() {
         let mut closest = f64::INFINITY;
         for (earlier, (_, start)) in solved.iter().enumerate().take(later) {
             let (material, theirs) = (&study.materials[earlier].material, &solved[later].0);
+            let Some(part) = fixture.parts_mut().first_mut() else { continue };
             let imitation = Imitation {
                 study,
-                model: &mut model,
+                model: &mut part.model,
                 theirs,
                 drive_mm: start.drive_mm,
                 solve: &options.solve,
@@ -233,6 +242,15 @@ fn by_material(
         by_material[later].separation_sd = Some(closest);
     }
     Ok(by_material)
+}
+
+/// Shares the time of one scan out to the drives of a design in the way that is best for all materials together; evenly
+/// where they do not determine the parameters.
+fn share_time(evaluated: &mut [(Evaluation, EvaluationMaps)], limit: f64) -> Result<(), EvaluationError> {
+    let times: Vec<&SharedTime> = evaluated.iter().map(|(_, maps)| &maps.time).collect();
+    let num_drives = evaluated.first().map_or(0, |(evaluation, _)| evaluation.steps.len());
+    let shares = best_shares(&times)?.unwrap_or_else(|| vec![1.0 / num_drives as f64; num_drives]);
+    evaluated.iter_mut().try_for_each(|(evaluation, maps)| maps.promise(evaluation, &shares, limit))
 }
 
 /// Responses at every material sample. Those at the central values are the evaluations'; a variant's is the centre's
@@ -270,7 +288,7 @@ fn failure(error: EvaluationError) -> EvaluationFailure {
 }
 
 fn of_material(
-    model: &ForwardModel,
+    fixture: &Fixture,
     name: &str,
     material: &crate::material::Ogden,
     evaluation: Evaluation,
@@ -278,10 +296,12 @@ fn of_material(
 ) -> MaterialEvaluation {
     let covariance = maps.information.covariance();
     let [d, a, e, w] = criteria_as_relative_sd(&covariance, &maps.information.shear_indices());
-    let stretch = maps.equilibria.last().map_or(1.0, |state| {
-        let fields = model.quadrature_fields(material, state);
-        tearing_stretch(fields.iter().map(|q| (principal_stretches(&q.deformation_gradient)[0], q.volume_mm3)))
+    let stretches = fixture.parts().iter().zip(&maps.samples).filter_map(|(part, sample)| {
+        let fields = part.model.quadrature_fields(material, sample.equilibria.last()?);
+        let of_points = fields.iter().map(|q| (principal_stretches(&q.deformation_gradient)[0], q.volume_mm3));
+        Some(tearing_stretch(of_points))
     });
+    let stretch = stretches.fold(1.0, f64::max);
     MaterialEvaluation {
         material: name.into(),
         force_n: evaluation.steps.last().map_or(0.0, |s| s.force_n),

@@ -4,12 +4,13 @@ use super::confirm::{Confirmed, Gain, MaterialEvaluation};
 use crate::sensitivity::Evaluation;
 use crate::specimen::{LimitMargin, Specimen};
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// One design of a result.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DesignEntry {
-    /// The design; its only drive is the one it is scanned at.
+    /// The design; its drives are those it is scanned at, which share the time of one scan where there are several.
     pub specimen: Specimen,
     /// The first material's evaluation.
     pub evaluation: Evaluation,
@@ -28,7 +29,7 @@ pub struct DesignEntry {
     pub limits: Vec<LimitMargin>,
     /// Whether all limits and the guard are kept.
     pub is_within_limits: bool,
-    /// Volume of material, mm³.
+    /// Volume of the scanned material, mm³.
     pub volume_mm3: f64,
     /// What is to be known about how it came here: a limit that only the fine mesh broke, or a repair.
     #[serde(default)]
@@ -62,8 +63,21 @@ impl DesignEntry {
 
     /// Limits that are not kept, in words; guards are meant where every limit is.
     pub fn not_kept(&self) -> String {
-        let names: Vec<&str> = self.limits.iter().filter(|m| !m.is_satisfied).map(|m| m.name.as_str()).collect();
+        let names: Vec<&str> = self.limits.iter().filter(|m| !m.is_satisfied).map(LimitMargin::plain_name).collect();
         if names.is_empty() { "guard on the promised standard deviations".into() } else { names.join(", ") }
+    }
+
+    /// Whether it is the design of `other`, whatever the drive.
+    pub fn is_design_of(&self, other: &DesignEntry) -> bool {
+        let shape = |e: &DesignEntry| e.specimen.samples().into_iter().map(|s| (s.block, s.holes)).collect::<Vec<_>>();
+        self.specimen.test == other.specimen.test && shape(self) == shape(other)
+    }
+
+    /// The material that needs the largest force, and that force, N.
+    pub fn largest_force(&self) -> Option<(&str, f64)> {
+        let of = |m: &'_ MaterialEvaluation| m.force_n.abs();
+        let material = self.by_material.iter().max_by(|a, b| of(a).total_cmp(&of(b)))?;
+        Some((&material.material, material.force_n))
     }
 
     /// Largest force over the materials, N.

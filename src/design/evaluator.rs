@@ -9,15 +9,16 @@ use super::aim::ObjectiveKind;
 use super::evaluation_failure::EvaluationFailure;
 use super::material_samples::{MaterialSample, sample_materials};
 use super::response::{Response, criteria_as_relative_sd, log_or_undetermined, normalised, tearing_stretch};
+use super::shown::{Block, ImitatingMaterial, OnTheWay, Shown, Solved, sum_of_readings};
 use super::space::{Subspace, Variable};
 use super::study::{MaterialPrior, Study};
 use super::tell_apart::{Imitation, log_separation, separation, state_of};
-use crate::fem::{Equilibrium, ForwardModel, ParameterSensitivity, PathSensitivity, SolveOptions, Tangent};
+use crate::fem::{Equilibrium, ForwardModel, ParameterSensitivity, QuadraturePoint, SolveOptions, Tangent};
 use crate::kinematics::principal_stretches;
 use crate::material::Ogden;
 use crate::mesh::{MeshOptions, shape_velocity};
 use crate::sensitivity::{
-    ForceReading, ForceReadings, MaterialState, information_of_protocol, integrate_over_quadrature,
+    ForceReading, ForceReadings, MaterialState, ScannedBlock, information_of_protocol, integrate_over_blocks,
 };
 use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
@@ -42,34 +43,6 @@ pub struct Evaluator<'a> {
 
 /// How a variable moves the nodes (none: not at all) and the drive.
 type Move = (Option<Vec<[f64; 3]>>, f64);
-
-/// An earlier material fitted to a sample's scan.
-#[derive(Clone)]
-struct ImitatingMaterial {
-    /// The sample whose scan it is.
-    of: usize,
-    material: Ogden,
-    state: MaterialState,
-}
-
-/// Forces read on the way to the scan with one material, and their derivatives.
-struct OnTheWay {
-    readings: Vec<ForceReading>,
-    /// Per move, then per reading: rates.
-    rates: Vec<Vec<ForceReading>>,
-}
-
-/// All that a design does at one drive.
-struct Solved {
-    /// Per sample.
-    states: Vec<MaterialState>,
-    /// Per sample: the forces before.
-    on_the_way: Vec<OnTheWay>,
-    /// Earlier materials fitted to them, where the study asks for it.
-    imitators: Vec<ImitatingMaterial>,
-    /// Per state, then per fitted material: derivatives along each move.
-    paths: Vec<Vec<PathSensitivity>>,
-}
 
 impl<'a> Evaluator<'a> {
     /// For `study`: at the priors' central values, and at their variants if its budget says so.
@@ -122,17 +95,26 @@ impl<'a> Evaluator<'a> {
         let no_drive = || EvaluationFailure::Geometry { reason: "the specimen has no drive".into() };
         let drive = *specimen.drive_mm.last().ok_or_else(no_drive)?;
         specimen.validate().map_err(|e| EvaluationFailure::Geometry { reason: e.to_string() })?;
-        let mut model = ForwardModel::of_specimen(specimen, &self.mesh_options(specimen))?;
-        let moves: Vec<Move> =
-            subspace.map(|s| s.variables.iter().map(|&v| a_move(&model, specimen, s, v)).collect()).unwrap_or_default();
-        let solved = self.solve(&mut model, drive, &moves, is_cancelled)?;
-        let readings: Vec<&[ForceReading]> = solved.on_the_way.iter().map(|w| &w.readings[..]).collect();
-        let responses = self.responses(&model, &model.mesh().nodes, &solved.states, &readings, &solved.imitators)?;
+        let samples = specimen.samples();
+        let counts = specimen.num_scanned(self.study.protocol.blocks_scanned);
+        let (mut blocks, mut solved, mut moves_of_blocks) = (Vec::new(), Vec::new(), Vec::new());
+        for (number, (sample, num_scanned)) in samples.iter().zip(counts).enumerate() {
+            let mut block =
+                Block { model: ForwardModel::of_specimen(sample, &self.mesh_options(sample))?, num_scanned };
+            let moves: Vec<Move> = subspace
+                .map(|s| s.variables.iter().map(|&v| a_move(&block.model, (sample, number), s, v)).collect())
+                .unwrap_or_default();
+            solved.push(self.solve(&mut block.model, drive, &moves, is_cancelled)?);
+            blocks.push(block);
+            moves_of_blocks.push(moves);
+        }
+        let shown: Vec<Shown> = blocks.iter().zip(&solved).map(|(b, s)| Shown::as_solved(b, s)).collect();
+        let responses = self.responses(&shown)?;
         let mut gradients = Vec::new();
-        if subspace.is_some() {
-            gradients = vec![Vec::with_capacity(moves.len()); solved.states.len()];
-            for (n, moved) in moves.iter().enumerate() {
-                let rows = self.gradient(&model, &solved, n, moved)?;
+        if let Some(subspace) = subspace {
+            gradients = vec![Vec::with_capacity(subspace.variables.len()); self.samples.len()];
+            for index in 0..subspace.variables.len() {
+                let rows = self.gradient(&blocks, &solved, index, &moves_of_blocks)?;
                 gradients.iter_mut().zip(rows).for_each(|(all, row)| all.push(row));
             }
         }
@@ -232,52 +214,20 @@ impl<'a> Evaluator<'a> {
     /// their values: at the nearest point the distance does not change with them.
     fn gradient(
         &self,
-        model: &ForwardModel,
-        solved: &Solved,
+        blocks: &[Block],
+        solved: &[Solved],
         index: usize,
-        (velocity, _): &Move,
+        moves_of_blocks: &[Vec<Move>],
     ) -> Result<Vec<Vec<f64>>, EvaluationFailure> {
         // A central difference along a known direction: 10⁻⁴ mm balances its truncation and rounding.
         let t = 1e-4;
         let mut sides = Vec::with_capacity(2);
-        for sign in [1.0, -1.0] {
-            let step = sign * t;
-            let shift = |x: &[[f64; 3]], v: &[[f64; 3]]| -> Vec<[f64; 3]> {
-                x.iter().zip(v).map(|(a, b)| [0, 1, 2].map(|i| a[i] + step * b[i])).collect()
-            };
-            let positions = match velocity {
-                Some(v) => shift(&model.mesh().nodes, v),
-                None => model.mesh().nodes.clone(),
-            };
-            let follow = |state: &MaterialState, path: &PathSensitivity| MaterialState {
-                displacement: shift(&state.displacement, &path.displacement),
-                force_n: state.force_n + step * path.force_n,
-                sensitivities: state
-                    .sensitivities
-                    .iter()
-                    .zip(&path.parameters)
-                    .map(|(s, d)| ParameterSensitivity {
-                        parameter: s.parameter,
-                        displacement: shift(&s.displacement, &d.displacement),
-                        force_n: s.force_n + step * d.force_n,
-                    })
-                    .collect(),
-            };
-            let (of_states, of_imitators) = solved.paths.split_at(solved.states.len());
-            let moved: Vec<MaterialState> =
-                solved.states.iter().zip(of_states).map(|(state, paths)| follow(state, &paths[index])).collect();
-            let imitators: Vec<ImitatingMaterial> = solved
-                .imitators
-                .iter()
-                .zip(of_imitators)
-                .map(|(i, paths)| ImitatingMaterial { state: follow(&i.state, &paths[index]), ..i.clone() })
-                .collect();
-            let followed = |way: &OnTheWay| -> Vec<ForceReading> {
-                way.readings.iter().zip(&way.rates[index]).map(|(r, rate)| followed_reading(r, rate, step)).collect()
-            };
-            let readings: Vec<Vec<ForceReading>> = solved.on_the_way.iter().map(followed).collect();
-            let readings: Vec<&[ForceReading]> = readings.iter().map(|r| &r[..]).collect();
-            sides.push(self.responses(model, &positions, &moved, &readings, &imitators)?);
+        for step in [t, -t] {
+            let moved =
+                blocks.iter().zip(solved).zip(moves_of_blocks).map(|((block, solved), moves)| {
+                    Shown::moved(block, solved, index, (moves[index].0.as_deref(), step))
+                });
+            sides.push(self.responses(&moved.collect::<Vec<_>>())?);
         }
         let slope = |(a, b): (&Response, &Response)| -> Vec<f64> {
             a.to_vector().iter().zip(b.to_vector()).map(|(a, b)| (a - b) / (2.0 * t)).collect()
@@ -285,21 +235,20 @@ impl<'a> Evaluator<'a> {
         Ok(sides[0].iter().zip(&sides[1]).map(slope).collect())
     }
 
-    /// Responses of all samples from their states, the mesh's nodes at `positions`.
-    fn responses(
-        &self,
-        model: &ForwardModel,
-        positions: &[[f64; 3]],
-        states: &[MaterialState],
-        readings: &[&[ForceReading]],
-        imitators: &[ImitatingMaterial],
-    ) -> Result<Vec<Response>, EvaluationFailure> {
-        let mut all = Vec::with_capacity(states.len());
-        for (index, (sample, state)) in self.samples.iter().zip(states).enumerate() {
-            let mut response = self.response(model, &sample.material, positions, state, readings[index])?;
+    /// Responses of all material samples of a design with these kinds of samples.
+    fn responses(&self, shown: &[Shown]) -> Result<Vec<Response>, EvaluationFailure> {
+        let mut all = Vec::with_capacity(self.samples.len());
+        for (index, sample) in self.samples.iter().enumerate() {
+            let mut response = self.response(&sample.material, index, shown)?;
             let mut distances = Vec::new();
-            for i in imitators.iter().filter(|i| i.of == index) {
-                distances.push(separation(self.study, model, positions, &i.material, &i.state, state)?.distance_sd);
+            // A study that tells materials apart has one kind of sample.
+            for block in shown {
+                let theirs = &block.states[index];
+                for i in block.imitators.iter().filter(|i| i.of == index) {
+                    let (model, positions) = (&block.block.model, &block.positions);
+                    let apart = separation(self.study, model, positions, &i.material, &i.state, theirs)?;
+                    distances.push(apart.distance_sd);
+                }
             }
             response.log_separation = log_separation(distances);
             all.push(response);
@@ -312,51 +261,52 @@ impl<'a> Evaluator<'a> {
         index == 0 || self.samples[index - 1].prior != self.samples[index].prior
     }
 
-    fn response(
-        &self,
-        model: &ForwardModel,
-        material: &Ogden,
-        positions: &[[f64; 3]],
-        state: &MaterialState,
-        before: &[ForceReading],
-    ) -> Result<Response, EvaluationFailure> {
+    /// Response to the material sample with this index.
+    fn response(&self, material: &Ogden, index: usize, shown: &[Shown]) -> Result<Response, EvaluationFailure> {
         let scan = &self.study.scan;
         let voxel_volume = scan.voxel_mm.iter().product();
-        let fields = model.quadrature_fields_at(material, positions, &state.displacement);
-        let integrated = integrate_over_quadrature(material, &fields, model.mesh().mirror, voxel_volume);
-        let (mesh, noise) = (model.mesh(), scan.noise());
-        let own = state.sensitivities.iter().map(|s| s.force_n).collect();
-        let readings = [before, &[ForceReading { force_n: state.force_n, sensitivities: own }]].concat();
+        let fields: Vec<Vec<QuadraturePoint>> = shown
+            .iter()
+            .map(|s| s.block.model.quadrature_fields_at(material, &s.positions, &s.states[index].displacement))
+            .collect();
+        let of_blocks = shown.iter().zip(&fields).map(|(s, points)| ScannedBlock {
+            count: s.block.num_scanned,
+            mesh: s.block.model.mesh(),
+            points,
+            sensitivities: &s.states[index].sensitivities,
+        });
+        let blocks: Vec<ScannedBlock> = of_blocks.collect();
+        let readings = sum_of_readings(shown, index);
         let forces = ForceReadings { readings: &readings, protocol: &self.study.protocol };
-        let scanned = &state.sensitivities;
-        let information = information_of_protocol(material, mesh, &fields, scanned, &forces, &noise, voxel_volume)?;
+        let information = information_of_protocol(material, &blocks, &forces, &scan.noise(), voxel_volume)?;
         let covariance = information.covariance();
         let shear = information.shear_indices();
         let normalisation = self.study.objective.normalisation;
+        let integrated = integrate_over_blocks(material, &blocks, voxel_volume);
+        let stretches = fields.iter().map(|points| {
+            tearing_stretch(points.iter().map(|q| (principal_stretches(&q.deformation_gradient)[0], q.volume_mm3)))
+        });
+        let force_n: f64 = shown.iter().map(|s| s.states[index].force_n).sum();
         Ok(Response {
             log_integrated: integrated.iter().map(|s| normalised(s, normalisation).max(1e-300).ln()).collect(),
             log_relative_sd: shear.iter().map(|&i| log_or_undetermined(covariance.relative_sd(i))).collect(),
             log_criteria: criteria_as_relative_sd(&covariance, &shear).map(log_or_undetermined),
             log_separation: 0.0,
-            log_force: state.force_n.abs().max(1e-12).ln(),
-            log_stretch: tearing_stretch(
-                fields.iter().map(|q| (principal_stretches(&q.deformation_gradient)[0], q.volume_mm3)),
-            )
-            .ln(),
+            log_force: force_n.abs().max(1e-12).ln(),
+            log_stretch: stretches.fold(1.0, f64::max).ln(),
         })
     }
 }
 
-/// A force and its sensitivities a `step` further on.
-fn followed_reading(reading: &ForceReading, rate: &ForceReading, step: f64) -> ForceReading {
-    let sensitivities = reading.sensitivities.iter().zip(&rate.sensitivities).map(|(s, d)| s + step * d).collect();
-    ForceReading { force_n: reading.force_n + step * rate.force_n, sensitivities }
-}
-
-/// How `variable` moves the nodes and the drive.
-fn a_move(model: &ForwardModel, specimen: &Specimen, subspace: &Subspace, variable: Variable) -> Move {
+/// How `variable` moves the nodes of the design's sample with this number, and the drive.
+fn a_move(
+    model: &ForwardModel,
+    (specimen, number): (&Specimen, usize),
+    subspace: &Subspace,
+    variable: Variable,
+) -> Move {
     let mut velocity: Option<Vec<[f64; 3]>> = None;
-    for (design_variable, sign) in subspace.moves(variable) {
+    for (design_variable, sign) in subspace.moves(variable, number) {
         let one = shape_velocity(model.mesh(), specimen, design_variable);
         let sum = velocity.get_or_insert_with(|| vec![[0.0; 3]; one.len()]);
         for (s, v) in sum.iter_mut().zip(&one) {

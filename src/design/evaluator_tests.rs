@@ -46,11 +46,9 @@ fn every_gradient_passes_the_taylor_test() {
         moved.block.thickness_mm += thicker_mm;
         let mut model = ForwardModel::new(mesh, &moved).expect("a model");
         let solved = evaluator.solve(&mut model, drive, moves, &|| false).expect("equilibria");
-        let readings: Vec<&[ForceReading]> = solved.on_the_way.iter().map(|w| &w.readings[..]).collect();
-        let nodes = &model.mesh().nodes;
-        let responses =
-            evaluator.responses(&model, nodes, &solved.states, &readings, &solved.imitators).expect("responses");
-        (model, solved, responses.iter().map(Response::to_vector).collect::<Vec<_>>())
+        let block = Block { model, num_scanned: 1 };
+        let responses = evaluator.responses(&[Shown::as_solved(&block, &solved)]).expect("responses");
+        (block, solved, responses.iter().map(Response::to_vector).collect::<Vec<_>>())
     };
     for &variable in &space.variables {
         // The second hole's variables are of the same kinds as the first's.
@@ -58,12 +56,12 @@ fn every_gradient_passes_the_taylor_test() {
             continue;
         }
         let model = ForwardModel::new(mesh.clone(), &specimen).expect("a model");
-        let moves = [a_move(&model, &specimen, space, variable)];
-        let (model, solved, here) = at(mesh.clone(), 5.0, 0.0, &moves);
-        let gradients = evaluator.gradient(&model, &solved, 0, &moves[0]).expect("a gradient");
+        let moves = vec![a_move(&model, (&specimen, 0), space, variable)];
+        let (block, solved, here) = at(mesh.clone(), 5.0, 0.0, &moves);
+        let gradients = evaluator.gradient(&[block], &[solved], 0, &[moves]).expect("a gradient");
         let value = |h: f64| -> Vec<Vec<f64>> {
             let mut moved = mesh.clone();
-            for (design_variable, sign) in space.moves(variable) {
+            for (design_variable, sign) in space.moves(variable, 0) {
                 moved = morphed(&moved, &shape_velocity(&mesh, &specimen, design_variable), sign * h);
             }
             let of = |which: Variable| if variable == which { h } else { 0.0 };
@@ -101,6 +99,69 @@ fn every_gradient_passes_the_taylor_test() {
                     assert!((1.6..2.6).contains(&order), "{variable:?}, response {i}: order {order} ({large} {small})");
                 }
             }
+        }
+    }
+}
+
+/// Gradients of a design of two unlike blocks, both scanned, with one force: of a variable that moves both, of one that
+/// moves the second alone, and of the drive.
+#[test]
+fn gradients_of_unlike_blocks() {
+    let mut study = study();
+    study.objective.kind = ObjectiveKind::SensitivityAndPromisedSd;
+    study.protocol.blocks_scanned = 2;
+    study.materials.truncate(1);
+    study.base.samples_in_parallel = 1;
+    let block = crate::specimen::Block { thickness_mm: 7.5, ..study.base.block };
+    study.base.other_samples = vec![crate::specimen::Sample { block, holes: study.base.holes.clone() }];
+    let thickness_mm = Some(super::super::study::Range { min: 5.0, max: 9.0 });
+    study.vary.other_samples =
+        vec![super::super::study::VarySample { is_like_first: true, thickness_mm, ..Default::default() }];
+    study.validate().expect("a study");
+    let specimen = study.base.clone();
+    let all = subspaces(&study);
+    let space = all.iter().find(|s| s.vector_of(&specimen, 5.0).is_some()).expect("the base's structure");
+    let mut evaluator = Evaluator::new(&study).with_coarseness(1.5);
+    evaluator.solve.tolerance = 1e-10;
+    let samples = specimen.samples();
+    let meshes: Vec<crate::mesh::Mesh> =
+        samples.iter().map(|s| mesh_specimen(s, &evaluator.mesh_options(s)).expect("a mesh")).collect();
+    let at = |step: f64, variable: Variable, has_gradient: bool| {
+        let drive = 5.0 + if variable == Variable::Drive { step } else { 0.0 };
+        let (mut blocks, mut solved, mut of_blocks) = (Vec::new(), Vec::new(), Vec::new());
+        for (number, (sample, mesh)) in samples.iter().zip(&meshes).enumerate() {
+            let mut moved = mesh.clone();
+            let mut thicker = sample.clone();
+            for (design_variable, sign) in space.moves(variable, number) {
+                moved = morphed(&moved, &shape_velocity(mesh, sample, design_variable), sign * step);
+                if design_variable == crate::mesh::DesignVariable::BlockThickness {
+                    thicker.block.thickness_mm += step;
+                }
+            }
+            let mut model = ForwardModel::new(moved, &thicker).expect("a model");
+            let own = if has_gradient { vec![a_move(&model, (sample, number), space, variable)] } else { Vec::new() };
+            solved.push(evaluator.solve(&mut model, drive, &own, &|| false).expect("equilibria"));
+            blocks.push(Block { model, num_scanned: 1 });
+            of_blocks.push(own);
+        }
+        let shown: Vec<Shown> = blocks.iter().zip(&solved).map(|(b, s)| Shown::as_solved(b, s)).collect();
+        let responses = evaluator.responses(&shown).expect("responses");
+        let gradient = has_gradient.then(|| evaluator.gradient(&blocks, &solved, 0, &of_blocks).expect("a gradient"));
+        (responses[0].to_vector(), gradient)
+    };
+    assert!(space.variables.contains(&Variable::OtherThickness(0)), "{:?}", space.variables);
+    for variable in [Variable::X(0), Variable::OtherThickness(0), Variable::Thickness, Variable::Drive] {
+        let (here, gradient) = at(0.0, variable, true);
+        let gradient = &gradient.expect("asked for")[0];
+        let h = 0.08;
+        let [a, b, c, d] = [h, -h, 0.5 * h, -0.5 * h].map(|step| at(step, variable, false).0);
+        // The last entry is the stretch of one quadrature point, another one after a large step.
+        for i in 0..here.len() - 1 {
+            let (coarse, fine) = ((a[i] - b[i]) / (2.0 * h), (c[i] - d[i]) / h);
+            let limit = (4.0 * fine - coarse) / 3.0;
+            // As in the test above: what extrapolation leaves is O(h⁴).
+            let is_close = (limit - gradient[i]).abs() < 2e-4 + 2e-3 * gradient[i].abs();
+            assert!(is_close, "{variable:?}, response {i}: difference {limit}, gradient {}", gradient[i]);
         }
     }
 }

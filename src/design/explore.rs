@@ -12,11 +12,14 @@ const ATTEMPTS: usize = 60;
 /// on the number of holes alone.
 pub fn geometry_margins(specimen: &Specimen, limits: &ManufacturingLimits, voxel_mm: [f64; 3]) -> Vec<f64> {
     let mut margins = Vec::new();
-    for ligament in specimen.ligaments() {
-        margins.push(ligament.length_mm - limits.min_ligament_mm(ligament.kind));
-        if let Some(fewest) = limits.min_voxels_across_ligament {
-            let across = ManufacturingLimits::voxels_across(specimen, ligament.length_mm, ligament.direction, voxel_mm);
-            margins.push(across - fewest);
+    for sample in specimen.samples() {
+        for ligament in sample.ligaments() {
+            margins.push(ligament.length_mm - limits.min_ligament_mm(ligament.kind));
+            if let Some(fewest) = limits.min_voxels_across_ligament {
+                let across =
+                    ManufacturingLimits::voxels_across(&sample, ligament.length_mm, ligament.direction, voxel_mm);
+                margins.push(across - fewest);
+            }
         }
     }
     margins

@@ -53,13 +53,13 @@ impl SearchRun<'_> {
         }
         let specimens: Vec<&Specimen> = std::iter::once(base).chain(finalists.iter().map(|f| &f.specimen)).collect();
         let (total, done) = (specimens.len(), AtomicUsize::new(0));
-        let best = state.history.last().copied();
+        let (best, leader) = (state.history.last().copied(), state.leader());
         let results: Vec<Confirmation> = specimens
             .par_iter()
             .map(|specimen| {
                 let result = self.confirmed(specimen);
-                let count = done.fetch_add(1, Ordering::Relaxed) + 1;
-                (self.progress)(&Progress { stage: "confirm", done: count, total, best });
+                let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+                (self.progress)(&Progress { stage: "confirm", done, total, best, leader: leader.clone() });
                 result
             })
             .collect();
@@ -95,7 +95,8 @@ impl SearchRun<'_> {
         let best_kept = ranked.iter().filter(is_kept).map(|c| c.objective).fold(0.0, f64::max);
         broken.retain(|(_, _, objective)| *objective > best_kept);
         broken.sort_by(|a, b| b.2.total_cmp(&a.2));
-        broken.truncate(MAX_REPAIRS);
+        // Gradients are of one scan alone.
+        broken.truncate(if study.vary.earlier_scan_mm.is_some() { 0 } else { MAX_REPAIRS });
         let in_integrals = match broken.is_empty() {
             true => None,
             false => Some(self.reference_from(self.evaluated(base_specimen, None), state)?),
@@ -146,11 +147,11 @@ impl SearchRun<'_> {
         };
         let shifted = in_integrals.with_shifts(shifts(confirmed, &searched));
         let (index, start) = &finalist.point;
-        let (done, best) = (AtomicUsize::new(0), state.history.last().copied());
+        let (done, best, leader) = (AtomicUsize::new(0), state.history.last().copied(), state.leader());
         let on_evaluation = || {
-            let count = done.fetch_add(1, Ordering::Relaxed) + 1;
             let total = REPAIR_EVALUATIONS;
-            (self.progress)(&Progress { stage: "repair", done: count.min(total), total, best });
+            let done = (done.fetch_add(1, Ordering::Relaxed) + 1).min(total);
+            (self.progress)(&Progress { stage: "repair", done, total, best, leader: leader.clone() });
         };
         let problem = StructureProblem::new(self, &shifted, &spaces[*index], &on_evaluation);
         // Near the start: what broke is small.

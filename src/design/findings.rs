@@ -1,80 +1,11 @@
 //! What a result says, in plain words: each sentence is computed from the numbers beside it.
 
 use super::aim::Normalisation;
+use super::disagreement::{Disagreement, information_gain, integrated_gain};
 use super::entry::DesignEntry;
 use super::study::Study;
+use super::words::listed;
 use crate::sensitivity::IDENTIFIABILITY_LIMIT;
-use serde::{Deserialize, Serialize};
-
-/// How differently integrated sensitivity and Fisher information rank the confirmed designs for one material.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Disagreement {
-    /// Name of the prior.
-    pub material: String,
-    /// Kendall's τ between the two rankings: 1 the same, −1 reversed; null with fewer than two designs.
-    pub kendall_tau: Option<f64>,
-    /// Rank (from 1) of each confirmed design by the smallest gain in 𝒮.
-    pub rank_by_integrated_sensitivity: Vec<usize>,
-    /// Rank by the D-optimal figure.
-    pub rank_by_information: Vec<usize>,
-}
-
-/// The smallest ln gain in 𝒮 over the parameters of a material.
-fn integrated_gain(entry: &DesignEntry, material: &str) -> f64 {
-    entry
-        .gains
-        .iter()
-        .filter(|g| g.material == material)
-        .map(|g| g.integrated_sensitivity.unwrap_or(0.0))
-        .fold(f64::INFINITY, f64::min)
-}
-
-/// Gain in the D-optimal figure of a material.
-fn information_gain(entry: &DesignEntry, base: &DesignEntry, material: usize) -> Option<f64> {
-    let own = entry.by_material.get(material)?.relative_sd_by_criterion.d_optimal?;
-    Some(base.by_material.get(material)?.relative_sd_by_criterion.d_optimal? / own)
-}
-
-/// Ranks from 1, largest value first; equal values by index.
-fn ranks(values: &[f64]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..values.len()).collect();
-    order.sort_by(|a, b| values[*b].total_cmp(&values[*a]).then(a.cmp(b)));
-    let mut ranks = vec![0; values.len()];
-    for (rank, index) in order.into_iter().enumerate() {
-        ranks[index] = rank + 1;
-    }
-    ranks
-}
-
-/// Compares the two rankings for every material.
-pub fn disagreement(study: &Study, base: &DesignEntry, ranked: &[DesignEntry]) -> Vec<Disagreement> {
-    study
-        .materials
-        .iter()
-        .enumerate()
-        .map(|(index, prior)| {
-            let by_sum: Vec<f64> = ranked.iter().map(|e| integrated_gain(e, &prior.name)).collect();
-            let by_information: Vec<f64> =
-                ranked.iter().map(|e| information_gain(e, base, index).unwrap_or(0.0)).collect();
-            let (mut agreeing, mut pairs) = (0i64, 0i64);
-            for i in 0..ranked.len() {
-                for j in 0..i {
-                    let product = (by_sum[i] - by_sum[j]) * (by_information[i] - by_information[j]);
-                    // Ties (and what is not a number) count for neither.
-                    agreeing += i64::from(product > 0.0) - i64::from(product < 0.0);
-                    pairs += 1;
-                }
-            }
-            Disagreement {
-                material: prior.name.clone(),
-                kendall_tau: (pairs > 0).then(|| agreeing as f64 / pairs as f64),
-                rank_by_integrated_sensitivity: ranks(&by_sum),
-                rank_by_information: ranks(&by_information),
-            }
-        })
-        .collect()
-}
 
 fn holes(count: usize) -> String {
     match count {
@@ -97,7 +28,7 @@ fn more_or_less(ratio: f64) -> String {
 }
 
 /// "mu_1" as it is written in reports: μ₁.
-fn symbol(parameter: &str) -> String {
+pub(super) fn symbol(parameter: &str) -> String {
     let subscript = |digits: &str| -> String {
         digits.chars().filter_map(|c| c.to_digit(10)).filter_map(|d| char::from_u32('₀' as u32 + d)).collect()
     };
@@ -137,6 +68,7 @@ pub fn findings(
     let Some(best) = ranked.first() else { return Vec::new() };
     let mut said = vec![winner(base, best)];
     said.extend(which_are_equal(ranked, equals));
+    said.extend(what_is_simpler(ranked, equals));
     said.extend(what_size_does(study, base, best));
     said.extend(how_far_apart(base, best));
     for (index, prior) in study.materials.iter().enumerate() {
@@ -169,24 +101,25 @@ fn how_far_apart(base: &DesignEntry, best: &DesignEntry) -> Vec<String> {
 
 fn winner(base: &DesignEntry, best: &DesignEntry) -> String {
     let drive = |e: &DesignEntry| e.specimen.drive_mm.last().copied().unwrap_or(0.0);
-    if best.specimen.holes == base.specimen.holes
-        && best.specimen.block == base.specimen.block
-        && best.objective < 1.0005
-    {
+    if best.is_design_of(base) && best.objective < 1.0005 {
         return format!(
             "No design within the limits beats the base specimen at {:.2} mm. Widen the limits or the ranges, or search longer.",
             drive(base)
         );
     }
+    let force = |e: &DesignEntry| {
+        let (material, force_n) = e.largest_force().unwrap_or(("", 0.0));
+        format!("{force_n:.1} N at {:.2} mm with material \"{material}\"", drive(e))
+    };
     format!(
         "The best specimen within the limits is \"{}\", scanned at a drive of {:.2} mm. By the study's objective it is {:.3} times \
-         as good as the base specimen at {:.2} mm. It needs {:.1} N (base: {:.1} N).",
+         as good as the base specimen at {:.2} mm. The largest force that it needs is {} (base: {}).",
         best.specimen.name,
         drive(best),
         best.objective,
         drive(base),
-        best.force_n(),
-        base.force_n(),
+        force(best),
+        force(base),
     )
 }
 
@@ -214,9 +147,35 @@ fn which_are_equal(ranked: &[DesignEntry], Equals { equal_to_best, simplest }: E
     Some(format!("{open} Within that, {noun} {} of the list {verb} as good as the first. {advice}", others.join(", ")))
 }
 
+/// Holes of all samples.
+fn num_holes(entry: &DesignEntry) -> usize {
+    entry.specimen.samples().iter().map(|s| s.holes.len()).sum()
+}
+
+/// The best designs with fewer holes than the one recommended, and what they cost.
+fn what_is_simpler(ranked: &[DesignEntry], equals: Equals) -> Option<String> {
+    let chosen = ranked.get(equals.simplest)?;
+    let mut simpler: std::collections::BTreeMap<usize, (usize, &DesignEntry)> = std::collections::BTreeMap::new();
+    for (place, entry) in ranked.iter().enumerate().filter(|(_, e)| e.is_within_limits) {
+        if num_holes(entry) < num_holes(chosen) {
+            let best = simpler.entry(num_holes(entry)).or_insert((place, entry));
+            if entry.objective > best.1.objective {
+                *best = (place, entry);
+            }
+        }
+    }
+    let each = simpler.iter().rev().map(|(count, (place, entry))| {
+        let less = 100.0 * (1.0 - entry.objective / chosen.objective);
+        format!("number {} with {} is {less:.1} % worse", place + 1, holes(*count))
+    });
+    let each: Vec<String> = each.collect();
+    (!each.is_empty()).then(|| format!("Simpler to make within the limits: {}.", listed(&each)))
+}
+
 /// Where blocks may differ: what of the gain is size and what is geometry.
 fn what_size_does(study: &Study, base: &DesignEntry, best: &DesignEntry) -> Option<String> {
-    if best.specimen.block == base.specimen.block {
+    let sizes = |e: &DesignEntry| e.specimen.samples().iter().map(|s| s.block).collect::<Vec<_>>();
+    if sizes(best) == sizes(base) {
         return None;
     }
     let ratio = best.volume_mm3 / base.volume_mm3;
@@ -279,15 +238,20 @@ fn gains_of_material(best: &DesignEntry, material: &str) -> Option<String> {
     Some(text)
 }
 
-/// The best of every number of holes, by both measures, against the solid block.
+/// The best of every number of holes, by both measures, against the solid block: designs that keep every limit of
+/// mould, rig and material, whether or not they keep the guard, so that like is compared with like.
 fn what_holes_do(base: &DesignEntry, ranked: &[DesignEntry], index: usize, material: &str) -> Vec<String> {
     let mut by_count: std::collections::BTreeMap<usize, (f64, f64)> = std::collections::BTreeMap::new();
-    for entry in ranked {
-        let slot = by_count.entry(entry.specimen.holes.len()).or_insert((0.0, 0.0));
+    for entry in ranked.iter().filter(|e| e.limits.iter().all(|limit| limit.is_satisfied)) {
+        let slot = by_count.entry(num_holes(entry)).or_insert((0.0, 0.0));
         slot.0 = slot.0.max(integrated_gain(entry, material));
         slot.1 = slot.1.max(information_gain(entry, base, index).unwrap_or(0.0));
     }
-    let Some(&(solid_sum, solid_information)) = by_count.get(&0) else { return Vec::new() };
+    let Some(&(solid_sum, solid_information)) = by_count.get(&0) else {
+        let was_tried = index == 0 && ranked.iter().any(|e| num_holes(e) == 0);
+        let said = "No solid block kept every limit at confirmation, so that nothing is said of what holes do.";
+        return was_tried.then(|| said.to_string()).into_iter().collect();
+    };
     let holed: Vec<_> = by_count.iter().filter(|(count, _)| **count > 0).collect();
     let mut said = Vec::new();
     if let Some((count, (sum, _))) = holed.iter().max_by(|a, b| a.1.0.total_cmp(&b.1.0)) {
@@ -299,7 +263,7 @@ fn what_holes_do(base: &DesignEntry, ranked: &[DesignEntry], index: usize, mater
         };
         let reason = if ratio > 1.005 { "" } else { ": a removed voxel is a lost measurement" };
         said.push(format!(
-            "Material \"{material}\": {verdict}. The best confirmed specimen with holes ({}) has {} of it than the best solid block{reason}.",
+            "Material \"{material}\": {verdict}. The best confirmed specimen with holes ({}) has {} of it than the best solid block within the same limits{reason}.",
             holes(**count),
             more_or_less(ratio).replace("as much", "no more and no less")
         ));
@@ -312,14 +276,14 @@ fn what_holes_do(base: &DesignEntry, ranked: &[DesignEntry], index: usize, mater
         } else if ratio < 0.995 {
             format!(
                 "Material \"{material}\": holes help to tell the parameters apart. The best confirmed specimen with holes ({}) promises a \
-                 generalised standard deviation {:.0} % smaller than the best solid block's.",
+                 generalised standard deviation {:.0} % smaller than the best solid block's within the same limits.",
                 holes(**count),
                 100.0 * (1.0 - ratio)
             )
         } else {
             format!(
                 "Material \"{material}\": holes do not help to tell the parameters apart. The best confirmed specimen with holes ({}) \
-                 promises a generalised standard deviation {} than the best solid block's.",
+                 promises a generalised standard deviation {} than the best solid block's within the same limits.",
                 holes(**count),
                 if ratio < 1.005 { "no smaller".to_string() } else { format!("{:.0} % larger", 100.0 * (ratio - 1.0)) }
             )
@@ -421,10 +385,5 @@ mod tests {
         assert_eq!(more_or_less(1.12), "12 % more");
         assert_eq!(more_or_less(0.92), "8 % less");
         assert_eq!(more_or_less(1.001), "as much");
-    }
-
-    #[test]
-    fn equal_values_rank_by_index() {
-        assert_eq!(ranks(&[1.0, 3.0, 3.0, 2.0]), [4, 1, 2, 3]);
     }
 }

@@ -155,8 +155,8 @@ impl<'a> Reference<'a> {
             let guards = parameters.filter(|n| n != "kappa");
             names.extend(guards.map(|p| format!("the guard on the standard deviation of {p}, material \"{name}\"")));
         }
-        names.extend(self.study.limits.max_force_n.map(|_| "max_force_n".into()));
-        names.extend(self.study.limits.max_local_stretch.map(|_| "max_local_stretch".into()));
+        names.extend(self.study.limits.max_force_n.map(|_| "the largest force".into()));
+        names.extend(self.study.limits.max_local_stretch.map(|_| "the largest local stretch".into()));
         names.get(limit).cloned().unwrap_or_default()
     }
 

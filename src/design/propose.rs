@@ -32,17 +32,33 @@ pub(super) struct RaceRules {
     optimism: &'static [f64],
     /// Evaluations.
     pub total: usize,
+    /// The structures that race; the best of all where it is `None`.
+    structures: Option<Vec<usize>>,
 }
+
+/// Part of the proposals that goes to the solid block, so that what holes do is told of the best one.
+const PART_OF_SOLID: usize = 6;
+/// The fewest proposals of the solid block, of those asked for.
+const LEAST_OF_SOLID: usize = 8;
 
 impl RaceRules {
     /// Of all structures, on the coarse mesh.
     pub fn of_samples(total: usize) -> RaceRules {
-        RaceRules { stage: "explore", most_structures: usize::MAX, optimism: &[0.0, 1.0], total }
+        let (stage, optimism) = ("explore", &[0.0, 1.0]);
+        RaceRules { stage, most_structures: usize::MAX, optimism, total, structures: None }
     }
 
     /// Of the best structures, on the fine mesh.
     pub fn of_proposals(total: usize) -> RaceRules {
-        RaceRules { stage: "propose", most_structures: 6, optimism: &[0.0, 0.5, 1.0, 2.0], total }
+        let (stage, optimism) = ("propose", &[0.0, 0.5, 1.0, 2.0]);
+        RaceRules { stage, most_structures: 6, optimism, total, structures: None }
+    }
+
+    /// Of the structures without holes, on the fine mesh, beside `proposals` of all.
+    pub fn of_solid(proposals: usize, spaces: &[Subspace]) -> RaceRules {
+        let solid = (0..spaces.len()).filter(|&s| spaces[s].structure.num_holes() == 0).collect();
+        let total = (proposals / PART_OF_SOLID).max(LEAST_OF_SOLID).min(proposals);
+        RaceRules { stage: "solid", optimism: &[0.0, 1.0], total, structures: Some(solid), ..RaceRules::of_samples(0) }
     }
 }
 
@@ -222,7 +238,10 @@ impl SearchRun<'_> {
         let total = rules.total;
         let mut races: Vec<Race> = Vec::new();
         if total > 0 {
-            let best = state.best_structures(rules.most_structures);
+            let best = match &rules.structures {
+                Some(structures) => structures.clone(),
+                None => state.best_structures(rules.most_structures),
+            };
             races.extend(best.into_iter().filter_map(|space| Race::of(self, judge, state, space)));
         }
         let Some(like) = state.first_judged().filter(|_| !races.is_empty()).cloned() else { return Ok(()) };
@@ -264,15 +283,15 @@ impl SearchRun<'_> {
             race.is_settled = points.is_empty();
             batch.extend(points.into_iter().map(|point| (index, point)));
         }
-        let best = state.history.last().copied();
+        let (best, leader) = (state.history.last().copied(), state.leader());
         let total = rules.total;
         let places: Vec<usize> = races.iter().map(|r| r.space).collect();
         let results: Vec<Option<Attempt>> = batch
             .par_iter()
             .map(|(race, point)| {
                 let attempt = self.estimated(&spaces[places[*race]].specimen(point), judge.fidelity);
-                let count = done.fetch_add(1, atomic::Ordering::Relaxed) + 1;
-                (self.progress)(&Progress { stage: rules.stage, done: count.min(total), total, best });
+                let done = (done.fetch_add(1, atomic::Ordering::Relaxed) + 1).min(total);
+                (self.progress)(&Progress { stage: rules.stage, done, total, best, leader: leader.clone() });
                 attempt
             })
             .collect();

@@ -1,24 +1,34 @@
 //! The result of a design search (`design/1`) and what it says in plain words.
 
 use super::aim::Objective;
+use super::disagreement::{Disagreement, disagreement};
 use super::entry::DesignEntry;
-use super::findings::{Disagreement, Equals, disagreement, findings};
+use super::findings::{Equals, findings, symbol};
+use super::recommendation::Recommendation;
 use super::search::Found;
 use super::study::Study;
 use super::study_hash::study_hash;
 use super::ties::{equal_to_best, simplest};
 use crate::calibration::ParameterSpread;
 use crate::provenance::VERSION;
+use crate::sensitivity::Protocol;
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// A finished search.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DesignResult {
     /// Always `design/1`.
     pub schema: String,
     /// Name of the study.
     pub name: String,
+    /// What to make and how to scan it, in words.
+    #[serde(default)]
+    pub recommendation: Recommendation,
+    /// How every design is measured.
+    #[serde(default)]
+    pub protocol: Protocol,
     /// The base specimen at its drive.
     pub base: DesignEntry,
     /// The winner.
@@ -59,7 +69,7 @@ pub struct DesignResult {
 }
 
 /// Spread found against spread promised.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Verification {
     /// Of the best design.
@@ -69,7 +79,7 @@ pub struct Verification {
 }
 
 /// One material's verification.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MaterialVerification {
     /// Name of the prior.
@@ -87,6 +97,11 @@ pub struct MaterialVerification {
 }
 
 impl DesignResult {
+    /// The design to make: the simplest of those equal to the best.
+    pub fn recommended(&self) -> &DesignEntry {
+        self.ranked.get(self.simplest).unwrap_or(&self.best)
+    }
+
     /// Puts a search's findings together; `None` if nothing was confirmed.
     pub fn new(study: &Study, found: &Found) -> Option<DesignResult> {
         let ranked: Vec<DesignEntry> = found.ranked.iter().filter_map(DesignEntry::of).collect();
@@ -95,17 +110,14 @@ impl DesignResult {
         let base = DesignEntry::of(&found.base)?;
         let best = ranked.first()?.clone();
         let disagreement = disagreement(study, &base, &ranked);
+        let equals = Equals { equal_to_best: &equal_to_best, simplest };
         Some(DesignResult {
             schema: "design/1".into(),
             name: study.name.clone(),
             pareto: pareto(&ranked),
-            findings: findings(
-                study,
-                &base,
-                &ranked,
-                &disagreement,
-                Equals { equal_to_best: &equal_to_best, simplest },
-            ),
+            recommendation: Recommendation::new(study, &base, &ranked, equals),
+            protocol: study.protocol.clone(),
+            findings: findings(study, &base, &ranked, &disagreement, equals),
             equal_to_best,
             simplest,
             disagreement,
@@ -122,6 +134,26 @@ impl DesignResult {
             version: VERSION.into(),
             input_hash: study_hash(study),
         })
+    }
+
+    /// Which promises the verification found not to be trusted, and why, in words.
+    pub fn verification_doubts(&self) -> Vec<String> {
+        let mut said = Vec::new();
+        for v in &self.verification_by_material {
+            for (label, list) in [("best", &v.best), ("base", &v.base)] {
+                for p in list {
+                    if !p.doubts.is_empty() {
+                        said.push(format!(
+                            "Material \"{}\", {label} specimen: do not trust what is promised of {}: {}.",
+                            v.material,
+                            symbol(&p.parameter),
+                            p.doubts.join("; ")
+                        ));
+                    }
+                }
+            }
+        }
+        said
     }
 
     /// Where fits of the verification failed, in words.

@@ -1,7 +1,7 @@
 //! Designs in the steps that a mould maker works to.
 
 use super::explore::is_makeable;
-use crate::specimen::{ManufacturingLimits, Specimen};
+use crate::specimen::{Block, Hole, ManufacturingLimits, Specimen};
 
 /// The step where limits state none, mm.
 const USUAL_STEP_MM: f64 = 0.1;
@@ -13,21 +13,20 @@ pub(super) fn in_steps(specimen: &Specimen, limits: &ManufacturingLimits, voxel_
     let step = limits.dimension_step_mm.unwrap_or(USUAL_STEP_MM);
     let nearest = |value: f64| multiple(step, (value / step).round());
     let mut rounded = specimen.clone();
-    let block = &mut rounded.block;
-    for length in [&mut block.length_mm, &mut block.thickness_mm, &mut block.width_mm] {
-        *length = nearest(*length);
-    }
     rounded.drive_mm.iter_mut().for_each(|d| *d = nearest(*d));
-    for hole in &mut rounded.holes {
-        hole.center_mm = hole.center_mm.map(nearest);
+    for (block, holes) in shapes_of(&mut rounded) {
+        for length in [&mut block.length_mm, &mut block.thickness_mm, &mut block.width_mm] {
+            *length = nearest(*length);
+        }
+        holes.iter_mut().for_each(|hole| hole.center_mm = hole.center_mm.map(nearest));
     }
     if limits.punches_mm.is_some() {
         return Some(rounded).filter(|s| is_makeable(s, limits, voxel_mm));
     }
     let with_diameters = |of: &dyn Fn(f64) -> f64| {
         let mut made = rounded.clone();
-        for (hole, drawn) in made.holes.iter_mut().zip(&specimen.holes) {
-            hole.diameter_mm = multiple(step, of(drawn.diameter_mm / step));
+        for (_, holes) in shapes_of(&mut made) {
+            holes.iter_mut().for_each(|hole| hole.diameter_mm = multiple(step, of(hole.diameter_mm / step)));
         }
         made
     };
@@ -35,6 +34,12 @@ pub(super) fn in_steps(specimen: &Specimen, limits: &ManufacturingLimits, voxel_
     [with_diameters(&f64::round), smaller_by(0.0), smaller_by(1.0), smaller_by(2.0)]
         .into_iter()
         .find(|s| is_makeable(s, limits, voxel_mm))
+}
+
+/// Block and holes of every sample.
+fn shapes_of(specimen: &mut Specimen) -> impl Iterator<Item = (&mut Block, &mut Vec<Hole>)> {
+    let Specimen { block, holes, other_samples, .. } = specimen;
+    std::iter::once((block, holes)).chain(other_samples.iter_mut().map(|s| (&mut s.block, &mut s.holes)))
 }
 
 /// `count` steps, without the last digit that a product of a decimal fraction leaves.
@@ -46,7 +51,7 @@ fn multiple(step: f64, count: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::specimen::{Hole, HoleAxis};
+    use crate::specimen::HoleAxis;
 
     fn published() -> (Specimen, ManufacturingLimits) {
         let specimen = Specimen::from_json(include_str!("../../geometries/two-hole-shear.json")).expect("a specimen");

@@ -85,8 +85,7 @@ pub fn search(
 impl SearchRun<'_> {
     fn run(&self) -> Result<Found, SearchError> {
         let study = self.study;
-        let report = |stage, done, total, best| (self.progress)(&Progress { stage, done, total, best });
-        report("base", 0, 1, None);
+        (self.progress)(&Progress { stage: "base", done: 0, total: 1, best: None, leader: None });
         let base_specimen = base_at_drive(study);
         let mut state = State::default();
         let coarse = self.judge(&base_specimen, Fidelity::Coarse, &state)?;
@@ -98,6 +97,9 @@ impl SearchRun<'_> {
             self.refine(&fine, &in_integrals, &spaces, &mut state)?;
         }
         self.race(&RaceRules::of_proposals(study.budget.propose), &fine, &spaces, &mut state)?;
+        if spaces.iter().any(|s| s.structure.num_holes() > 0) {
+            self.race(&RaceRules::of_solid(study.budget.propose, &spaces), &fine, &spaces, &mut state)?;
+        }
         let (base, ranked) = self.confirm_all(&base_specimen, &spaces, &mut state)?;
         Ok(Found {
             base,
@@ -163,23 +165,25 @@ impl SearchRun<'_> {
     ) -> Result<(), SearchError> {
         let reference = &judge.reference;
         let done = AtomicUsize::new(state.num_evaluations);
-        let best_before = state.history.last().copied();
-        // Largest merit seen by any thread, for display only.
-        let best = std::sync::Mutex::new(best_before);
+        // The best design seen by any thread, for display only.
+        let best = std::sync::Mutex::new((state.history.last().copied(), state.leader()));
         let results: Vec<Option<Attempt>> = batch
             .par_iter()
             .map(|(space, vector)| {
-                let attempt = self.estimated(&spaces[*space].specimen(vector), judge.fidelity);
+                let specimen = spaces[*space].specimen(vector);
+                let attempt = self.estimated(&specimen, judge.fidelity);
                 if let (Some(Ok(evaluated)), Ok(mut best)) = (&attempt, best.lock()) {
                     let judged = reference.judge(evaluated);
                     if judged.margins.iter().all(|m| *m >= 0.0) {
                         let gain = reference.objective(&judged).exp();
-                        *best = Some(best.map_or(gain, |b| b.max(gain)));
+                        if best.0.is_none_or(|before| gain > before) {
+                            *best = (Some(gain), Some(specimen));
+                        }
                     }
                 }
-                let shown = best.lock().ok().and_then(|b| *b);
+                let (best, leader) = best.lock().map(|shown| shown.clone()).unwrap_or_default();
                 let count = done.fetch_add(1, Ordering::Relaxed) + 1;
-                (self.progress)(&Progress { stage, done: count.min(total), total, best: shown });
+                (self.progress)(&Progress { stage, done: count.min(total), total, best, leader });
                 attempt
             })
             .collect();
@@ -209,10 +213,10 @@ impl SearchRun<'_> {
         let starts = state.starts(budget.refine);
         let total = starts.len() * budget.iterations;
         let done = AtomicUsize::new(0);
-        let best = state.history.last().copied();
+        let (best, leader) = (state.history.last().copied(), state.leader());
         let on_evaluation = || {
-            let count = done.fetch_add(1, Ordering::Relaxed) + 1;
-            (self.progress)(&Progress { stage: "refine", done: count.min(total), total, best });
+            let (done, leader) = ((done.fetch_add(1, Ordering::Relaxed) + 1).min(total), leader.clone());
+            (self.progress)(&Progress { stage: "refine", done, total, best, leader });
         };
         let improved: Vec<Option<(usize, Vec<f64>)>> = starts
             .par_iter()

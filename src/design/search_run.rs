@@ -14,7 +14,7 @@ use crate::specimen::Specimen;
 /// How far a search is.
 #[derive(Clone, Debug)]
 pub struct Progress {
-    /// `base`, `explore`, `refine`, `propose`, `confirm`, `repair`, `verify`.
+    /// `base`, `explore`, `refine`, `propose`, `solid`, `confirm`, `repair`, `verify`.
     pub stage: &'static str,
     /// Finished in this stage.
     pub done: usize,
@@ -22,6 +22,8 @@ pub struct Progress {
     pub total: usize,
     /// Largest objective so far (gain over the base), of designs within the limits.
     pub best: Option<f64>,
+    /// The design that reached it.
+    pub leader: Option<Specimen>,
 }
 
 /// Receives progress; called from several threads.

@@ -78,6 +78,95 @@ fn proposals_keep_the_limits() {
     assert!(found.ranked[0].objective.is_finite());
 }
 
+/// The solid block is improved on the fine mesh for the comparison, in the race of all structures or by proposals of its
+/// own, which are of no other structure.
+#[test]
+fn the_solid_block_is_improved_too() {
+    let mut study = small_study();
+    let length_mm = study.base.block.length_mm;
+    study.vary.length_mm = Some(Range { min: 0.7 * length_mm, max: 1.2 * length_mm });
+    // Enough samples of the solid block to learn from.
+    study.budget.explore = 16;
+    let found = search(&study, &Checkpoint::in_memory(), &quiet, &|| false).expect("the search succeeds");
+    let solid: Vec<&str> =
+        found.candidates.iter().filter(|c| c.specimen.holes.is_empty()).map(|c| &c.stage[..]).collect();
+    assert!(solid.iter().any(|stage| ["propose", "solid"].contains(stage)), "{solid:?} {:?}", found.failures);
+    assert!(found.candidates.iter().all(|c| c.stage != "solid" || c.specimen.holes.is_empty()));
+}
+
+/// Two blocks that differ in thickness alone, both scanned: the second follows the first, limits and rounding hold for
+/// both, and the recommendation speaks of both.
+#[test]
+fn unlike_samples_are_searched() {
+    let sample = crate::specimen::Sample {
+        block: crate::specimen::Block { length_mm: 12.0, thickness_mm: 4.0, width_mm: 9.0 },
+        holes: Vec::new(),
+    };
+    let mut study = small_study();
+    study.base = Specimen {
+        test: crate::specimen::TestKind::DoubleLapShear,
+        block: sample.block,
+        holes: Vec::new(),
+        drive_mm: vec![2.0],
+        samples_in_parallel: 1,
+        other_samples: vec![sample],
+        ..study.base
+    };
+    study.vary.tests = Vec::new();
+    study.vary.axes = Some(vec![crate::specimen::HoleAxis::Thickness]);
+    study.vary.drive_mm = Range { min: 1.0, max: 2.0 };
+    study.vary.thickness_mm = Some(Range { min: 3.0, max: 5.0 });
+    let thickness_mm = Some(Range { min: 3.0, max: 6.0 });
+    study.vary.other_samples = vec![VarySample { is_like_first: true, thickness_mm, ..VarySample::default() }];
+    study.scan.voxel_mm = [1.0, 0.5, 1.0];
+    study.protocol.blocks_scanned = 2;
+    study.budget = Budget { explore: 4, refine: 1, iterations: 2, propose: 4, confirm: 1, variants_in_search: false };
+    study.validate().expect("a study");
+    let found = search(&study, &Checkpoint::in_memory(), &quiet, &|| false).expect("the search succeeds");
+    let result = DesignResult::new(&study, &found).expect("something was confirmed");
+    for candidate in &found.candidates {
+        let (first, other) = (&candidate.specimen, &candidate.specimen.other_samples[0]);
+        assert_eq!((&first.holes, first.block.length_mm), (&other.holes, other.block.length_mm));
+        assert!((3.0..=6.0).contains(&other.block.thickness_mm));
+    }
+    let best = &result.best;
+    assert_eq!(best.evaluation.blocks_scanned, 2);
+    assert_eq!(best.evaluation.steps[0].force_by_kind_n.len(), 2);
+    assert!(best.objective.is_finite() && best.is_within_limits);
+    // In steps of a tenth of a millimetre.
+    let thickness = 10.0 * best.specimen.other_samples[0].block.thickness_mm;
+    assert!((thickness - thickness.round()).abs() < 1e-9, "{thickness}");
+    let said = result.recommendation.make;
+    assert!(said.contains("sample 2") && said.contains("2 blocks together"), "{said}");
+}
+
+/// A further scan before the last one: its drive is searched, and the time of one scan is shared out to the two.
+#[test]
+fn an_earlier_scan_is_searched() {
+    let mut study = small_study();
+    study.vary.hole_count = CountRange { min: 1, max: 1 };
+    study.vary.earlier_scan_mm = Some(Range { min: 2.0, max: 10.0 });
+    assert!(matches!(study.validate(), Err(StudyError::EarlierScanNeedsVoxels)), "gradients are of one scan");
+    study.budget = Budget { explore: 4, refine: 0, propose: 4, confirm: 1, ..study.budget };
+    study.validate().expect("a study");
+    let found = search(&study, &Checkpoint::in_memory(), &quiet, &|| false).expect("the search succeeds");
+    let result = DesignResult::new(&study, &found).expect("something was confirmed");
+    for candidate in &found.candidates {
+        assert!(matches!(candidate.specimen.drive_mm[..], [earlier, last] if 2.0 <= earlier && earlier < last));
+    }
+    let scanned = result.ranked.iter().filter(|e| e.specimen.drive_mm.len() == 2);
+    for entry in scanned {
+        let shares = &entry.evaluation.scan_share;
+        assert!(shares.len() == 2 && (shares.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{shares:?}");
+        // Each drive alone tells less than both.
+        let both = entry.evaluation.promised_sd[2].value.expect("it is determined");
+        for step in &entry.evaluation.steps {
+            assert!(step.promised_sd[2].value.is_none_or(|alone| alone > both));
+        }
+    }
+    assert!(result.base.evaluation.scan_share.is_empty());
+}
+
 /// The base is a design like any other: its structure's vector gives it back, symmetric studies included.
 #[test]
 fn the_base_has_a_vector() {

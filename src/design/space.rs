@@ -6,7 +6,7 @@
 
 use super::study::{Range, Study};
 use crate::mesh::DesignVariable;
-use crate::specimen::{Hole, HoleAxis, MIRROR_TOLERANCE_MM, Specimen, Symmetry, TestKind};
+use crate::specimen::{Block, Hole, HoleAxis, MIRROR_TOLERANCE_MM, Specimen, Symmetry, TestKind};
 
 /// One orbit of holes: which of its two coordinates are held at zero by lying on a mirror.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -42,12 +42,20 @@ pub enum Variable {
     Diameter(usize),
     /// Drive.
     Drive,
+    /// Drive of a scan before it.
+    EarlierScan,
     /// Length of the block.
     Length,
     /// Thickness of the block.
     Thickness,
     /// Width of the block.
     Width,
+    /// Length of a further sample's block.
+    OtherLength(usize),
+    /// Thickness of a further sample's block.
+    OtherThickness(usize),
+    /// Width of a further sample's block.
+    OtherWidth(usize),
 }
 
 /// A structure with the ranges of its variables.
@@ -62,6 +70,8 @@ pub struct Subspace {
     /// Diameters that exist, where only some do.
     pub punches_mm: Option<Vec<f64>>,
     template: Specimen,
+    /// Whether each further sample has the outline and the holes of the first.
+    is_like_first: Vec<bool>,
 }
 
 impl Structure {
@@ -209,6 +219,7 @@ impl Subspace {
         }
         for (variable, interval) in [
             (Variable::Drive, Some(study.drive_range())),
+            (Variable::EarlierScan, vary.earlier_scan_mm),
             (Variable::Length, vary.length_mm),
             (Variable::Thickness, vary.thickness_mm),
             (Variable::Width, vary.width_mm),
@@ -218,13 +229,30 @@ impl Subspace {
                 ranges.push(interval);
             }
         }
-        Subspace { structure, variables, ranges, punches_mm: study.limits.punches_mm.clone(), template }
+        for (index, other) in vary.other_samples.iter().enumerate() {
+            for (variable, interval) in [
+                (Variable::OtherLength(index), other.length_mm),
+                (Variable::OtherThickness(index), other.thickness_mm),
+                (Variable::OtherWidth(index), other.width_mm),
+            ] {
+                if let Some(interval) = interval {
+                    variables.push(variable);
+                    ranges.push(interval);
+                }
+            }
+        }
+        let is_like_first = (0..template.other_samples.len())
+            .map(|index| vary.other_samples.get(index).is_some_and(|other| other.is_like_first))
+            .collect();
+        let punches_mm = study.limits.punches_mm.clone();
+        Subspace { structure, variables, ranges, punches_mm, template, is_like_first }
     }
 
     /// The specimen of a vector with components in [0, 1]. A punched diameter is the nearest punch.
     pub fn specimen(&self, vector: &[f64]) -> Specimen {
         let mut specimen = self.template.clone();
         let mut orbits = vec![([0.0; 2], 0.0); self.structure.orbits.len()];
+        let mut earlier_mm = None;
         for ((variable, range), t) in self.variables.iter().zip(&self.ranges).zip(vector) {
             let value = range.min + t.clamp(0.0, 1.0) * (range.max - range.min);
             match *variable {
@@ -232,11 +260,17 @@ impl Subspace {
                 Variable::Other(o) => orbits[o].0[1] = value,
                 Variable::Diameter(o) => orbits[o].1 = self.nearest_punch(value),
                 Variable::Drive => specimen.drive_mm = vec![value],
+                Variable::EarlierScan => earlier_mm = Some(value),
                 Variable::Length => specimen.block.length_mm = value,
                 Variable::Thickness => specimen.block.thickness_mm = value,
                 Variable::Width => specimen.block.width_mm = value,
+                Variable::OtherLength(i) => specimen.other_samples[i].block.length_mm = value,
+                Variable::OtherThickness(i) => specimen.other_samples[i].block.thickness_mm = value,
+                Variable::OtherWidth(i) => specimen.other_samples[i].block.width_mm = value,
             }
         }
+        // One beyond the last drive is no earlier one: such a design is not valid.
+        specimen.drive_mm.splice(0..0, earlier_mm);
         specimen.holes.clear();
         for (orbit, (center, diameter_mm)) in self.structure.orbits.iter().zip(&orbits) {
             for signs in self.structure.image_signs(*orbit) {
@@ -245,6 +279,12 @@ impl Subspace {
                     center_mm: [signs[0] * center[0], signs[1] * center[1]],
                     diameter_mm: *diameter_mm,
                 });
+            }
+        }
+        for (sample, is_like_first) in specimen.other_samples.iter_mut().zip(&self.is_like_first) {
+            if *is_like_first {
+                sample.block = Block { thickness_mm: sample.block.thickness_mm, ..specimen.block };
+                sample.holes.clone_from(&specimen.holes);
             }
         }
         let count = specimen.holes.len();
@@ -280,8 +320,22 @@ impl Subspace {
         self.punches_mm.is_none() || !matches!(self.variables[index], Variable::Diameter(_))
     }
 
-    /// What a variable moves in the specimen, with signs; empty for the drive.
-    pub fn moves(&self, variable: Variable) -> Vec<(DesignVariable, f64)> {
+    /// What a variable moves in the specimen's sample with this number (0: the first), with signs; empty where it moves
+    /// nothing, as the drive.
+    pub fn moves(&self, variable: Variable, number: usize) -> Vec<(DesignVariable, f64)> {
+        // A sample like the first moves with it, but for its thickness.
+        let follows = number == 0 || variable != Variable::Thickness && self.is_like_first[number - 1];
+        let is_of = |index: usize| number == index + 1;
+        match variable {
+            Variable::OtherLength(i) if is_of(i) => vec![(DesignVariable::BlockLength, 1.0)],
+            Variable::OtherThickness(i) if is_of(i) => vec![(DesignVariable::BlockThickness, 1.0)],
+            Variable::OtherWidth(i) if is_of(i) => vec![(DesignVariable::BlockWidth, 1.0)],
+            _ if follows => self.moves_of_first(variable),
+            _ => Vec::new(),
+        }
+    }
+
+    fn moves_of_first(&self, variable: Variable) -> Vec<(DesignVariable, f64)> {
         let first =
             |orbit: usize| -> usize { self.structure.orbits[..orbit].iter().map(|o| self.structure.images(*o)).sum() };
         let of_orbit = |orbit: usize, make: fn(usize) -> DesignVariable, component: Option<usize>| {
@@ -296,7 +350,11 @@ impl Subspace {
             Variable::X(o) => of_orbit(o, DesignVariable::HoleX, Some(0)),
             Variable::Other(o) => of_orbit(o, DesignVariable::HoleOther, Some(1)),
             Variable::Diameter(o) => of_orbit(o, DesignVariable::HoleDiameter, None),
-            Variable::Drive => Vec::new(),
+            Variable::Drive
+            | Variable::EarlierScan
+            | Variable::OtherLength(_)
+            | Variable::OtherThickness(_)
+            | Variable::OtherWidth(_) => Vec::new(),
             Variable::Length => vec![(DesignVariable::BlockLength, 1.0)],
             Variable::Thickness => vec![(DesignVariable::BlockThickness, 1.0)],
             Variable::Width => vec![(DesignVariable::BlockWidth, 1.0)],
@@ -312,6 +370,15 @@ impl Subspace {
         if specimen.holes.iter().any(|h| h.axis != self.structure.axis) {
             return None;
         }
+        if specimen.other_samples.len() != self.is_like_first.len() {
+            return None;
+        }
+        for (sample, is_like_first) in specimen.other_samples.iter().zip(&self.is_like_first) {
+            let like = Block { thickness_mm: sample.block.thickness_mm, ..specimen.block };
+            if *is_like_first && (sample.block != like || sample.holes != specimen.holes) {
+                return None;
+            }
+        }
         let holes = self.representatives(&specimen.holes)?;
         let mut vector = Vec::with_capacity(self.variables.len());
         for (variable, range) in self.variables.iter().zip(&self.ranges) {
@@ -320,9 +387,13 @@ impl Subspace {
                 Variable::Other(o) => holes[o].center_mm[1],
                 Variable::Diameter(o) => holes[o].diameter_mm,
                 Variable::Drive => drive_mm,
+                Variable::EarlierScan => *specimen.drive_mm.first().filter(|d| **d < drive_mm)?,
                 Variable::Length => specimen.block.length_mm,
                 Variable::Thickness => specimen.block.thickness_mm,
                 Variable::Width => specimen.block.width_mm,
+                Variable::OtherLength(i) => specimen.other_samples[i].block.length_mm,
+                Variable::OtherThickness(i) => specimen.other_samples[i].block.thickness_mm,
+                Variable::OtherWidth(i) => specimen.other_samples[i].block.width_mm,
             };
             let width = (range.max - range.min).max(1e-12);
             let t = (value - range.min) / width;

@@ -72,6 +72,15 @@ impl State {
         self.failures.push(format!("{}: {cause}", specimen.name));
     }
 
+    /// The best design within the limits, of those that were solved as finely as the last one.
+    pub fn leader(&self) -> Option<Specimen> {
+        let fidelity = self.fidelities.last()?;
+        let counts = |index: &usize| self.fidelities[*index] == *fidelity && self.candidates[*index].is_within_limits;
+        let objective = |index: &usize| self.candidates[*index].objective;
+        let best = (0..self.candidates.len()).filter(counts).max_by(|a, b| objective(a).total_cmp(&objective(b)));
+        best.map(|index| self.candidates[index].specimen.clone())
+    }
+
     /// Candidates by merit, best first; those that were solved finely before others.
     fn order(&self) -> Vec<usize> {
         let is_coarse = |index: &usize| self.fidelities[*index] == Fidelity::Coarse;
@@ -164,15 +173,20 @@ impl State {
 pub(super) fn is_same(a: &Specimen, b: &Specimen) -> bool {
     const TOLERANCE_MM: f64 = 1e-3;
     let near = |a: f64, b: f64| (a - b).abs() <= TOLERANCE_MM;
-    let lengths = |s: &Specimen| {
-        [s.block.length_mm, s.block.thickness_mm, s.block.width_mm, s.drive_mm.last().copied().unwrap_or(0.0)]
+    let is_same_sample = |a: &Specimen, b: &Specimen| {
+        let lengths = |s: &Specimen| [s.block.length_mm, s.block.thickness_mm, s.block.width_mm];
+        a.holes.len() == b.holes.len()
+            && lengths(a).iter().zip(lengths(b)).all(|(a, b)| near(*a, b))
+            && a.holes.iter().zip(&b.holes).all(|(a, b)| {
+                a.axis == b.axis
+                    && near(a.diameter_mm, b.diameter_mm)
+                    && (0..2).all(|c| near(a.center_mm[c], b.center_mm[c]))
+            })
     };
+    let (of_a, of_b) = (a.samples(), b.samples());
     a.test == b.test
-        && a.holes.len() == b.holes.len()
-        && lengths(a).iter().zip(lengths(b)).all(|(a, b)| near(*a, b))
-        && a.holes.iter().zip(&b.holes).all(|(a, b)| {
-            a.axis == b.axis
-                && near(a.diameter_mm, b.diameter_mm)
-                && (0..2).all(|c| near(a.center_mm[c], b.center_mm[c]))
-        })
+        && a.drive_mm.len() == b.drive_mm.len()
+        && a.drive_mm.iter().zip(&b.drive_mm).all(|(a, b)| near(*a, *b))
+        && of_a.len() == of_b.len()
+        && of_a.iter().zip(&of_b).all(|(a, b)| is_same_sample(a, b))
 }

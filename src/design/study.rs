@@ -24,6 +24,26 @@ pub struct MaterialPrior {
     pub weight: f64,
 }
 
+/// How a further sample of the base specimen may vary; what is absent stays.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct VarySample {
+    /// Whether length, width and holes are always those of the first sample, so that the two differ in thickness alone.
+    pub is_like_first: bool,
+    /// Length of the block, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub length_mm: Option<Range>,
+    /// Thickness of the block, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub thickness_mm: Option<Range>,
+    /// Width of the block, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub width_mm: Option<Range>,
+}
+
 /// What may vary; what is absent stays as in the base specimen.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
@@ -41,16 +61,22 @@ pub struct Vary {
     pub drive_mm: Range,
     /// Length of the block, mm.
     #[serde(default)]
-    #[schema(nullable = false)]
     pub length_mm: Option<Range>,
     /// Thickness of the block, mm.
     #[serde(default)]
-    #[schema(nullable = false)]
     pub thickness_mm: Option<Range>,
     /// Width of the block, mm.
     #[serde(default)]
-    #[schema(nullable = false)]
     pub width_mm: Option<Range>,
+    /// Drive of a further scan before the last one, mm: the two share the time of one scan in the way that is best for
+    /// all materials together. The base has one scan in all of the time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub earlier_scan_mm: Option<Range>,
+    /// The base's further samples, in their order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 7)]
+    pub other_samples: Vec<VarySample>,
 }
 
 /// Two counts, both included.
@@ -150,7 +176,8 @@ pub struct Study {
     pub materials: Vec<MaterialPrior>,
     /// The scan.
     pub scan: ScanSettings,
-    /// Forces read on the way to the scan, of the base as of every design, and what is not known of the load cell.
+    /// Which samples are scanned, of the base as of every design, forces read on the way to the scan, and what is not
+    /// known of the load cell.
     #[serde(default, skip_serializing_if = "is_plain")]
     pub protocol: Protocol,
     /// What may vary.

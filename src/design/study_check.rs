@@ -7,7 +7,7 @@ use super::study_limits::{
     MAX_COUNT, MAX_HOLES_TO_TRY, MAX_LENGTH_MM, MAX_RELATIVE_SD, MAX_WEIGHT, MIN_LENGTH_MM, MIN_WEIGHT,
 };
 use crate::field::{FieldError, FieldPath};
-use crate::specimen::{MAX_NAME_LENGTH, Symmetry};
+use crate::specimen::{MAX_NAME_LENGTH, Symmetry, TestKind};
 
 impl Study {
     /// Checks a study and all of its parts. Call it on a study that was not read by this program's readers.
@@ -45,6 +45,7 @@ impl Study {
         }
         self.check_materials(&mut problems);
         self.check_variation(&mut problems);
+        self.check_blocks(&mut problems);
         if self.objective.kind == ObjectiveKind::TellApart && self.materials.len() < 2 {
             problems.push(StudyError::NothingToTellApart { count: self.materials.len() });
         }
@@ -98,6 +99,47 @@ impl Study {
         }
     }
 
+    /// Whether the samples, what of them varies and which are scanned fit together.
+    fn check_blocks(&self, problems: &mut Vec<StudyError>) {
+        let (base, protocol) = (&self.base, &self.protocol);
+        // The base has one scan in all of the time; shares of several are found for each design.
+        if !protocol.scan_share.is_empty() {
+            let error = FieldError::new("/scan_share", format!("a list of {}", protocol.scan_share.len()), "left out");
+            problems.push(StudyError::Protocol(error.remedy("vary.earlier_scan_mm finds the shares of a second scan")));
+        } else if base.samples_in_parallel > 0 {
+            problems.extend(protocol.suits(base, 1).err().map(|e| StudyError::Protocol(e.field_error())));
+        }
+        let count = self.vary.other_samples.len();
+        if count > base.other_samples.len() {
+            problems.push(StudyError::NoSuchSamples { count, limit: base.other_samples.len() });
+        }
+        for (index, other) in self.vary.other_samples.iter().enumerate() {
+            if other.is_like_first && (other.length_mm.is_some() || other.width_mm.is_some()) {
+                problems.push(StudyError::SampleLikeFirst { index });
+            }
+            let named =
+                [("length_mm", other.length_mm), ("thickness_mm", other.thickness_mm), ("width_mm", other.width_mm)];
+            for (name, interval) in named {
+                let path = || FieldPath::of("vary").name("other_samples").index(index).name(name);
+                if let Some(range) = interval {
+                    check_range(path, range, problems);
+                }
+            }
+        }
+        let num_blocks = base.other_samples.len() + protocol.blocks_scanned as usize;
+        if self.objective.kind == ObjectiveKind::TellApart && num_blocks > 1 {
+            problems.push(StudyError::SeveralBlocksToTellApart);
+        }
+        let is_uncertain = self.materials.iter().any(|prior| prior.relative_sd > 0.0);
+        let needs_integrals = self.budget.refine > 0 || is_uncertain || self.objective.kind == ObjectiveKind::TellApart;
+        if self.vary.earlier_scan_mm.is_some() && needs_integrals {
+            problems.push(StudyError::EarlierScanNeedsVoxels);
+        }
+        if !base.other_samples.is_empty() && self.tests().contains(&TestKind::Uniaxial) {
+            problems.push(StudyError::OtherSamplesInTension);
+        }
+    }
+
     fn check_variation(&self, problems: &mut Vec<StudyError>) {
         let vary = &self.vary;
         let max_holes = vary.hole_count.max;
@@ -117,9 +159,10 @@ impl Study {
             ("length_mm", vary.length_mm),
             ("thickness_mm", vary.thickness_mm),
             ("width_mm", vary.width_mm),
+            ("earlier_scan_mm", vary.earlier_scan_mm),
         ] {
             if let Some(range) = interval {
-                check_range(name, range, problems);
+                check_range(|| FieldPath::of("vary").name(name), range, problems);
             }
         }
         if let Some(limit_mm) = self.limits.max_drive_mm
@@ -130,8 +173,8 @@ impl Study {
     }
 }
 
-fn check_range(name: &str, range: Range, problems: &mut Vec<StudyError>) {
-    let field = |end: &str| FieldPath::of("vary").name(name).name(end);
+fn check_range(path: impl Fn() -> FieldPath, range: Range, problems: &mut Vec<StudyError>) {
+    let field = |end: &str| path().name(end);
     if !(MIN_LENGTH_MM..=MAX_LENGTH_MM).contains(&range.min) {
         let allowed = format!("positive, from {MIN_LENGTH_MM} to {MAX_LENGTH_MM} mm");
         problems.push(StudyError::OutOfRange { field: field("min"), value: range.min, allowed });

@@ -104,6 +104,38 @@ pub enum StudyError {
         /// Materials given.
         count: usize,
     },
+    /// More further samples are to vary than the base has.
+    #[error("vary.other_samples has {count} entries and the base {limit} other samples; give at most so many")]
+    NoSuchSamples {
+        /// Entries.
+        count: usize,
+        /// Other samples of the base.
+        limit: usize,
+    },
+    /// A sample is to be like the first and to vary by itself.
+    #[error(
+        "vary.other_samples[{index}]: with is_like_first length and width are the first sample's; leave out length_mm and \
+         width_mm, or is_like_first"
+    )]
+    SampleLikeFirst {
+        /// Which.
+        index: usize,
+    },
+    /// Materials are to be told apart by several blocks, which is not supported.
+    #[error(
+        "objective.kind: tell_apart is supported for one scanned block without other samples; leave out base.other_samples \
+         and protocol.blocks_scanned, or choose another objective"
+    )]
+    SeveralBlocksToTellApart,
+    /// Gradients, variants of the priors and distances of materials are of one scan alone.
+    #[error(
+        "vary.earlier_scan_mm: gradients, the priors' variants and tell_apart are of one scan alone; set budget.refine and \
+         every relative_sd to 0 and choose another objective, or leave it out"
+    )]
+    EarlierScanNeedsVoxels,
+    /// Unlike samples cannot be pulled side by side.
+    #[error("vary.tests has uniaxial and the base other_samples; only a double-lap shear test may hold unlike samples")]
+    OtherSamplesInTension,
     /// Weights of parameters are given that nothing uses.
     #[error("objective.parameter_weights: only `combine: weighted` uses them")]
     WeightsUnused,
@@ -168,6 +200,26 @@ impl StudyError {
             E::NothingToTellApart { count } => {
                 FieldError::new("/materials", format!("a list of {count}"), "a list of at least two")
                     .remedy("the objective tell_apart compares materials with each other")
+            }
+            E::NoSuchSamples { count, limit } => {
+                let allowed = format!("at most {limit}, as the base has other samples");
+                FieldError::new("/vary/other_samples", format!("a list of {count}"), allowed)
+            }
+            E::SampleLikeFirst { index } => {
+                let pointer = FieldPath::of("vary").name("other_samples").index(*index).name("is_like_first").pointer();
+                FieldError::new(pointer, true, "false where length_mm or width_mm vary")
+                    .remedy("a sample like the first has its length and width")
+            }
+            E::SeveralBlocksToTellApart => {
+                FieldError::new("/objective/kind", "\"tell_apart\"", "another kind for several blocks")
+                    .remedy("or leave out base.other_samples and protocol.blocks_scanned")
+            }
+            E::EarlierScanNeedsVoxels => {
+                let allowed = "left out where budget.refine or a relative_sd is above 0, and with tell_apart";
+                FieldError::new("/vary/earlier_scan_mm", "given", allowed).remedy("these are of one scan alone")
+            }
+            E::OtherSamplesInTension => {
+                FieldError::new("/vary/tests", "a list with uniaxial", "double_lap_shear where the base has other samples")
             }
             E::WeightsUnused => FieldError::new(weights, "given", "left out")
                 .remedy("only `combine: weighted` uses weights of parameters"),

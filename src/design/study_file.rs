@@ -5,7 +5,8 @@ use super::inline::Inline;
 use super::study::{Budget, MaterialPrior, Study, Vary, VerificationSettings};
 use super::study_error::StudyError;
 use super::study_limits::{DEFAULT_SEED, DEFAULT_WEIGHT, RelativeSd, SCHEMA, Weight};
-use crate::field::schema::{schema_of_file, schema_tag};
+use crate::field::file_tag;
+use crate::field::schema::{Seed, schema_of_file};
 use crate::field::{FieldError, read};
 use crate::material::Ogden;
 use crate::sensitivity::{Protocol, ScanSettings};
@@ -15,7 +16,7 @@ use serde::Deserialize;
 use std::path::Path;
 use utoipa::ToSchema;
 
-schema_tag!(StudyTag, SCHEMA);
+file_tag!(StudyTag, SCHEMA);
 
 /// A study (`study/1`), with specimen and materials spelled out.
 #[derive(Deserialize, ToSchema)]
@@ -36,8 +37,10 @@ struct StudyFile {
     materials: Vec<MaterialEntry>,
     /// The scan.
     scan: ScanSettings,
-    /// Forces read on the way to the scan, of the base as of every design, and what is not known of the load cell. A
-    /// force at or beyond the drive of a design's scan is left out. The drive's zero counts at confirmation alone.
+    /// Which samples are scanned, of the base as of every design, forces read on the way to the scan, and what is not
+    /// known of the load cell. A force at or beyond the drive of a design's scan is left out. The drive's zero counts
+    /// at confirmation alone. How designs with several scans share their time is found for each of them, so that
+    /// `scan_share` is left out.
     #[serde(default)]
     protocol: Protocol,
     /// What may vary; what is absent stays as in the base specimen.
@@ -55,6 +58,7 @@ struct StudyFile {
     verification: VerificationSettings,
     /// Seed of everything random; 1 by default.
     #[serde(default = "default_seed")]
+    #[schema(value_type = Seed, default = default_seed)]
     seed: u64,
 }
 

@@ -121,6 +121,26 @@ fn all_errors_come_at_once() {
     assert_eq!(found, ["/base/samples_in_parallel", "/scan/voxel_mm/0", "/materials/1/name", "/vary/axes"]);
 }
 
+/// What of a fixture does not fit together is told where it stands.
+#[test]
+fn blocks_and_what_varies_of_them_fit_together() {
+    let range = json!({ "min": 5.0, "max": 8.0 });
+    let one_more = json!([{ "block": { "length_mm": 25.4, "thickness_mm": 8.0, "width_mm": 19.1 } }]);
+    let like_first = json!([{ "is_like_first": true, "thickness_mm": range }]);
+    let others = ("/base/other_samples", one_more);
+    let blocks = |n: u32| ("/protocol", json!({ "blocks_scanned": n }));
+    // Nothing is wrong with them but what is wrong beside them.
+    let fine = [others.clone(), ("/vary/other_samples", like_first.clone()), blocks(2), ("/vary/axes", json!([]))];
+    assert_eq!(pointers(&fine), ["/vary/axes"]);
+    assert_eq!(pointers(&[("/vary/other_samples", like_first)]), ["/vary/other_samples"]);
+    assert_eq!(pointers(&[blocks(9)]), ["/protocol/blocks_scanned"]);
+    assert_eq!(pointers(&[("/protocol", json!({ "scan_share": [0.5, 0.5] }))]), ["/protocol/scan_share"]);
+    let both = json!([{ "is_like_first": true, "length_mm": range }]);
+    assert_eq!(pointers(&[others.clone(), ("/vary/other_samples", both)]), ["/vary/other_samples/0/is_like_first"]);
+    let told_apart = pointers(&[others, ("/objective", json!({ "kind": "tell_apart" }))]);
+    assert_eq!(told_apart, ["/objective/kind"]);
+}
+
 #[test]
 fn a_request_names_no_files() {
     assert_eq!(pointers(&[("/base", json!("two-hole-shear.json"))]), ["/base"]);

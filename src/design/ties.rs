@@ -31,14 +31,16 @@ pub(super) fn equal_to_best(study: &Study, base: &Confirmed, ranked: &[Confirmed
 pub(super) fn simplest(ranked: &[Confirmed], places: &[usize]) -> Option<usize> {
     let key = |place: &usize| {
         let specimen = &ranked[*place].specimen;
-        (specimen.holes.len(), num_diameters(specimen), *place)
+        let num_holes: usize = specimen.samples().iter().map(|s| s.holes.len()).sum();
+        (num_holes, num_diameters(specimen), *place)
     };
     places.iter().copied().min_by_key(key)
 }
 
 /// How many different diameters (to 1 µm) a specimen's holes have.
 fn num_diameters(specimen: &Specimen) -> usize {
-    let mut all: Vec<i64> = specimen.holes.iter().map(|h| (1e3 * h.diameter_mm).round() as i64).collect();
+    let holes = specimen.samples().into_iter().flat_map(|s| s.holes);
+    let mut all: Vec<i64> = holes.map(|h| (1e3 * h.diameter_mm).round() as i64).collect();
     all.sort_unstable();
     all.dedup();
     all.len()

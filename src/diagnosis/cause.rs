@@ -4,6 +4,8 @@ use super::location::Location;
 use super::scene::Scene;
 use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+use utoipa::ToSchema;
 
 /// The public name of a cause, as results state it (`tilt`, `debond`, …). Every cause names itself once, in its own
 /// file.
@@ -30,7 +32,7 @@ impl std::fmt::Display for CauseName {
 }
 
 /// What kind of thing a cause is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Category {
     /// The material.
@@ -116,6 +118,11 @@ pub trait Cause: Send + Sync {
     fn category(&self) -> Category;
     /// In words, for people.
     fn description(&self) -> String;
+    /// What a laboratory can do about it, in a sentence. The registry has one for every cause that comes with the
+    /// program; a cause of one's own may have its own.
+    fn remedy(&self) -> String {
+        String::new()
+    }
     /// Its parameters.
     fn parameters(&self) -> Vec<CauseParameter>;
     /// Values of the parameters from which a fit starts.
@@ -187,6 +194,11 @@ pub trait Cause: Send + Sync {
     }
     /// Leaps: values that a fit which ended at `values` could not reach by small steps, and that may explain more.
     fn leaps(&self, _values: &[f64]) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
+    /// Look-alikes: other causes that a fit which ended at `values` may have found in truth, each to be fitted from its
+    /// start.
+    fn look_alikes(&self, _values: &[f64], _specimen: &Specimen) -> Vec<Arc<dyn Cause>> {
         Vec::new()
     }
     /// Changes the scene by the same cause with an edge twice as wide, and says so by `true`; `false` where the cause

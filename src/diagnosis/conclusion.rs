@@ -14,6 +14,10 @@ use crate::rate::Verdict;
 /// Causes of a misfit above that limit explain it where they leave less than this part of it (rms), or no more than the
 /// allowance: the right cause leaves a tenth or less, but for the odd debond; another one in its place about a third.
 const EXPLAINED_LEAVES: f64 = 0.25;
+/// A cause whose model idealises its shape errs by some percent of its effect: a misfit counts as left unexplained
+/// beside it above this part of what was there (rms; half of the squares that a further cause must explain there,
+/// [`SMALLEST_SHARE`](super::evidence::SMALLEST_SHARE)).
+const IDEALISED_LEAVES: f64 = 0.1;
 /// Causes of a smaller misfit explain it where they leave less than this part of it (rms): half of the squares, as much
 /// of which is what the mesh leaves.
 const SMALL_LEAVES: f64 = std::f64::consts::FRAC_1_SQRT_2;
@@ -29,15 +33,18 @@ const ITERATIONS_OF_PART: usize = 3;
 /// Blocks of the chequerboard along the length and across the width.
 const BLOCKS: f64 = 4.0;
 
-/// How a diagnosis ended: `structured_mm` is the misfit beyond noise (mm rms) without and with the causes.
+/// How a diagnosis ended: `structured_mm` is the misfit beyond noise (mm rms) without and with the causes, of which one
+/// may idealise its shape.
 pub(super) fn verdict_on(
     structured_mm: [f64; 2],
     allowance_mm: f64,
+    is_idealised: bool,
     causes: &[FoundCause],
     alternatives: &[FoundCause],
 ) -> Verdict {
     let [before, after] = structured_mm;
-    let limit = UNEXPLAINED * allowance_mm;
+    let of_model = if is_idealised { IDEALISED_LEAVES * before } else { 0.0 };
+    let limit = of_model.max(UNEXPLAINED * allowance_mm);
     // Of a misfit that is hardly more than a mesh's, causes that claim it must take the larger part.
     let claim_it = before > allowance_mm && causes.iter().any(|c| c.effect_rms_mm > CLAIMS * before);
     let enough = allowance_mm.min(if claim_it { SMALL_LEAVES * before } else { f64::INFINITY });

@@ -20,7 +20,7 @@ fn some_cause() -> Vec<FoundCause> {
 fn verdicts_follow_from_what_is_left() {
     let (none, cause) = (Vec::new(), some_cause());
     let verdict = |structured: [f64; 2], causes: &[FoundCause], alternatives: &[FoundCause]| {
-        verdict_on(structured, 0.01, causes, alternatives)
+        verdict_on(structured, 0.01, false, causes, alternatives)
     };
     assert_eq!(verdict([0.015, 0.015], &none, &none), Verdict::NoMismatch);
     assert_eq!(verdict([0.1, 0.02], &cause, &none), Verdict::Explained);
@@ -30,6 +30,11 @@ fn verdicts_follow_from_what_is_left() {
     // More than a quarter of a misfit that was above the limit, and more than the allowance.
     assert_eq!(verdict([0.04, 0.011], &cause, &none), Verdict::Unexplained);
     assert_eq!(verdict([0.04, 0.0099], &cause, &none), Verdict::Explained);
+    // A tenth of a misfit beside a cause that idealises its shape.
+    let beside_idealised = |structured: [f64; 2]| verdict_on(structured, 0.01, true, &cause, &none);
+    assert_eq!(beside_idealised([0.3, 0.029]), Verdict::Explained);
+    assert_eq!(beside_idealised([0.3, 0.031]), Verdict::Unexplained);
+    assert_eq!(beside_idealised([0.1, 0.021]), Verdict::Unexplained);
     // A misfit below the limit may stay as it is.
     assert_eq!(verdict([0.019, 0.018], &cause, &none), Verdict::Explained);
 }

@@ -12,12 +12,13 @@ use super::trace::Trace;
 use crate::material::Ogden;
 use crate::rate::BeforeAfter;
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// Steps of the fit of a recording's own motions: Gauss and Newton's on a nearly quadratic form.
 const NUM_STEPS: usize = 4;
 
 /// What one recording's model says of another recording.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CrossPrediction {
     /// The recording that was fitted.

@@ -2,10 +2,8 @@
 //! back.
 
 use super::cause::CauseName;
-use super::cause_fit::CauseFit;
 use super::conclusion::{explain_too_little, kept_back, verdict_on};
 use super::error::DiagnosisError;
-use super::evidence::{EVIDENCE, OF_IMAGE_ALONE, UNEXPLAINED, is_large_force, penalty};
 use super::findings::Findings;
 use super::found::FoundCause;
 use super::inference::{Inference, KNOWN_LOG_SD};
@@ -17,21 +15,17 @@ use super::load_history::LoadHistoryFit;
 use super::material_cause::{MaterialCase, Recheck};
 use super::mesh_error::{Finer, MeshDefect, widen};
 use super::metric::Metric;
-use super::nominal::{first_guess, fit_nominal, fit_with_terms};
+use super::nominal::{first_guess, fit_nominal};
 use super::options::DiagnosisOptions;
 use super::outcome::Diagnosis;
 use super::prior::{BulkPrior, FitSettings, ShearPrior, shear_modulus};
 use super::registry::Registry;
-use super::rounds::{Asked, RoundLimits, add_causes, fit_round, score_round, take_out_artefacts};
-use super::set_up::{fit_set_up, is_set_up_promising, simplest_set_up};
-use super::supposed::Supposed;
-use super::thinning::{Needed, named_causes, thinned};
+use super::rounds::take_out_artefacts;
 use super::trace::Trace;
 use crate::calibration::{Boundary, Observed};
 use crate::material::Ogden;
 use crate::mesh::MeshOptions;
 use crate::recording::Recording;
-use std::cell::{Cell, RefCell};
 
 /// Standard deviation of ln κ of the material believed.
 const BELIEVED_LOG_SD: f64 = 0.5;
@@ -42,46 +36,8 @@ const TOLERANCE: f64 = 0.3;
 /// The allowance where none is stated, as a part of the largest drive.
 const ALLOWANCE_OF_DRIVE: f64 = 1e-3;
 
-/// The set-up as a whole is looked at where single causes leave more than this part of the misfit (rms), or more than
-/// could be called explained.
-const SET_UP_LEAVES: f64 = 0.25;
-/// It is gone on from where it leaves less than this part of what they leave (rms).
-const SET_UP_GAINS: f64 = 0.7;
-
-/// Single causes are given up for the set-up where the first explains less than this part of the deviance, or where one
-/// explains a smaller part of what was left than the one before it did.
-const LEAST_OF_FIRST: f64 = 0.2;
-
-/// Where causes leave a misfit unexplained, one that alone explained at least this part of what the first did is tried
-/// in its place: the greedy choice between two that explain nearly the same may be the wrong one.
-const NEARLY_AS_MUCH: f64 = 0.95;
-/// What is found from there is kept where it leaves less than this part (rms).
-const OTHER_START_GAINS: f64 = 0.9;
-
 /// The interior is tested where the misfit beyond noise exceeds this multiple of the allowance (rms).
 const INTERIOR_ABOVE: f64 = 2.0;
-
-/// The artefacts among the causes of a fit.
-fn artefacts_of(fitted: &CauseFit) -> Vec<Supposed> {
-    fitted.causes.iter().filter(|c| c.cause.is_artefact()).cloned().collect()
-}
-
-/// Whether causes that leave `left_mm` of `before_mm` (rms) explain a misfit as far as single causes can be asked to:
-/// else the set-up as a whole is fitted in their place.
-fn is_explained(left_mm: f64, before_mm: f64, allowance_mm: f64) -> bool {
-    left_mm < (SET_UP_LEAVES * before_mm).max(allowance_mm) && left_mm < UNEXPLAINED * allowance_mm
-}
-
-/// Whether causes, found one after the other, explain less and less of what was left (`lefts`, before the first and
-/// after each): right ones explain more and more of it, down to nothing.
-fn explain_ever_less(lefts: &[f64]) -> bool {
-    let shares: Vec<f64> = lefts.windows(2).map(|pair| 1.0 - pair[1] / pair[0]).collect();
-    match shares[..] {
-        [] => false,
-        [first] => first < LEAST_OF_FIRST,
-        [.., before, last] => last < before,
-    }
-}
 
 /// Diagnoses `recording`; `progress` is told what is being done.
 ///
@@ -93,7 +49,21 @@ pub fn diagnose(
     progress: &dyn Fn(&str),
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Diagnosis, DiagnosisError> {
-    let registry = Registry::standard().without(&options.left_out)?;
+    diagnose_with(&Registry::standard(), recording, options, progress, is_cancelled)
+}
+
+/// As [`diagnose`], with the causes of `registry`: causes of one's own, or fewer than all.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn diagnose_with(
+    registry: &Registry,
+    recording: &Recording,
+    options: &DiagnosisOptions,
+    progress: &dyn Fn(&str),
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Diagnosis, DiagnosisError> {
+    let registry = registry.clone().without(&options.left_out)?;
     let registry = match options.boundary {
         Boundary::Commanded => registry,
         Boundary::Measured => registry.without_boundary(),
@@ -101,7 +71,7 @@ pub fn diagnose(
     diagnose_among(&registry, recording, options, progress, is_cancelled)
 }
 
-/// As [`diagnose`], with the causes of `registry`.
+/// As [`diagnose_with`], with the very causes of `registry`.
 ///
 /// # Errors
 /// As [`diagnose`].
@@ -128,34 +98,27 @@ pub(super) fn diagnose_among(
     run.conclude(&seen)
 }
 
-/// What was found with the set-up as a whole in the fit.
-struct WithSetUp {
-    findings: Findings,
-    /// What its misfits are weighed by ([`Inference::discrepancy_mm2`]).
-    discrepancy_mm2: [f64; 3],
-}
-
 /// A diagnosis at work: its stages are its methods, in the order of [`diagnose_among`].
-struct Run<'a> {
-    registry: &'a Registry,
-    options: &'a DiagnosisOptions,
-    observed: &'a Observed,
-    inference: Inference<'a>,
+pub(super) struct Run<'a> {
+    pub(super) registry: &'a Registry,
+    pub(super) options: &'a DiagnosisOptions,
+    pub(super) observed: &'a Observed,
+    pub(super) inference: Inference<'a>,
     /// The finer mesh; `None` where ours is fine already, or the finer one cannot be meshed.
-    finer: Option<Finer<'a>>,
+    pub(super) finer: Option<Finer<'a>>,
     /// The material from which nominal fits start.
-    start: Ogden,
+    pub(super) start: Ogden,
     /// Displacement unknowns of the model.
-    num_unknowns: usize,
+    pub(super) num_unknowns: usize,
     /// What was recorded, less what the load curve's effects add.
-    recorded: Trace,
+    pub(super) recorded: Trace,
     /// The load curve.
-    load: Option<LoadHistoryFit>,
+    pub(super) load: Option<LoadHistoryFit>,
     /// What the finer mesh predicts beyond ours.
-    mesh_defect: Option<MeshDefect>,
+    pub(super) mesh_defect: Option<MeshDefect>,
     /// What the interior test found, where it was made.
-    interior: Option<InteriorTest>,
-    findings: Findings,
+    pub(super) interior: Option<InteriorTest>,
+    pub(super) findings: Findings,
 }
 
 impl<'a> Run<'a> {
@@ -215,11 +178,11 @@ impl<'a> Run<'a> {
         })
     }
 
-    fn tell(&self, what: &str) {
+    pub(super) fn tell(&self, what: &str) {
         (self.inference.progress)(what);
     }
 
-    fn is_cancelled(&self) -> bool {
+    pub(super) fn is_cancelled(&self) -> bool {
         (self.inference.is_cancelled)()
     }
 
@@ -249,7 +212,7 @@ impl<'a> Run<'a> {
     }
 
     /// What our mesh would have shown of what was recorded, were it not for its own error.
-    fn measured(&self) -> Trace {
+    pub(super) fn measured(&self) -> Trace {
         self.mesh_defect.as_ref().map_or_else(|| self.recorded.clone(), |d| d.taken_off(&self.recorded))
     }
 
@@ -315,6 +278,7 @@ impl<'a> Run<'a> {
         (self.inference.progress)("predicting on a finer mesh");
         match finer.defect(&self.findings.nominal, self.inference.is_cancelled) {
             Ok(found) => {
+                self.inference.laboratory.know_own_error(found.trace.clone());
                 self.mesh_defect = Some(found);
                 let (measured, start) = (self.measured(), self.findings.nominal.material.clone());
                 self.fit_nominal(&measured, &start)
@@ -363,249 +327,6 @@ impl<'a> Run<'a> {
         take_out_artefacts(inference, registry, findings, &measured)
     }
 
-    /// Tests, fits and names causes, round by round. Where the interior test found that the inside fits, causes there
-    /// wait. Where single causes leave much of the misfit, the set-up as a whole is fitted in their place, and rounds
-    /// go on from that.
-    fn add_causes(&mut self) -> Result<(), DiagnosisError> {
-        let measured = self.measured();
-        let limits = RoundLimits { max_causes: self.options.max_causes, has_load_curve: self.load.is_some() };
-        if self.findings.causes.len() >= limits.max_causes {
-            return Ok(());
-        }
-        let at_boundary = self.registry.clone().without_inside();
-        let everything =
-            Asked { registry: self.registry, with_terms: self.options.prior.is_none(), evidence: EVIDENCE };
-        let does_inside_wait = self.interior.as_ref().is_some_and(InteriorTest::inside_fits);
-        let first = if does_inside_wait {
-            Asked { registry: &at_boundary, with_terms: false, evidence: EVIDENCE }
-        } else {
-            everything
-        };
-        let Run { inference, findings, observed, .. } = self;
-        let left_mm =
-            |fitted: &CauseFit, metric: &Metric| leftover(observed, &fitted.residual, metric).structured_rms_mm;
-        let before_mm = left_mm(&findings.current, &inference.metric);
-        // What is no more than a mesh's has no cause but in the image.
-        if before_mm < inference.allowance_mm && !is_large_force(observed, &findings.current.residual) {
-            let of_image = self.registry.clone().of_image_alone(&observed.specimen);
-            let asked = Asked { registry: &of_image, with_terms: false, evidence: OF_IMAGE_ALONE * EVIDENCE };
-            return add_causes(inference, findings, &measured, limits, &|_, _| Some(asked));
-        }
-        let begun = findings.current.clone();
-        let scored = score_round(inference, first, findings, limits)?;
-        // What is no more than a mesh's needs no set-up.
-        let is_promising = before_mm > inference.allowance_mm
-            && is_set_up_promising(inference, first.registry, &findings.current, &scored.candidates)?;
-        // What was left of the deviance after each cause so far.
-        let lefts = RefCell::new(vec![inference.misfit_beyond_noise(&findings.current)]);
-        let are_given_up = Cell::new(false);
-        let to_ask = |inference: &Inference, findings: &Findings| {
-            let left = left_mm(&findings.current, &inference.metric);
-            lefts.borrow_mut().push(inference.misfit_beyond_noise(&findings.current));
-            let is_explained = is_explained(left, before_mm, inference.allowance_mm);
-            are_given_up.set(is_promising && !is_explained && explain_ever_less(&lefts.borrow()));
-            let asked = if is_explained { everything } else { first };
-            (!are_given_up.get()).then_some(asked)
-        };
-        if fit_round(inference, findings, &measured, &scored)? {
-            add_causes(inference, findings, &measured, limits, &to_ask)?;
-        }
-        let are_all_asked = !(does_inside_wait || are_given_up.get());
-        if are_all_asked {
-            self.start_otherwise(begun, &measured, limits)?;
-            self.fit_material_anew(&measured, limits)?;
-        }
-        let Some(with_set_up) = self.with_set_up(&measured, limits, is_promising)? else {
-            return if are_all_asked { Ok(()) } else { self.ask_all(&measured, limits) };
-        };
-        if !are_all_asked && !self.is_explained_by(&with_set_up.findings) {
-            self.ask_all(&measured, limits)?;
-        }
-        if self.left_mm(&with_set_up.findings.current) < SET_UP_GAINS * self.left_mm(&self.findings.current) {
-            self.go_on_with(with_set_up);
-        }
-        Ok(())
-    }
-
-    /// Where causes leave a misfit unexplained and another cause alone explained nearly as much of it as the first one
-    /// found: adds causes from `begun`, the fit before the first round, without that first one in the first round, and
-    /// goes on from there where that leaves clearly less.
-    fn start_otherwise(
-        &mut self,
-        begun: CauseFit,
-        measured: &Trace,
-        limits: RoundLimits,
-    ) -> Result<(), DiagnosisError> {
-        let Some(first) = self.findings.causes.iter().find(|c| c.is_of_fit()).map(|c| c.name) else { return Ok(()) };
-        let alone = self.findings.ranked.iter().filter(|r| r.round == 1).filter_map(|r| Some((r, r.fitted?)));
-        let best = alone.clone().map(|(_, fitted)| fitted).fold(0.0, f64::max);
-        let has_rival = alone.clone().any(|(r, fitted)| r.identity.name != first && fitted > NEARLY_AS_MUCH * best);
-        if !has_rival || self.is_explained_by(&self.findings) {
-            return Ok(());
-        }
-        self.tell("starting from another cause that explains nearly as much as the first");
-        let others = self.registry.clone().without(&[first])?;
-        let num_begun = begun.causes.len();
-        let from_begun = self.findings.going_on_from(begun);
-        let mut before = std::mem::replace(&mut self.findings, from_begun);
-        let Run { inference, registry, findings, options, .. } = self;
-        let with_terms = options.prior.is_none();
-        let added = add_causes(inference, findings, measured, limits, &|_, findings| {
-            let is_first = findings.current.causes.len() == num_begun;
-            Some(Asked { registry: if is_first { &others } else { registry }, with_terms, evidence: EVIDENCE })
-        });
-        if added.is_err() || self.left_mm(&self.findings.current) >= OTHER_START_GAINS * self.left_mm(&before.current) {
-            (before.ranked, before.maps) =
-                (std::mem::take(&mut self.findings.ranked), std::mem::take(&mut self.findings.maps));
-            self.findings = before;
-        }
-        if self.is_cancelled() { added } else { Ok(()) }
-    }
-
-    /// Goes on with single causes where they were given up, or not all of them asked.
-    fn ask_all(&mut self, measured: &Trace, limits: RoundLimits) -> Result<(), DiagnosisError> {
-        let Run { inference, registry, findings, options, .. } = self;
-        let everything = Asked { registry, with_terms: options.prior.is_none(), evidence: EVIDENCE };
-        add_causes(inference, findings, measured, limits, &|_, _| Some(everything))?;
-        self.fit_material_anew(measured, limits)
-    }
-
-    /// Where causes leave more than a mesh does: fits the material from its start again, now that they are in the fit,
-    /// and goes on from there where that explains more. The nominal fit took terms to make up for what causes do, from
-    /// which a fit does not find back. In the end, what later causes made needless goes.
-    fn fit_material_anew(&mut self, measured: &Trace, limits: RoundLimits) -> Result<(), DiagnosisError> {
-        let is_believed = self.options.prior.is_some();
-        let current = &self.findings.current;
-        if !is_believed && !current.causes.is_empty() && self.left_mm(current) > self.inference.allowance_mm {
-            self.tell("fitting the material anew, with the causes found");
-            let (causes, deviance) = (current.causes.clone(), current.deviance);
-            let num_terms = current.material.terms.len();
-            match fit_with_terms(&mut self.inference, measured, &self.start, &causes) {
-                Ok(anew) => {
-                    let num_more = anew.material.terms.len() as f64 - num_terms as f64;
-                    let cost = num_more * penalty(&self.inference.metric, 2);
-                    if deviance - anew.deviance - cost > EVIDENCE {
-                        self.findings.current = anew;
-                        let Run { inference, registry, findings, .. } = self;
-                        let everything = Asked { registry, with_terms: true, evidence: EVIDENCE };
-                        add_causes(inference, findings, measured, limits, &|_, _| Some(everything))?;
-                    }
-                }
-                Err(error) if self.is_cancelled() => return Err(error),
-                Err(_) => {}
-            }
-        }
-        self.leave_out_what_is_not_needed(measured)
-    }
-
-    /// What a fit leaves beyond noise, mm rms.
-    fn left_mm(&self, fitted: &CauseFit) -> f64 {
-        leftover(self.observed, &fitted.residual, &self.inference.metric).structured_rms_mm
-    }
-
-    /// Whether findings explain the misfit as far as causes can be asked to.
-    fn is_explained_by(&self, findings: &Findings) -> bool {
-        let (before, left) = (self.left_mm(&findings.nominal), self.left_mm(&findings.current));
-        is_explained(left, before, self.inference.allowance_mm)
-    }
-
-    /// Goes on with the set-up as a whole and the weights that belong to it.
-    fn go_on_with(&mut self, with_set_up: WithSetUp) {
-        let WithSetUp { mut findings, discrepancy_mm2 } = with_set_up;
-        (findings.ranked, findings.maps) =
-            (std::mem::take(&mut self.findings.ranked), std::mem::take(&mut self.findings.maps));
-        self.findings = findings;
-        self.inference.weigh_by(discrepancy_mm2);
-    }
-
-    /// Takes out of the fit the causes that `measured`, or later causes, have made needless.
-    fn leave_out_what_is_not_needed(&mut self, measured: &Trace) -> Result<(), DiagnosisError> {
-        let Run { inference, findings, .. } = self;
-        let num_causes = findings.current.causes.len();
-        if num_causes > 1 {
-            findings.current = thinned(inference, measured, findings.current.clone(), Needed::ByEvidence)?;
-            if findings.current.causes.len() < num_causes {
-                self.name_causes_of_fit()?;
-            }
-        }
-        Ok(())
-    }
-
-    /// The set-up as a whole with causes added to it, where what was named so far leaves much of the misfit and the
-    /// set-up `is_promising`. `None` where it is not asked for, or has no fit.
-    fn with_set_up(
-        &mut self,
-        measured: &Trace,
-        limits: RoundLimits,
-        is_promising: bool,
-    ) -> Result<Option<WithSetUp>, DiagnosisError> {
-        let is_asked = is_promising && !self.is_explained_by(&self.findings);
-        if !is_asked || self.registry.set_up(self.observed).is_empty() {
-            return Ok(None);
-        }
-        self.tell("fitting the set-up as a whole: plates, rig, layers, block");
-        // Without the further terms that the nominal fit took to make up for the set-up.
-        let start = CauseFit {
-            material: self.start.clone(),
-            causes: artefacts_of(&self.findings.current),
-            ..self.findings.nominal.clone()
-        };
-        let Run { inference, registry, .. } = self;
-        let fitted = fit_set_up(inference, registry, measured, &start)
-            .and_then(|fitted| simplest_set_up(inference, registry, measured, fitted));
-        let found = match fitted {
-            Ok(fitted) => self.and_causes(fitted, measured, limits),
-            Err(error) => Err(error),
-        };
-        self.inference.forget_discrepancy();
-        match found {
-            Ok(found) => Ok(Some(found)),
-            Err(error) if self.is_cancelled() => Err(error),
-            Err(_) => Ok(None),
-        }
-    }
-
-    /// What is found from `fitted` on, a fit of the set-up as a whole; the findings so far stay as they are, but for
-    /// the list of what was tested.
-    fn and_causes(
-        &mut self,
-        fitted: CauseFit,
-        measured: &Trace,
-        limits: RoundLimits,
-    ) -> Result<WithSetUp, DiagnosisError> {
-        let from_set_up = self.findings.going_on_from(fitted);
-        let before = std::mem::replace(&mut self.findings, from_set_up);
-        self.findings.nominal.deviance = self.inference.misfit_of(&self.findings.nominal.residual);
-        let added = self.add_causes_to_set_up(measured, limits);
-        let mut findings = std::mem::replace(&mut self.findings, before);
-        (self.findings.ranked, self.findings.maps) =
-            (std::mem::take(&mut findings.ranked), std::mem::take(&mut findings.maps));
-        self.findings.num_rounds = findings.num_rounds;
-        added.map(|()| WithSetUp { findings, discrepancy_mm2: self.inference.discrepancy_mm2 })
-    }
-
-    /// Adds causes to the set-up as a whole, and names all of them.
-    fn add_causes_to_set_up(&mut self, measured: &Trace, limits: RoundLimits) -> Result<(), DiagnosisError> {
-        self.name_causes_of_fit()?;
-        let Run { inference, registry, findings, options, .. } = self;
-        let everything = Asked { registry, with_terms: options.prior.is_none(), evidence: EVIDENCE };
-        let num_before = findings.current.causes.len();
-        add_causes(inference, findings, measured, limits, &|_, _| Some(everything))?;
-        if findings.current.causes.len() > num_before {
-            findings.current = simplest_set_up(inference, registry, measured, findings.current.clone())?;
-            self.name_causes_of_fit()?;
-        }
-        Ok(())
-    }
-
-    /// Names the causes that are in the fit, with the evidence for each among all others.
-    fn name_causes_of_fit(&mut self) -> Result<(), DiagnosisError> {
-        let named = named_causes(&mut self.inference, &self.findings.current)?;
-        self.findings.causes.retain(|c| !c.is_of_fit());
-        self.findings.causes.extend(named);
-        Ok(())
-    }
-
     /// Looks again at the causes in the material's law, now that other causes are in the fit.
     fn question_material_again(&mut self) -> Result<(), DiagnosisError> {
         if self.findings.current.causes.is_empty() {
@@ -652,7 +373,7 @@ impl<'a> Run<'a> {
                 seen[n] = defect.taken_off(&self.recorded);
                 if n == 1 {
                     // What our mesh alone called for.
-                    self.leave_out_what_is_not_needed(&seen[n])?;
+                    self.attempt("needless causes", |run| run.leave_out_what_is_not_needed(&seen[n]))?;
                 }
             }
             self.widen_intervals(n, &settings[n], defect.as_ref())?;
@@ -704,8 +425,17 @@ impl<'a> Run<'a> {
     fn conclude(mut self, seen: &[Trace; 2]) -> Result<Diagnosis, DiagnosisError> {
         let Findings { nominal, mut current, mut causes, mut alternatives, ranked, maps, .. } = self.findings;
         (self.inference.progress)("predicting voxel blocks that were kept back");
-        let kept_back = kept_back(&mut self.inference, seen, [&nominal, &current])?;
-        if self.inference.accepts_discrepancy() {
+        let kept_back = match kept_back(&mut self.inference, seen, [&nominal, &current]) {
+            Ok(kept_back) => Some(kept_back),
+            Err(error) if (self.inference.is_cancelled)() => return Err(error),
+            Err(error) => {
+                (self.inference.progress)(&format!(
+                    "nothing is said of voxels kept back: a fit to half of them: {error}"
+                ));
+                None
+            }
+        };
+        if let Some(kept_back) = kept_back.as_ref().filter(|_| self.inference.accepts_discrepancy()) {
             // What is left is no noise: neighbours share it, and halves of the voxels tell what that does.
             for (sd, half) in current.sd.iter_mut().zip(&kept_back.half_differences) {
                 *sd = sd.hypot(*half);
@@ -718,7 +448,8 @@ impl<'a> Run<'a> {
         causes.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
         let left = [&nominal, &current].map(|f| leftover(self.observed, &f.residual, &self.inference.metric));
         let structured_mm = [left[0].structured_rms_mm, left[1].structured_rms_mm];
-        let verdict = verdict_on(structured_mm, self.inference.allowance_mm, &causes, &alternatives);
+        let is_idealised = current.causes.iter().any(|s| s.cause.is_idealised());
+        let verdict = verdict_on(structured_mm, self.inference.allowance_mm, is_idealised, &causes, &alternatives);
         if explain_too_little(verdict, structured_mm) {
             alternatives.splice(0..0, causes.drain(..));
         }
@@ -729,7 +460,7 @@ impl<'a> Run<'a> {
             nominal,
             corrected: current,
             left,
-            kept_back_rms_mm: kept_back.rms_mm,
+            kept_back_rms_mm: kept_back.map(|k| k.rms_mm),
             ranked,
             load: self.load,
             maps,

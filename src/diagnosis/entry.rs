@@ -49,6 +49,8 @@ pub(super) enum Origin {
     },
     /// It has a place or a direction, which is searched for first (in a map, for instance).
     Searched(fn(&mut Search) -> Result<Vec<Candidate>, DiagnosisError>),
+    /// Another cause's fit may end where it looks like this one ([`Cause::look_alikes`]).
+    LookAlike,
     /// It is an artefact of the image, found in the residual of the nominal model.
     Artefact {
         /// All artefacts of a residual, with their sizes.

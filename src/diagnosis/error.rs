@@ -28,6 +28,14 @@ pub enum DiagnosisError {
         /// The names that there are.
         known: String,
     },
+    /// A cause of one's own cannot be tested.
+    #[error("the cause '{name}': {problem}")]
+    OwnCause {
+        /// Its name.
+        name: &'static str,
+        /// What is wrong with it, and what to change.
+        problem: String,
+    },
     /// A setting is out of range.
     #[error("{name} is {value}; it must be {requirement}")]
     Setting {

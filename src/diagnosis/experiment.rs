@@ -15,12 +15,14 @@ use crate::calibration::{Observed, ObservedForce, ObservedStep};
 use crate::mesh::MeshOptions;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// Drives looked at, relative to the largest one recorded: that one again, farther, half way, and the other way.
 const DRIVES: [f64; 4] = [1.0, 1.5, 0.5, -1.0];
 
 /// A further step of the same sample under the same scan.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = TellingExperiment)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
     /// Drive, mm.

@@ -31,6 +31,8 @@ pub struct FoundCause {
     pub effect_rms_mm: f64,
     /// Of an alternative: further steps that would tell it apart, most telling first.
     pub experiments: Vec<Experiment>,
+    /// What a laboratory can do about it, as a cause that the registry does not know says of itself.
+    pub own_remedy: String,
     /// Where its parameters come from.
     pub(super) source: Source,
 }
@@ -71,6 +73,7 @@ impl FoundCause {
             evidence: 0.0,
             effect_rms_mm: 0.0,
             experiments: Vec::new(),
+            own_remedy: supposed.cause.remedy(),
             source: Source::Fit(index),
         }
     }
@@ -99,6 +102,7 @@ impl FoundCause {
                     evidence: fitted.gained,
                     effect_rms_mm: 0.0,
                     experiments: Vec::new(),
+                    own_remedy: String::new(),
                     source: Source::LoadCurve,
                 }),
             }

@@ -16,6 +16,7 @@ use crate::material::Ogden;
 use crate::mesh::MeshOptions;
 use crate::rate::BeforeAfter;
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// A misfit was made at the boundary where the interior test leaves less than this part of it (rms).
 const VANISHES: f64 = 0.4;
@@ -25,7 +26,7 @@ const INSIDE_FITS: f64 = 0.2;
 const STAYS: f64 = 0.8;
 
 /// Where a misfit was made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MisfitOrigin {
     /// At the boundary: plates, bonds, mount.
@@ -48,7 +49,7 @@ impl MisfitOrigin {
 }
 
 /// What the interior test found, on the voxels between the planes.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InteriorTest {
     /// Where the misfit was made.

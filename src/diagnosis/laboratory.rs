@@ -49,6 +49,8 @@ pub struct Laboratory<'a> {
     solve: SolveOptions,
     face_axis: usize,
     half_extents: [f64; 3],
+    /// What a finer mesh predicts beyond ours; it is taken off what is measured.
+    own_error: Option<Trace>,
     /// Equilibria solved so far.
     pub num_solves: usize,
 }
@@ -63,7 +65,8 @@ impl<'a> Laboratory<'a> {
         let nominal = mesh_specimen(&observed.specimen, &options).map_err(crate::fem::PrepareError::from)?;
         Ok(Laboratory {
             observed,
-            stations: Stations::new(observed, nominal),
+            stations: Stations::new(observed, nominal, options),
+            own_error: None,
             solve: SolveOptions::default(),
             face_axis: match observed.specimen.test {
                 TestKind::DoubleLapShear => 1,
@@ -124,8 +127,18 @@ impl<'a> Laboratory<'a> {
         let seen = states.par_iter().map(|s| view.average(&s.displacement)).collect::<Result<Vec<_>, _>>()?;
         self.stations[at].states = states.clone();
         let forces: Vec<f64> = states.iter().map(|s| s.force_n).collect();
-        let trace = self.recorded(scene, at, &states, &forces, &seen)?;
+        let mut trace = self.recorded(scene, at, &states, &forces, &seen)?;
+        if let (Some(error), true) = (&self.own_error, scene.cut.is_some()) {
+            // A sample with a cut has a finer mesh of its own, without that error.
+            trace = trace.plus(-1.0, error);
+        }
         Ok(Prediction { trace, states, seen })
+    }
+
+    /// Says what a finer mesh predicts beyond ours of the sample as drawn. Where that is taken off what is measured,
+    /// scenes whose mesh is another one are compared without it.
+    pub(super) fn know_own_error(&mut self, error: Trace) {
+        self.own_error = Some(error);
     }
 
     /// Equilibria from those that the station last found, steps side by side; `None` for a step that has none to start

@@ -3,9 +3,10 @@
 use crate::mesh::half_extents_mm;
 use crate::specimen::{Specimen, TestKind};
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// Where something is: a box in the undeformed sample.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Location {
     /// In words.

@@ -22,10 +22,15 @@ use crate::mesh::MeshOptions;
 use nalgebra::DVector;
 
 /// Element size of the finer mesh as a factor on ours.
-const FINER: f64 = 0.6;
+pub(super) const FINER: f64 = 0.5;
 /// The smallest element size of the finer mesh, as a factor on the standard one. The error of a mesh that fine is
 /// smaller than what a recording shows.
 const FINEST: f64 = 0.45;
+/// Most passes of the correction of one fit.
+const MAX_CORRECTIONS: usize = 3;
+/// Passes end where one moves the prediction by less than this part of what the finer mesh predicts beyond ours (rms):
+/// that changes by some percent of it.
+const HARDLY_MOVED: f64 = 0.2;
 /// A finer mesh whose element size is closer to ours than this factor says nothing about our error.
 const HARDLY_FINER: f64 = 0.9;
 /// Other meshes: element size as a factor on ours, and whether they are of prisms. Prisms err in another pattern than
@@ -75,8 +80,8 @@ impl<'a> Finer<'a> {
     }
 
     /// Corrects a fit by the finer mesh's prediction (deferred correction: what the finer mesh predicts beyond ours is
-    /// taken off the measured, and the fit repeated on ours from where it ended). `fitted.residual` is then against the
-    /// finer mesh to first order.
+    /// taken off the measured, and the fit repeated on ours from where it ended; where that moves the prediction much,
+    /// once more). `fitted.residual` is then against the finer mesh to first order.
     ///
     /// # Errors
     /// [`DiagnosisError`]: the finer model has no equilibrium, or the work was cancelled.
@@ -89,9 +94,22 @@ impl<'a> Finer<'a> {
         fitted: &mut CauseFit,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<MeshDefect, DiagnosisError> {
-        let defect = self.defect(fitted, is_cancelled)?;
-        let seen = defect.taken_off(measured);
-        *fitted = fit(laboratory, metric, &seen, &fitted.material, &fitted.causes, settings, is_cancelled)?;
+        let mut defect = self.defect(fitted, is_cancelled)?;
+        for pass in 1..=MAX_CORRECTIONS {
+            let before = fitted.prediction.trace.clone();
+            let seen = defect.taken_off(measured);
+            *fitted = fit(laboratory, metric, &seen, &fitted.material, &fitted.causes, settings, is_cancelled)?;
+            let moved_mm = fitted.prediction.trace.plus(-1.0, &before).rms_mm();
+            if pass == MAX_CORRECTIONS || moved_mm < HARDLY_MOVED * defect.trace.rms_mm() {
+                break;
+            }
+            match self.defect(fitted, is_cancelled) {
+                Ok(next) => defect = next,
+                Err(error) if is_cancelled() => return Err(error),
+                // What was corrected so far stands.
+                Err(_) => break,
+            }
+        }
         Ok(defect)
     }
 

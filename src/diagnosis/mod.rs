@@ -8,8 +8,10 @@
 //! * A misfit counts by its pattern and size: noise and what meshes may leave are in its weights ([`Metric`]).
 //! * [`together()`] looks at several diagnosed recordings.
 //!
-//! A new cause is a file in `causes` and a line in the registry there.
+//! A new cause is a file in `causes` and a line in the registry there. A program on the library needs neither: it
+//! implements [`Cause`], adds its cause to a [`Registry`] and calls [`diagnose_with`] (`examples/own_cause.rs`).
 
+mod adding_causes;
 mod balls;
 mod candidate;
 mod case;
@@ -36,6 +38,7 @@ mod interior;
 mod interval;
 mod jumps;
 mod laboratory;
+mod law_curves;
 mod leftover;
 mod load_curve;
 mod load_effect;
@@ -72,13 +75,14 @@ pub use crate::rate::{BeforeAfter, Verdict};
 pub use cause::{Category, Cause, CauseIdentity, CauseName, CauseParameter, Course};
 pub use cause_fit::CauseFit;
 pub use cross_prediction::CrossPrediction;
-pub use diagnose::diagnose;
+pub use diagnose::{diagnose, diagnose_with};
 pub use division::Division;
 pub use error::DiagnosisError;
 pub use experiment::Experiment;
 pub use found::{FoundCause, FoundParameter};
 pub use interior::{InteriorTest, MisfitOrigin};
 pub use laboratory::{Laboratory, Prediction};
+pub use law_curves::{LawCurve, law_curves};
 pub use leftover::Leftover;
 pub use load_effect::{EffectParameter, FittedEffect, ForceChange, LoadEffect, LoadReadings};
 pub use load_history::LoadHistoryFit;
@@ -90,9 +94,9 @@ pub use options::DiagnosisOptions;
 pub use outcome::Diagnosis;
 pub use prior::{BulkPrior, FitSettings, ShearPrior};
 pub use ranked::Ranked;
-pub use registry::{answers, cause_names};
+pub use registry::{Registry, answers, cause_names};
 pub use result::{CauseResult, DiagnosisResult, ModulusAgainstBelief, ParameterResult, RankedResult};
-pub use scene::{ImageChange, Jump, Scene};
+pub use scene::{ImageChange, Jump, MovedCut, Scene};
 pub use supposed::Supposed;
 pub use together::{Agreement, CommonCause, TogetherResult, together};
 pub use trace::Trace;

@@ -29,7 +29,7 @@ pub struct DiagnosisOptions {
 impl Default for DiagnosisOptions {
     fn default() -> Self {
         DiagnosisOptions {
-            mesh_factor: 1.35,
+            mesh_factor: 1.8,
             allowance_mm: None,
             prior: None,
             max_causes: 6,

@@ -28,8 +28,9 @@ pub struct Diagnosis {
     pub corrected: CauseFit,
     /// What each leaves.
     pub left: [Leftover; 2],
-    /// Rms misfit (mm) on voxel blocks kept back, without and with the causes.
-    pub kept_back_rms_mm: [f64; 2],
+    /// Rms misfit (mm) on voxel blocks kept back, without and with the causes; `None` where a fit to half of the blocks
+    /// has no equilibrium.
+    pub kept_back_rms_mm: Option<[f64; 2]>,
     /// All causes looked at.
     pub ranked: Vec<Ranked>,
     /// The load curve.

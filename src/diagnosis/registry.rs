@@ -1,7 +1,7 @@
 //! The causes that a diagnosis supposes.
 
 use super::candidate::Candidate;
-use super::cause::{Cause, CauseName};
+use super::cause::{Category, Cause, CauseName};
 use super::causes::{AT_BOUNDARY, INSIDE, REGISTRY};
 use super::entry::{Entry, Origin};
 use super::error::DiagnosisError;
@@ -34,35 +34,93 @@ pub fn answers(hidden: CauseName, named: &str) -> bool {
     hidden.as_str() == named || covers(named, hidden.as_str()) || covers(hidden.as_str(), named)
 }
 
-/// The causes that a diagnosis supposes.
+/// The causes that a diagnosis supposes: those that come with the program, and causes of one's own beside them.
+///
+/// ```
+/// use lambdak::diagnosis::{Category, Cause, CauseName, CauseParameter, Registry, Scene};
+/// use std::sync::Arc;
+///
+/// /// The image is turned about y.
+/// struct TurnedImage;
+///
+/// impl Cause for TurnedImage {
+///     fn name(&self) -> CauseName {
+///         CauseName::new("turned_image")
+///     }
+///     fn category(&self) -> Category {
+///         Category::Acquisition
+///     }
+///     fn description(&self) -> String {
+///         "the image is turned about y".into()
+///     }
+///     fn parameters(&self) -> Vec<CauseParameter> {
+///         vec![CauseParameter::new("degrees_about_y", 0.5, [-20.0, 20.0])]
+///     }
+///     fn apply(&self, values: &[f64], scene: &mut Scene) {
+///         scene.image.pose.rotation_rad[1] += values[0].to_radians();
+///     }
+///     fn changes_sample(&self) -> bool {
+///         false
+///     }
+/// }
+///
+/// let registry = Registry::standard().with(Arc::new(TurnedImage))?;
+/// assert!(registry.names().contains(&CauseName::new("turned_image")));
+/// # Ok::<(), lambdak::diagnosis::DiagnosisError>(())
+/// ```
 #[derive(Clone)]
-pub(super) struct Registry {
+pub struct Registry {
     entries: Vec<Entry>,
+    /// Causes of a program on the library, in the order in which it added them.
+    own: Vec<Arc<dyn Cause>>,
 }
 
 impl Registry {
-    /// All causes.
-    pub(super) fn standard() -> Registry {
-        Registry { entries: REGISTRY.to_vec() }
+    /// All causes that come with the program.
+    pub fn standard() -> Registry {
+        Registry { entries: REGISTRY.to_vec(), own: Vec::new() }
+    }
+
+    /// With a cause of one's own: every recording is tested for it, after the others. Causes that differ in their
+    /// variant ([`Cause::variant`]) may share a name.
+    ///
+    /// Where only the boundary is in question, or only the inside, its category says whether it is asked: causes of
+    /// [`Category::Boundary`] act at the boundary, those of [`Category::Material`] inside, all others in both.
+    ///
+    /// # Errors
+    /// [`DiagnosisError::OwnCause`]: the name belongs to a cause that comes with the program, or the cause has no
+    /// parameter, a parameter without a positive scale or a range, or a start that lies outside.
+    pub fn with(mut self, cause: Arc<dyn Cause>) -> Result<Registry, DiagnosisError> {
+        if let Some(problem) = problem_of(&*cause) {
+            return Err(DiagnosisError::OwnCause { name: cause.name().as_str(), problem });
+        }
+        if self.own.iter().any(|c| c.identity() == cause.identity()) {
+            let problem = "a cause of this name and variant is there already; give it another variant".into();
+            return Err(DiagnosisError::OwnCause { name: cause.name().as_str(), problem });
+        }
+        self.own.push(cause);
+        Ok(self)
     }
 
     /// Without the causes of some names, and without those of which they are special cases.
     ///
     /// # Errors
     /// [`DiagnosisError::UnknownCause`] for a name that no cause has.
-    pub(super) fn without(mut self, names: &[CauseName]) -> Result<Registry, DiagnosisError> {
+    pub fn without(mut self, names: &[CauseName]) -> Result<Registry, DiagnosisError> {
         let known = self.names();
         if let Some(name) = names.iter().find(|n| !known.contains(n)) {
             let known = known.iter().map(|n| n.as_str()).collect::<Vec<_>>().join(", ");
             return Err(DiagnosisError::UnknownCause { name: name.as_str(), known });
         }
         self.entries.retain(|e| !names.contains(&e.name) && !e.special_cases().iter().any(|n| names.contains(n)));
+        self.own.retain(|c| !names.contains(&c.name()));
         Ok(self)
     }
 
     /// Without the causes that act where the sample is held: plates, bonds, layers, the outline.
     pub(super) fn without_boundary(mut self) -> Registry {
         self.entries.retain(|e| !AT_BOUNDARY.contains(&e.name));
+        self.own.retain(|c| c.category() != Category::Boundary);
         self
     }
 
@@ -73,21 +131,23 @@ impl Registry {
             Origin::Tested(suspects) => suspects(specimen).iter().all(|c| !(c.changes_sample() || c.is_sponge())),
             _ => false,
         });
+        self.own.retain(|c| !(c.changes_sample() || c.is_sponge()));
         self
     }
 
     /// Without the causes that act inside the sample.
     pub(super) fn without_inside(mut self) -> Registry {
         self.entries.retain(|e| !INSIDE.contains(&e.name));
+        self.own.retain(|c| c.category() != Category::Material);
         self
     }
 
     /// The names, each once, in order.
-    pub(super) fn names(&self) -> Vec<CauseName> {
+    pub fn names(&self) -> Vec<CauseName> {
         let mut names: Vec<CauseName> = Vec::new();
-        for entry in &self.entries {
-            if !names.contains(&entry.name) {
-                names.push(entry.name);
+        for name in self.entries.iter().map(|e| e.name).chain(self.own.iter().map(|c| c.name())) {
+            if !names.contains(&name) {
+                names.push(name);
             }
         }
         names
@@ -105,7 +165,7 @@ impl Registry {
             Origin::Tested(suspects) => suspects(specimen),
             _ => Vec::new(),
         };
-        self.entries.iter().flat_map(of_entry).collect()
+        self.entries.iter().flat_map(of_entry).chain(self.own.iter().cloned()).collect()
     }
 
     /// The parts of the set-up of a recording.
@@ -163,6 +223,30 @@ impl Registry {
         };
         self.entries.iter().filter_map(of_entry).collect()
     }
+}
+
+/// What keeps a cause of one's own from being tested.
+fn problem_of(cause: &dyn Cause) -> Option<String> {
+    let (parameters, start) = (cause.parameters(), cause.start());
+    if REGISTRY.iter().any(|e| e.name == cause.name()) {
+        return Some("a cause of this name comes with the program; give it another name".into());
+    }
+    if parameters.is_empty() {
+        return Some("it has no parameter; give it one that says how large it is".into());
+    }
+    if start.len() != parameters.len() {
+        return Some(format!("it has {} parameters and {} values to start from", parameters.len(), start.len()));
+    }
+    for (p, start) in parameters.iter().zip(start) {
+        let [low, high] = p.range;
+        if !(p.scale > 0.0 && p.scale.is_finite()) {
+            return Some(format!("the scale of {} is {}; it must be above 0", p.name, p.scale));
+        }
+        if !(low < high && (low..=high).contains(&start)) {
+            return Some(format!("{} starts from {start}; its range, {low} to {high}, must hold that", p.name));
+        }
+    }
+    None
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
 use super::*;
+use crate::diagnosis::cause::CauseParameter;
 use crate::diagnosis::diagnose::diagnose_among;
 use crate::diagnosis::options::DiagnosisOptions;
 use crate::diagnosis::scene::Scene;
@@ -47,7 +48,81 @@ mod turned_image {
 
 /// The one line that registers the cause above beside all others.
 fn with_turned_image() -> Registry {
-    Registry { entries: [REGISTRY, &[turned_image::ENTRY]].concat() }
+    Registry { entries: [REGISTRY, &[turned_image::ENTRY]].concat(), own: Vec::new() }
+}
+
+/// A cause of a program's own, with the name, scale, range and start that a test asks for.
+struct Own {
+    name: &'static str,
+    category: Category,
+    scale: f64,
+    range: [f64; 2],
+    start: Vec<f64>,
+}
+
+impl Cause for Own {
+    fn name(&self) -> CauseName {
+        CauseName::new(self.name)
+    }
+
+    fn category(&self) -> Category {
+        self.category
+    }
+
+    fn description(&self) -> String {
+        "the sample is stiffer at its rim".into()
+    }
+
+    fn parameters(&self) -> Vec<CauseParameter> {
+        vec![CauseParameter::new("log_rim", self.scale, self.range)]
+    }
+
+    fn start(&self) -> Vec<f64> {
+        self.start.clone()
+    }
+
+    fn apply(&self, _values: &[f64], _scene: &mut Scene) {}
+}
+
+fn own(name: &'static str, category: Category) -> Own {
+    Own { name, category, scale: 0.1, range: [-1.0, 1.0], start: vec![0.0] }
+}
+
+/// A cause of one's own is tested, left out and set aside with the rest of its kind.
+#[test]
+fn own_causes_stand_beside_the_others() {
+    let name = CauseName::new("rim");
+    let with = |category| Registry::standard().with(Arc::new(own("rim", category))).unwrap();
+    let specimen = Specimen::from_json(include_str!("../../geometries/solid-shear.json")).unwrap();
+    let num_tested = |registry: &Registry| registry.tested(&specimen).iter().filter(|c| c.name() == name).count();
+    for (category, at_boundary, inside) in
+        [(Category::Boundary, 1, 0), (Category::Material, 0, 1), (Category::Geometry, 1, 1)]
+    {
+        let registry = with(category);
+        assert_eq!((registry.names().last(), num_tested(&registry)), (Some(&name), 1));
+        assert_eq!(num_tested(&registry.clone().without_inside()), at_boundary, "{category:?}");
+        assert_eq!(num_tested(&registry.clone().without_boundary()), inside, "{category:?}");
+        assert_eq!(num_tested(&registry.clone().of_image_alone(&specimen)), 0);
+        assert_eq!(num_tested(&registry.without(&[name]).unwrap()), 0);
+    }
+}
+
+/// What a fit could not use is refused with the cause's name and what to change.
+#[test]
+fn own_causes_that_cannot_be_fitted_are_refused() {
+    let refused = |registry: Registry, cause: Own| registry.with(Arc::new(cause)).map(|_| ()).unwrap_err().to_string();
+    let rim = || own("rim", Category::Material);
+    let with_rim = Registry::standard().with(Arc::new(rim())).unwrap();
+    for (message, part) in [
+        (refused(Registry::standard(), own("swelling", Category::Material)), "comes with the program"),
+        (refused(with_rim, rim()), "another variant"),
+        (refused(Registry::standard(), Own { scale: f64::NAN, ..rim() }), "the scale of log_rim is NaN"),
+        (refused(Registry::standard(), Own { range: [1.0, -1.0], ..rim() }), "log_rim starts from 0"),
+        (refused(Registry::standard(), Own { start: vec![2.0], ..rim() }), "log_rim starts from 2"),
+        (refused(Registry::standard(), Own { start: vec![], ..rim() }), "1 parameters and 0 values"),
+    ] {
+        assert!(message.contains(part), "{message}");
+    }
 }
 
 /// One file and one line: the diagnosis tests, ranks, fits, names and measures a cause that it never heard of.
@@ -81,17 +156,19 @@ fn names_are_those_of_the_format() {
         "cell",
         "compliance",
         "compressibility",
+        "cut",
         "debond",
         "fibre",
         "gain",
-        "geometry",
         "gradient",
         "hole",
         "inclusion",
+        "law",
         "layer",
         "mount",
         "mullins",
         "offaxis",
+        "outline",
         "registration",
         "relaxation",
         "slack",
@@ -131,7 +208,7 @@ fn entries_are_named_as_what_they_hold() {
             Origin::Tested(suspects) => assert!(suspects(&specimen).iter().all(|c| c.name() == entry.name)),
             Origin::LoadCurve(effect) => assert_eq!(effect.name(), entry.name),
             Origin::Material(cause) => assert_eq!(cause.name(), entry.name),
-            Origin::Searched(_) | Origin::Artefact { .. } | Origin::SetUp { .. } => {}
+            Origin::Searched(_) | Origin::LookAlike | Origin::Artefact { .. } | Origin::SetUp { .. } => {}
         }
     }
     // Holes are suspects of one name and different identities.

@@ -13,9 +13,11 @@ use super::registry::remedy_of;
 use crate::material::{Ogden, Parameter};
 use crate::rate::{BeforeAfter, Verdict};
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// A number with its 95 % interval.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = DiagnosedParameter)]
 #[serde(deny_unknown_fields)]
 pub struct ParameterResult {
     /// Name, with its unit.
@@ -27,7 +29,7 @@ pub struct ParameterResult {
 }
 
 /// A cause in a result.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CauseResult {
     /// Name.
@@ -54,7 +56,7 @@ pub struct CauseResult {
 
 /// A sample stiffer or softer than believed. A load cell that reads too much or too little would look the same:
 /// displacements tell ratios of moduli, not their size.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ModulusAgainstBelief {
     /// Initial shear modulus of the material as believed, kPa.
@@ -96,7 +98,7 @@ impl ModulusAgainstBelief {
 }
 
 /// A cause that was tested.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RankedResult {
     /// Round of the search, from 1.
@@ -112,7 +114,7 @@ pub struct RankedResult {
 }
 
 /// `diagnosis/1`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DiagnosisResult {
     /// `diagnosis/1`.
@@ -143,8 +145,9 @@ pub struct DiagnosisResult {
     pub chi2_per_datum: BeforeAfter,
     /// Misfit beyond noise, mm rms.
     pub structured_rms_mm: BeforeAfter,
-    /// Misfit on data kept back, mm rms, noise included.
-    pub kept_back_rms_mm: BeforeAfter,
+    /// Misfit on data kept back, mm rms, noise included; absent where a fit to half of the data has no equilibrium.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kept_back_rms_mm: Option<BeforeAfter>,
     /// Voxels of a step at most that agree with hardly any of their neighbours and were left out.
     #[serde(default)]
     pub num_outlying_voxels: usize,
@@ -188,7 +191,7 @@ impl DiagnosisResult {
             alternatives: d.alternatives.iter().map(cause).collect(),
             chi2_per_datum: BeforeAfter { before: d.left[0].chi2_per_datum, after: d.left[1].chi2_per_datum },
             structured_rms_mm: BeforeAfter { before: d.left[0].structured_rms_mm, after: d.left[1].structured_rms_mm },
-            kept_back_rms_mm: BeforeAfter { before: d.kept_back_rms_mm[0], after: d.kept_back_rms_mm[1] },
+            kept_back_rms_mm: d.kept_back_rms_mm.map(|[before, after]| BeforeAfter { before, after }),
             interior: d.interior,
             num_outlying_voxels: d.observed.num_outliers,
             left_at: d.left[1].location.clone(),
@@ -224,7 +227,10 @@ fn cause(c: &FoundCause) -> CauseResult {
         evidence: c.evidence,
         effect_rms_mm: c.effect_rms_mm,
         experiments: c.experiments.clone(),
-        remedy: remedy_of(c.name).into(),
+        remedy: match remedy_of(c.name) {
+            "" => c.own_remedy.clone(),
+            registered => registered.into(),
+        },
     }
 }
 

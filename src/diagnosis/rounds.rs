@@ -2,6 +2,7 @@
 //! where the evidence for it is strong enough.
 
 use super::candidate::Candidate;
+use super::cause::Cause;
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
 use super::evidence::{EVIDENCE, ROUGH_TOLERANCE, is_large, penalty, smallest_share};
@@ -15,6 +16,7 @@ use super::registry::Registry;
 use super::score_round::{RoundScope, RoundScores, leading, score_suspects};
 use super::supposed::Supposed;
 use super::trace::Trace;
+use std::sync::Arc;
 
 /// Two fits end in the same place where their predictions differ by less than this part of the cause's effect.
 const SAME_EFFECT: f64 = 0.2;
@@ -29,6 +31,9 @@ const LEAST_PROMISE: f64 = 0.25;
 /// each of them first explains a part of that. What later causes make needless is taken out at the end.
 const SPONGE_COUNTS: f64 = 1.0 / 3.0;
 
+/// How often fits are gone on with as what they look like.
+const MAX_LOOK_ALIKES: usize = 2;
+
 /// Fits that ended early may lie so many times that apart from where they would have ended.
 const NEAR_TOLERANCES: f64 = 5.0;
 
@@ -37,6 +42,8 @@ struct Trial {
     /// Fall of the deviance, less ln n per parameter of the cause.
     gain: f64,
     fit: CauseFit,
+    /// Whether the fit went on to its end.
+    is_settled: bool,
 }
 
 impl Trial {
@@ -196,41 +203,92 @@ fn fit_leading(
     measured: &Trace,
 ) -> Result<Vec<Trial>, DiagnosisError> {
     let Scored { candidates, known, .. } = scored;
-    let round = findings.num_rounds;
     let mut trials: Vec<Trial> = Vec::new();
     let least = LEAST_PROMISE * smallest_share(&findings.current.causes) * findings.explained();
+    let starts = leading(candidates, &findings.current).into_iter().filter(|c| c.score > least);
+    let starts: Vec<Start> = starts.map(|c| (c.cause.clone(), c.values.clone())).collect();
+    fit_starts(inference, findings, measured, known, &starts, &mut trials)?;
+    let (specimen, names) = (&inference.laboratory.observed().specimen, scored.registry.names());
+    let mut from = 0;
+    for _ in 0..MAX_LOOK_ALIKES {
+        let ended = trials[from..].iter().filter_map(|t| t.fit.causes.last());
+        let alike = ended.flat_map(|s| s.cause.look_alikes(&s.values, specimen));
+        let starts: Vec<Start> = alike.filter(|c| names.contains(&c.name())).map(|c| (c.clone(), c.start())).collect();
+        from = trials.len();
+        findings.ranked.extend(starts.iter().map(|(cause, _)| Ranked {
+            identity: cause.identity(),
+            description: cause.description(),
+            score: 0.0,
+            fitted: None,
+            round: findings.num_rounds,
+        }));
+        fit_starts(inference, findings, measured, known, &starts, &mut trials)?;
+    }
+    trials.sort_by(|a, b| b.counted().total_cmp(&a.counted()));
+    Ok(trials)
+}
+
+/// A cause and the values of its parameters from which its fit starts.
+type Start = (Arc<dyn Cause>, Vec<f64>);
+
+/// Adds the fits from `starts`, which end early, and goes on with those of all trials that may be the best.
+///
+/// # Errors
+/// [`DiagnosisError`]: the work was cancelled.
+fn fit_starts(
+    inference: &mut Inference,
+    findings: &mut Findings,
+    measured: &Trace,
+    known: &[Trace],
+    starts: &[Start],
+    trials: &mut Vec<Trial>,
+) -> Result<(), DiagnosisError> {
+    if starts.is_empty() {
+        return Ok(());
+    }
     let settings = inference.settings;
     let tolerance = settings.tolerance.max(ROUGH_TOLERANCE * inference.misfit_beyond_noise(&findings.current));
     inference.settings.relative_tolerance = ROUGH_TOLERANCE;
-    for c in leading(candidates, &findings.current).into_iter().filter(|c| c.score > least) {
-        if (inference.is_cancelled)() {
-            break;
-        }
-        (inference.progress)(&format!("round {round}: fitting '{}'", c.cause.description()));
-        let current = &findings.current;
-        let mut supposed = current.causes.clone();
-        supposed.push(Supposed { cause: c.cause.clone(), values: c.values.clone() });
-        let Ok(fit) = inference.fit_with_leaps(measured, &current.material, &supposed, known) else { continue };
-        let gain = gain_of(inference, current, &fit);
-        // Suspects without an identity of their own, as two balls, share the last entry.
-        let identity = c.cause.identity();
-        if let Some(ranked) = findings.ranked.iter_mut().rev().find(|r| r.identity == identity) {
-            ranked.fitted = Some(gain);
-        }
-        trials.push(Trial { gain, fit });
+    for (cause, values) in starts {
+        trials.extend(tried(inference, findings, measured, known, cause, values));
     }
     inference.settings = settings;
     let best = trials.iter().map(Trial::counted).fold(f64::NEG_INFINITY, f64::max);
-    let near = best - 2.0 * AMBIGUITY - NEAR_TOLERANCES * tolerance;
-    for trial in trials.iter_mut().filter(|t| t.counted() > near.max(EVIDENCE - NEAR_TOLERANCES * tolerance)) {
+    let near = (best - 2.0 * AMBIGUITY).max(EVIDENCE) - NEAR_TOLERANCES * tolerance;
+    for trial in trials.iter_mut().filter(|t| !t.is_settled && t.counted() > near) {
         match inference.fit(measured, &trial.fit.material, &trial.fit.causes) {
-            Ok(fit) => *trial = Trial { gain: gain_of(inference, &findings.current, &fit), fit },
+            Ok(fit) => *trial = Trial { gain: gain_of(inference, &findings.current, &fit), fit, is_settled: true },
             Err(error) if (inference.is_cancelled)() => return Err(error),
             Err(_) => {}
         }
     }
-    trials.sort_by(|a, b| b.counted().total_cmp(&a.counted()));
-    Ok(trials)
+    Ok(())
+}
+
+/// The fit with one more cause, which ends early; `None` where it has none or the work is cancelled.
+fn tried(
+    inference: &mut Inference,
+    findings: &mut Findings,
+    measured: &Trace,
+    known: &[Trace],
+    cause: &Arc<dyn Cause>,
+    values: &[f64],
+) -> Option<Trial> {
+    if (inference.is_cancelled)() {
+        return None;
+    }
+    (inference.progress)(&format!("round {}: fitting '{}'", findings.num_rounds, cause.description()));
+    let current = &findings.current;
+    let mut supposed = current.causes.clone();
+    supposed.push(Supposed { cause: cause.clone(), values: values.to_vec() });
+    let fit = inference.fit_with_leaps(measured, &current.material, &supposed, known).ok()?;
+    let gain = gain_of(inference, current, &fit);
+    // Suspects without an identity of their own, as two balls, share the last entry.
+    let identity = cause.identity();
+    if let Some(ranked) = findings.ranked.iter_mut().rev().find(|r| r.identity == identity) {
+        ranked.fitted = Some(gain);
+    }
+    Some(Trial { gain, fit, is_settled: false })
 }
 
 /// By how much the deviance of `current` falls with the last cause of `fit`, less what its parameters cost.

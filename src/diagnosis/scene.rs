@@ -2,8 +2,8 @@
 
 pub use super::image::{ImageChange, Jump, Pose};
 use crate::calibration::ObservedStep;
-use crate::fem::{Departures, FIRM_BOND_KPA_PER_MM, Fibre, Field, PlateMotion};
-use crate::mesh::BlockShape;
+use crate::fem::{Departures, FIRM_BOND_KPA_PER_MM, Fibre, Field, LawCorrection, PlateMotion};
+use crate::mesh::{BlockShape, Cut};
 use crate::specimen::Specimen;
 
 /// What differs from the nominal experiment. Causes change it; the laboratory predicts what would be recorded of it.
@@ -17,12 +17,16 @@ pub struct Scene {
     pub log_growth: f64,
     /// Fibres.
     pub fibre: Option<Fibre>,
+    /// A correction of the material's law.
+    pub law: Option<LawCorrection>,
     /// The plates: fixed, moved.
     pub plates: [PlateMotion; 2],
     /// Motions of the plates at each step alone, added to the others. Steps without an entry have none.
     pub plates_at: Vec<[PlateMotion; 2]>,
     /// How far the block's faces lie off the drawing.
     pub shape: BlockShape,
+    /// A cut through the sample.
+    pub cut: Option<MovedCut>,
     /// Real minus commanded drive per newton of the measured force, mm/N.
     pub compliance_mm_per_n: f64,
     /// How loose the bond is on the fixed and the moved face, from 0 (firm) to 1 (gone). Where several fields overlap,
@@ -36,6 +40,15 @@ pub struct Scene {
     pub force_offset_n: f64,
     /// Added to the load cell's reading, N per N.
     pub force_gain: f64,
+}
+
+/// A cut that was moved from where its mesh was made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MovedCut {
+    /// Where the mesh has it. Scenes that differ in this have meshes of their own.
+    pub meshed: Cut,
+    /// Where it is.
+    pub cut: Cut,
 }
 
 impl Scene {
@@ -72,6 +85,7 @@ impl Scene {
             stiffness_factor,
             log_growth: (growth.abs() > 0.0).then(|| Field::new(move |_| growth)),
             fibre: self.fibre,
+            law: self.law,
             fixed_plate,
             moved_plate,
             bond_kpa_per_mm: bond,

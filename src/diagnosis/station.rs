@@ -1,21 +1,33 @@
 //! Prepared models: one per block as made and per set of released faces, each with how the scan sees it.
 
 use super::error::DiagnosisError;
-use super::scene::{Pose, Scene};
+use super::scene::{MovedCut, Pose, Scene};
 use crate::calibration::{Observed, Placing, View};
-use crate::fem::{Equilibrium, ForwardModel};
-use crate::mesh::{BlockShape, DesignVariable, Mesh, half_extents_mm, made_mesh, morphed, shape_velocity};
+use crate::fem::{Equilibrium, ForwardModel, PrepareError};
+use crate::mesh::{
+    BlockShape, DesignVariable, Mesh, MeshOptions, cut_offset, half_extents_mm, made_mesh, mesh_cut_specimen, morphed,
+    shape_velocity,
+};
 use crate::specimen::Specimen;
+use std::sync::Arc;
 
 /// Most prepared models kept: one nominal, some with released faces, other holes or faces.
 const MAX_STATIONS: usize = 4;
+/// Element size of the mesh of a sample with a cut, as a factor on the nominal mesh's, whose error it is to be without:
+/// its triangles err otherwise.
+const CUT_FACTOR: f64 = 0.6;
+/// Cut meshes are no finer than this, as a factor on the standard size.
+const FINEST_CUT: f64 = 0.9;
 
 /// A prepared model: one mesh, one set of released faces.
 pub(super) struct Station {
     holes: Vec<[f64; 3]>,
     releases: [bool; 2],
     shape: BlockShape,
-    /// The mesh of the drawn block with the holes as made.
+    cut: Option<MovedCut>,
+    /// The mesh of the specimen as drawn, with the cut where it was meshed.
+    base: Arc<Mesh>,
+    /// The mesh of the drawn block with the holes and the cut as they are.
     drawn: Mesh,
     /// Of the block as made.
     pub(super) model: ForwardModel,
@@ -36,7 +48,8 @@ impl Station {
 /// The prepared models of one recording.
 pub(super) struct Stations<'a> {
     observed: &'a Observed,
-    nominal: Mesh,
+    options: MeshOptions,
+    nominal: Arc<Mesh>,
     all: Vec<Station>,
 }
 
@@ -55,9 +68,9 @@ impl std::ops::IndexMut<usize> for Stations<'_> {
 }
 
 impl<'a> Stations<'a> {
-    /// None yet; `nominal` is the mesh of the specimen as drawn.
-    pub(super) fn new(observed: &'a Observed, nominal: Mesh) -> Stations<'a> {
-        Stations { observed, nominal, all: Vec::new() }
+    /// None yet; `nominal` is the mesh of the specimen as drawn, made with `options`.
+    pub(super) fn new(observed: &'a Observed, nominal: Mesh, options: MeshOptions) -> Stations<'a> {
+        Stations { observed, options, nominal: Arc::new(nominal), all: Vec::new() }
     }
 
     /// Forgets the equilibria.
@@ -80,7 +93,9 @@ impl<'a> Stations<'a> {
             let same = |a: &[f64; 3], b: &[f64; 3]| a.iter().zip(b).all(|(x, y)| x.to_bits() == y.to_bits());
             s.holes.iter().zip(&holes).all(|(a, b)| same(a, b))
         };
-        let found = self.all.iter().position(|s| s.releases == releases && s.shape == scene.shape && same_holes(s));
+        let is_found =
+            |s: &Station| s.releases == releases && s.shape == scene.shape && s.cut == scene.cut && same_holes(s);
+        let found = self.all.iter().position(is_found);
         if let Some(at) = found {
             let station = &mut self.all[at];
             if station.pose != pose {
@@ -90,19 +105,24 @@ impl<'a> Stations<'a> {
             return Ok(at);
         }
         made.validate().map_err(DiagnosisError::Specimen)?;
-        let mut mesh = self.nominal.clone();
+        let base = self.base_of(scene)?;
+        let mut mesh = Mesh::clone(&base);
         for (hole, change) in holes.iter().enumerate() {
             for (variable, &by) in hole_variables(hole).into_iter().zip(change) {
                 if by.abs() > 0.0 {
-                    let velocity = shape_velocity(&self.nominal, drawn, variable);
+                    let velocity = shape_velocity(&base, drawn, variable);
                     mesh = morphed(&mesh, &velocity, by);
                 }
             }
         }
+        if let Some(MovedCut { meshed, cut }) = &scene.cut {
+            let offsets: Vec<[f64; 3]> = base.nodes.iter().map(|x| cut_offset(drawn, meshed, cut, *x)).collect();
+            mesh = morphed(&mesh, &offsets, 1.0);
+        }
         let view = self.observed.placed_view(&made, &mesh, &placing(&pose, scene.shape))?;
         let as_made = made_mesh(&mesh, drawn, &scene.shape);
         // The nodes of two such meshes correspond: equilibria of one start the other, and symbolic work is shared.
-        let near = self.all.iter().rev().find(|s| s.releases == releases);
+        let near = self.all.iter().rev().find(|s| s.releases == releases && Arc::ptr_eq(&s.base, &base));
         let states = near.map(|s| s.states.clone()).unwrap_or_default();
         let model = match near.filter(|_| releases == [false; 2]) {
             Some(near) => near.model.moved(as_made.nodes)?,
@@ -112,8 +132,21 @@ impl<'a> Stations<'a> {
             // The nominal one stays.
             self.all.remove(1);
         }
-        self.all.push(Station { holes, releases, shape: scene.shape, drawn: mesh, model, view, pose, states });
+        let (shape, cut) = (scene.shape, scene.cut);
+        self.all.push(Station { holes, releases, shape, cut, base, drawn: mesh, model, view, pose, states });
         Ok(self.all.len() - 1)
+    }
+
+    /// The mesh of the specimen as drawn, with the cut of a scene where it was meshed.
+    fn base_of(&self, scene: &Scene) -> Result<Arc<Mesh>, DiagnosisError> {
+        let Some(MovedCut { meshed, .. }) = &scene.cut else { return Ok(self.nominal.clone()) };
+        let has_it = |s: &&Station| s.cut.is_some_and(|c| c.meshed == *meshed);
+        if let Some(station) = self.all.iter().find(has_it) {
+            return Ok(station.base.clone());
+        }
+        let options = self.options.refined_by(CUT_FACTOR, &self.observed.specimen, FINEST_CUT);
+        let mesh = mesh_cut_specimen(&self.observed.specimen, &options, meshed).map_err(PrepareError::from)?;
+        Ok(Arc::new(mesh))
     }
 
     /// Velocity of a station's nodes from one scene to another 2 `step` further, if holes or faces change.
@@ -121,7 +154,7 @@ impl<'a> Stations<'a> {
         let mut velocity: Option<Vec<[f64; 3]>> = None;
         let half_mm = half_extents_mm(&self.observed.specimen);
         let mut add = |rate: f64, of_node: &dyn Fn(usize) -> [f64; 3]| {
-            let num = self.nominal.nodes.len();
+            let num = self.all[at].base.nodes.len();
             let sum = velocity.get_or_insert_with(|| vec![[0.0; 3]; num]);
             for (n, s) in sum.iter_mut().enumerate() {
                 for (s, v) in s.iter_mut().zip(of_node(n)) {
@@ -133,10 +166,20 @@ impl<'a> Stations<'a> {
             let rate = [0, 1, 2].map(|i| (a[i] - b[i]) / (2.0 * step));
             for (r, variable) in rate.into_iter().zip(hole_variables(hole)) {
                 if r.abs() > 0.0 {
-                    let v = shape_velocity(&self.nominal, &self.observed.specimen, variable);
+                    let v = shape_velocity(&self.all[at].base, &self.observed.specimen, variable);
                     add(r, &|n| v[n]);
                 }
             }
+        }
+        if let (Some(a), Some(b)) = (&ahead.cut, &behind.cut)
+            && a != b
+        {
+            let (specimen, base) = (&self.observed.specimen, &self.all[at].base.nodes);
+            let offset = |c: &MovedCut, n: usize| cut_offset(specimen, &c.meshed, &c.cut, base[n]);
+            add(0.5 / step, &|n| {
+                let (a, b) = (offset(a, n), offset(b, n));
+                [0, 1, 2].map(|i| a[i] - b[i])
+            });
         }
         let change = ahead.shape.plus(-1.0, &behind.shape);
         if !change.is_nominal() {

@@ -2,6 +2,7 @@
 //! voxels.
 
 use super::laboratory::Laboratory;
+use super::mesh_error::FINER;
 use super::options::DiagnosisOptions;
 use super::scene::Scene;
 use crate::calibration::Observed;
@@ -15,7 +16,7 @@ use crate::voxel::VoxelMask;
 pub(super) const MESH_FACTOR: f64 = 4.0;
 /// Element size of the finer mesh by which such a diagnosis corrects itself: a recording made on it has no other error
 /// of its mesh.
-pub(super) const FINER_FACTOR: f64 = 0.6 * MESH_FACTOR;
+pub(super) const FINER_FACTOR: f64 = FINER * MESH_FACTOR;
 /// Standard deviation of the displacement's noise, mm.
 pub(super) const NOISE_MM: f64 = 0.01;
 /// Drift of the load cell, N.

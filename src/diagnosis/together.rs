@@ -16,9 +16,10 @@ use super::result::{ParameterResult, material_parameters, parameter};
 use super::supposed::Supposed;
 use crate::material::Ogden;
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// Whether recordings agree: a supposition that saves parameters is compared with fits of every recording for itself.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Agreement {
     /// Rise of the deviance.
@@ -33,7 +34,7 @@ pub struct Agreement {
 
 /// A cause that is named in every recording. Of a cause of which some numbers are the rig's or the scanner's, those
 /// alone.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CommonCause {
     /// Name.
@@ -47,7 +48,7 @@ pub struct CommonCause {
 }
 
 /// Several recordings together (part of `diagnoses/1`).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TogetherResult {
     /// Their one material, each recording with its own causes.

@@ -27,7 +27,7 @@ pub enum MaterialFormat {
 }
 
 /// The energy of a change of volume.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum VolumetricLaw {
     /// κ/2 (ln J)², which is ours.
@@ -81,7 +81,7 @@ pub struct Convention {
 }
 
 /// A constant of a card.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
 pub struct Constant {
     /// Its name in the program's manual.
     pub name: String,

@@ -204,6 +204,7 @@ impl Assembler {
             stiffness_factor: self.departures.factor.get(e),
             log_growth: self.departures.growth.get(e),
             fibre: self.departures().fibre,
+            law: self.departures().law,
             ..gathered(self.mesh(), e, at, pressure)
         }
     }
@@ -419,6 +420,7 @@ fn gathered<'a>(mesh: &Mesh, e: usize, at: &Configuration<'a>, pressure: Option<
         stiffness_factor: None,
         log_growth: None,
         fibre: None,
+        law: None,
     };
     for (a, &v) in mesh.element(e).iter().enumerate() {
         input.positions[a] = at.positions[v as usize];

@@ -8,6 +8,7 @@ use super::assembler::Assembler;
 use super::departures::Departures;
 use super::element_data::{FibreDifference, MAX_GROUPS};
 use super::error::SolveError;
+use super::law_correction::LawCorrection;
 use super::rates::Rates;
 use super::tangent::Tangent;
 use crate::material::Lanes;
@@ -25,6 +26,7 @@ pub struct Change {
     stiffness_factor: Option<Vec<[Lanes; MAX_GROUPS]>>,
     log_growth: Option<Vec<[Lanes; MAX_GROUPS]>>,
     fibre: Option<FibreDifference>,
+    law: Option<LawCorrection>,
     /// Of the springs' forces at the nodes that they hold, where these stay, kPa·mm².
     spring_forces: Vec<(u32, [f64; 3])>,
 }
@@ -38,6 +40,7 @@ impl Change {
             stiffness_factor: self.stiffness_factor.as_deref(),
             log_growth: self.log_growth.as_deref(),
             fibre: self.fibre,
+            law: self.law,
         }
     }
 }
@@ -57,6 +60,7 @@ impl Tangent<'_> {
     pub fn change_of_departures(&self, path: &dyn Fn(f64) -> Departures, step: f64) -> Change {
         let ends = [path(step), path(-step)];
         let fibre = ends.iter().any(|d| d.fibre.is_some()).then(|| [0, 1].map(|n| ends[n].fibre));
+        let law = law_rate(&ends, 1.0 / (2.0 * step));
         let ends = ends.map(|departures| self.assembler.departed(&departures));
         let (drive_mm, mut imposed) = (self.equilibrium.drive_mm, self.still());
         let per_step = 1.0 / (2.0 * step);
@@ -71,6 +75,7 @@ impl Tangent<'_> {
             stiffness_factor: difference(factors, 1.0, per_step),
             log_growth: difference(growths, 0.0, per_step),
             fibre: fibre.map(|ends| FibreDifference { ends, step }),
+            law,
             spring_forces: self.spring_rates(&ends, per_step),
         }
     }
@@ -187,6 +192,14 @@ impl Tangent<'_> {
             }
         }
     }
+}
+
+/// The rate between the corrections of the law at two ends, whose reach is the same.
+fn law_rate([ahead, behind]: &[Departures; 2], per_step: f64) -> Option<LawCorrection> {
+    let reach = ahead.law.or(behind.law)?.reach;
+    let of = |end: &Departures, n: usize| end.law.map_or(0.0, |law| law.coefficients_kpa[n]);
+    let coefficients_kpa = [0, 1, 2, 3].map(|n| (of(ahead, n) - of(behind, n)) * per_step);
+    coefficients_kpa.iter().any(|c| c.abs() > 0.0).then_some(LawCorrection { reach, coefficients_kpa })
 }
 
 /// The rate between two fields at quadrature points, each `constant` where it is not given; `None` where neither is.

@@ -4,6 +4,7 @@
 //! along x. Each departure here is at rest in its default; the element kernels, the factorisation and the derivatives
 //! are the same with and without.
 
+use super::law_correction::LawCorrection;
 use super::rotation::turning_of;
 use std::fmt;
 use std::sync::Arc;
@@ -124,6 +125,8 @@ pub struct Departures {
     pub log_growth: Option<Field>,
     /// Fibres.
     pub fibre: Option<Fibre>,
+    /// A correction of the material's law. The factor on the stiffness scales it, too.
+    pub law: Option<LawCorrection>,
     /// The fixed plate or grip (−y or −x).
     pub fixed_plate: PlateMotion,
     /// The moved plate or grip (+y or +x).
@@ -142,6 +145,7 @@ impl Departures {
         self.stiffness_factor.is_none()
             && self.log_growth.is_none()
             && self.fibre.is_none()
+            && self.law.is_none()
             && !self.moves_plates()
             && self.bond_kpa_per_mm.is_none()
             && self.faces_per_mm.iter().all(Option::is_none)

@@ -42,6 +42,11 @@ fn paths() -> Vec<Path> {
             fibre: Some(Fibre { direction: [0.6, 0.8, 0.0], modulus_kpa: 5.0 * t }),
             ..Departures::default()
         }),
+        ("law", |t| Departures {
+            law: Some(LawCorrection { reach: 0.5, coefficients_kpa: [8.0 * t, -5.0 * t, 4.0 * t, 3.0 * t] }),
+            stiffness_factor: Some(Field::new(|x| 1.0 + 0.2 * x[1] / 3.2)),
+            ..Departures::default()
+        }),
         ("tilt", |t| Departures {
             moved_plate: PlateMotion { rotation_rad_per_mm: [0.0, 0.0, 0.02 * t], ..PlateMotion::default() },
             ..Departures::default()

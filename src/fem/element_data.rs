@@ -4,6 +4,7 @@
 //! Quadrature points stand in lanes, eight to a group; nodes of the stiffness likewise.
 
 use super::departures::Fibre;
+use super::law_correction::LawCorrection;
 use crate::material::{LANES, Lanes, Ogden, Parameter, Tensor};
 use crate::mesh::ElementKind;
 
@@ -84,6 +85,8 @@ pub struct ElementInput<'a> {
     pub log_growth: Option<&'a [Lanes; MAX_GROUPS]>,
     /// Fibres.
     pub fibre: Option<Fibre>,
+    /// A correction of the material's law.
+    pub law: Option<LawCorrection>,
 }
 
 /// A direction in which the condensed residual of an element is differentiated: rates per unit of t. What is absent
@@ -102,6 +105,8 @@ pub struct Variation<'a> {
     pub log_growth: Option<&'a [Lanes; MAX_GROUPS]>,
     /// The fibres at the ends of a central difference.
     pub fibre: Option<FibreDifference>,
+    /// Of the correction of the law, in which its stress is linear.
+    pub law: Option<LawCorrection>,
 }
 
 /// Fibres ahead and behind, and half of what lies between them in t. The stress of fibres is differenced between them.

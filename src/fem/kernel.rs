@@ -19,6 +19,7 @@
 
 use super::element_data::{ElementInput, ElementOutput, ElementTables, MAX_GROUPS, MAX_NODES};
 use super::fibre_kernel::{add_fibre_stress, add_fibre_tangent};
+use super::law_kernel::{add_law_stress, add_law_tangent};
 use crate::material::{LANES, Lanes, SpectralState, Tensor};
 
 /// A vector at the nodes of an element.
@@ -270,7 +271,12 @@ pub(super) fn element<const FMA: bool, const TANGENT: bool>(
         // P is linear in the energy: f Ψ_iso with pressure p is f (Ψ_iso with pressure p/f).
         let factor = input.stiffness_factor.map_or(Lanes::splat(1.0), |f| f[g]);
         let kirchhoff = p * out.jacobian[g] / factor;
-        out.stress[g] = scaled(&state.first_piola_kirchhoff_stress(kirchhoff), factor);
+        let mut stress = state.first_piola_kirchhoff_stress(kirchhoff);
+        if let Some(law) = &input.law {
+            let f = &out.deformation_gradient[g];
+            add_law_stress(law, f, out.jacobian[g], &out.cofactor[g], &mut stress);
+        }
+        out.stress[g] = scaled(&stress, factor);
         if let Some(fibre) = &input.fibre {
             add_fibre_stress(fibre, &out.deformation_gradient[g], &mut out.stress[g]);
         }
@@ -281,6 +287,10 @@ pub(super) fn element<const FMA: bool, const TANGENT: bool>(
         }
         if TANGENT {
             state.material_tangent::<FMA>(input.material, kirchhoff, kirchhoff, &mut out.tangent[g]);
+            if let Some(law) = &input.law {
+                let f = &out.deformation_gradient[g];
+                add_law_tangent(law, f, out.jacobian[g], &out.cofactor[g], &mut out.tangent[g]);
+            }
             for row in &mut out.tangent[g] {
                 for x in row.iter_mut() {
                     *x = *x * factor;

@@ -21,6 +21,7 @@ impl Default for SolveOptions {
 
 /// What the last solve took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Statistics {
     /// Load steps accepted.

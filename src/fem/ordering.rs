@@ -1,53 +1,25 @@
-//! Elimination order of the node graph: METIS nested dissection, then a postorder of its elimination tree.
+//! Elimination order of the node graph: nested dissection or, without METIS, approximate minimum degree; then a
+//! postorder of its elimination tree.
 //!
 //! The graph's vertices are nodes, not unknowns (three unknowns per node share a pattern, so this is nine times less
 //! work). Postordering lets the factorisation merge columns into larger supernodes; it does not change the fill.
 
-/// Adjacency in compressed form, without self-loops.
-pub struct Graph {
-    /// `neighbours[offsets[v]..offsets[v + 1]]` are the neighbours of v.
-    pub offsets: Vec<i32>,
-    /// Neighbours.
-    pub neighbours: Vec<i32>,
-}
+use super::graph::Graph;
+use super::minimum_degree::minimum_degree;
+#[cfg(feature = "metis")]
+use super::nested_dissection::nested_dissection;
 
 /// `order[k]` is the vertex eliminated k-th.
 pub fn elimination_order(graph: &Graph) -> Vec<u32> {
     let n = graph.offsets.len() - 1;
-    let mut order = nested_dissection(graph).unwrap_or_else(|| (0..n as u32).collect());
+    #[cfg(feature = "metis")]
+    let dissected = nested_dissection(graph);
+    #[cfg(not(feature = "metis"))]
+    let dissected = None;
+    // Any order is correct; a good one leaves little fill.
+    let mut order = dissected.or_else(|| minimum_degree(graph)).unwrap_or_else(|| (0..n as u32).collect());
     postorder(graph, &mut order);
     order
-}
-
-/// METIS draws from the C library's `rand`, whose state is the process's: calls at the same time would disturb each
-/// other's orders, and with them the last digits of every solution. One at a time each call seeds it anew.
-static METIS: std::sync::Mutex<()> = std::sync::Mutex::new(());
-
-/// METIS_NodeND; `None` where the library refuses (empty graph, no memory), in which case any order is correct.
-fn nested_dissection(graph: &Graph) -> Option<Vec<u32>> {
-    let mut n = (graph.offsets.len() - 1) as i32;
-    if n == 0 || graph.neighbours.is_empty() {
-        return None;
-    }
-    let (mut offsets, mut neighbours) = (graph.offsets.clone(), graph.neighbours.clone());
-    let mut options = [-1i32; metis_sys::METIS_NOPTIONS as usize];
-    let (mut perm, mut inverse) = (vec![0i32; n as usize], vec![0i32; n as usize]);
-    // The lock guards no data, so a poisoned one is as good.
-    let _one_at_a_time = METIS.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-    // SAFETY: the arrays have the lengths that METIS documents (n + 1, offsets[n], METIS_NOPTIONS, n, n), indices are
-    // in range by construction, and all outlive the call.
-    let status = unsafe {
-        metis_sys::METIS_NodeND(
-            &mut n,
-            offsets.as_mut_ptr(),
-            neighbours.as_mut_ptr(),
-            std::ptr::null_mut(),
-            options.as_mut_ptr(),
-            perm.as_mut_ptr(),
-            inverse.as_mut_ptr(),
-        )
-    };
-    (status == metis_sys::rstatus_et_METIS_OK).then(|| perm.into_iter().map(|v| v as u32).collect())
 }
 
 /// Reorders `order` to a postorder of its elimination tree (Liu's algorithm with path compression).

@@ -1,6 +1,7 @@
 //! Rates, at every node and element of a mesh, along which a residual is differentiated.
 
 use super::element_data::{FibreDifference, MAX_GROUPS, MAX_NODES, Variation};
+use super::law_correction::LawCorrection;
 use crate::material::{Lanes, Parameter};
 
 /// Rates per unit of t. What is absent stays.
@@ -18,6 +19,8 @@ pub(super) struct Rates<'a> {
     pub(super) log_growth: Option<&'a [[Lanes; MAX_GROUPS]]>,
     /// The fibres at the ends of a central difference.
     pub(super) fibre: Option<FibreDifference>,
+    /// Of the correction of the material's law.
+    pub(super) law: Option<LawCorrection>,
 }
 
 impl<'a> Rates<'a> {
@@ -30,13 +33,15 @@ impl<'a> Rates<'a> {
             stiffness_factor: self.stiffness_factor.map(|all| &all[e]).filter(|own| is_any(own)),
             log_growth: self.log_growth.map(|all| &all[e]).filter(|own| is_any(own)),
             fibre: self.fibre,
+            law: self.law,
         };
         let changes = variation.velocities.is_some()
             || variation.displacements.is_some()
             || variation.parameter.is_some()
             || variation.stiffness_factor.is_some()
             || variation.log_growth.is_some()
-            || variation.fibre.is_some();
+            || variation.fibre.is_some()
+            || variation.law.is_some();
         changes.then_some(variation)
     }
 }

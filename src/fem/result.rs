@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// Forces at each drive, with what they rest on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct SolveResult {
     /// Always `solve/1`.
@@ -31,12 +32,16 @@ pub struct SolveResult {
 
 /// One drive of a [`SolveResult`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct SolveStep {
     /// Drive, mm.
     pub drive_mm: f64,
     /// Force along +x on the moved face, all samples together, N.
     pub force_n: f64,
+    /// Where there are several kinds of samples: the force of all samples of each kind, N.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub force_by_kind_n: Vec<f64>,
     /// Force along +y on the moved face, all samples together, N.
     pub normal_force_n: f64,
     /// |sum of the forces on both faces| / |force|.
@@ -66,16 +71,54 @@ impl SolveResult {
         }
     }
 
+    /// The result of a test from those of its kinds of samples, at the same drives: forces, elements, unknowns and
+    /// solver work add, of the rest the worst counts; mirror planes are those that all have.
+    pub fn of_samples(parts: Vec<SolveResult>, input_hash: &str) -> SolveResult {
+        let mut parts = parts.into_iter();
+        let Some(mut all) = parts.next() else { unreachable!("a specimen has a first sample") };
+        all.input_hash = input_hash.into();
+        for part in parts {
+            all.num_elements += part.num_elements;
+            all.num_unknowns += part.num_unknowns;
+            all.mirror = [0, 1].map(|axis| all.mirror[axis] && part.mirror[axis]);
+            all.min_scaled_jacobian = all.min_scaled_jacobian.min(part.min_scaled_jacobian);
+            for (step, own) in all.steps.iter_mut().zip(part.steps) {
+                step.add_sample(own);
+            }
+        }
+        all
+    }
+
     /// Adds an equilibrium; `extremes` are the largest principal stretch, the smallest and the largest det F.
     pub fn push(&mut self, equilibrium: &Equilibrium, extremes: [f64; 3], statistics: Statistics) {
         self.steps.push(SolveStep {
             drive_mm: equilibrium.drive_mm,
             force_n: equilibrium.force_n,
+            force_by_kind_n: Vec::new(),
             normal_force_n: equilibrium.normal_force_n,
             reaction_imbalance: equilibrium.reaction_imbalance,
             largest_principal_stretch: extremes[0],
             jacobian_range: [extremes[1], extremes[2]],
             statistics,
         });
+    }
+}
+
+impl SolveStep {
+    /// Adds the same drive of another kind of sample.
+    fn add_sample(&mut self, other: SolveStep) {
+        if self.force_by_kind_n.is_empty() {
+            self.force_by_kind_n.push(self.force_n);
+        }
+        self.force_by_kind_n.push(other.force_n);
+        self.force_n += other.force_n;
+        self.normal_force_n += other.normal_force_n;
+        self.reaction_imbalance = self.reaction_imbalance.max(other.reaction_imbalance);
+        self.largest_principal_stretch = self.largest_principal_stretch.max(other.largest_principal_stretch);
+        let [low, high] = other.jacobian_range;
+        self.jacobian_range = [self.jacobian_range[0].min(low), self.jacobian_range[1].max(high)];
+        self.statistics.load_steps += other.statistics.load_steps;
+        self.statistics.failed_steps += other.statistics.failed_steps;
+        self.statistics.newton_iterations += other.statistics.newton_iterations;
     }
 }

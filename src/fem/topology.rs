@@ -4,7 +4,8 @@
 //! a component that a mirror plane fixes keeps its number, with an identity row, so that the pattern stays in 3×3
 //! blocks.
 
-use super::ordering::{Graph, elimination_order};
+use super::graph::Graph;
+use super::ordering::elimination_order;
 use crate::mesh::Mesh;
 
 /// Marks a node without unknowns.

@@ -14,6 +14,7 @@
 use super::element_data::{ElementInput, ElementOutput, ElementTables, MAX_GROUPS, MAX_NODES, Variation};
 use super::fibre_kernel::{add_fibre_stress, add_fibre_tangent};
 use super::kernel::{NodalVector, add_internal_force, contract, element, gradient_of, multiply, scaled};
+use super::law_kernel::{add_law_stress, add_law_tangent};
 use crate::material::{Lanes, Parameter, SpectralState, Tensor};
 
 const ZERO_TENSOR: Tensor = [[Lanes::ZERO; 3]; 3];
@@ -105,6 +106,9 @@ fn tangents<const FMA: bool>(tables: &ElementTables, input: &ElementInput, state
             kirchhoff,
             &mut out.tangent[g],
         );
+        if let Some(law) = &input.law {
+            add_law_tangent(law, f, out.jacobian[g], &out.cofactor[g], &mut out.tangent[g]);
+        }
         for row in &mut out.tangent[g] {
             for x in row.iter_mut() {
                 *x = *x * factor;
@@ -281,7 +285,7 @@ fn varied<const FMA: bool>(
     found
 }
 
-/// What the material's parameter, the factor on the stiffness and fibres do to P at fixed F and p.
+/// What the material's parameter, the factor on the stiffness, the law's correction and fibres do to P at fixed F and p.
 #[inline(always)]
 fn other_stress_rate(input: &ElementInput, variation: &Variation, out: &ElementOutput, g: usize) -> Tensor {
     let f = &out.deformation_gradient[g];
@@ -292,8 +296,21 @@ fn other_stress_rate(input: &ElementInput, variation: &Variation, out: &ElementO
         s = scaled(&rate, factor);
     }
     if let Some(rate) = variation.stiffness_factor {
-        let isochoric = SpectralState::new(input.material, f).first_piola_kirchhoff_stress(Lanes::ZERO);
+        let mut isochoric = SpectralState::new(input.material, f).first_piola_kirchhoff_stress(Lanes::ZERO);
+        if let Some(law) = &input.law {
+            add_law_stress(law, f, out.jacobian[g], &out.cofactor[g], &mut isochoric);
+        }
         let rate = scaled(&isochoric, rate[g]);
+        for i in 0..3 {
+            for j in 0..3 {
+                s[i][j] += rate[i][j];
+            }
+        }
+    }
+    if let Some(law) = &variation.law {
+        let mut stress = ZERO_TENSOR;
+        add_law_stress(law, f, out.jacobian[g], &out.cofactor[g], &mut stress);
+        let rate = scaled(&stress, input.stiffness_factor.map_or(Lanes::splat(1.0), |f| f[g]));
         for i in 0..3 {
             for j in 0..3 {
                 s[i][j] += rate[i][j];

@@ -97,41 +97,12 @@ macro_rules! schema_of_file {
     };
 }
 
-/// Defines the type of a file's `schema` field: it is written as the given text and reads nothing else.
-macro_rules! schema_tag {
-    ($name:ident, $text:expr) => {
-        /// The `schema` field of the file.
-        #[derive(Clone, Copy, Debug)]
-        pub(super) struct $name;
+/// Largest seed: the largest whole number that every reader of JSON holds exactly, 2⁵³ − 1.
+const MAX_SEED: usize = (1 << 53) - 1;
 
-        impl serde::Serialize for $name {
-            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-                serializer.serialize_str($text)
-            }
-        }
-
-        impl<'de> serde::Deserialize<'de> for $name {
-            fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-                let found = String::deserialize(deserializer)?;
-                if found == $text {
-                    return Ok($name);
-                }
-                let expected = format!("{:?}", $text);
-                Err(serde::de::Error::invalid_value(serde::de::Unexpected::Str(&found), &expected.as_str()))
-            }
-        }
-
-        impl utoipa::PartialSchema for $name {
-            fn schema() -> utoipa::openapi::RefOr<utoipa::openapi::schema::Schema> {
-                utoipa::openapi::schema::ObjectBuilder::new()
-                    .schema_type(utoipa::openapi::schema::Type::String)
-                    .enum_values(Some([$text]))
-                    .into()
-            }
-        }
-
-        impl utoipa::ToSchema for $name {}
-    };
+schema_type! {
+    /// A seed of random numbers.
+    pub Seed = integer_within(0..=MAX_SEED);
 }
 
-pub(crate) use {schema_of_file, schema_tag, schema_type};
+pub(crate) use {schema_of_file, schema_type};

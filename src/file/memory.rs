@@ -115,6 +115,8 @@ pub enum MemoryError {
 pub struct MemoryLimit {
     /// This reading alone, bytes.
     pub reading_bytes: u64,
+    /// What else belongs to this reading and is held already, bytes: a job's recordings are one reading.
+    pub beside_bytes: u64,
     /// What it shares with others.
     pub pool: &'static MemoryPool,
     /// Ends it early.
@@ -123,7 +125,7 @@ pub struct MemoryLimit {
 
 impl MemoryLimit {
     fn of(reading_bytes: u64, pool: &'static MemoryPool) -> MemoryLimit {
-        MemoryLimit { reading_bytes, pool, stop: StopFlag::default() }
+        MemoryLimit { reading_bytes, beside_bytes: 0, pool, stop: StopFlag::default() }
     }
 
     /// Of the command.
@@ -131,7 +133,7 @@ impl MemoryLimit {
         MemoryLimit::of(COMMAND_READING_BYTES, &COMMAND)
     }
 
-    /// Of a recording that a job of the service reads.
+    /// Of all recordings that a job of the service reads.
     pub fn job() -> MemoryLimit {
         MemoryLimit::of(SERVICE_READING_BYTES, &JOBS)
     }
@@ -172,7 +174,8 @@ impl ReadingMemory {
     pub fn take(&self, what: &'static str, bytes: u64) -> Result<(), MemoryError> {
         self.check()?;
         let limit_bytes = self.limit.reading_bytes;
-        let wanted_bytes = self.taken_bytes.load(Ordering::Acquire).saturating_add(bytes);
+        let held_bytes = self.limit.beside_bytes.saturating_add(self.taken_bytes.load(Ordering::Acquire));
+        let wanted_bytes = held_bytes.saturating_add(bytes);
         if wanted_bytes > limit_bytes {
             return Err(MemoryError::TooMuch { what, wanted_bytes, limit_bytes });
         }
@@ -292,6 +295,19 @@ mod tests {
         assert_eq!(second.take("a mask", 1), Err(MemoryError::Stopped));
         drop(second);
         assert_eq!(SMALL.taken_bytes(), 0);
+    }
+
+    #[test]
+    fn what_belongs_to_a_reading_counts_against_its_limit() {
+        static POOL: MemoryPool = MemoryPool::new(10_000);
+        let limit = MemoryLimit::of(800, &POOL);
+        let first = limit.begin();
+        first.take("an image", 700).expect("it fits");
+        let second = MemoryLimit { beside_bytes: first.taken_bytes(), ..limit }.begin();
+        second.take("an image", 100).expect("it fits");
+        let error = MemoryError::TooMuch { what: "an image", wanted_bytes: 801, limit_bytes: 800 };
+        assert_eq!(second.take("an image", 1), Err(error));
+        assert_eq!(POOL.taken_bytes(), 800);
     }
 
     #[test]

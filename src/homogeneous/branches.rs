@@ -14,6 +14,7 @@ const LARGEST_STEP: f64 = 0.5;
 
 /// What follows the first loading branch.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct Unloading {
     /// The drive at which the test turns, in the curve's unit (a stretch, an amount of shear, or mm).
     pub turn: f64,

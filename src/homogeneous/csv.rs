@@ -61,6 +61,7 @@ pub struct CsvCurve {
 
 /// How a file was understood.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct CsvReading {
     /// The column of the drive, as the header calls it.
     pub drive_column: String,

@@ -129,6 +129,7 @@ impl Curve {
 
 /// How well a model meets a curve.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct CurveMatch {
     /// The curve's name.

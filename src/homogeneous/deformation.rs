@@ -9,7 +9,8 @@ use crate::material::{ShearTerm, power_difference};
 use serde::{Deserialize, Serialize};
 
 /// A homogeneous test: how the drive becomes a deformation and which nominal stress the load cell sees.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, utoipa::ToSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum HomogeneousTest {
     /// Stretch λ along x, free laterally. Stress P_xx.

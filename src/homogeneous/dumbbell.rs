@@ -37,6 +37,7 @@ pub struct DumbbellOptions {
 
 /// Grip-to-gauge conversion of one displacement.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct GaugePoint {
     /// Displacement of the grips, mm.
@@ -49,6 +50,7 @@ pub struct GaugePoint {
 
 /// Fits of a dumb-bell's curve with the conversion that belongs to them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct DumbbellFit {
     /// The fits.

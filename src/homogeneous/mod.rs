@@ -20,6 +20,7 @@ mod fit_options;
 mod loading_path;
 mod result;
 mod selection;
+#[cfg(feature = "calibration")]
 mod stand_in;
 mod starts;
 mod statistics;
@@ -41,6 +42,7 @@ pub use result::{CurveFit, CurveFitSequence, CurveParameter, Interval, fit_curve
 pub use selection::{
     F_LEVEL, MIN_DECREMENT, ModelEvidence, Selection, bic, compare, independent_count, neighbour_correlation,
 };
+#[cfg(feature = "calibration")]
 pub use stand_in::{GAUGE_STRETCHES, TRUTH, UniaxialRow, UniaxialStandIn, UniaxialStandInOptions, uniaxial_stand_in};
 pub use statistics::{erf, f_exceedance, t_quantile};
 pub use stress_unit::StressUnit;

@@ -17,6 +17,7 @@ const FADED: f64 = 1e-3;
 
 /// A parameter and what the data say of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct CurveParameter {
     /// `mu_1` (kPa), `alpha_1`, …
@@ -35,6 +36,7 @@ pub struct CurveParameter {
 
 /// A value with its interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Interval {
     /// Best value.
@@ -45,6 +47,7 @@ pub struct Interval {
 
 /// A fit with a number of terms.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct CurveFit {
     /// Terms, the neo-Hookean one included.
@@ -91,6 +94,7 @@ impl CurveFit {
 
 /// Fits of one family (with or without a neo-Hookean term), 1 to N terms.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct CurveFitSequence {
     /// Whether one term is neo-Hookean.

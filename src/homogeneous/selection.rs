@@ -11,6 +11,7 @@ pub const F_LEVEL: f64 = 0.01;
 
 /// One model of the sequence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ModelEvidence {
     /// What the model is called.
@@ -31,6 +32,7 @@ pub struct ModelEvidence {
 
 /// Which model each rule takes, and the one that decides.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Selection {
     /// The models, each nested in the next.

@@ -42,8 +42,16 @@ pub struct UniaxialStandInOptions {
     pub seed: u64,
 }
 
+impl Default for UniaxialStandInOptions {
+    /// A fit on elements of 1.4 times the standard size to a truth on finer ones, with 0.2 % noise.
+    fn default() -> Self {
+        UniaxialStandInOptions { truth_factor: 0.75 * 1.4, fit_factor: 1.4, relative_noise: 2e-3, seed: 1 }
+    }
+}
+
 /// One line of the table.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct UniaxialRow {
     /// Largest gauge stretch of the data that were fitted.
@@ -56,6 +64,7 @@ pub struct UniaxialRow {
 
 /// The table.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct UniaxialStandIn {
     /// ½Σμα of what made the data, kPa.

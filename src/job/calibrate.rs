@@ -1,8 +1,8 @@
 //! Calibrate: the material from recordings, with its uncertainty and the number of terms.
 
-use super::request::{InputForm, InputUse};
+use super::request::{InputForm, InputUse, RecordingOutline};
 use super::subject::check_mesh;
-use super::{Context, JobError, Outcome, Progress, Request, Run, defaults, summary};
+use super::{Context, JobError, Outcome, Progress, Request, ResultSchema, Run, cost, defaults, summary};
 use crate::calibration::{
     Boundary, CalibrateOptions, Calibration, CalibrationResult, ContourOptions, DECREMENT_THRESHOLD, Objective,
     Observed, PAPER_BETA, Rule, TermCount, calibrate,
@@ -11,6 +11,7 @@ use crate::field::FieldError;
 use crate::mesh::{MeshOptions, MeshSize};
 use crate::recording::write_vectors;
 use crate::report::calibration_report;
+use crate::sensitivity::Protocol;
 use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -74,6 +75,10 @@ pub struct CalibrationRequest {
     #[serde(default)]
     #[schema(default = Boundary::default)]
     pub boundary: Boundary,
+    /// Forces read on the way to the scans, from recordings' load curves, and what is unknown of the load cell. Gain
+    /// and zero of the cell are estimated beside the material; the drive's zero is taken to be known.
+    #[serde(default)]
+    pub protocol: Protocol,
     /// Profile likelihoods of all parameters.
     #[serde(default)]
     pub has_profiles: bool,
@@ -132,6 +137,8 @@ impl CalibrationRequest {
                 let allowed = "small enough to leave a voxel";
                 return Err(JobError::at("/end_margin_mm", self.end_margin_mm, allowed));
             }
+            let ready =
+                ready.with_protocol(recording, &self.protocol, defaults::force_sd_n()).map_err(|e| unfit(&e))?;
             let parts = ready.with_boundary(self.boundary).map_err(|e| unfit(&e))?.steps_apart();
             for part in &parts {
                 names.push(match (&part.steps[..], parts.len()) {
@@ -154,8 +161,32 @@ impl Request for CalibrationRequest {
         serde_json::json!({ "recordings": [super::defaults::EXAMPLE_RECORDING], "num_terms": 1, "mesh_factor": 2.0 })
     }
 
+    fn result() -> ResultSchema {
+        ResultSchema::of::<CalibrationResult>("calibration/1")
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
-        Ok(Box::new(self))
+        let mut errors: Vec<FieldError> =
+            self.protocol.field_errors().into_iter().map(|e| e.below("/protocol")).collect();
+        if self.protocol.drive_zero_sd_mm > 0.0 {
+            let error = FieldError::new("/protocol/drive_zero_sd_mm", self.protocol.drive_zero_sd_mm, "0");
+            errors.push(error.remedy("a calibration takes the drive as recorded; `diagnose` finds its zero"));
+        }
+        if self.protocol.blocks_scanned != 1 {
+            let error = FieldError::new("/protocol/blocks_scanned", self.protocol.blocks_scanned, "1");
+            errors.push(error.remedy("a recording is of one block; give one recording for each that was scanned"));
+        }
+        if !self.protocol.scan_share.is_empty() {
+            let error = FieldError::new("/protocol/scan_share", "given", "left out");
+            errors.push(error.remedy("a recording states the noise that its scans had"));
+        }
+        if self.boundary == Boundary::Measured
+            && let Some(drive_mm) = self.protocol.force_drive_mm.first()
+        {
+            let error = FieldError::new("/protocol/force_drive_mm", *drive_mm, "left out");
+            errors.push(error.remedy("where nothing was scanned, nothing was measured at the boundary"));
+        }
+        if errors.is_empty() { Ok(Box::new(self)) } else { Err(errors) }
     }
 }
 
@@ -171,9 +202,19 @@ impl Run for CalibrationRequest {
         InputUse::of_list("/recordings", &self.recordings, InputForm::Displacements)
     }
 
-    fn check_size(&self, specimens: &[Specimen], max_elements: usize) -> Result<(), FieldError> {
+    fn check_size(&self, recordings: &[RecordingOutline], max_elements: usize) -> Result<(), FieldError> {
         let mesh = MeshSize::Factor(self.mesh_factor);
-        specimens.iter().try_for_each(|s| check_mesh(s, mesh, "/mesh_factor", max_elements))
+        recordings.iter().try_for_each(|r| check_mesh(&r.specimen, mesh, "/mesh_factor", max_elements))
+    }
+
+    fn estimated_seconds(&self, recordings: &[RecordingOutline]) -> Option<f64> {
+        let effort = cost::CalibrationEffort {
+            num_terms: self.num_terms,
+            num_starts: self.num_starts,
+            has_profiles: self.has_profiles,
+            has_contours: self.has_contours,
+        };
+        cost::of_calibration(recordings, self.mesh_factor, effort)
     }
 
     fn run(&self, context: &Context) -> Result<Outcome, JobError> {

@@ -1,6 +1,6 @@
 //! Compare: whether results are the same as, better or worse than others.
 
-use super::{Context, JobError, Outcome, Request, Run};
+use super::{Context, JobError, Outcome, Request, ResultSchema, Run};
 use crate::compare::{
     CompareError, CompareOptions, Comparison, Subject, compare, subject_of, to_junit, to_markdown, to_text,
 };
@@ -48,7 +48,7 @@ fn relative_tolerance() -> f64 {
 }
 
 /// Result (`comparison/1`).
-#[derive(Serialize)]
+#[derive(Serialize, ToSchema)]
 struct CompareResult<'a> {
     schema: &'static str,
     relative_tolerance: f64,
@@ -75,6 +75,10 @@ impl Request for CompareRequest {
             })
         };
         serde_json::json!({ "pairs": [{ "name": "before and after", "base": result(5.0), "current": result(5.1) }] })
+    }
+
+    fn result() -> ResultSchema {
+        ResultSchema::of::<CompareResult>("comparison/1")
     }
 
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {

@@ -37,7 +37,7 @@ pub struct CurveColumns {
 }
 
 /// What was read of a curve's file, and what was left out.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, ToSchema)]
 pub(super) struct CurveReport {
     /// The curve.
     pub(super) name: String,

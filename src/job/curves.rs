@@ -3,7 +3,7 @@
 use super::curve_files::{
     CurveColumns, CurveFitSettings, CurveReport, TestCurve, add_material, fit_failed, reports_in_words,
 };
-use super::{Context, JobError, Outcome, Request, Run, summary};
+use super::{Context, JobError, Outcome, Request, ResultSchema, Run, summary};
 use crate::field::FieldError;
 use crate::homogeneous::{
     Curve, CurveFit, CurveFitSequence, CurveMatch, CurveParameter, Interval, fit_curves, matches_of,
@@ -36,7 +36,7 @@ pub struct CurvesRequest {
 }
 
 /// Result (`curves/1`): the fields of `calibration/1` for the fit that is used, and all fits.
-#[derive(Serialize)]
+#[derive(Serialize, ToSchema)]
 struct CurvesResult<'a> {
     schema: &'static str,
     version: &'static str,
@@ -70,6 +70,10 @@ impl Request for CurvesRequest {
 
     fn example() -> serde_json::Value {
         serde_json::json!({ "curves": [{ "test": "uniaxial", "csv": super::defaults::example_curve() }], "fit": { "max_terms": 1 } })
+    }
+
+    fn result() -> ResultSchema {
+        ResultSchema::of::<CurvesResult>("curves/1")
     }
 
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {

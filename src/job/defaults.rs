@@ -1,7 +1,7 @@
 //! The material, mesh and scan that are taken where a request leaves them out.
 
 use crate::material::Ogden;
-use crate::sensitivity::{PartialVoxels, ScanSettings};
+use crate::sensitivity::ScanSettings;
 use crate::specimen::Specimen;
 
 /// Ecoflex 00-20 as calibrated in the paper: κ 2173 kPa, μ₁ 17.0 kPa, α₁ 1.91.
@@ -21,22 +21,17 @@ pub fn dumbbell() -> Specimen {
 
 /// The paper's voxels, 1 × 0.1875 × 0.75 mm; 0.05 mm and 0.02 N noise.
 pub fn scan() -> ScanSettings {
-    ScanSettings {
-        voxel_mm: voxel_mm(),
-        noise_sd_mm: [0.05; 3],
-        force_sd_n: force_sd_n(),
-        partial_voxels: PartialVoxels::default(),
-    }
+    ScanSettings::default()
 }
 
 /// Edges of the paper's voxels, mm.
 pub fn voxel_mm() -> [f64; 3] {
-    [1.0, 0.1875, 0.75]
+    scan().voxel_mm
 }
 
 /// Standard deviation of a load cell's mean, N.
 pub fn force_sd_n() -> f64 {
-    0.02
+    scan().force_sd_n
 }
 
 /// The shipped bar.

@@ -1,19 +1,19 @@
 //! Design: the best specimen under the limits of a study, with the evidence.
 
 use super::design_pictures::pictures;
-use super::subject::{add_drawings, check_count, unmeshable};
-use super::{Context, JobError, Outcome, Progress, Request, Run, cost, summary};
+use super::subject::{add_drawings, check_count, num_elements};
+use super::{Context, JobError, Outcome, Progress, RecordingOutline, Request, ResultSchema, Run, cost, summary};
 use crate::calibration::{ParameterSpread, VerifyOptions, verify_in_full};
 use crate::design::{
-    Checkpoint, CheckpointError, DesignResult, MaterialVerification, SearchError, Study, Unfinished,
+    Checkpoint, CheckpointError, DesignEntry, DesignResult, MaterialVerification, SearchError, Study, Unfinished,
     VerificationSettings, search, study_hash,
 };
 use crate::field::FieldError;
 use crate::material::Ogden;
-use crate::mesh::{MeshOptions, mesh_specimen};
+use crate::mesh::MeshOptions;
 use crate::provenance::input_hash;
 use crate::report::design_report;
-use crate::specimen::Specimen;
+use crate::sensitivity::Protocol;
 use serde_json::{Value, json};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -30,6 +30,10 @@ impl Request for Study {
             include_str!("../../geometries/studies/two-hole-shear.json"),
             &super::defaults::two_hole_shear(),
         )
+    }
+
+    fn result() -> ResultSchema {
+        ResultSchema::of::<DesignResult>("design/1")
     }
 
     fn read(value: &Value) -> Result<Study, Vec<FieldError>> {
@@ -64,13 +68,12 @@ impl Run for CheckedStudy {
         self.0.name.clone()
     }
 
-    fn check_size(&self, _: &[Specimen], max_elements: usize) -> Result<(), FieldError> {
+    fn check_size(&self, _: &[RecordingOutline], max_elements: usize) -> Result<(), FieldError> {
         let base = &self.0.base;
-        let fine = mesh_specimen(base, &MeshOptions::fine(base)).map_err(|e| unmeshable("/base", &e))?;
-        check_count(fine.num_elements(), "/base", max_elements)
+        check_count(num_elements(base, "/base", &MeshOptions::fine)?, "/base", max_elements)
     }
 
-    fn estimated_seconds(&self) -> Option<f64> {
+    fn estimated_seconds(&self, _: &[RecordingOutline]) -> Option<f64> {
         let (study, budget) = (&self.0, self.0.budget);
         let num_searched = budget.refine.saturating_mul(budget.iterations).saturating_add(budget.explore);
         // Every material is a solve of its own.
@@ -89,7 +92,8 @@ impl Run for CheckedStudy {
             context.progress(&Progress::stage(&text));
         }
         let show = |p: &crate::design::Progress| {
-            context.progress(&Progress { best: p.best, ..Progress::new(p.stage, p.done, p.total) });
+            let (best, best_specimen) = (p.best, p.leader.clone());
+            context.progress(&Progress { best, best_specimen, ..Progress::new(p.stage, p.done, p.total) });
         };
         let found = search(study, &checkpoint, &show, &|| context.is_cancelled()).map_err(|e| match e {
             SearchError::Stopped { unfinished } => stopped(&unfinished),
@@ -113,6 +117,12 @@ impl Run for CheckedStudy {
         let mut best = result.best.specimen.clone();
         best.name = format!("{} (designed for: {})", best.name, result.name).chars().take(200).collect();
         add_drawings(&mut outcome, &best, "best-specimen")?;
+        if result.simplest > 0 {
+            let mut recommended = result.recommended().specimen.clone();
+            recommended.name =
+                format!("{} (recommended for: {})", recommended.name, result.name).chars().take(200).collect();
+            add_drawings(&mut outcome, &recommended, "recommended-specimen")?;
+        }
         Ok(outcome)
     }
 }
@@ -155,17 +165,21 @@ impl CheckedStudy {
         let total = 2 * study.materials.len() * draws;
         let done = AtomicUsize::new(0);
         let is_cancelled = || context.is_cancelled();
-        let of = |specimen: &Specimen, material: &Ogden| -> Option<Verified> {
-            let options = VerifyOptions::new(specimen, draws, study.seed);
+        let of = |entry: &DesignEntry, material: &Ogden| -> Option<Verified> {
+            let specimen = &entry.specimen;
+            let scan_share = entry.evaluation.scan_share.clone();
+            let protocol = Protocol { scan_share, ..study.protocol.clone() };
+            let options = VerifyOptions { protocol, ..VerifyOptions::new(specimen, draws, study.seed) };
             let before = done.load(Ordering::Relaxed);
             let on_draw = || {
                 let count = done.fetch_add(1, Ordering::Relaxed) + 1;
-                let best = Some(result.best.objective);
-                context.progress(&Progress { best, ..Progress::new("verify", count, total) });
+                let (best, best_specimen) = (Some(result.best.objective), Some(result.best.specimen.clone()));
+                context.progress(&Progress { best, best_specimen, ..Progress::new("verify", count, total) });
             };
             let key = input_hash(&json!({
                 "specimen": specimen, "material": material, "kind": "verification", "truth_mesh": options.truth_mesh,
                 "fit_mesh": options.fit_mesh, "max_iterations": options.fit.max_iterations,
+                "protocol": options.protocol,
             }));
             let verified = checkpoint.get_or(&key, || {
                 match verify_in_full(specimen, material, &study.scan, &options, &on_draw, &is_cancelled) {
@@ -182,8 +196,8 @@ impl CheckedStudy {
         };
         let mut verified = Vec::new();
         for prior in &study.materials {
-            let (best, best_failure) = of(&result.best.specimen, &prior.material)?;
-            let (base, base_failure) = of(&result.base.specimen, &prior.material)?;
+            let (best, best_failure) = of(&result.best, &prior.material)?;
+            let (base, base_failure) = of(&result.base, &prior.material)?;
             let material = prior.name.clone();
             verified.push(MaterialVerification { material, best, base, best_failure, base_failure });
         }

@@ -1,8 +1,8 @@
 //! Diagnose: where recordings and their model differ, and what physics was left out.
 
-use super::request::{InputForm, InputUse};
+use super::request::{InputForm, InputUse, RecordingOutline};
 use super::subject::check_mesh;
-use super::{Context, JobError, Outcome, Progress, Request, Run, summary};
+use super::{Context, JobError, Outcome, Progress, Request, ResultSchema, Run, cost, summary};
 use crate::calibration::Boundary;
 use crate::diagnosis::{
     CauseName, Diagnosis, DiagnosisError, DiagnosisOptions, DiagnosisResult, TogetherResult, cause_names, diagnose,
@@ -13,7 +13,6 @@ use crate::material::Ogden;
 use crate::mesh::MeshSize;
 use crate::recording::write_vectors;
 use crate::report::{diagnosis_pictures, diagnosis_report, together_pictures, together_report};
-use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -65,7 +64,8 @@ fn max_causes() -> usize {
 }
 
 /// A diagnosis among several, for their result.
-#[derive(Serialize)]
+#[derive(Serialize, ToSchema)]
+#[schema(as = DiagnosesResult)]
 struct Several<'a> {
     schema: &'static str,
     input_hash: &'a str,
@@ -111,6 +111,10 @@ impl Request for DiagnosisRequest {
         serde_json::json!({ "recording": super::defaults::EXAMPLE_RECORDING, "material": super::defaults::ecoflex(), "max_causes": 3 })
     }
 
+    fn result() -> ResultSchema {
+        ResultSchema::of::<DiagnosisResult>("diagnosis/1").or(ResultSchema::of::<Several>("diagnoses/1"))
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let mut errors = Vec::new();
         if self.recording.is_some() != self.recordings.is_empty() {
@@ -146,9 +150,13 @@ impl Run for DiagnosisRequest {
         }
     }
 
-    fn check_size(&self, specimens: &[Specimen], max_elements: usize) -> Result<(), FieldError> {
+    fn check_size(&self, recordings: &[RecordingOutline], max_elements: usize) -> Result<(), FieldError> {
         let mesh = MeshSize::Factor(self.mesh_factor);
-        specimens.iter().try_for_each(|s| check_mesh(s, mesh, "/mesh_factor", max_elements))
+        recordings.iter().try_for_each(|r| check_mesh(&r.specimen, mesh, "/mesh_factor", max_elements))
+    }
+
+    fn estimated_seconds(&self, recordings: &[RecordingOutline]) -> Option<f64> {
+        cost::of_diagnosis(recordings, self.mesh_factor)
     }
 
     fn run(&self, context: &Context) -> Result<Outcome, JobError> {

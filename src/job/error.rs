@@ -3,6 +3,7 @@
 use super::outcome::{Outcome, OutcomeError};
 use crate::field::{FieldError, in_lines};
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// Why a job has no outcome.
 #[derive(Debug, thiserror::Error)]
@@ -71,7 +72,7 @@ impl From<OutcomeError> for JobError {
 }
 
 /// Why a part of a job has no result, as it stands in the result of the whole.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct Failure {
     /// In words: the value, the limit, what to change.
     pub detail: String,

@@ -1,12 +1,15 @@
 //! Evaluate: what a scan of a specimen would see and what it would tell about the material.
 
-use super::subject::{add_drawings, check_mesh, driven, model_of};
-use super::{Context, JobError, Outcome, Request, Run, cost, defaults, summary};
+use super::subject::{add_drawings, check_meshes, driven, model_of, name_of_sample};
+use super::{Context, JobError, Outcome, RecordingOutline, Request, ResultSchema, Run, cost, defaults, summary};
 use crate::field::FieldError;
 use crate::material::Ogden;
 use crate::mesh::MeshSize;
 use crate::report::{bar_pictures, histogram_picture, map_pictures, surface_json, vtu_of};
-use crate::sensitivity::{DriveSelection, EvaluationError, EvaluationOptions, Protocol, ScanSettings, evaluate_model};
+use crate::sensitivity::{
+    DriveSelection, Evaluation, EvaluationError, EvaluationMaps, EvaluationOptions, Fixture, Protocol, ScanSettings,
+    evaluate_fixture,
+};
 use crate::specimen::Specimen;
 use crate::voxel::VoxelGrid;
 use serde::{Deserialize, Serialize};
@@ -31,7 +34,8 @@ pub struct EvaluationRequest {
     #[serde(default = "defaults::scan")]
     #[schema(default = defaults::scan)]
     pub scan: ScanSettings,
-    /// Forces read beside those at the scans, and what is not known exactly of the load cell and the drive.
+    /// Which samples are scanned and for how long, forces read beside those at the scans, and what is not known exactly
+    /// of the load cell and the drive.
     #[serde(default)]
     #[schema(default = Protocol::default)]
     pub protocol: Protocol,
@@ -87,19 +91,24 @@ impl EvaluationRequest {
             (None, Some(drives)) => DriveSelection::DriveMm(drives.clone()),
             (None, None) => DriveSelection::DriveMm(self.specimen.drive_mm.clone()),
         };
+        self.protocol.suits(&self.specimen, drives.count()).map_err(|e| vec![e.field_error().below("/protocol")])?;
         Ok(CheckedEvaluation { request: self, drives })
     }
 }
 
 /// Whether the scan's grid can be held in memory.
 fn check_grid(specimen: &Specimen, scan: &ScanSettings) -> Result<(), FieldError> {
-    let grid = VoxelGrid::covering(specimen, scan.voxel_mm).map_err(|e| {
-        FieldError::new("/scan/voxel_mm", format!("{:?}", scan.voxel_mm), "usable").remedy(e.to_string())
-    })?;
-    if grid.num_voxels() <= MAX_VOXELS {
+    let mut num_voxels = 0;
+    for sample in specimen.samples() {
+        let grid = VoxelGrid::covering(&sample, scan.voxel_mm).map_err(|e| {
+            FieldError::new("/scan/voxel_mm", format!("{:?}", scan.voxel_mm), "usable").remedy(e.to_string())
+        })?;
+        num_voxels += grid.num_voxels();
+    }
+    if num_voxels <= MAX_VOXELS {
         return Ok(());
     }
-    let found = format!("{:?}, which makes {} voxels", scan.voxel_mm, grid.num_voxels());
+    let found = format!("{:?}, which makes {num_voxels} voxels", scan.voxel_mm);
     let allowed = format!("large enough for at most {MAX_VOXELS} voxels");
     Err(FieldError::new("/scan/voxel_mm", found, allowed))
 }
@@ -111,6 +120,10 @@ impl Request for EvaluationRequest {
 
     fn example() -> serde_json::Value {
         serde_json::json!({ "specimen": defaults::two_hole_shear(), "material": defaults::ecoflex(), "drive_mm": [5.0], "mesh": "search" })
+    }
+
+    fn result() -> ResultSchema {
+        ResultSchema::of::<Evaluation>("evaluation/1")
     }
 
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
@@ -132,11 +145,11 @@ impl Run for CheckedEvaluation {
         self.request.specimen.name.clone()
     }
 
-    fn check_size(&self, _: &[Specimen], max_elements: usize) -> Result<(), FieldError> {
-        check_mesh(&self.request.specimen, self.request.mesh, "/mesh", max_elements)
+    fn check_size(&self, _: &[RecordingOutline], max_elements: usize) -> Result<(), FieldError> {
+        check_meshes(&self.request.specimen, self.request.mesh, "/mesh", max_elements)
     }
 
-    fn estimated_seconds(&self) -> Option<f64> {
+    fn estimated_seconds(&self, _: &[RecordingOutline]) -> Option<f64> {
         let num_drives = match &self.drives {
             DriveSelection::DriveMm(drives) => drives.len(),
             // The drive is looked for first.
@@ -159,36 +172,62 @@ impl Run for CheckedEvaluation {
         let EvaluationRequest { specimen, material, scan, .. } = &self.request;
         context.step("solve", 0, 2);
         let options = self.options();
-        let mut model = model_of(specimen, &options.mesh, context)?;
+        let models = specimen
+            .samples()
+            .iter()
+            .map(|sample| model_of(sample, &options.mesh.carried(specimen, sample), context))
+            .collect::<Result<Vec<_>, _>>()?;
         let cancelled = || context.is_cancelled();
-        let (evaluation, maps) =
-            evaluate_model(&mut model, specimen, material, scan, &self.drives, &options, &cancelled).map_err(|e| {
-                match e {
-                    EvaluationError::Solve(_) | EvaluationError::MedianStretchNotReached { .. } => context.failed(&e),
-                    other => FieldError::new("", "an evaluation that cannot be made", "one that can")
-                        .remedy(other.to_string())
-                        .into(),
-                }
-            })?;
+        let evaluated = Fixture::of_models(specimen, models, scan, &options).and_then(|mut fixture| {
+            let found = evaluate_fixture(&mut fixture, material, &self.drives, &[], &options, &cancelled)?;
+            Ok((fixture, found))
+        });
+        let (fixture, (evaluation, maps)) = evaluated.map_err(|e| match e {
+            EvaluationError::Solve(_) | EvaluationError::MedianStretchNotReached { .. } => context.failed(&e),
+            other => FieldError::new("", "an evaluation that cannot be made", "one that can")
+                .remedy(other.to_string())
+                .into(),
+        })?;
         let text = summary::evaluation(&specimen.name, &evaluation);
         let mut outcome = Outcome::new("evaluation.json", &evaluation, text)?;
         if !self.request.has_files {
             return Ok(outcome);
         }
         context.step("pictures", 1, 2);
-        let panels: Vec<_> = maps
-            .drives
-            .iter()
-            .enumerate()
-            .map(|(index, d)| (format!("drive {:.2} mm", d.drive_mm), &maps, index))
-            .collect();
-        outcome.add("histogram.svg", histogram_picture(&panels));
-        outcome.add_pictures(map_pictures(&maps).into_iter().chain(bar_pictures(&evaluation)));
-        if let Some(state) = maps.equilibria.last() {
-            outcome.add("solution.vtu", vtu_of(&model, material, state).map_err(|e| context.failed(&e))?);
-            outcome.add("surface.json", surface_json(&model, material, state).map_err(|e| context.failed(&e))?);
-        }
+        outcome.add_pictures(bar_pictures(&evaluation));
+        self.add_samples(&mut outcome, &fixture, &maps, context)?;
         add_drawings(&mut outcome, specimen, "specimen")?;
         Ok(outcome)
+    }
+}
+
+impl CheckedEvaluation {
+    /// Adds pictures and fields of every sample.
+    fn add_samples(
+        &self,
+        outcome: &mut Outcome,
+        fixture: &Fixture,
+        maps: &EvaluationMaps,
+        context: &Context,
+    ) -> Result<(), JobError> {
+        let material = &self.request.material;
+        let has_others = maps.samples.len() > 1;
+        let mut panels = Vec::new();
+        for (number, sample) in maps.samples.iter().enumerate() {
+            let of = if has_others { format!(", sample {}", number + 1) } else { String::new() };
+            panels.extend(sample.drives.iter().map(|d| (format!("drive {:.2} mm{of}", d.drive_mm), &d.states[..])));
+        }
+        outcome.add("histogram.svg", histogram_picture(&panels));
+        for (index, (part, sample)) in fixture.parts().iter().zip(&maps.samples).enumerate() {
+            let name = |stem: &str| name_of_sample(stem, index);
+            outcome.add_pictures(map_pictures(sample).into_iter().map(|(stem, svg)| (name(&stem), svg)));
+            if let Some(state) = sample.equilibria.last() {
+                let vtu = vtu_of(&part.model, material, state).map_err(|e| context.failed(&e))?;
+                outcome.add(format!("{}.vtu", name("solution")), vtu);
+                let surface = surface_json(&part.model, material, state).map_err(|e| context.failed(&e))?;
+                outcome.add(format!("{}.json", name("surface")), surface);
+            }
+        }
+        Ok(())
     }
 }

@@ -5,9 +5,9 @@
 
 use super::evaluate::EvaluationRequest;
 use super::evaluation_table::{Entry, evaluation_table};
-use super::outcome::to_json;
-use super::{Context, Failure, JobError, Outcome, Part, PartKind, Request, Run};
+use super::{Context, Failure, JobError, Outcome, Part, PartKind, RecordingOutline, Request, ResultSchema, Run, cost};
 use crate::field::FieldError;
+use crate::field::schema::Seed;
 use crate::file::json_bytes;
 use crate::provenance::VERSION;
 use crate::sweep::{latin_hypercube_points, to_parquet};
@@ -50,7 +50,7 @@ pub struct RangeSample {
     pub count: usize,
     /// Seed; the same seed gives the same points.
     #[serde(default)]
-    #[schema(minimum = 0)]
+    #[schema(value_type = Seed)]
     pub seed: u64,
 }
 
@@ -222,6 +222,10 @@ impl Request for EvaluationListRequest {
         serde_json::json!({ "name": "diameters", "base": EvaluationRequest::example(), "vary": [{ "pointer": "/specimen/holes/0/diameter_mm", "values": [3.0, 4.0] }] })
     }
 
+    fn result() -> ResultSchema {
+        ResultSchema::of::<EvaluationListResult>("evaluation-list/1")
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let mut errors = Vec::new();
         let mut evaluations = Vec::new();
@@ -241,6 +245,17 @@ impl Request for EvaluationListRequest {
     }
 }
 
+/// Result (`evaluation-list/1`).
+#[derive(Serialize, ToSchema)]
+struct EvaluationListResult<'a> {
+    schema: &'static str,
+    version: &'static str,
+    /// JSON pointers to what was varied.
+    varied: &'a [String],
+    /// The evaluations, in their order.
+    evaluations: &'a [Entry],
+}
+
 struct CheckedList {
     request: EvaluationListRequest,
     evaluations: Vec<Value>,
@@ -252,14 +267,12 @@ impl Run for CheckedList {
     }
 
     /// From the first, the middle and the last evaluation: to mesh ten thousand specimens would take minutes.
-    fn estimated_seconds(&self) -> Option<f64> {
-        let count = self.evaluations.len();
+    fn estimated_seconds(&self, _: &[RecordingOutline]) -> Option<f64> {
         let of = |index: usize| {
-            let request = crate::field::read::<EvaluationRequest>(&self.evaluations[index]).ok()?;
-            request.checked().ok()?.estimated_seconds()
+            let request = crate::field::read::<EvaluationRequest>(self.evaluations.get(index)?).ok()?;
+            request.checked().ok()?.estimated_seconds(&[])
         };
-        let found: Vec<f64> = [0, count / 2, count.checked_sub(1)?].into_iter().filter_map(of).collect();
-        (!found.is_empty()).then(|| count as f64 * found.iter().sum::<f64>() / found.len() as f64)
+        cost::of_many(self.evaluations.len(), of)
     }
 
     fn parts(&self) -> Vec<Part> {
@@ -293,12 +306,15 @@ impl Run for CheckedList {
         let pointers: Vec<String> = self.request.vary.iter().flatten().map(|a| a.pointer.clone()).collect();
         let table = evaluation_table(&entries, &pointers);
         let parquet = to_parquet(&table).map_err(|e| JobError::Internal(e.to_string()))?;
-        let result = json!({
-            "schema": "evaluation-list/1", "version": VERSION, "varied": pointers, "evaluations": entries,
-        });
+        let result = EvaluationListResult {
+            schema: "evaluation-list/1",
+            version: VERSION,
+            varied: &pointers,
+            evaluations: &entries,
+        };
         let num_failed = entries.iter().filter(|e| e.problem.is_some()).count();
         let text = format!("{}: {} evaluations, {num_failed} failed\n", self.title(), entries.len());
-        let mut outcome = Outcome { result: to_json(&result)?, ..Outcome::new("evaluations.json", &(), text)? };
+        let mut outcome = Outcome::new("evaluations.json", &result, text)?;
         outcome.add("table.csv", table.to_csv());
         outcome.add("table.parquet", parquet);
         Ok(outcome)

@@ -1,18 +1,28 @@
 //! The table of a sweep's evaluations: one row per evaluation and drive, one row for an evaluation that failed.
 
 use super::Failure;
+use super::evaluate::EvaluationRequest;
 use crate::sensitivity::{Evaluation, EvaluationStep, PromisedSd};
 use crate::sweep::{Cells, SweepTable, TableColumn};
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// One evaluation of a sweep's result.
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, ToSchema)]
+#[schema(as = ListedEvaluation)]
 pub(super) struct Entry {
+    /// Place in the list, from 0.
     pub index: usize,
+    /// What was asked.
+    #[schema(value_type = EvaluationRequest)]
     pub request: serde_json::Value,
+    /// What was found; left out where it failed.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<Evaluation>, nullable = false)]
     pub evaluation: Option<serde_json::Value>,
+    /// Why it failed; left out where it did not.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
     pub problem: Option<Failure>,
 }
 

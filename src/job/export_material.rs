@@ -4,7 +4,7 @@
 //! same check, provenance and two doors as every other result.
 
 use super::export_result::Card;
-use super::{Context, JobError, Outcome, Request, Run, summary};
+use super::{Context, JobError, Outcome, Request, ResultSchema, Run, summary};
 use crate::export::{ExportError, MaterialFormat, Origin, material_card};
 use crate::field::FieldError;
 use crate::homogeneous::StressUnit;
@@ -38,7 +38,7 @@ pub(super) fn stress_unit() -> StressUnit {
 }
 
 /// Result (`export-material/1`).
-#[derive(Serialize)]
+#[derive(Serialize, ToSchema)]
 struct ExportMaterialResult<'a> {
     schema: &'static str,
     version: &'static str,
@@ -90,6 +90,10 @@ impl Request for ExportMaterialRequest {
 
     fn example() -> serde_json::Value {
         serde_json::json!({ "material": super::defaults::ecoflex(), "stress_unit": "kpa" })
+    }
+
+    fn result() -> ResultSchema {
+        ResultSchema::of::<ExportMaterialResult>("export-material/1")
     }
 
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {

@@ -2,7 +2,7 @@
 
 use super::export_result::{ExportModelResult, ModelFile};
 use super::subject::{check_mesh, driven, model_of};
-use super::{Context, JobError, Outcome, Request, Run, defaults, summary};
+use super::{Context, JobError, Outcome, RecordingOutline, Request, ResultSchema, Run, defaults, summary};
 use crate::export::{ExportError, Model, ModelFormat, Origin, model_file};
 use crate::field::FieldError;
 use crate::material::Ogden;
@@ -74,6 +74,10 @@ impl Request for ExportModelRequest {
         })
     }
 
+    fn result() -> ResultSchema {
+        ResultSchema::of::<ExportModelResult>("export-model/1")
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let mut errors = Vec::new();
         let specimen = driven(&self.specimen, self.drive_mm.as_ref(), &mut errors);
@@ -94,7 +98,7 @@ impl Run for CheckedExport {
         format!("model of {}", self.specimen.name)
     }
 
-    fn check_size(&self, _: &[Specimen], max_elements: usize) -> Result<(), FieldError> {
+    fn check_size(&self, _: &[RecordingOutline], max_elements: usize) -> Result<(), FieldError> {
         check_mesh(&self.specimen, self.request.mesh, "/mesh", max_elements)
     }
 

@@ -2,9 +2,10 @@
 
 use crate::export::{Constant, MaterialFormat, ModelFormat, VolumetricLaw};
 use serde::Serialize;
+use utoipa::ToSchema;
 
 /// The card of one program.
-#[derive(Serialize)]
+#[derive(Serialize, ToSchema)]
 pub(super) struct Card {
     pub(super) format: MaterialFormat,
     /// The program, as it is called.
@@ -19,7 +20,7 @@ pub(super) struct Card {
 }
 
 /// Result (`export-model/1`).
-#[derive(Serialize)]
+#[derive(Serialize, ToSchema)]
 pub(super) struct ExportModelResult<'a> {
     pub(super) schema: &'static str,
     pub(super) version: &'static str,
@@ -38,7 +39,7 @@ pub(super) struct ExportModelResult<'a> {
 }
 
 /// A file for a program.
-#[derive(Serialize)]
+#[derive(Serialize, ToSchema)]
 pub(super) struct ModelFile {
     pub(super) format: ModelFormat,
     /// Its name.

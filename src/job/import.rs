@@ -1,19 +1,21 @@
-//! Import: raw phases, MATLAB files and point clouds become a recording of displacements.
+//! Import: raw phases, MATLAB files, point clouds, images and the files of scanners become a recording.
 
 use super::import_result::{ImportResult, ImportStep};
-use super::outcome::{WithRecording, recording_identifier, to_json};
+use super::import_series::{ScannerForm, check_series, open_scanner};
+use super::outcome::{RECORDING_FIELD, WithRecording, recording_identifier, to_json};
 use super::request::{InputForm, InputUse};
-use super::{Context, JobError, Outcome, Request, Run, summary};
+use super::{Context, JobError, Outcome, Request, ResultSchema, Run, summary};
 use crate::acquisition::unwrap::{Method, UnwrapOptions};
 use crate::acquisition::{Anchor, ReconstructOptions, StepReport, reconstruct};
 use crate::field::FieldError;
 use crate::file::ReadingMemory;
 use crate::provenance::VERSION;
 use crate::recording::{
-    Filter, GridOrigin, Image, ImportOptions, LoadCurve, NamedImage, ReadLimits, Recording, VectorFrame,
-    axes_of_affine, mat, read_points, recording_from_images, recording_from_mat, recording_from_points, write_vectors,
+    Filter, GridOrigin, Image, ImportOptions, LoadCurve, NamedImage, RawRecording, ReadLimits, Recording, SeriesMap,
+    VectorFrame, axes_of_affine, mat, raw_recording_from_series, read_points, recording_from_images,
+    recording_from_mat, recording_from_points, write_vectors,
 };
-use crate::report::displacement_picture;
+use crate::report::{displacement_picture, raw_picture};
 use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -52,6 +54,22 @@ pub enum FileForm {
     Points,
     /// NIfTI images with a displacement per voxel, and one with the mask.
     Nifti,
+    /// DICOM images of phases and magnitudes, single or with many frames: files, or folders of them.
+    Dicom,
+    /// Reconstructions of Bruker ParaVision with phases and magnitudes: folders of a study, an experiment or a
+    /// reconstruction.
+    Paravision,
+}
+
+impl FileForm {
+    /// The scanner's form, of files that hold phases.
+    fn of_scanner(self) -> Option<ScannerForm> {
+        match self {
+            FileForm::Dicom => Some(ScannerForm::Dicom),
+            FileForm::Paravision => Some(ScannerForm::Paravision),
+            FileForm::Matlab | FileForm::Points | FileForm::Nifti => None,
+        }
+    }
 }
 
 /// Body of an import: a `recording` of raw phases, or `files`.
@@ -61,13 +79,26 @@ pub struct ImportRequest {
     /// A recording of raw phases.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording: Option<String>,
-    /// MATLAB files, point clouds (one per drive), or NIfTI images, in place of a recording.
+    /// MATLAB files, point clouds (one per drive), NIfTI images, or files and folders of a scanner, in place of a
+    /// recording.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 1000)]
     pub files: Vec<String>,
     /// What the files hold.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub form: Option<FileForm>,
+    /// Which series of a scanner's files are the phases along x, y and z and which the magnitude, at which drive.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub series: Option<SeriesMap>,
+    /// Values of a scanner's phase images, as it rescales them, that stand for −π and π, such as 0,4096 or
+    /// -3141.5927,3141.5927. Where they are left out, the known range that the values fill.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(min_items = 2, max_items = 2)]
+    pub phase_range: Option<[f64; 2]>,
+    /// Whether the phases of a scanner's files are kept as they are, in a recording of raw phases.
+    #[serde(default)]
+    #[schema(default = false)]
+    pub is_raw: bool,
     /// Name of the recording that is made from files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(max_length = 200)]
@@ -83,9 +114,9 @@ pub struct ImportRequest {
     #[serde(default)]
     #[schema(default = LengthUnit::default)]
     pub unit: LengthUnit,
-    /// Axes along the indices of MATLAB arrays and images, such as y,z,x or -y,z,-x. Displacement i of MATLAB arrays is
-    /// the one along index i. Where it is left out, y,z,x for MATLAB, and for images the axes that their affine leads
-    /// to.
+    /// Axes along the indices of MATLAB arrays and images, such as y,z,x or -y,z,-x; of a scanner's images along
+    /// columns, rows and slices. Displacement i of MATLAB arrays is the one along index i. Where it is left out, y,z,x
+    /// for MATLAB, and for images the axes that their affine leads to.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(max_length = 16)]
     pub axes: Option<String>,
@@ -93,7 +124,8 @@ pub struct ImportRequest {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(max_length = 16)]
     pub components: Option<String>,
-    /// Where the voxels of MATLAB files lie: the mask's box centred on the specimen, or as the positions X say.
+    /// Where the voxels of MATLAB files and of a scanner lie: the mask's box centred on the specimen, or as the
+    /// positions X or the scanner say.
     #[serde(default)]
     #[schema(default = GridOrigin::default)]
     pub origin: GridOrigin,
@@ -158,6 +190,32 @@ impl ImportRequest {
         if is_of_files && self.form.is_none() {
             errors.push(FieldError::new("/form", "", "given with files"));
         }
+        let is_of_scanner = self.form.and_then(FileForm::of_scanner).is_some();
+        for (name, is_given) in
+            [("series", self.series.is_some()), ("phase_range", self.phase_range.is_some()), ("is_raw", self.is_raw)]
+        {
+            if is_given && !is_of_scanner {
+                let error = FieldError::new(format!("/{name}"), "given", "left out");
+                errors.push(error.remedy("only the files of a scanner have series (form dicom or paravision)"));
+            }
+        }
+        if is_of_scanner && !self.drive_mm.is_empty() {
+            let error = FieldError::new("/drive_mm", "given", "left out");
+            errors.push(error.remedy("the drives of a scanner's files stand with their series"));
+        }
+        if self.is_raw && self.filter != Filter::None {
+            errors.push(FieldError::new("/filter", "hamming2", "none where raw phases are asked for"));
+        }
+        if let Some([low, high]) = self.phase_range.filter(|[low, high]| !(low < high && (high - low).is_finite())) {
+            errors.push(FieldError::new("/phase_range", format!("{low} to {high}"), "two rising numbers"));
+        }
+        if let Some(map) = &self.series {
+            check_series(map, self.specimen.as_ref(), errors);
+            if map.scanner_axes.is_some() && self.axes.is_some() {
+                let error = FieldError::new("/axes", "given beside series.scanner_axes", "one of the two");
+                errors.push(error.remedy("scanner_axes says how the specimen lay, axes what the images' indices are"));
+            }
+        }
         for error in self.specimen.iter().flat_map(Specimen::field_errors) {
             errors.push(error.below("/specimen"));
         }
@@ -199,10 +257,15 @@ impl ImportRequest {
 impl Request for ImportRequest {
     const COMMAND: &'static str = "import";
     const COLLECTION: &'static str = "imports";
-    const ABOUT: &'static str = "Raw phases, MATLAB files, point clouds or images as a recording of displacements.";
+    const ABOUT: &'static str =
+        "Raw phases, MATLAB files, point clouds, images or the files of a scanner as a recording.";
 
     fn example() -> serde_json::Value {
         serde_json::json!({ "recording": super::defaults::EXAMPLE_RECORDING, "filter": "hamming2" })
+    }
+
+    fn result() -> ResultSchema {
+        ResultSchema::with::<ImportResult>("import/1", &[("recording", RECORDING_FIELD)])
     }
 
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
@@ -228,25 +291,47 @@ fn unfit(pointer: &str, path: &Path, error: &dyn std::fmt::Display) -> JobError 
 }
 
 impl CheckedImport {
-    fn unwrapped(&self, context: &Context) -> Result<Imported, JobError> {
-        let mut raw = context
-            .raw_recordings
-            .first()
-            .map(|read| read.recording.clone())
-            .ok_or_else(|| JobError::Internal("the raw recording was not read".into()))?;
-        if let Some(specimen) = &self.request.specimen {
-            raw.specimen.clone_from(specimen);
-        }
+    fn unwrapped(&self, raw: &RawRecording, pointer: &str, context: &Context) -> Result<Imported, JobError> {
         let unwrap = UnwrapOptions {
             method: self.request.method,
             needs_agreement: self.request.needs_agreement,
             ..UnwrapOptions::default()
         };
         let settings = ReconstructOptions { unwrap, anchor: self.request.anchor, filter: self.request.filter };
-        let found = reconstruct(&raw, &settings).map_err(|e| context.failed(&e))?;
-        let named = || FieldError::new("/recording", &raw.id, "phases that move the plates as the drive says");
+        let found = reconstruct(raw, &settings).map_err(|e| context.failed(&e))?;
+        let named = || FieldError::new(pointer, &raw.id, "phases that move the plates as the drive says");
         found.recording.check_plate_motion().map_err(|e| named().remedy(e.to_string()))?;
         Ok((found.recording, found.sd_mm, found.steps))
+    }
+
+    /// The raw recording that the request names, or that the files of a scanner make; `None` for other files.
+    fn raw(&self, context: &Context) -> Result<Option<RawRecording>, JobError> {
+        if self.request.recording.is_some() {
+            let missing = || JobError::Internal("the raw recording was not read".into());
+            let mut raw = context.raw_recordings.first().map(|read| read.recording.clone()).ok_or_else(missing)?;
+            if let Some(specimen) = &self.request.specimen {
+                raw.specimen.clone_from(specimen);
+            }
+            return Ok(Some(raw));
+        }
+        let Some(form) = self.request.form.and_then(FileForm::of_scanner) else { return Ok(None) };
+        let missing = || JobError::Internal("a checked import has a specimen and files".into());
+        let specimen = self.request.specimen.as_ref().ok_or_else(missing)?;
+        let options = self.request.import_options().ok_or_else(missing)?;
+        let first = context.files.first().ok_or_else(missing)?;
+        let limits = ReadLimits::default();
+        let memory = limits.memory.begin();
+        let map = self.request.series.as_ref();
+        let opened = open_scanner(form, &context.files, map.is_some(), &limits, &memory);
+        let axes = self.request.axes.as_ref().map(|_| options.axes);
+        let made = opened.and_then(|files| match map {
+            Some(map) => {
+                let range = self.request.phase_range;
+                raw_recording_from_series(files.as_ref(), map, range, axes, specimen, &options, &memory).map(Some)
+            }
+            None => Ok(None),
+        });
+        made.map_err(|e| unfit("/files", first, &e))
     }
 
     fn read_images(&self, files: &[PathBuf], memory: &ReadingMemory) -> Result<Vec<NamedImage>, JobError> {
@@ -287,6 +372,7 @@ impl CheckedImport {
                 let options = ImportOptions { axes, ..options };
                 recording_from_images(&images, specimen, self.request.vectors, &options, &memory).map_err(|e| unfit(&e))
             }
+            FileForm::Dicom | FileForm::Paravision => Err(missing()),
             FileForm::Points => {
                 let mut steps = Vec::new();
                 for (index, path) in files.iter().enumerate() {
@@ -302,6 +388,36 @@ impl CheckedImport {
                     .map_err(|e| unfit("/files", first, &e))
             }
         }
+    }
+}
+
+impl CheckedImport {
+    /// Phases as they are.
+    fn raw_outcome(&self, raw: &RawRecording, context: &Context) -> Result<Outcome, JobError> {
+        let steps = raw.steps.iter().map(|s| ImportStep {
+            drive_mm: s.drive_mm,
+            force_n: s.force_n,
+            num_complete: raw.num_voxels(),
+            reconstruction: None,
+        });
+        let result = ImportResult {
+            schema: "import/1",
+            version: VERSION,
+            input_hash: context.input_hash.clone(),
+            id: raw.id.clone(),
+            is_raw: true,
+            num_voxels: raw.num_voxels(),
+            noise_sd_mm: raw.noise_sd_mm,
+            steps: steps.collect(),
+        };
+        let mut outcome = Outcome { summary: summary::import(&result), ..Outcome::default() };
+        outcome.add_written(true, |folder| raw.write(folder))?;
+        let named = WithRecording { result: &result, recording: recording_identifier(&outcome.recording()) };
+        (outcome.result, outcome.result_name) = (to_json(&named)?, "import.json");
+        for n in 0..raw.steps.len() {
+            outcome.add(format!("raw_{}.svg", n + 1), raw_picture(raw, n));
+        }
+        Ok(outcome)
     }
 }
 
@@ -322,17 +438,34 @@ impl Run for CheckedImport {
 
     fn run(&self, context: &Context) -> Result<Outcome, JobError> {
         context.step("import", 0, 1);
-        let (mut recording, sd, reports) = match self.request.recording {
-            Some(_) => self.unwrapped(context)?,
+        let mut raw = self.raw(context)?;
+        if let (Some(raw), Some(load)) = (&mut raw, &self.load) {
+            raw.load = Some(load.clone());
+            for step in &mut raw.steps {
+                step.force_n = step.force_n.or_else(|| load.force_at_n(step.drive_mm, step.window_s));
+            }
+        }
+        if let Some(raw) = raw.as_ref().filter(|_| self.request.is_raw) {
+            return self.raw_outcome(raw, context);
+        }
+        let (mut recording, sd, reports) = match raw {
+            Some(raw) => {
+                let pointer = if self.request.recording.is_some() { "/recording" } else { "/files" };
+                self.unwrapped(&raw, pointer, context)?
+            }
             None => (self.read_files(&context.files)?, Vec::new(), Vec::new()),
         };
         if let Some(load) = &self.load {
             recording.load = Some(load.clone());
+            for step in &mut recording.steps {
+                step.force_n = step.force_n.or_else(|| load.force_at_n(step.drive_mm, step.window_s));
+            }
         }
         let mut reports = reports.into_iter();
         let is_complete = |u: &&[f64; 3]| u.iter().all(|x| x.is_finite());
         let steps = recording.steps.iter().map(|s| ImportStep {
             drive_mm: s.drive_mm,
+            force_n: s.force_n,
             num_complete: s.displacement.iter().filter(is_complete).count(),
             reconstruction: reports.next(),
         });
@@ -341,6 +474,7 @@ impl Run for CheckedImport {
             version: VERSION,
             input_hash: context.input_hash.clone(),
             id: recording.id.clone(),
+            is_raw: false,
             num_voxels: recording.num_voxels(),
             noise_sd_mm: recording.noise_sd_mm,
             steps: steps.collect(),

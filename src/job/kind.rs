@@ -1,12 +1,11 @@
 //! What a kind of job is, and a job of any kind.
 
 use super::part::Part;
-use super::request::{Context, InputForm, InputUse, Request, Run};
+use super::request::{Context, InputUse, RecordingOutline, Request, Run};
 use super::schema::{RequestField, RequestSchema};
-use super::{Failure, JobError, Outcome, Surroundings};
+use super::{Failure, Input, JobError, Outcome, ResultSchema, Surroundings};
 use crate::field::{FieldError, printable};
 use crate::provenance::{VERSION, input_hash};
-use crate::specimen::Specimen;
 use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::sync::OnceLock;
@@ -29,6 +28,7 @@ pub struct Kind {
     schema_name: fn() -> Cow<'static, str>,
     checked: fn(&Value) -> Result<Checked, Vec<FieldError>>,
     example: fn() -> Value,
+    result: fn() -> ResultSchema,
     cell: OnceLock<RequestSchema>,
 }
 
@@ -59,6 +59,7 @@ impl Kind {
             schema_name: R::name,
             checked: checked::<R>,
             example: R::example,
+            result: R::result,
             cell: OnceLock::new(),
         }
     }
@@ -82,6 +83,11 @@ impl Kind {
         (self.example)()
     }
 
+    /// What its results look like.
+    pub fn result(&self) -> ResultSchema {
+        (self.result)()
+    }
+
     /// The fields of its requests.
     pub fn fields(&self) -> Vec<RequestField> {
         self.schema().fields()
@@ -92,13 +98,32 @@ impl Kind {
     /// # Errors
     /// Everything that is wrong with the request, each with its JSON pointer.
     pub fn job(&'static self, request: &Value) -> Result<Job, Vec<FieldError>> {
+        self.read(request).map_err(|refusal| match refusal {
+            Refusal::Misfit(errors) | Refusal::Unfit(errors) => errors,
+        })
+    }
+
+    /// As [`job`](Self::job), and says of a request that is refused whether it fits the schema.
+    ///
+    /// # Errors
+    /// [`Refusal`].
+    pub fn read(&'static self, request: &Value) -> Result<Job, Refusal> {
         let errors = self.schema().errors(request);
         if !errors.is_empty() {
-            return Err(errors);
+            return Err(Refusal::Misfit(errors));
         }
-        let (canonical, run) = (self.checked)(request)?;
+        let (canonical, run) = (self.checked)(&self.schema().settled(request)).map_err(Refusal::Unfit)?;
         Ok(Job { kind: self, request: request.clone(), canonical, run })
     }
+}
+
+/// Why a request is refused: everything that is wrong with it, each with its JSON pointer.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// It does not fit the schema of its kind.
+    Misfit(Vec<FieldError>),
+    /// It fits, and cannot be computed.
+    Unfit(Vec<FieldError>),
 }
 
 impl PartialEq for Kind {
@@ -143,17 +168,18 @@ impl Job {
         (key, is_numbers_only)
     }
 
-    /// Whether its meshes have at most `max_elements` elements; `specimens` are those of its recordings.
+    /// Whether its meshes have at most `max_elements` elements, given what is known of its recordings.
     ///
     /// # Errors
     /// The field that decides, with the number of elements.
-    pub fn check_size(&self, specimens: &[Specimen], max_elements: usize) -> Result<(), FieldError> {
-        self.run.check_size(specimens, max_elements)
+    pub fn check_size(&self, recordings: &[RecordingOutline], max_elements: usize) -> Result<(), FieldError> {
+        self.run.check_size(recordings, max_elements)
     }
 
-    /// About how many processor seconds it takes, where that can be told before it runs.
-    pub fn estimated_seconds(&self) -> Option<f64> {
-        self.run.estimated_seconds()
+    /// About how many processor seconds it takes, given what is known of its recordings, where that can be told before
+    /// it runs.
+    pub fn estimated_seconds(&self, recordings: &[RecordingOutline]) -> Option<f64> {
+        self.run.estimated_seconds(recordings)
     }
 
     /// The parts into which the work divides; empty for work that does not divide.
@@ -182,22 +208,20 @@ impl Job {
     fn context<'a>(&self, surroundings: &'a dyn Surroundings) -> Result<Context<'a>, JobError> {
         let mut canonical = self.canonical.clone();
         let (mut recordings, mut raw_recordings, mut files) = (Vec::new(), Vec::new(), Vec::new());
-        for wanted in self.run.inputs() {
-            let digest = match wanted.form {
-                InputForm::Displacements => {
-                    let read = surroundings.recording(&wanted.name)?;
+        let wanted = self.run.inputs();
+        for (wanted, input) in wanted.iter().zip(surroundings.inputs(&wanted)?) {
+            let digest = match input {
+                Input::Displacements(read) => {
                     let digest = read.digest.clone();
                     recordings.push(read);
                     digest
                 }
-                InputForm::RawPhases => {
-                    let read = surroundings.raw_recording(&wanted.name)?;
+                Input::RawPhases(read) => {
                     let digest = read.digest.clone();
                     raw_recordings.push(read);
                     digest
                 }
-                InputForm::File => {
-                    let found = surroundings.file(&wanted.name)?;
+                Input::File(found) => {
                     files.push(found.path);
                     found.digest
                 }

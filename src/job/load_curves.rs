@@ -1,7 +1,7 @@
 //! Load curves: what an elastic material leaves out of load curves of homogeneous tests, without a recording.
 
 use super::curve_files::{CurveColumns, TestCurve, add_material, needs_stress_and_stretch, unfit};
-use super::{Context, JobError, Outcome, Request, Run, summary};
+use super::{Context, JobError, Outcome, Request, ResultSchema, Run, summary};
 use crate::field::FieldError;
 use crate::provenance::VERSION;
 use crate::rate::{LoadCurve, LoadCurveOptions, LoadCurveVerdict, analyse_load_curve};
@@ -64,6 +64,11 @@ impl Request for LoadCurvesRequest {
 
     fn example() -> serde_json::Value {
         serde_json::json!({ "curves": [{ "test": "uniaxial", "name": "pull", "csv": super::defaults::example_history() }] })
+    }
+
+    fn result() -> ResultSchema {
+        let further = [("version", "Version of the program."), ("input_hash", "SHA-256 of the request, hexadecimal.")];
+        ResultSchema::with::<LoadCurveVerdict>("load_curve_diagnosis/1", &further)
     }
 
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {

@@ -156,6 +156,9 @@ impl Outcome {
     }
 }
 
+/// What the field says that [`WithRecording`] adds.
+pub(super) const RECORDING_FIELD: &str = "The recording that was made: a hash of its content.";
+
 /// A result that names the recording that was made.
 #[derive(Serialize)]
 pub(super) struct WithRecording<'a, T: Serialize> {

@@ -1,13 +1,14 @@
 //! Paper tables: tables like the paper's on synthetic stand-ins of its experiments.
 
-use super::{Context, JobError, Outcome, Progress, Request, Run, defaults, summary};
-use crate::calibration::{Contour, Objective, PAPER_BETA, StandInOptions, stand_ins};
+use super::{Context, JobError, Outcome, Progress, Request, ResultSchema, Run, defaults, summary};
+use crate::calibration::{Contour, Objective, PAPER_BETA, StandInOptions, TermSelection, stand_ins};
 use crate::field::FieldError;
+use crate::field::schema::Seed;
 use crate::homogeneous::{UniaxialStandIn, UniaxialStandInOptions, uniaxial_stand_in};
+use crate::recording::Filter;
 use crate::report::{ContourPlot, contour_panels};
 use crate::sensitivity::ScanSettings;
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
 use utoipa::ToSchema;
 
 /// Element size of the truth relative to that of the fits.
@@ -35,7 +36,7 @@ pub struct PaperTablesRequest {
     pub mesh_factor: f64,
     /// Seed of the noise.
     #[serde(default = "seed")]
-    #[schema(default = seed)]
+    #[schema(value_type = Seed, default = seed)]
     pub seed: u64,
     /// Weight of the force in the loss.
     #[serde(default = "beta")]
@@ -44,19 +45,19 @@ pub struct PaperTablesRequest {
 }
 
 fn noise_sd_mm() -> [f64; 3] {
-    [0.05; 3]
+    defaults::scan().noise_sd_mm
 }
 
 fn dumbbell_noise() -> f64 {
-    2e-3
+    UniaxialStandInOptions::default().relative_noise
 }
 
 fn mesh_factor() -> f64 {
-    1.4
+    StandInOptions::default().fit_factor
 }
 
 fn seed() -> u64 {
-    1
+    StandInOptions::default().seed
 }
 
 fn beta() -> f64 {
@@ -64,13 +65,24 @@ fn beta() -> f64 {
 }
 
 /// Result (`paper-tables/1`).
-#[derive(Serialize)]
+#[derive(Serialize, ToSchema)]
 struct PaperTablesResult<'a> {
     schema: &'static str,
     input_hash: &'a str,
     uniaxial: &'a UniaxialStandIn,
-    stand_ins: Vec<Value>,
+    /// The stand-ins of the recordings.
+    stand_ins: Vec<StandInRow<'a>>,
     contours: &'a [Contour],
+}
+
+/// A row of the tables like the paper's 2 and 3.
+#[derive(Serialize, ToSchema)]
+#[schema(as = StandIn)]
+struct StandInRow<'a> {
+    drive_mm: f64,
+    filter: Filter,
+    /// The fits of each number of terms.
+    term_selection: &'a TermSelection,
 }
 
 impl Request for PaperTablesRequest {
@@ -80,6 +92,10 @@ impl Request for PaperTablesRequest {
 
     fn example() -> serde_json::Value {
         serde_json::json!({ "mesh_factor": 5.0 })
+    }
+
+    fn result() -> ResultSchema {
+        ResultSchema::of::<PaperTablesResult>("paper-tables/1")
     }
 
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
@@ -121,9 +137,11 @@ impl Run for PaperTablesRequest {
         };
         let uniaxial =
             uniaxial_stand_in(&defaults::dumbbell(), &uniaxial, &cancelled).map_err(|e| context.failed(&e))?;
-        let rows = all
-            .iter()
-            .map(|s| json!({ "drive_mm": s.drive_mm, "filter": s.filter, "term_selection": s.calibration.selection }));
+        let rows = all.iter().map(|s| StandInRow {
+            drive_mm: s.drive_mm,
+            filter: s.filter,
+            term_selection: &s.calibration.selection,
+        });
         let result = PaperTablesResult {
             schema: "paper-tables/1",
             input_hash: &context.input_hash,

@@ -1,12 +1,17 @@
 //! Proof: causes concealed in synthetic recordings, and how the diagnosis fares on them.
 
-use super::{Context, JobError, Outcome, Progress, Request, Run, defaults, summary};
+use super::{
+    Context, JobError, Outcome, Progress, RecordingOutline, Request, ResultSchema, Run, cost, defaults, summary,
+};
 use crate::field::FieldError;
+use crate::field::schema::Seed;
 use crate::proof::{
-    ExperimentKind, HiddenCause, ProofOptions, Scored, SeveralOptions, SeveralScored, prove, prove_several,
+    ExperimentKind, HiddenCause, Proof, ProofOptions, Scored, SeveralOptions, SeveralProof, SeveralScored,
+    num_recordings, prove, prove_several,
 };
 use crate::provenance::build_id;
 use crate::report::{confusion_picture, detection_picture};
+use crate::voxel::VoxelGrid;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::io::Write;
@@ -41,7 +46,7 @@ pub struct ProofRequest {
     pub recordings: usize,
     /// Seed of all draws.
     #[serde(default = "seed")]
-    #[schema(default = seed)]
+    #[schema(value_type = Seed, default = seed)]
     pub seed: u64,
     /// Element size of the diagnosis as a factor on the standard one.
     #[serde(default = "mesh_factor")]
@@ -54,27 +59,23 @@ pub struct ProofRequest {
 }
 
 fn per_cause() -> usize {
-    20
+    ProofOptions::default().per_cause
 }
 
 fn controls() -> usize {
-    100
+    ProofOptions::default().controls
 }
 
 fn recordings() -> usize {
-    300
+    SeveralOptions::default().num_recordings
 }
 
-/// Recordings with an unknown cause where their number is left out: per cause, and in all beside a known one.
-const UNKNOWN_PER_CAUSE: usize = 10;
-const UNKNOWN_BESIDE_KNOWN: usize = 60;
-
 fn seed() -> u64 {
-    1
+    ProofOptions::default().seed
 }
 
 fn mesh_factor() -> f64 {
-    1.8
+    ProofOptions::default().mesh_factor
 }
 
 struct CheckedProof {
@@ -92,6 +93,10 @@ impl Request for ProofRequest {
 
     fn example() -> serde_json::Value {
         serde_json::json!({ "per_cause": 1, "unknown": 0, "controls": 1, "mesh_factor": 4.0 })
+    }
+
+    fn result() -> ResultSchema {
+        ResultSchema::of::<Proof>("proof/1").or(ResultSchema::of::<SeveralProof>("proof-of-several/1"))
     }
 
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
@@ -114,7 +119,7 @@ impl Request for ProofRequest {
             let options = SeveralOptions {
                 num_recordings: self.recordings,
                 num_controls: self.controls,
-                num_unknown: self.unknown.unwrap_or(UNKNOWN_BESIDE_KNOWN),
+                num_unknown: self.unknown.unwrap_or(SeveralOptions::default().num_unknown),
                 seed: self.seed,
                 mesh_factor: self.mesh_factor,
             };
@@ -123,7 +128,7 @@ impl Request for ProofRequest {
         let options = ProofOptions {
             per_cause: self.per_cause,
             controls: self.controls,
-            unknown: self.unknown.unwrap_or(UNKNOWN_PER_CAUSE),
+            unknown: self.unknown.unwrap_or(ProofOptions::default().unknown),
             seed: self.seed,
             mesh_factor: self.mesh_factor,
             only,
@@ -154,9 +159,22 @@ fn line(s: &Scored) -> String {
     )
 }
 
+/// Processor seconds of the diagnosis of so many recordings of the proof's specimen; making them takes a small part.
+fn seconds_of(num_recordings: usize, mesh_factor: f64) -> Option<f64> {
+    let specimen = defaults::two_hole_shear();
+    let voxel_mm = defaults::voxel_mm();
+    let num_voxels = VoxelGrid::covering(&specimen, voxel_mm).ok()?.num_voxels();
+    let outline = RecordingOutline { num_drives: specimen.drive_mm.len(), specimen, num_voxels };
+    Some(num_recordings as f64 * cost::of_diagnosis(&[outline], mesh_factor)?)
+}
+
 impl Run for CheckedProof {
     fn title(&self) -> String {
         format!("proof of the diagnosis, seed {}", self.options.seed)
+    }
+
+    fn estimated_seconds(&self, _: &[RecordingOutline]) -> Option<f64> {
+        seconds_of(num_recordings(&self.options), self.options.mesh_factor)
     }
 
     fn run(&self, context: &Context) -> Result<Outcome, JobError> {
@@ -197,6 +215,11 @@ fn line_of_several(s: &SeveralScored) -> String {
 impl Run for CheckedSeveral {
     fn title(&self) -> String {
         format!("proof of the diagnosis with several causes at once, seed {}", self.options.seed)
+    }
+
+    fn estimated_seconds(&self, _: &[RecordingOutline]) -> Option<f64> {
+        let SeveralOptions { num_recordings, num_controls, num_unknown, mesh_factor, .. } = self.options;
+        seconds_of(num_recordings.saturating_add(num_controls).saturating_add(num_unknown), mesh_factor)
     }
 
     fn run(&self, context: &Context) -> Result<Outcome, JobError> {

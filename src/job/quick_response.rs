@@ -46,15 +46,24 @@ pub enum NoResponse {
 pub fn quick_response(specimen: &Specimen, material: &Ogden) -> Result<QuickResponse, NoResponse> {
     let failed = |e: &dyn std::fmt::Display| NoResponse::Failed(e.to_string());
     let drive = specimen.drive_mm.iter().copied().reduce(f64::max).ok_or(NoResponse::NoDrive)?;
-    let options = MeshOptions::search(specimen);
-    let mesh = mesh_specimen(specimen, &options).map_err(|e| failed(&e))?;
-    let seconds = seconds_per_drive(mesh.nodes.len(), 0);
+    let samples = specimen.samples();
+    let mut seconds = 0.0;
+    for sample in &samples {
+        let mesh = mesh_specimen(sample, &MeshOptions::search(sample)).map_err(|e| failed(&e))?;
+        seconds += seconds_per_drive(mesh.nodes.len(), 0);
+    }
     if seconds > MOST_SECONDS {
         return Err(NoResponse::TooSlow { seconds });
     }
-    let mut model = ForwardModel::of_specimen(specimen, &options).map_err(|e| failed(&e))?;
-    let found = model.solve(material, drive, None, &SolveOptions::default(), &|| false).map_err(|e| failed(&e))?;
-    let stretches = model.quadrature_fields(material, &found);
-    let stretches = stretches.iter().map(|q| decompose(&q.deformation_gradient).principal_stretches[0]);
-    Ok(QuickResponse { force_n: found.force_n, local_stretch: stretches.fold(f64::NEG_INFINITY, f64::max) })
+    let mut response = QuickResponse { force_n: 0.0, local_stretch: f64::NEG_INFINITY };
+    for sample in &samples {
+        let options = MeshOptions::search(sample);
+        let mut model = ForwardModel::of_specimen(sample, &options).map_err(|e| failed(&e))?;
+        let found = model.solve(material, drive, None, &SolveOptions::default(), &|| false).map_err(|e| failed(&e))?;
+        response.force_n += found.force_n;
+        let stretches = model.quadrature_fields(material, &found);
+        let stretches = stretches.iter().map(|q| decompose(&q.deformation_gradient).principal_stretches[0]);
+        response.local_stretch = stretches.fold(response.local_stretch, f64::max);
+    }
+    Ok(response)
 }

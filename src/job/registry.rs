@@ -4,7 +4,7 @@ use super::kind::Kind;
 use super::part::PartKind;
 
 /// The kinds that this program runs.
-pub static KINDS: [Kind; 17] = [
+pub static KINDS: [Kind; 18] = [
     Kind::of::<super::solve::SolveRequest>(),
     Kind::of::<super::evaluate::EvaluationRequest>(),
     Kind::of::<super::evaluation_list::EvaluationListRequest>(),
@@ -12,6 +12,7 @@ pub static KINDS: [Kind; 17] = [
     Kind::of::<super::import::ImportRequest>(),
     Kind::of::<super::calibrate::CalibrationRequest>(),
     Kind::of::<super::diagnose::DiagnosisRequest>(),
+    Kind::of::<super::next::NextRequest>(),
     Kind::of::<super::load_curves::LoadCurvesRequest>(),
     Kind::of::<super::curves::CurvesRequest>(),
     Kind::of::<super::uniaxial::UniaxialRequest>(),

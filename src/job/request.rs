@@ -1,6 +1,6 @@
 //! What every kind of request and every checked request can do.
 
-use super::{JobError, Outcome, Part, Progress, Surroundings};
+use super::{JobError, Outcome, Part, Progress, ResultSchema, Surroundings};
 use crate::field::FieldError;
 use crate::recording::{RawRecording, ReadRecording};
 use crate::specimen::Specimen;
@@ -25,6 +25,9 @@ pub trait Request: Serialize + DeserializeOwned + ToSchema + Send + Sync + 'stat
     /// A request that shows what it is like, for the document of the service.
     fn example() -> Value;
 
+    /// What its results look like.
+    fn result() -> ResultSchema;
+
     /// The request in `value`, whose fields fit the schema.
     ///
     /// # Errors
@@ -47,7 +50,7 @@ pub enum InputForm {
     Displacements,
     /// A recording of wrapped phases.
     RawPhases,
-    /// A file of a laboratory's own format.
+    /// A file of a laboratory's own format, or a folder of such files.
     File,
 }
 
@@ -74,6 +77,17 @@ impl InputUse {
     }
 }
 
+/// What is known of a recording before it is read: enough to check a mesh and to estimate a cost.
+#[derive(Clone, Debug)]
+pub struct RecordingOutline {
+    /// The specimen as drawn.
+    pub specimen: Specimen,
+    /// Voxels of the mask.
+    pub num_voxels: usize,
+    /// Drives at which it was scanned.
+    pub num_drives: usize,
+}
+
 /// A checked request.
 pub trait Run: Send + Sync {
     /// What the job is called in lists.
@@ -84,16 +98,17 @@ pub trait Run: Send + Sync {
         Vec::new()
     }
 
-    /// Whether its meshes have at most `max_elements` elements; `specimens` are those of its recordings. Meshes once.
+    /// Whether its meshes have at most `max_elements` elements, given what is known of its recordings. Meshes once.
     ///
     /// # Errors
     /// The field that decides, with the number of elements.
-    fn check_size(&self, _specimens: &[Specimen], _max_elements: usize) -> Result<(), FieldError> {
+    fn check_size(&self, _recordings: &[RecordingOutline], _max_elements: usize) -> Result<(), FieldError> {
         Ok(())
     }
 
-    /// About how many processor seconds it takes, where that can be told before it runs. Meshes once.
-    fn estimated_seconds(&self) -> Option<f64> {
+    /// About how many processor seconds it takes, given what is known of its recordings, where that can be told before
+    /// it runs. Meshes once.
+    fn estimated_seconds(&self, _recordings: &[RecordingOutline]) -> Option<f64> {
         None
     }
 

@@ -3,7 +3,8 @@
 use super::kind::Job;
 use super::part::Part;
 use super::registry::kind_of_part;
-use super::{Failure, InputFile, JobError, Outcome, Progress, Surroundings};
+use super::request::InputUse;
+use super::{Failure, Input, InputFile, JobError, Outcome, Progress, Surroundings};
 use crate::recording::{RawRecording, ReadRecording};
 use rayon::prelude::*;
 use serde_json::Value;
@@ -49,6 +50,10 @@ pub fn job_of_part(part: &Part) -> Result<Job, JobError> {
 struct PartSurroundings<'a>(&'a dyn Surroundings);
 
 impl Surroundings for PartSurroundings<'_> {
+    fn inputs(&self, wanted: &[InputUse]) -> Result<Vec<Input>, JobError> {
+        self.0.inputs(wanted)
+    }
+
     fn recording(&self, name: &str) -> Result<ReadRecording, JobError> {
         self.0.recording(name)
     }

@@ -1,13 +1,14 @@
 //! Scan: a synthetic recording of a specimen as the scanner and the load cell would give it.
 
-use super::outcome::{WithRecording, recording_identifier, to_json};
-use super::subject::{check_mesh, driven};
-use super::{Context, JobError, Outcome, Request, Run, defaults, summary};
+use super::outcome::{RECORDING_FIELD, WithRecording, recording_identifier, to_json};
+use super::subject::{check_meshes, driven, name_of_sample};
+use super::{Context, JobError, Outcome, RecordingOutline, Request, ResultSchema, Run, cost, defaults, summary};
 use crate::acquisition::{
     KSpace, LoadProgram, ReconstructOptions, Reconstruction, Scan, ScanOptions, ScanResult, Window, reconstruct, scan,
 };
 use crate::fem::SolveOptions;
 use crate::field::FieldError;
+use crate::field::schema::Seed;
 use crate::material::Ogden;
 use crate::mesh::MeshSize;
 use crate::provenance::VERSION;
@@ -55,6 +56,12 @@ pub struct ScanRequest {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(min_items = 1, max_items = 1000)]
     pub drive_mm: Option<Vec<f64>>,
+    /// Which kind of the specimen's samples is scanned, from 1 in the order in which they are listed. The force of all
+    /// samples is in the recording of the first kind alone, so that it counts once where several are calibrated
+    /// together.
+    #[serde(default = "first_sample")]
+    #[schema(minimum = 1, maximum = 8, default = first_sample)]
+    pub sample: usize,
     /// Element size.
     #[serde(default)]
     #[schema(default = MeshSize::default)]
@@ -102,7 +109,7 @@ pub struct ScanRequest {
     pub is_raw: bool,
     /// Seed of all noise.
     #[serde(default = "seed")]
-    #[schema(default = seed)]
+    #[schema(value_type = Seed, default = seed)]
     pub seed: u64,
 }
 
@@ -112,6 +119,10 @@ fn no_offset() -> [f64; 3] {
 
 fn mm_per_radian() -> [f64; 3] {
     [0.5 * std::f64::consts::FRAC_1_PI; 3]
+}
+
+fn first_sample() -> usize {
+    1
 }
 
 fn seed() -> u64 {
@@ -151,11 +162,17 @@ impl ScanRequest {
             let allowed = "above 0 and at most 1 along each axis";
             errors.push(FieldError::new("/kspace/keep", format!("{keep:?}"), allowed).remedy(error.to_string()));
         }
+        let samples = specimen.samples();
+        let sample = samples.get(self.sample.wrapping_sub(1));
+        if sample.is_none() {
+            let allowed = format!("from 1 to {}, the specimen's kinds of samples", samples.len());
+            errors.push(FieldError::new("/sample", self.sample, allowed));
+        }
         if !errors.is_empty() {
             return None;
         }
         let unfit = |allowed: String| FieldError::new("/voxel_mm", format!("{:?}", self.voxel_mm), allowed);
-        let grid = match ScanOptions::grid_around(specimen, self.voxel_mm, MARGIN_VOXELS, self.offset_voxels) {
+        let grid = match ScanOptions::grid_around(sample?, self.voxel_mm, MARGIN_VOXELS, self.offset_voxels) {
             Ok(grid) if grid.num_voxels() <= MAX_VOXELS => grid,
             Ok(grid) => {
                 let error = unfit(format!("large enough for at most {MAX_VOXELS} voxels"));
@@ -170,7 +187,8 @@ impl ScanRequest {
         let noise = self.noise_sd_mm.unwrap_or(NOISE_SD_MM);
         let snr = self.snr.unwrap_or([0, 1, 2].map(|axis| self.mm_per_radian[axis] / noise[axis]));
         let load = LoadProgram { drift_sd_n: self.force_sd_n, ..LoadProgram::default() };
-        Some(ScanOptions { grid, mm_per_radian: self.mm_per_radian, snr, kspace, load, seed: self.seed })
+        let sample = self.sample - 1;
+        Some(ScanOptions { grid, mm_per_radian: self.mm_per_radian, snr, kspace, load, seed: self.seed, sample })
     }
 }
 
@@ -182,6 +200,10 @@ impl Request for ScanRequest {
 
     fn example() -> serde_json::Value {
         serde_json::json!({ "specimen": defaults::two_hole_shear(), "material": defaults::ecoflex(), "snr": [20.0, 20.0, 20.0], "seed": 7 })
+    }
+
+    fn result() -> ResultSchema {
+        ResultSchema::with::<ScanResult>("scan/1", &[("recording", RECORDING_FIELD)])
     }
 
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
@@ -204,8 +226,14 @@ impl Run for CheckedScan {
         format!("scan of {}", self.specimen.name)
     }
 
-    fn check_size(&self, _: &[Specimen], max_elements: usize) -> Result<(), FieldError> {
-        check_mesh(&self.specimen, self.request.mesh, "/mesh", max_elements)
+    fn check_size(&self, _: &[RecordingOutline], max_elements: usize) -> Result<(), FieldError> {
+        check_meshes(&self.specimen, self.request.mesh, "/mesh", max_elements)
+    }
+
+    fn estimated_seconds(&self, _: &[RecordingOutline]) -> Option<f64> {
+        let mut mesh = self.request.mesh.options(&self.specimen);
+        mesh.use_mirror &= !self.request.is_whole;
+        cost::seconds(&self.specimen, &mesh, Some(self.request.voxel_mm), self.specimen.drive_mm.len())
     }
 
     fn run(&self, context: &Context) -> Result<Outcome, JobError> {
@@ -216,7 +244,7 @@ impl Run for CheckedScan {
         mesh.max_elements = mesh.max_elements.min(context.surroundings.max_elements());
         context.step(&format!("scanning at {} drives", specimen.drive_mm.len()), 0, 3);
         let name = self.request.name.as_ref().unwrap_or(&specimen.name);
-        let id = format!("{}-seed-{}", plain(name), options.seed);
+        let id = name_of_sample(&format!("{}-seed-{}", plain(name), options.seed), options.sample);
         let cancelled = || context.is_cancelled();
         let mut made = scan(&id, specimen, material, &mesh, &SolveOptions::default(), options, &cancelled)
             .map_err(|e| context.failed(&e))?;

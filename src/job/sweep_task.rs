@@ -1,6 +1,6 @@
 //! One task of a sweep: a design with a material, evaluated; its figures or the reason why there are none.
 
-use super::{Context, JobError, Outcome, Request, Run};
+use super::{Context, JobError, Outcome, Request, ResultSchema, Run};
 use crate::field::FieldError;
 use crate::material::Ogden;
 use crate::mesh::MeshSize;
@@ -31,6 +31,10 @@ impl Request for SweepTaskRequest {
 
     fn example() -> serde_json::Value {
         serde_json::json!({ "specimen": super::defaults::two_hole_shear(), "material": super::defaults::ecoflex(), "scan": super::defaults::scan(), "mesh": "search" })
+    }
+
+    fn result() -> ResultSchema {
+        ResultSchema::default()
     }
 
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {

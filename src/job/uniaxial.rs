@@ -3,7 +3,7 @@
 use super::curve_files::{
     CurveColumns, CurveFitSettings, CurveReport, add_material, fit_failed, reports_in_words, unfit,
 };
-use super::{Context, JobError, Outcome, Progress, Request, Run, defaults, summary};
+use super::{Context, JobError, Outcome, Progress, Request, ResultSchema, Run, defaults, summary};
 use crate::field::FieldError;
 use crate::homogeneous::{
     CsvCurve, Curve, CurveFit, CurveFitSequence, CurveParameter, DumbbellFit, DumbbellOptions, HomogeneousTest,
@@ -53,7 +53,7 @@ fn search_mesh() -> MeshSize {
 }
 
 /// Result (`uniaxial/1`): the fields of `calibration/1` for the chosen fit, and all fits.
-#[derive(Serialize)]
+#[derive(Serialize, ToSchema)]
 struct UniaxialResult<'a> {
     schema: &'static str,
     version: &'static str,
@@ -93,6 +93,10 @@ impl Request for UniaxialRequest {
 
     fn example() -> serde_json::Value {
         serde_json::json!({ "csv": super::defaults::example_curve(), "fit": { "max_terms": 1 } })
+    }
+
+    fn result() -> ResultSchema {
+        ResultSchema::of::<UniaxialResult>("uniaxial/1")
     }
 
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {

@@ -1,13 +1,19 @@
 //! A material in a file (`ogden/1`): the fields of [`Ogden`] behind the tag that names the format.
 
-use super::limits::{MAX_ALPHA, MAX_MODULUS_KPA, SCHEMA};
-use super::{MAX_TERMS, Ogden, OgdenTerm};
-use crate::field::schema::{list_of, number_above, number_within, schema_of_file, schema_tag, schema_type};
+#[cfg(feature = "schema")]
+use super::MAX_TERMS;
+use super::limits::SCHEMA;
+#[cfg(feature = "schema")]
+use super::limits::{MAX_ALPHA, MAX_MODULUS_KPA};
+use super::{Ogden, OgdenTerm};
+use crate::field::file_tag;
+#[cfg(feature = "schema")]
+use crate::field::schema::{list_of, number_above, number_within, schema_of_file, schema_type};
 use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
 
-schema_tag!(MaterialTag, SCHEMA);
+file_tag!(MaterialTag, SCHEMA);
 
+#[cfg(feature = "schema")]
 schema_type! {
     /// The bulk modulus κ, kPa.
     BulkKpa = number_above(0.0).maximum(Some(MAX_MODULUS_KPA));
@@ -20,17 +26,17 @@ schema_type! {
 }
 
 /// An Ogden material (`ogden/1`).
-#[derive(Serialize, Deserialize, ToSchema)]
+#[derive(Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = MaterialSchema))]
 #[serde(deny_unknown_fields, expecting = "struct Ogden")]
-#[schema(as = MaterialSchema)]
 pub(super) struct OgdenFile {
     /// Always `ogden/1`.
     schema: MaterialTag,
     /// κ, kPa.
-    #[schema(value_type = BulkKpa)]
+    #[cfg_attr(feature = "schema", schema(value_type = BulkKpa))]
     bulk_kpa: f64,
     /// Terms.
-    #[schema(value_type = Terms)]
+    #[cfg_attr(feature = "schema", schema(value_type = Terms))]
     terms: Vec<OgdenTerm>,
 }
 
@@ -48,4 +54,5 @@ impl From<Ogden> for OgdenFile {
     }
 }
 
+#[cfg(feature = "schema")]
 schema_of_file!(Ogden, OgdenFile);

@@ -21,18 +21,17 @@ pub use shear_term::{ShearTerm, power_difference};
 pub use stability::{least_relative_stiffness, smallest_principal_stiffness_kpa, smallest_relative_stiffness};
 
 use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
 
 /// One Ogden term.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-#[schema(as = TermSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = TermSchema))]
 #[serde(deny_unknown_fields)]
 pub struct OgdenTerm {
     /// μ, kPa.
-    #[schema(value_type = file::MuKpa)]
+    #[cfg_attr(feature = "schema", schema(value_type = file::MuKpa))]
     pub mu_kpa: f64,
     /// α.
-    #[schema(value_type = file::Alpha)]
+    #[cfg_attr(feature = "schema", schema(value_type = file::Alpha))]
     pub alpha: f64,
 }
 

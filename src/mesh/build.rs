@@ -6,6 +6,7 @@ use super::error::MeshError;
 use super::grading::{divide, with_middles};
 use super::node_sets::{nodes_on_plane, pull_axis};
 use super::options::MeshOptions;
+use super::parting::part;
 use super::quads::quad_section;
 use super::section::Section;
 use super::triangles::triangle_section;
@@ -47,6 +48,23 @@ pub fn mesh_specimen_along(
     domain.lines = lines.to_vec();
     let section = triangle_section(&domain, options)?;
     orient_and_limit(&section, options)?;
+    extrude(&domain, options, &section)
+}
+
+/// As [`mesh_specimen_along`] one line of the section, on which the elements part.
+///
+/// # Errors
+/// As [`mesh_specimen_along`].
+pub(super) fn mesh_specimen_parted(
+    specimen: &Specimen,
+    options: &MeshOptions,
+    line: [[f64; 2]; 2],
+) -> Result<Mesh, MeshError> {
+    let mut domain = Domain::new(specimen, &MeshOptions { use_mirror: false, ..*options })?;
+    domain.lines = vec![line];
+    let mut section = triangle_section(&domain, options)?;
+    orient_and_limit(&section, options)?;
+    part(&mut section, line, domain.scale());
     extrude(&domain, options, &section)
 }
 

@@ -66,6 +66,9 @@ pub(super) struct Grading {
 impl Domain {
     /// Checks `specimen` and `options` and finds the mirror planes.
     pub fn new(specimen: &Specimen, options: &MeshOptions) -> Result<Self, MeshError> {
+        if !specimen.other_samples.is_empty() {
+            return Err(MeshError::UnlikeSamples { count: specimen.other_samples.len() + 1 });
+        }
         let block = &specimen.block;
         let [low, high] = LENGTH_RANGE_MM;
         in_range("length_mm", block.length_mm, low, high)?;

@@ -34,6 +34,15 @@ pub enum MeshError {
         /// Largest value allowed.
         maximum: f64,
     },
+    /// The specimen holds several kinds of samples, and this is done of one.
+    #[error(
+        "the specimen has {count} kinds of samples (other_samples), and this is done of one kind alone; leave out \
+         other_samples, or take one sample at a time"
+    )]
+    UnlikeSamples {
+        /// Kinds of samples.
+        count: usize,
+    },
     /// A hole's centre or diameter is not a usable number.
     #[error(
         "hole {hole} has centre ({}, {}) mm and diameter {diameter_mm} mm; all must be finite and the diameter positive",
@@ -119,6 +128,11 @@ pub enum MeshError {
         /// Second coordinate, mm.
         y_mm: f64,
     },
+    /// The section needs triangles, without which the library was built.
+    #[error(
+        "quadrilaterals do not suit this section, and lambdak was built without triangles: turn on its feature `triangles`"
+    )]
+    NoTriangles,
     /// The geometry Jacobian of an element is not positive.
     #[error("element {element} has a geometry Jacobian of {jacobian:e} mm³; it must be positive")]
     InvertedElement {

@@ -6,6 +6,7 @@
 //!                         └─ section ─ build        extrusion in graded levels, node sets
 //! mesh ─ check, locator, morph                      invariants and quality; inverse map; shape derivatives
 //!      ─ block_shape                                a block whose faces lie off the drawing
+//!      ─ cut                                        a slit, on which the elements part
 //! ```
 //!
 //! The section is (x, z) extruded along y, or (x, y) extruded along z where holes run along the width. Every mesh is
@@ -15,6 +16,7 @@ mod block_shape;
 mod build;
 mod cells;
 mod check;
+mod cut;
 mod domain;
 mod element;
 mod error;
@@ -25,11 +27,16 @@ mod locator;
 mod morph;
 mod node_sets;
 mod options;
+mod parting;
 mod power;
 mod quads;
 mod refine;
 mod section;
 mod size;
+#[cfg(feature = "triangles")]
+mod triangles;
+#[cfg(not(feature = "triangles"))]
+#[path = "no_triangles.rs"]
 mod triangles;
 
 #[cfg(test)]
@@ -40,6 +47,7 @@ mod test_specimens;
 pub use block_shape::{BlockShape, FACE_TERMS, face_term_degree, face_term_name, half_extents_mm, made_mesh};
 pub use build::{mesh_specimen, mesh_specimen_along};
 pub use check::MeshQuality;
+pub use cut::{Cut, clearance_mm, cut_offset, mesh_cut_specimen, section_axes, takes_cuts};
 pub use element::ElementKind;
 pub use error::{LigamentEnd, MeshError};
 pub use locator::{Column, Location, Locator};

@@ -44,6 +44,12 @@ pub(super) const FINE_FACTOR: f64 = 0.6;
 /// Grading of [`MeshOptions::graded`].
 const STRONG_GRADING: f64 = 0.1;
 
+/// The standard element size of a specimen, mm.
+fn standard_size_mm(specimen: &Specimen) -> f64 {
+    let block = &specimen.block;
+    (block.length_mm * block.thickness_mm * block.width_mm / STANDARD_ELEMENTS).cbrt()
+}
+
 impl MeshOptions {
     /// Coarse meshes for a search: about 2–4 thousand free unknowns in half of a two-hole block.
     pub fn search(specimen: &Specimen) -> Self {
@@ -63,8 +69,7 @@ impl MeshOptions {
     /// Element size `factor` times that of [`Self::standard`]; unknowns go with its inverse third power.
     pub fn scaled(specimen: &Specimen, factor: f64) -> Self {
         let block = &specimen.block;
-        let volume = block.length_mm * block.thickness_mm * block.width_mm;
-        let size = (volume / STANDARD_ELEMENTS).cbrt() * factor;
+        let size = standard_size_mm(specimen) * factor;
         let along_width = specimen.holes.first().is_some_and(|h| h.axis == crate::specimen::HoleAxis::Width);
         let depth = if along_width { block.width_mm } else { block.thickness_mm };
         // Through the plates' gap shear is not uniform. Along holes fields change slowly but for the free faces.
@@ -84,6 +89,14 @@ impl MeshOptions {
         }
     }
 
+    /// Meshes of elements `by` times the size of these, but no smaller than `finest` times the standard size (where
+    /// these are not smaller themselves). All else is as [`Self::scaled`] has it.
+    pub fn refined_by(&self, by: f64, specimen: &Specimen, finest: f64) -> Self {
+        let own = self.section_size_mm / standard_size_mm(specimen);
+        let (use_mirror, max_elements) = (self.use_mirror, self.max_elements);
+        MeshOptions { use_mirror, max_elements, ..Self::scaled(specimen, (by * own).max(finest.min(own))) }
+    }
+
     /// As [`Self::scaled`] with elements that get thinner toward bonded faces and edges three times as fast, and twice
     /// as many layers between the plates where holes run through the gap. Along the plates elements are as large as
     /// those of `scaled`: the free faces' bonded edges are on the brink of folding, and elements small enough to fold
@@ -94,6 +107,17 @@ impl MeshOptions {
         let is_through_gap = specimen.test == crate::specimen::TestKind::DoubleLapShear && !along_width;
         let levels = if is_through_gap { 2 * options.levels } else { options.levels };
         MeshOptions { grading: STRONG_GRADING, levels, ..options }
+    }
+
+    /// These options, made for `from`, for another block `to`: sizes and layers in proportion to their standard meshes.
+    pub fn carried(self, from: &Specimen, to: &Specimen) -> Self {
+        let (own, other) = (Self::standard(from), Self::standard(to));
+        let levels = self.levels as f64 * other.levels as f64 / own.levels as f64;
+        MeshOptions {
+            section_size_mm: self.section_size_mm * other.section_size_mm / own.section_size_mm,
+            levels: (levels.round() as usize).max(1),
+            ..self
+        }
     }
 
     /// Checks the ranges.

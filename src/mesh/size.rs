@@ -4,9 +4,6 @@ use super::MeshOptions;
 use crate::field::FieldError;
 use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
-use utoipa::openapi::RefOr;
-use utoipa::openapi::schema::{ObjectBuilder, OneOfBuilder, Schema, Type};
-use utoipa::{PartialSchema, ToSchema};
 
 /// Smallest and largest factor on the standard element size.
 pub const SIZE_FACTORS: std::ops::RangeInclusive<f64> = 0.2..=5.0;
@@ -109,18 +106,26 @@ impl std::fmt::Display for MeshSize {
     }
 }
 
-impl PartialSchema for MeshSize {
-    fn schema() -> RefOr<Schema> {
-        let names = ObjectBuilder::new().schema_type(Type::String).max_length(Some(24));
-        let [low, high] = [*SIZE_FACTORS.start(), *SIZE_FACTORS.end()];
-        let factor = ObjectBuilder::new().schema_type(Type::Number).minimum(Some(low)).maximum(Some(high));
-        let text =
-            format!("Element size: search, standard, fine, or a factor from {low} to {high} on the standard size.");
-        OneOfBuilder::new().item(factor).item(names).description(Some(text)).into()
-    }
-}
+#[cfg(feature = "schema")]
+mod schema {
+    use super::{MeshSize, SIZE_FACTORS};
+    use utoipa::openapi::RefOr;
+    use utoipa::openapi::schema::{ObjectBuilder, OneOfBuilder, Schema, Type};
+    use utoipa::{PartialSchema, ToSchema};
 
-impl ToSchema for MeshSize {}
+    impl PartialSchema for MeshSize {
+        fn schema() -> RefOr<Schema> {
+            let names = ObjectBuilder::new().schema_type(Type::String).max_length(Some(24));
+            let [low, high] = [*SIZE_FACTORS.start(), *SIZE_FACTORS.end()];
+            let factor = ObjectBuilder::new().schema_type(Type::Number).minimum(Some(low)).maximum(Some(high));
+            let text =
+                format!("Element size: search, standard, fine, or a factor from {low} to {high} on the standard size.");
+            OneOfBuilder::new().item(factor).item(names).description(Some(text)).into()
+        }
+    }
+
+    impl ToSchema for MeshSize {}
+}
 
 #[cfg(test)]
 mod tests {

@@ -13,6 +13,7 @@ pub(super) fn specimen(test: TestKind, extents: [f64; 3], axis: HoleAxis, holes:
         holes: holes.iter().map(|h| Hole { axis, center_mm: [h[0], h[1]], diameter_mm: h[2] }).collect(),
         drive_mm: vec![1.0],
         samples_in_parallel: 1,
+        other_samples: Vec::new(),
     }
 }
 

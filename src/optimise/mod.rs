@@ -16,18 +16,24 @@
 mod active_set;
 mod covariance;
 mod descend;
+#[cfg(feature = "calibration")]
 mod evolution;
 mod limit;
+#[cfg(feature = "calibration")]
 mod limited_step;
+#[cfg(feature = "calibration")]
 mod quadratic;
 mod residuals;
 mod rules;
 
 pub use covariance::covariance;
 pub use descend::{Descent, End, LeastSquares, Step, descend};
+#[cfg(feature = "calibration")]
 pub use evolution::Evolution;
 pub use limit::LinearLimit;
+#[cfg(feature = "calibration")]
 pub use limited_step::{NoStep, limited_step};
+#[cfg(feature = "calibration")]
 pub use quadratic::{Precision, QuadraticProgramme, QuadraticSolution, SolverStatus};
 pub use residuals::{Evaluation, LeastSquaresOptions, Minimum, minimise};
 pub use rules::{Damping, Raise, Rules, Shortening, Stop};

@@ -205,8 +205,8 @@ fn made_specimen(specimen: &Specimen, experiment: &Experiment) -> Specimen {
                     hole.center_mm[1] += hidden.strength * hidden.direction[2];
                 }
             }
-            HiddenCause::Geometry if hidden.which == 0 => made.block.length_mm += hidden.strength,
-            HiddenCause::Geometry if hidden.which == 1 => made.block.width_mm += hidden.strength,
+            HiddenCause::Outline if hidden.which == 0 => made.block.length_mm += hidden.strength,
+            HiddenCause::Outline if hidden.which == 1 => made.block.width_mm += hidden.strength,
             _ => {}
         }
     }
@@ -221,7 +221,7 @@ fn model_of(made: &Specimen, experiment: &Experiment, mesh_factor: f64) -> Resul
     let lines = patch.map_or_else(Vec::new, |hidden| patch_lines(made, hidden));
     let along = (!lines.is_empty()).then(|| mesh_specimen_along(made, &options, &lines)).and_then(Result::ok);
     let mut mesh = along.map_or_else(|| mesh_specimen(made, &options), Ok).map_err(PrepareError::from)?;
-    for wedge in experiment.of(HiddenCause::Geometry).filter(|h| h.which == WEDGE) {
+    for wedge in experiment.of(HiddenCause::Outline).filter(|h| h.which == WEDGE) {
         // Wider by half of it at one end, narrower at the other.
         for x in &mut mesh.nodes {
             x[2] *= 1.0 + wedge.strength * x[0] / (made.block.length_mm * made.block.width_mm);

@@ -4,6 +4,7 @@
 
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// Iterations of the fit (Newton's method on a concave function; it settles in ten).
 const ITERATIONS: usize = 100;
@@ -20,7 +21,7 @@ const LOGIT_90: f64 = 2.197_224_577_336_219_6;
 const FEWEST: usize = 3;
 
 /// A fitted curve: P(found) = 1 / (1 + exp(−(b₀ + b₁ ln a))).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DetectionCurve {
     /// b₀ and b₁ for a in mm.

@@ -5,9 +5,10 @@ use crate::material::{Ogden, OgdenTerm};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// A cause that can be hidden.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum HiddenCause {
     /// Nothing.
@@ -57,7 +58,7 @@ pub enum HiddenCause {
     /// The moved plate strays from its course, neither alike at all drives nor in proportion to them.
     Travel,
     /// The block is longer or wider than drawn, or a wedge.
-    Geometry,
+    Outline,
 }
 
 impl HiddenCause {
@@ -86,7 +87,7 @@ impl HiddenCause {
     ];
 
     /// Those that are hidden only beside others: alone each is one of several causes that look alike.
-    pub const IN_COMPANY: [HiddenCause; 3] = [HiddenCause::Layer, HiddenCause::Travel, HiddenCause::Geometry];
+    pub const IN_COMPANY: [HiddenCause; 3] = [HiddenCause::Layer, HiddenCause::Travel, HiddenCause::Outline];
 
     /// Whether it is to be seen in the displacement.
     pub fn acts_on_displacement(self) -> bool {
@@ -124,13 +125,13 @@ impl HiddenCause {
             HiddenCause::Bond => "bond",
             HiddenCause::Layer => "layer",
             HiddenCause::Travel => "travel",
-            HiddenCause::Geometry => "geometry",
+            HiddenCause::Outline => "outline",
         }
     }
 }
 
 /// What is hidden in one recording.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Hidden {
     /// The cause.
@@ -309,7 +310,7 @@ pub fn draw_cause(cause: HiddenCause, seed: u64) -> Hidden {
             let norm = raw.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-9);
             hidden.direction = raw.map(|x| x / norm);
         }
-        HiddenCause::Geometry => {
+        HiddenCause::Outline => {
             hidden.strength = d.sign() * d.log_within(0.1, 1.2);
             hidden.which = d.below(3);
         }

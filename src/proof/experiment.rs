@@ -3,9 +3,11 @@
 use super::draw::{Draw, Hidden, HiddenCause, draw_cause};
 use crate::material::{Ogden, OgdenTerm};
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// One experiment.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = HiddenExperiment)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
     /// Seed of its noise.
@@ -92,7 +94,7 @@ const OF_MEASUREMENT: [HiddenCause; 6] = [
     HiddenCause::Relaxation,
 ];
 /// How it is made.
-const OF_SHAPE: [HiddenCause; 2] = [HiddenCause::Geometry, HiddenCause::Hole];
+const OF_SHAPE: [HiddenCause; 2] = [HiddenCause::Outline, HiddenCause::Hole];
 /// Causes that may be kept from a diagnosis: none is a special case of another that it knows.
 const UNKNOWN: [HiddenCause; 4] =
     [HiddenCause::Inclusion, HiddenCause::Debond, HiddenCause::Hole, HiddenCause::Gradient];

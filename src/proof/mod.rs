@@ -27,7 +27,7 @@ pub use draw::{Hidden, HiddenCause, draw_cause};
 pub use experiment::{Experiment, draw_harmless, draw_several, draw_with_unknown};
 pub use options::ProofOptions;
 pub use result::{CauseSummary, FirstNamed, Proof, Scored};
-pub use score::{prove, score_one};
+pub use score::{num_recordings, prove, score_one};
 pub use several::{
     SeveralOptions, prove_several, score_answer, score_experiment, several_experiments, specimen_of, sum_up,
     unknown_cause,

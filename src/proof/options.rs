@@ -18,3 +18,10 @@ pub struct ProofOptions {
     /// Causes hidden; all where empty.
     pub only: Vec<HiddenCause>,
 }
+
+impl Default for ProofOptions {
+    /// Twenty recordings of every cause, ten of every cause that the diagnosis is not told of, a hundred controls.
+    fn default() -> Self {
+        ProofOptions { per_cause: 20, controls: 100, unknown: 10, seed: 1, mesh_factor: 1.8, only: Vec::new() }
+    }
+}

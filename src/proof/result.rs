@@ -3,9 +3,10 @@
 use super::draw::{Hidden, HiddenCause};
 use crate::diagnosis::Verdict;
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// One diagnosis of a concealed cause.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scored {
     /// What was hidden.
@@ -32,6 +33,7 @@ pub struct Scored {
     /// Half the diagonal of the hidden place, mm.
     pub location_size_mm: Option<f64>,
     /// Parameters of the hidden cause: name, and estimate minus truth in half widths of the 95 % interval.
+    #[schema(value_type = Vec<Vec<serde_json::Value>>)]
     pub deviations: Vec<(String, f64)>,
     /// χ² per datum before and after; null where there is no diagnosis.
     pub chi2: Option<[f64; 2]>,
@@ -62,7 +64,7 @@ impl Scored {
 }
 
 /// What a diagnosis named first. Results write the cause's name, or `(none)`, `(unexplained)`, `(failed)`.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
 #[serde(from = "String", into = "String")]
 pub enum FirstNamed {
     /// A cause.
@@ -120,7 +122,7 @@ impl From<String> for FirstNamed {
 }
 
 /// Sums over one hidden cause.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CauseSummary {
     /// The cause.
@@ -142,11 +144,12 @@ pub struct CauseSummary {
     /// Intervals that hold the truth, and all intervals, where named right.
     pub num_covered: [usize; 2],
     /// How often each cause was named first, the most frequent first.
+    #[schema(value_type = Vec<Vec<serde_json::Value>>)]
     pub first_named: Vec<(FirstNamed, usize)>,
 }
 
 /// A proof.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Proof {
     /// `proof/1`.
@@ -157,13 +160,17 @@ pub struct Proof {
     pub known: Vec<CauseSummary>,
     /// Causes kept from it.
     pub unknown: Vec<CauseSummary>,
-    /// Right among the detectable, causes together.
+    /// Right among the detectable, causes together; this share and the others are null where there was none.
+    #[schema(value_type = Option<f64>)]
     pub right_of_detectable: f64,
     /// Controls in which a cause was named or left unexplained.
+    #[schema(value_type = Option<f64>)]
     pub false_alarm_rate: f64,
     /// Unknown detectable causes that were called unexplained.
+    #[schema(value_type = Option<f64>)]
     pub unexplained_of_unknown: f64,
     /// Share of intervals that hold the truth.
+    #[schema(value_type = Option<f64>)]
     pub interval_coverage: f64,
     /// Program version.
     pub version: String,

@@ -16,13 +16,29 @@ const DETECTABLE_ALLOWANCES: f64 = 3.0;
 /// A cause that acts on the force counts as detectable, too, where it changes the force by this part of it.
 const DETECTABLE_FORCE: f64 = 0.02;
 
+/// Causes that are hidden from a diagnosis that is not told of them.
+const UNKNOWN: [HiddenCause; 5] =
+    [HiddenCause::Inclusion, HiddenCause::Debond, HiddenCause::Hole, HiddenCause::Gradient, HiddenCause::Tilt];
+
+/// Recordings that a proof makes and diagnoses.
+pub fn num_recordings(options: &ProofOptions) -> usize {
+    let count = |causes: &[HiddenCause]| causes.iter().filter(|cause| is_hidden(options, **cause)).count();
+    let [controls, known, unknown] = [&[HiddenCause::None][..], &HiddenCause::ALL, &UNKNOWN].map(count);
+    let of = |causes: usize, each: usize| causes.saturating_mul(each);
+    of(controls, options.controls)
+        .saturating_add(of(known, options.per_cause))
+        .saturating_add(of(unknown, options.unknown))
+}
+
+fn is_hidden(options: &ProofOptions, cause: HiddenCause) -> bool {
+    options.only.is_empty() || options.only.contains(&cause)
+}
+
 /// What to conceal: cause, seed and whether the diagnosis knows of it.
 fn tasks(options: &ProofOptions) -> Vec<(HiddenCause, u64, bool)> {
     let mut all = Vec::new();
     // Round by round, so that a stopped proof has seen all causes alike.
     let rounds = options.per_cause.max(options.unknown).max(1);
-    let unknown =
-        [HiddenCause::Inclusion, HiddenCause::Debond, HiddenCause::Hole, HiddenCause::Gradient, HiddenCause::Tilt];
     for round in 0..rounds {
         let seed = |kind: u64| options.seed.wrapping_mul(1_000_003) + 1000 * round as u64 + kind;
         for n in 0..options.controls {
@@ -34,10 +50,10 @@ fn tasks(options: &ProofOptions) -> Vec<(HiddenCause, u64, bool)> {
             all.extend(HiddenCause::ALL.iter().enumerate().map(|(n, c)| (*c, seed(n as u64), true)));
         }
         if round < options.unknown {
-            all.extend(unknown.iter().enumerate().map(|(n, c)| (*c, seed(500 + n as u64), false)));
+            all.extend(UNKNOWN.iter().enumerate().map(|(n, c)| (*c, seed(500 + n as u64), false)));
         }
     }
-    all.retain(|(cause, _, _)| options.only.is_empty() || options.only.contains(cause));
+    all.retain(|(cause, _, _)| is_hidden(options, *cause));
     all
 }
 
@@ -180,4 +196,19 @@ fn scored(
             .collect();
     }
     s
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn recordings_are_counted_without_drawing_them() {
+        for only in
+            [vec![], vec![HiddenCause::None], vec![HiddenCause::Debond, HiddenCause::Cell], HiddenCause::ALL.to_vec()]
+        {
+            let options = ProofOptions { per_cause: 3, controls: 7, unknown: 2, only, ..ProofOptions::default() };
+            assert_eq!(num_recordings(&options), tasks(&options).len(), "{:?}", options.only);
+        }
+    }
 }

@@ -36,6 +36,13 @@ pub struct SeveralOptions {
     pub mesh_factor: f64,
 }
 
+impl Default for SeveralOptions {
+    /// Three hundred recordings with several causes, a hundred controls, sixty with an unknown cause.
+    fn default() -> Self {
+        SeveralOptions { num_recordings: 300, num_controls: 100, num_unknown: 60, seed: 1, mesh_factor: 1.8 }
+    }
+}
+
 /// All experiments of a proof, mixed so that a stopped one has seen all kinds alike.
 pub fn several_experiments(options: &SeveralOptions) -> Vec<(ExperimentKind, Experiment)> {
     tasks(options).into_iter().map(|(kind, seed)| (kind, draw(kind, seed))).collect()

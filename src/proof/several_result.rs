@@ -5,9 +5,10 @@ use super::draw::HiddenCause;
 use super::experiment::Experiment;
 use crate::diagnosis::Verdict;
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// What is hidden in a recording of such a proof.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ExperimentKind {
     /// Two to four causes at once.
@@ -19,7 +20,7 @@ pub enum ExperimentKind {
 }
 
 /// How the diagnosis fared on one of the hidden causes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CauseScore {
     /// The cause.
@@ -33,11 +34,12 @@ pub struct CauseScore {
     /// Whether it was named, as a cause or as one that the data cannot tell apart from it.
     pub is_named: bool,
     /// Its parameters: name, and estimate minus truth in half widths of the 95 % interval.
+    #[schema(value_type = Vec<Vec<serde_json::Value>>)]
     pub deviations: Vec<(String, f64)>,
 }
 
 /// One diagnosis.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SeveralScored {
     /// What kind of recording it is.
@@ -65,7 +67,7 @@ pub struct SeveralScored {
 }
 
 /// Sums over one hidden cause.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CauseOfSeveral {
     /// The cause.
@@ -85,7 +87,7 @@ pub struct CauseOfSeveral {
 }
 
 /// A proof with several causes at once.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SeveralProof {
     /// `proof-of-several/1`.

@@ -31,6 +31,7 @@ pub use force_history::fit_force_history;
 pub use force_history_input::{ForceHistory, ForceHistoryError, ForceHistoryOptions, ShearLayer};
 pub use force_history_result::{FittedRelaxation, ForceHistoryFit, ForceHistorySequence};
 pub use load_curve::{LoadCurve, LoadCurveError};
+#[cfg(feature = "calibration")]
 pub(crate) use prony::memory;
 pub use prony::{HistoryError, PronyTerm, RelaxedHistory, relax};
 pub use verdict::{

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// How the search for what a model leaves out ended, be it of load curves or of a whole recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// The model meets the data up to noise and to what the numerics leave.
@@ -75,6 +76,7 @@ impl Hypothesis {
 
 /// A parameter of a cause.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct CauseParameter {
     /// `g_1`, `tau_1_s`, `r`, `m_kpa`, `beta`, `bonding`, `friction_kpa`, `offset_kpa`, `gain_2`, …
@@ -87,6 +89,7 @@ pub struct CauseParameter {
 
 /// A named cause.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct CurveCause {
     /// [`Hypothesis::name`].
@@ -105,6 +108,7 @@ pub struct CurveCause {
 
 /// The evidence for one hypothesis at one stage of the search.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct HypothesisEvidence {
     /// Stage, from 1: what was tried on top of what the stages before took.
@@ -125,6 +129,7 @@ pub struct HypothesisEvidence {
 
 /// A material estimate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct CurveMaterial {
     /// `mu_1` (kPa), `alpha_1`, …
@@ -146,6 +151,7 @@ impl CurveMaterial {
 
 /// A number without and with the named causes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct BeforeAfter {
     /// The model without causes.
@@ -156,6 +162,7 @@ pub struct BeforeAfter {
 
 /// A curve's match without and with the physics.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct MatchBeforeAfter {
     /// Elastic material alone.
@@ -166,6 +173,7 @@ pub struct MatchBeforeAfter {
 
 /// The result of [`super::analyse_load_curve`] (`load_curve_diagnosis/1`).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LoadCurveVerdict {
     /// Always `load_curve_diagnosis/1`.

@@ -14,7 +14,7 @@ use super::nifti::Image;
 use crate::file::ReadingMemory;
 use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use utoipa::ToSchema;
 
 /// Cosine of the angle between two columns of an affine from which on the grid counts as sheared: half a degree.
@@ -48,13 +48,12 @@ pub struct NamedImage {
 ///
 /// # Errors
 /// [`ImportError::Layout`] for a sheared or flat grid.
-fn directions(named: &NamedImage) -> Result<([[f64; 3]; 3], [f64; 3]), ImportError> {
-    let affine = &named.image.affine;
+pub(super) fn directions(path: &Path, image: &Image) -> Result<([[f64; 3]; 3], [f64; 3]), ImportError> {
+    let affine = &image.affine;
     let column = |j: usize| [affine[0][j], affine[1][j], affine[2][j]];
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let edges = [0, 1, 2].map(|j| dot(column(j), column(j)).sqrt());
-    let refuse =
-        |message: &str| ImportError::Layout { name: named.path.display().to_string(), message: message.into() };
+    let refuse = |message: &str| ImportError::Layout { name: path.display().to_string(), message: message.into() };
     if !edges.iter().all(|e| *e > 0.0 && e.is_finite()) {
         return Err(refuse("its affine has a column without a length; the voxels have no size"));
     }
@@ -65,12 +64,18 @@ fn directions(named: &NamedImage) -> Result<([[f64; 3]; 3], [f64; 3]), ImportErr
     Ok((units, edges))
 }
 
+/// Whether directions and edges of two images agree.
+pub(super) fn is_same_lattice(a: ([[f64; 3]; 3], [f64; 3]), b: ([[f64; 3]; 3], [f64; 3])) -> bool {
+    let agree = |a: f64, b: f64| (a - b).abs() <= SAME_GRID * b.abs().max(1.0);
+    (0..3).all(|i| agree(a.1[i], b.1[i]) && (0..3).all(|c| agree(a.0[i][c], b.0[i][c])))
+}
+
 /// The axis that each index runs along most nearly, where the scanner's axes are the specimen's.
 ///
 /// # Errors
 /// [`ImportError::Layout`] for a sheared or flat grid, and for one turned so far that no axis is the nearest.
 pub fn axes_of_affine(named: &NamedImage) -> Result<[IndexAxis; 3], ImportError> {
-    let (units, _) = directions(named)?;
+    let (units, _) = directions(&named.path, &named.image)?;
     let nearest = units.map(|u| {
         let axis = (0..3).max_by(|&a, &b| u[a].abs().total_cmp(&u[b].abs())).unwrap_or(0);
         IndexAxis { axis, is_reversed: u[axis] < 0.0 }
@@ -103,20 +108,15 @@ pub fn recording_from_images(
     let layout =
         |named: &NamedImage, message: String| ImportError::Layout { name: named.path.display().to_string(), message };
     let first = images.first().ok_or(ImportError::Missing { what: "image", found: "no file".into() })?;
-    let (units, edges) = directions(first)?;
+    let (units, edges) = directions(&first.path, &first.image)?;
     let size = [0, 1, 2].map(|i| first.image.shape[i]);
     let num_voxels: usize = size.iter().product();
     let numeric = |values: Vec<f64>| MatValue::Numeric { dims: size.to_vec(), values, imaginary: None };
     let (mut steps, mut mask) = (Vec::new(), None);
     for named in images {
         let image = &named.image;
-        let (own_units, own_edges) = directions(named)?;
-        let differs = |a: f64, b: f64| (a - b).abs() > SAME_GRID * a.abs().max(1.0);
-        let is_same = (0..3).all(|i| {
-            image.shape[i] == size[i]
-                && !differs(own_edges[i], edges[i])
-                && (0..3).all(|c| !differs(own_units[i][c], units[i][c]))
-        });
+        let is_same = [0, 1, 2].map(|i| image.shape[i]) == size
+            && is_same_lattice(directions(&named.path, &named.image)?, (units, edges));
         if !is_same {
             let message = format!("its grid is not that of {}; resample one onto the other", first.path.display());
             return Err(layout(named, message));

@@ -1,6 +1,7 @@
 //! Displacements from other files: what the readers of MATLAB files and point clouds share.
 
 use super::mat::MatError;
+use super::scanner::ScannerError;
 use super::{Filter, RecordedStep, Recording, RecordingError};
 use crate::file::MemoryError;
 use crate::specimen::Specimen;
@@ -26,6 +27,9 @@ pub enum ImportError {
     /// A file of ours was not read or written.
     #[error(transparent)]
     Recording(#[from] RecordingError),
+    /// The files of a scanner were not read.
+    #[error(transparent)]
+    Scanner(#[from] ScannerError),
     /// The grid cannot be used.
     #[error(transparent)]
     Voxel(#[from] VoxelError),
@@ -108,14 +112,21 @@ pub struct IndexAxis {
     pub is_reversed: bool,
 }
 
-/// Where the voxels of a MATLAB file lie in the specimen's frame.
+impl IndexAxis {
+    /// Axes as they are given, such as `-y,z,x`.
+    pub(super) fn words(axes: [IndexAxis; 3]) -> String {
+        axes.map(|a| format!("{}{}", if a.is_reversed { "-" } else { "" }, ["x", "y", "z"][a.axis])).join(",")
+    }
+}
+
+/// Where the voxels of MATLAB files and of scanners lie in the specimen's frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, utoipa::ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum GridOrigin {
     /// The mask's box is centred on the specimen: the scanner's frame is not the specimen's.
     #[default]
     MaskCenter,
-    /// Where `X` says: its frame is the specimen's.
+    /// Where `X`, or the scanner, says: its frame is the specimen's.
     Positions,
 }
 
@@ -177,6 +188,20 @@ impl ImportOptions {
     }
 }
 
+/// Whether the measured box is that of the drawn block, but for what a unit or an axis could not explain.
+///
+/// # Errors
+/// [`ImportError::Extent`].
+pub(super) fn check_extent(specimen: &Specimen, grid: &VoxelGrid) -> Result<(), ImportError> {
+    let expected_mm = [specimen.block.length_mm, specimen.block.thickness_mm, specimen.block.width_mm];
+    let found_mm = [0, 1, 2].map(|a| grid.shape[a] as f64 * grid.voxel_mm[a]);
+    let fits = |a: usize| {
+        let ratio = found_mm[a] / expected_mm[a];
+        (1.0 / LARGEST_MISFIT..=LARGEST_MISFIT).contains(&ratio)
+    };
+    if (0..3).all(fits) { Ok(()) } else { Err(ImportError::Extent { found_mm, expected_mm }) }
+}
+
 /// Last checks and the recording.
 pub(super) fn finish(
     specimen: &Specimen,
@@ -186,15 +211,7 @@ pub(super) fn finish(
     options: &ImportOptions,
     notes: serde_json::Value,
 ) -> Result<Recording, ImportError> {
-    let expected_mm = [specimen.block.length_mm, specimen.block.thickness_mm, specimen.block.width_mm];
-    let found_mm = [0, 1, 2].map(|a| grid.shape[a] as f64 * grid.voxel_mm[a]);
-    let fits = |a: usize| {
-        let ratio = found_mm[a] / expected_mm[a];
-        (1.0 / LARGEST_MISFIT..=LARGEST_MISFIT).contains(&ratio)
-    };
-    if !(0..3).all(fits) {
-        return Err(ImportError::Extent { found_mm, expected_mm });
-    }
+    check_extent(specimen, &grid)?;
     let num_voxels = mask.iter().filter(|m| **m).count();
     if num_voxels == 0 {
         return Err(ImportError::EmptyMask);

@@ -8,17 +8,13 @@
 
 use super::import::{GridOrigin, ImportError, ImportOptions, IndexAxis, finish};
 use super::mat::MatValue;
+use super::placement::{MaskBox, Placement, VOXEL_BYTES, select_region};
 use super::{RecordedStep, Recording};
 use crate::file::ReadingMemory;
 use crate::specimen::Specimen;
-use crate::voxel::VoxelGrid;
 
 /// Names under which a field is looked for, first first.
 const FIELD_NAMES: [&str; 5] = ["U_t", "uicorr", "ui", "U", "u"];
-/// What is kept of a voxel beside its displacements while a recording is put together: flags, region, origin, bytes.
-const VOXEL_BYTES: u64 = 48;
-/// Regions smaller than this part of the largest are specks.
-const SPECK: f64 = 0.2;
 
 /// An array of a file: sizes and numbers, first index fastest.
 struct Array<'a> {
@@ -73,21 +69,9 @@ pub fn recording_from_mat(
         }
     };
     select_region(&mut mask, dims, options)?;
-    // The box around the mask, centred on the frame's origin.
-    let (mut low, mut high) = (dims, [0; 3]);
-    for v in (0..num_voxels).filter(|&v| mask[v]) {
-        let at = [v % dims[0], v / dims[0] % dims[1], v / (dims[0] * dims[1])];
-        for i in 0..3 {
-            low[i] = low[i].min(at[i]);
-            high[i] = high[i].max(at[i] + 1);
-        }
-    }
-    // Which index runs along which axis.
-    let index_of = [0, 1, 2].map(|axis| options.axes.iter().position(|a| a.axis == axis).unwrap_or(axis));
-    let shape = index_of.map(|i| high[i] - low[i]);
-    let voxel = index_of.map(|i| edges[i].abs());
+    let bounds = MaskBox::of(&mask, dims);
     let positions_mm = match find("X") {
-        Some(x) => Some(box_center(x, dims, (low, high), options)?),
+        Some(x) => Some(box_center(x, dims, &bounds, options)?),
         None => None,
     };
     let center = match (options.origin, positions_mm) {
@@ -95,19 +79,7 @@ pub fn recording_from_mat(
         (GridOrigin::Positions, Some(center)) => center,
         (GridOrigin::Positions, None) => return Err(ImportError::Missing { what: "X (positions)", found: names() }),
     };
-    let origin = [0, 1, 2].map(|a| center[a] - 0.5 * (shape[a] as f64 - 1.0) * voxel[a]);
-    let grid = VoxelGrid::new(origin, voxel, shape)?;
-    let source: Vec<usize> = (0..grid.num_voxels())
-        .map(|v| {
-            let n = grid.indices(v);
-            let mut at = [0; 3];
-            for (axis, &i) in index_of.iter().enumerate() {
-                at[i] = if options.axes[i].is_reversed { high[i] - 1 - n[axis] } else { low[i] + n[axis] };
-            }
-            at[0] + dims[0] * (at[1] + dims[1] * at[2])
-        })
-        .collect();
-    let flags: Vec<bool> = source.iter().map(|&s| mask[s]).collect();
+    let Placement { grid, mask: flags, source } = Placement::new(&mask, &bounds, edges, center, options.axes)?;
     let drives = match find("prescribedU").and_then(MatValue::numbers) {
         _ if options.drive_mm.len() == steps.len() => options.drive_mm.clone(),
         Some((_, values)) if options.drive_mm.is_empty() && values.len() == steps.len() => {
@@ -139,8 +111,8 @@ pub fn recording_from_mat(
     let ignored: Vec<&str> = variables.iter().map(|(n, _)| n.as_str()).filter(|n| !used.contains(n)).collect();
     let notes = serde_json::json!({
         "imported": { "field": field_name, "ignored_variables": ignored, "voxel_mm_by_index": edges, "region": options.region,
-            "origin": options.origin, "center_of_positions_mm": positions_mm, "axes": words(options.axes),
-            "components": words(components) },
+            "origin": options.origin, "center_of_positions_mm": positions_mm, "axes": IndexAxis::words(options.axes),
+            "components": IndexAxis::words(components) },
     });
     finish(specimen, grid, flags, recorded, options, notes)
 }
@@ -208,7 +180,7 @@ fn spacing_from_osc(value: &MatValue) -> Result<[f64; 3], ImportError> {
 fn box_center(
     value: &MatValue,
     dims: [usize; 3],
-    (low, high): ([usize; 3], [usize; 3]),
+    bounds: &MaskBox,
     options: &ImportOptions,
 ) -> Result<[f64; 3], ImportError> {
     let mut center = [0.0; 3];
@@ -218,18 +190,13 @@ fn box_center(
             let array = array_of(member, "X")?;
             let step = if dims[i] > 1 { array.values[stride] - array.values[0] } else { 0.0 };
             if step.abs() > along.0.abs() {
-                along = (step, array.values[0] + 0.5 * step * (low[i] + high[i] - 1) as f64);
+                along = (step, array.values[0] + step * bounds.center(i));
             }
         }
         let IndexAxis { axis, is_reversed } = options.axes[i];
         center[axis] = if is_reversed { -along.1 } else { along.1 } * options.unit_mm;
     }
     Ok(center)
-}
-
-/// Axes as they are given, such as `-y,z,x`.
-fn words(axes: [IndexAxis; 3]) -> String {
-    axes.map(|a| format!("{}{}", if a.is_reversed { "-" } else { "" }, ["x", "y", "z"][a.axis])).join(",")
 }
 
 /// Spacing along each index: whichever of the three position arrays changes along it.
@@ -257,53 +224,6 @@ fn spacing_from_positions(value: &MatValue, dims: [usize; 3]) -> Result<[f64; 3]
     } else {
         Err(layout(format!("the spacings along its indices are {spacing:?}")))
     }
-}
-
-/// Keeps one region of the mask: voxels joined by faces. Regions are counted along the array's thickness index.
-fn select_region(mask: &mut [bool], dims: [usize; 3], options: &ImportOptions) -> Result<(), ImportError> {
-    let strides = [1, dims[0], dims[0] * dims[1]];
-    let mut label = vec![0u32; mask.len()];
-    // Size and mean position along the thickness index, per region.
-    let mut regions: Vec<(usize, f64)> = Vec::new();
-    let along = options.axes.iter().position(|a| a.axis == 1).unwrap_or(1);
-    let mut stack = Vec::new();
-    for start in 0..mask.len() {
-        if !mask[start] || label[start] != 0 {
-            continue;
-        }
-        let name = regions.len() as u32 + 1;
-        let (mut size, mut sum) = (0, 0.0);
-        label[start] = name;
-        stack.push(start);
-        while let Some(v) = stack.pop() {
-            size += 1;
-            sum += (v / strides[along] % dims[along]) as f64;
-            for i in 0..3 {
-                let at = v / strides[i] % dims[i];
-                let below = (at > 0).then(|| v - strides[i]);
-                let above = (at + 1 < dims[i]).then(|| v + strides[i]);
-                for to in below.into_iter().chain(above) {
-                    if mask[to] && label[to] == 0 {
-                        label[to] = name;
-                        stack.push(to);
-                    }
-                }
-            }
-        }
-        regions.push((size, sum / f64::from(u32::try_from(size).unwrap_or(u32::MAX))));
-    }
-    let largest = regions.iter().map(|r| r.0).max().ok_or(ImportError::EmptyMask)?;
-    let mut large: Vec<usize> = (0..regions.len()).filter(|&r| regions[r].0 as f64 >= SPECK * largest as f64).collect();
-    large.sort_by(|&a, &b| regions[a].1.total_cmp(&regions[b].1));
-    let chosen = match options.region {
-        None if large.len() == 1 => large[0],
-        Some(n) if (1..=large.len()).contains(&n) => large[n - 1],
-        asked => return Err(ImportError::Regions { num_regions: large.len(), asked }),
-    };
-    for (m, l) in mask.iter_mut().zip(&label) {
-        *m = *l == chosen as u32 + 1;
-    }
-    Ok(())
 }
 
 #[cfg(test)]

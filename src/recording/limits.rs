@@ -19,7 +19,7 @@ impl ReadLimits {
         ReadLimits { max_file_bytes: 128 << 20, memory: MemoryLimit::upload(), max_steps: 200 }
     }
 
-    /// Of a recording that a job of the service reads.
+    /// Of a recording that a job of the service reads; its recordings together are one reading.
     pub fn job() -> ReadLimits {
         ReadLimits { memory: MemoryLimit::job(), ..ReadLimits::upload() }
     }

@@ -9,11 +9,13 @@ mod limits;
 mod load_curve;
 pub mod mat;
 mod nifti;
+mod placement;
 mod plate_fault;
 mod plates;
 mod points;
 mod raw;
 mod read;
+mod scanner;
 mod write;
 
 pub use error::RecordingError;
@@ -27,6 +29,10 @@ pub use plate_fault::PlateFault;
 pub use points::{DisplacementPoint, read_points, recording_from_points};
 pub use raw::{RawRecording, RawStep};
 pub use read::ReadRecording;
+pub use scanner::{
+    DicomFiles, ParavisionStudy, PhaseSource, ScannerError, SeriesLine, SeriesMap, SeriesStep, StackFault,
+    VolumeReader, VolumeSource, raw_recording_from_series,
+};
 pub use write::{write_scalars, write_vectors};
 
 use crate::specimen::Specimen;

@@ -1,7 +1,7 @@
 //! Values per parameter as bars, one per specimen, with the values written.
 
 use super::axis::Axis;
-use super::color::{AXIS, EMPTY, GRID, MUTED, SERIES};
+use super::color::{AXIS, EMPTY, GRID, MUTED, of_series};
 use super::number::significant;
 use super::svg::{NORMAL, SMALL, Svg, TITLE, TextStyle};
 use super::text::{shortened, text_width};
@@ -74,7 +74,7 @@ impl GroupedBars {
             svg.text([left - 12.0, middle + 0.35 * NORMAL], &label, &TextStyle::new(NORMAL).end());
             for s in 0..num_series {
                 let value = group.values.get(s).copied().unwrap_or(f64::NAN);
-                self.draw_value(&mut svg, value, SERIES[s % SERIES.len()], [left, y + s as f64 * BAR], &at);
+                self.draw_value(&mut svg, value, of_series(&self.series[s], s), [left, y + s as f64 * BAR], &at);
             }
         }
         let base = if self.is_log { left } else { at(0.0) };
@@ -112,7 +112,7 @@ impl GroupedBars {
             return;
         }
         for (s, name) in self.series.iter().enumerate() {
-            let color = SERIES[s % SERIES.len()];
+            let color = of_series(name, s);
             if self.is_log {
                 svg.circle([x + 5.0, y - 4.0], 4.5, color, "#ffffff", 1.0);
             } else {

@@ -23,6 +23,15 @@ pub(super) const BAD: &str = "#b3261e";
 /// Colours of series beyond base and best.
 pub(super) const SERIES: [&str; 6] = [BASE, BEST, ACCENT, "#3b8465", "#8a5a9e", "#a8882b"];
 
+/// The colour of a series: base and best have theirs in every picture, whatever their places.
+pub(super) fn of_series(name: &str, place: usize) -> &'static str {
+    match name {
+        "base" => BASE,
+        "best" => BEST,
+        _ => SERIES[place % SERIES.len()],
+    }
+}
+
 /// A colour map from 0 to 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ColorMap {
@@ -107,6 +116,13 @@ mod tests {
         assert_eq!(ColorMap::Magma.hex(2.0), "#fcfdbf");
         assert_eq!(ColorMap::Magma.hex(f64::NAN), "#000004");
         assert_eq!(ColorMap::Diverging.hex(0.5), "#f7f6f6");
+    }
+
+    #[test]
+    fn a_specimen_has_one_colour_at_every_place() {
+        assert_eq!([of_series("base", 0), of_series("base", 1)], [BASE; 2]);
+        assert_eq!([of_series("best", 0), of_series("best", 1)], [BEST; 2]);
+        assert_ne!(of_series("other", 2), of_series("another", 3));
     }
 
     #[test]

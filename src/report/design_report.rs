@@ -5,8 +5,8 @@ use super::{
     ParetoPoint, PointKind, RankedItem, RankingPlot, Report, ReportHeader, Table, design_verification::verification,
     significant, symbol_of_parameter,
 };
-use crate::design::{DesignEntry, DesignResult};
-use crate::specimen::{HoleAxis, to_svg};
+use crate::design::{DesignEntry, DesignResult, block_in_brief, holes_in_brief};
+use crate::specimen::{LimitMargin, Specimen, to_svg};
 
 /// Pictures made elsewhere, put in the page where they belong.
 #[derive(Clone, Debug, Default)]
@@ -21,10 +21,90 @@ fn show(value: Option<f64>, digits: usize) -> String {
     value.map_or("–".into(), |v| significant(v, digits))
 }
 
+/// First of all what to make and how to scan it, how precise that is, what is assumed, and the forces.
+fn what_to_do(page: &mut Report, result: &DesignResult) {
+    let (advice, recommended) = (&result.recommendation, result.recommended());
+    page.section("What to do");
+    page.callout(CalloutKind::Finding, "Make this, and scan it like this", &advice.make);
+    page.paragraph(&advice.precision);
+    page.paragraph(&advice.assumptions);
+    let samples = recommended.specimen.samples();
+    let drawings = samples.iter().map(|s| (to_svg(s), format!("Drawing of \"{}\"; dimensions in mm.", s.name)));
+    page.figures(&drawings.collect::<Vec<_>>());
+    page.table(&precision_table(result));
+    page.table(&force_table(result));
+}
+
+/// Promised standard deviations of base and recommended specimen, absolute and relative.
+fn precision_table(result: &DesignResult) -> Table {
+    let recommended = result.recommended();
+    let mut rows = Vec::new();
+    for (own, of_base) in recommended.by_material.iter().zip(&result.base.by_material) {
+        for p in &own.evaluation.promised_sd {
+            let base = of_base.evaluation.promised_sd.iter().find(|b| b.parameter == p.parameter);
+            let percent = |sd: Option<f64>| show(sd.map(|sd| 100.0 * sd), 2);
+            rows.push(vec![
+                own.material.clone(),
+                symbol_of_parameter(&p.parameter),
+                show(p.value, 2),
+                percent(p.relative_sd),
+                show(base.and_then(|b| b.value), 2),
+                percent(base.and_then(|b| b.relative_sd)),
+            ]);
+        }
+    }
+    Table {
+        caption: "What one scan promises, all parameters being fitted together: one standard deviation.".into(),
+        columns: vec![
+            Column::words("Material"),
+            Column::words("Parameter"),
+            Column::numbers("Recommended", "kPa, 1"),
+            Column::numbers("of the value", "%"),
+            Column::numbers("Base", "kPa, 1"),
+            Column::numbers("of the value", "%"),
+        ],
+        rows,
+        note: "Moduli (μ, κ) in kPa, exponents (α) are pure numbers. κ is hardly seen in such a test.".into(),
+        ..Table::default()
+    }
+}
+
+/// Forces of base and recommended specimen, each with its material and drive.
+fn force_table(result: &DesignResult) -> Table {
+    let mut rows = Vec::new();
+    for (label, entry) in [("recommended", result.recommended()), ("base", &result.base)] {
+        for m in &entry.by_material {
+            let of_scan = m.evaluation.steps.iter().map(|s| (s.drive_mm, s.force_n, "scan"));
+            let on_the_way = m.evaluation.force_steps.iter().map(|s| (s.drive_mm, s.force_n, "force alone"));
+            for (drive_mm, force_n, what) in on_the_way.chain(of_scan) {
+                rows.push(vec![
+                    label.into(),
+                    m.material.clone(),
+                    significant(drive_mm, 3),
+                    what.into(),
+                    significant(force_n, 3),
+                ]);
+            }
+        }
+    }
+    Table {
+        caption: "Forces of all samples together.".into(),
+        columns: vec![
+            Column::words("Specimen"),
+            Column::words("Material"),
+            Column::numbers("Drive", "mm"),
+            Column::words("What is read"),
+            Column::numbers("Force", "N"),
+        ],
+        rows,
+        ..Table::default()
+    }
+}
+
 /// The report of `result`.
 pub fn design_report(result: &DesignResult, pictures: &DesignPictures) -> String {
     let header = ReportHeader {
-        subtitle: format!("Best specimen found: {}", result.best.specimen.name),
+        subtitle: format!("Recommended: {}", result.recommended().specimen.name),
         program_version: result.version.clone(),
         input_hash: result.input_hash.clone(),
         seed: Some(result.seed),
@@ -35,14 +115,9 @@ pub fn design_report(result: &DesignResult, pictures: &DesignPictures) -> String
         ],
     };
     let mut page = Report::new(result.name.clone(), header);
+    what_to_do(&mut page, result);
     page.section("What was found");
-    for (index, sentence) in result.findings.iter().enumerate() {
-        if index == 0 {
-            page.callout(CalloutKind::Finding, "The best specimen", sentence);
-        }
-    }
-    page.list(&result.findings[1.min(result.findings.len())..]);
-    page.figures(&[(to_svg(&result.best.specimen), "Drawing of the best specimen; dimensions in mm.")]);
+    page.list(&result.findings);
     if !pictures.deformed.is_empty() {
         page.subsection("Under load");
         page.figures(&pictures.deformed);
@@ -94,8 +169,8 @@ pub fn design_report(result: &DesignResult, pictures: &DesignPictures) -> String
             .limits
             .iter()
             .map(|m| LimitBar {
-                name: m.name.clone(),
-                unit: String::new(),
+                name: m.plain_name().into(),
+                unit: m.unit().into(),
                 value: m.value,
                 limit: m.limit,
                 margin_relative: m.margin_relative,
@@ -123,8 +198,8 @@ pub fn design_report(result: &DesignResult, pictures: &DesignPictures) -> String
     };
     page.figure(&history.to_svg(), "Best gain within all limits after each evaluation, at search fidelity.");
     page.paragraph(&format!(
-        "{} Gains are relative to the base specimen at its drive; confirmed values come from the standard mesh and the scan's own \
-         voxels. Seed {}.",
+        "{} Gains are relative to the base specimen at its drive; confirmed values are means over three meshes, with the scan's \
+         own voxels. Seed {}.",
         result.objective.words(),
         result.seed
     ));
@@ -151,27 +226,9 @@ fn information_gain(entry: &DesignEntry, base: &DesignEntry, material: usize) ->
     of(base).zip(of(entry)).map_or(f64::NAN, |(base, own)| base / own)
 }
 
-/// The holes in brief: equal diameters together.
-fn short(entry: &DesignEntry) -> String {
-    let mut groups: Vec<(String, usize)> = Vec::new();
-    for hole in &entry.specimen.holes {
-        let diameter = format!("⌀{:.1}", hole.diameter_mm);
-        match groups.iter_mut().find(|(d, _)| *d == diameter) {
-            Some((_, count)) => *count += 1,
-            None => groups.push((diameter, 1)),
-        }
-    }
-    let along_width = entry.specimen.holes.first().is_some_and(|h| h.axis == HoleAxis::Width);
-    let list: Vec<String> = groups.into_iter().map(|(d, n)| if n > 1 { format!("{n} × {d}") } else { d }).collect();
-    match list.as_slice() {
-        [] => "solid".into(),
-        list => format!("{}{}", list.join(" + "), if along_width { " (along the width)" } else { "" }),
-    }
-}
-
-fn block(entry: &DesignEntry) -> String {
-    let b = &entry.specimen.block;
-    format!("{:.1} × {:.2} × {:.1}", b.length_mm, b.thickness_mm, b.width_mm)
+/// Something of every sample, in their order.
+fn of_samples(entry: &DesignEntry, of: fn(&Specimen) -> String) -> String {
+    entry.specimen.samples().iter().map(of).collect::<Vec<_>>().join("; ")
 }
 
 fn gains_table(best: &DesignEntry) -> Table {
@@ -237,10 +294,10 @@ fn ranked_table(result: &DesignResult) -> Table {
     let row = |label: String, entry: &DesignEntry| {
         vec![
             label,
-            short(entry),
-            block(entry),
-            significant(entry.specimen.drive_mm.last().copied().unwrap_or(f64::NAN), 3),
-            significant(entry.force_n(), 3),
+            of_samples(entry, holes_in_brief),
+            of_samples(entry, block_in_brief),
+            entry.specimen.drive_mm.iter().map(|d| significant(*d, 3)).collect::<Vec<_>>().join(", "),
+            entry.largest_force().map_or("–".into(), |(material, n)| format!("{} ({material})", significant(n, 3))),
             format!(
                 "{} ± {}",
                 significant(entry.objective, 4),
@@ -248,7 +305,7 @@ fn ranked_table(result: &DesignResult) -> Table {
             ),
             show(entry.information().map(|i| 100.0 * i), 3),
             if entry.is_within_limits {
-                entry.closest_limit.clone()
+                entry.limits.first().map_or("none".into(), LimitMargin::in_words)
             } else {
                 format!("not kept: {}", entry.not_kept())
             },
@@ -261,7 +318,12 @@ fn ranked_table(result: &DesignResult) -> Table {
         .filter_map(|(i, e)| Some(format!("{}: {}", i + 1, e.remark.as_ref()?)))
         .collect();
     let mut rows = vec![row("base".into(), &result.base)];
-    rows.extend(result.ranked.iter().enumerate().map(|(i, e)| row((i + 1).to_string(), e)));
+    let rank = |place: usize| {
+        let equal = if place > 0 && result.equal_to_best.contains(&place) { " (as good as 1)" } else { "" };
+        let chosen = if place == result.simplest { ", recommended" } else { "" };
+        format!("{}{equal}{chosen}", place + 1)
+    };
+    rows.extend(result.ranked.iter().enumerate().map(|(i, e)| row(rank(i), e)));
     Table {
         caption: "Confirmed designs, best first.".into(),
         columns: vec![
@@ -269,13 +331,13 @@ fn ranked_table(result: &DesignResult) -> Table {
             Column::words("Holes"),
             Column::words("Block, mm"),
             Column::numbers("Drive", "mm"),
-            Column::numbers("Force", "N"),
+            Column::numbers("Largest force", "N"),
             Column::numbers("Gain", "×"),
             Column::numbers("Generalised sd", "%"),
             Column::words("Closest limit"),
         ],
         rows,
-        emphasised_rows: vec![1],
+        emphasised_rows: vec![1 + result.simplest],
         note: format!("Generalised sd: (det C)^(1/2n) of all μ and α of the first material. {}", remarks.join(" ")),
     }
 }
@@ -302,7 +364,7 @@ fn pareto_plot(result: &DesignResult) -> ParetoPlot {
     }
     ParetoPlot {
         title: String::new(),
-        x_label: "force, N (largest over the materials)".into(),
+        x_label: "largest force over the materials at the drive of the scan, N".into(),
         y_label: "generalised sd, %".into(),
         is_log_x: false,
         is_log_y: false,

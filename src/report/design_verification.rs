@@ -1,7 +1,7 @@
 //! The report's section on the verification: what calibration on synthetic noisy scans found beside what was promised.
 
 use super::html::Report;
-use super::{Column, SpreadPlot, SpreadRow, Table, significant, symbol_of_parameter};
+use super::{CalloutKind, Column, SpreadPlot, SpreadRow, Table, significant, symbol_of_parameter};
 use crate::calibration::ParameterSpread;
 use crate::design::DesignResult;
 
@@ -31,11 +31,12 @@ fn row(specimen: &str, p: &ParameterSpread) -> Vec<String> {
         significant(p.truth, 4),
         show(p.promised_sd, 3),
         show(Some(p.found_sd), 3),
-        show(p.promised_sd.map(|sd| p.found_sd / sd), 3),
+        show(p.found_over_promised(), 3),
         coverage(p).map_or("–".into(), |c| format!("{:.0}", 100.0 * c)),
         show(Some(p.mean - p.truth), 2),
         show(p.discretisation_bias, 2),
         format!("{}{failed}{limited}", p.draws),
+        if p.doubts.is_empty() { "yes".into() } else { "no (see above)".into() },
     ]
 }
 
@@ -47,7 +48,14 @@ pub(super) fn verification(page: &mut Report, result: &DesignResult) {
          30 % off the truth. The spread of the estimates is set beside the spread promised: a ratio near 1 means that the promise \
          can be trusted.",
     );
-    page.list(&result.verification_failures());
+    let (failures, doubts) = (result.verification_failures(), result.verification_doubts());
+    page.list(&failures);
+    let is_whole = result.verification_by_material.iter().all(|v| !v.best.is_empty() && !v.base.is_empty());
+    if doubts.is_empty() && failures.is_empty() && is_whole {
+        page.paragraph("No row of these tables gives a reason to doubt what is promised.");
+    } else if !doubts.is_empty() {
+        page.callout(CalloutKind::Caution, "Not to be trusted", &doubts.join("\n\n"));
+    }
     for v in &result.verification_by_material {
         let (mut table_rows, mut rows) = (Vec::new(), Vec::new());
         for (label, list) in [("best", &v.best), ("base", &v.base)] {
@@ -63,6 +71,9 @@ pub(super) fn verification(page: &mut Report, result: &DesignResult) {
                 });
             }
         }
+        let all = v.best.iter().chain(&v.base);
+        let doubtful = all.enumerate().filter(|(_, p)| !p.doubts.is_empty()).map(|(n, _)| n).collect();
+        let is_corrected = v.best.iter().chain(&v.base).any(|p| p.is_mesh_corrected);
         let draws = v.best.first().map_or(0, |p| p.draws + p.failed_draws);
         page.table(&Table {
             caption: format!("Material \"{}\".", v.material),
@@ -77,17 +88,18 @@ pub(super) fn verification(page: &mut Report, result: &DesignResult) {
                 Column::numbers("Bias", ""),
                 Column::numbers("of it mesh", ""),
                 Column::numbers("Draws", ""),
+                Column::words("To be trusted"),
             ],
+            emphasised_rows: doubtful,
             rows: table_rows,
             note: format!(
                 "Moduli in kPa. Bias: mean of the estimates less the truth. Of it mesh: what a fit to the scan without noise misses the \
                  truth by; the scan is made on a finer mesh than the fit uses, so this part comes from the fit's mesh and not from the \
-                 specimen or the noise, and a finer mesh makes it smaller. Coverage: draws whose estimate ± 1.96 promised sd holds the \
+                 specimen or the noise{}. Coverage: draws whose estimate ± 1.96 promised sd holds the \
                  truth, the mesh's part taken out; 95 is right. With {draws} draws a found sd is itself uncertain by about {:.0} %.",
-                // Relative standard error of a standard deviation of n normal draws.
-                100.0 / (2.0 * (draws.max(2) as f64 - 1.0)).sqrt()
+                if is_corrected { " (the fits are corrected by a mesh between the two)" } else { "" },
+                100.0 * ParameterSpread::spread_error(draws)
             ),
-            ..Table::default()
         });
         let plot = SpreadPlot { title: format!("Material \"{}\"", v.material), rows };
         page.figure(&plot.to_svg(), "Each draw's estimate, the truth, and ± the promised standard deviation.");
@@ -113,7 +125,9 @@ mod tests {
             failed_draws: 0,
             estimates: vec![1.0, 2.0, 3.0],
             discretisation_bias: None,
+            is_mesh_corrected: false,
             limited_draws: 0,
+            doubts: Vec::new(),
         };
         let third = 1.0 / 3.0;
         assert!((coverage(&p).expect("promised") - third).abs() < 1e-12);

@@ -3,8 +3,10 @@
 use super::bars::{BarGroup, GroupedBars};
 use super::color::ColorMap;
 use super::curves::{CurveSeries, CurvesPlot};
+use super::lines::{Line, LinePlot};
 use super::maps::{VoxelField, VoxelMaps};
-use crate::diagnosis::{Diagnosis, LoadHistoryFit, ScoreMap, Trace};
+use crate::diagnosis::{Diagnosis, LawCurve, LoadHistoryFit, ScoreMap, Trace, law_curves};
+use crate::homogeneous::HomogeneousTest;
 
 /// Most suspects in the picture of the evidence, and most letters of each label.
 const MAX_SUSPECTS: usize = 12;
@@ -18,6 +20,8 @@ pub(super) struct DiagnosisPictures {
     pub(super) evidence: String,
     /// The load curve, where there is one.
     pub(super) load_curve: Option<String>,
+    /// The law with its correction, where it has one.
+    pub(super) law: Option<String>,
     /// Maps of where a misfit may come from: name and picture.
     pub(super) maps: Vec<(String, String)>,
 }
@@ -32,6 +36,7 @@ impl DiagnosisPictures {
             ],
             evidence: evidence_bars(d),
             load_curve: d.load.as_ref().map(load_curve),
+            law: law_plot(&law_curves(&d.corrected)),
             maps: d.maps.iter().map(|(name, map)| (name.clone(), significance_map(name, map))).collect(),
         }
     }
@@ -45,6 +50,7 @@ impl DiagnosisPictures {
             ("evidence".to_string(), self.evidence),
         ];
         all.extend(self.load_curve.map(|svg| ("load-curve".to_string(), svg)));
+        all.extend(self.law.map(|svg| ("law".to_string(), svg)));
         all.extend(self.maps.into_iter().enumerate().map(|(n, (_, svg))| (format!("map-{}", n + 1), svg)));
         all
     }
@@ -69,6 +75,31 @@ fn load_curve(load: &LoadHistoryFit) -> String {
         }],
     }
     .to_svg()
+}
+
+/// Stress over stretch of three tests, by the Ogden terms alone and with the correction.
+fn law_plot(curves: &[LawCurve]) -> Option<String> {
+    let lines_of = |curve: &LawCurve| {
+        let test = match curve.test {
+            HomogeneousTest::Uniaxial => "uniaxial",
+            HomogeneousTest::PureShear => "pure shear",
+            HomogeneousTest::Equibiaxial => "equibiaxial",
+            HomogeneousTest::SimpleShear => "simple shear",
+        };
+        [("", 2), (", terms alone", 1)].map(|(which, column)| Line {
+            name: format!("{test}{which}"),
+            points: curve.points.iter().map(|p| [p[0], p[column]]).collect(),
+            has_marks: false,
+        })
+    };
+    let plot = LinePlot {
+        title: "The law: Ogden terms and correction".into(),
+        x_label: "stretch".into(),
+        y_label: "nominal stress (kPa)".into(),
+        is_log: false,
+        lines: curves.iter().flat_map(lines_of).collect(),
+    };
+    (!curves.is_empty()).then(|| plot.to_svg())
 }
 
 /// Nineteen of twenty voxels are within the colours' range, which is no less than three standard deviations of the

@@ -26,6 +26,9 @@ pub fn diagnosis_report(d: &Diagnosis, r: &DiagnosisResult) -> Report {
     let [before, after] = &pictures.residuals;
     page.figure(before, "Measured minus nominal model at the largest drive. Each map has a scale of its own (see its bar): 19 of 20 voxels are within it, and it is no less than three standard deviations of the noise.");
     page.figure(after, "The same with the causes modelled, on scales of their own.");
+    if let Some(svg) = &pictures.law {
+        page.figure(svg, "Nominal stress of the incompressible material in homogeneous tests, up to the states that the largest drive brings about: the Ogden terms alone, and with the correction of the law.");
+    }
     if let Some(svg) = &pictures.load_curve {
         page.section("Load curve");
         page.figure(svg, "Force over time; measured minus modelled below.");
@@ -156,13 +159,14 @@ fn describe(page: &mut Report, cause: &CauseResult) {
 }
 
 fn before_and_after(page: &mut Report, r: &DiagnosisResult) {
+    let mut rows = vec![
+        row("χ² per datum (1 is noise)", r.chi2_per_datum.before, r.chi2_per_datum.after),
+        row("misfit beyond noise, mm rms", r.structured_rms_mm.before, r.structured_rms_mm.after),
+    ];
+    rows.extend(r.kept_back_rms_mm.as_ref().map(|k| row("misfit on blocks kept back, mm rms", k.before, k.after)));
     page.table(&Table {
         columns: vec![Column::words(""), Column::numbers("nominal model", ""), Column::numbers("with the causes", "")],
-        rows: vec![
-            row("χ² per datum (1 is noise)", r.chi2_per_datum.before, r.chi2_per_datum.after),
-            row("misfit beyond noise, mm rms", r.structured_rms_mm.before, r.structured_rms_mm.after),
-            row("misfit on blocks kept back, mm rms", r.kept_back_rms_mm.before, r.kept_back_rms_mm.after),
-        ],
+        rows,
         note: "Kept back: the fits see one colour of a chequerboard of voxel blocks and predict the other, in turn."
             .into(),
         ..Table::default()

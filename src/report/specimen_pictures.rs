@@ -5,9 +5,9 @@ use super::{
     VoxelField, VoxelMaps, Vtu, element_means, nodal_values, surface_quads, symbol_of_parameter,
 };
 use crate::fem::{Equilibrium, ForwardModel, QuadraturePoint};
-use crate::kinematics::decompose;
+use crate::kinematics::{Decomposition, decompose};
 use crate::material::Ogden;
-use crate::sensitivity::{Evaluation, EvaluationMaps};
+use crate::sensitivity::{Evaluation, SampleMaps};
 
 /// The deformed specimen, coloured by the largest principal stretch.
 ///
@@ -65,26 +65,25 @@ pub fn vtu_of(model: &ForwardModel, material: &Ogden, state: &Equilibrium) -> Re
     Ok(vtu.to_xml())
 }
 
-/// The (λ, k) histograms of several specimens or drives side by side: (title, evaluation maps, index of the drive).
-pub fn histogram_picture(panels: &[(String, &EvaluationMaps, usize)]) -> String {
+/// The (λ, k) histograms of several specimens or drives side by side: (title, states of the voxels).
+pub fn histogram_picture(panels: &[(String, &[Decomposition])]) -> String {
     // One λ axis for all: the panels' own axes end at different stretches, so the voxels are binned anew.
     let (num_stretch, num_mode) = (60, 50);
-    let states = |maps: &EvaluationMaps, drive: usize| -> Vec<(f64, f64)> {
-        let list = maps.drives.get(drive).map_or(&[][..], |d| &d.states[..]);
+    let states = |list: &[Decomposition]| -> Vec<(f64, f64)> {
         list.iter().filter_map(|s| Some((s.stretch_amplitude, s.deformation_mode?))).collect()
     };
-    let largest = panels.iter().flat_map(|(_, m, d)| states(m, *d)).fold(1.1f64, |s, x| s.max(x.0));
+    let largest = panels.iter().flat_map(|(_, list)| states(list)).fold(1.1f64, |s, x| s.max(x.0));
     let high = (largest * 10.0).ceil() / 10.0;
     let panels = panels
         .iter()
-        .map(|(title, maps, drive)| {
+        .map(|(title, list)| {
             let mut density = vec![0.0; num_stretch * num_mode];
-            for (stretch, mode) in states(maps, *drive) {
+            for (stretch, mode) in states(list) {
                 let i = (((stretch - 1.0) / (high - 1.0) * num_stretch as f64) as usize).min(num_stretch - 1);
                 let j = ((mode * num_mode as f64) as usize).min(num_mode - 1);
                 density[i + num_stretch * j] += 1.0;
             }
-            let mut all: Vec<f64> = states(maps, *drive).into_iter().map(|s| s.0).collect();
+            let mut all: Vec<f64> = states(list).into_iter().map(|s| s.0).collect();
             all.sort_by(f64::total_cmp);
             DensityPanel { title: title.clone(), density, median_stretch: all.get(all.len() / 2).copied() }
         })
@@ -101,11 +100,11 @@ pub fn histogram_picture(panels: &[(String, &EvaluationMaps, usize)]) -> String 
     .to_svg()
 }
 
-/// Maps of λ, k and every S_ξ at the last drive.
-pub fn map_pictures(maps: &EvaluationMaps) -> Vec<(String, String)> {
-    let Some(drive) = maps.drives.last() else { return Vec::new() };
-    let spread = |values: &[f64]| maps.mask.spread(values, f64::NAN);
-    let grid = &maps.mask.grid;
+/// Maps of λ, k and every S_ξ of a scanned sample at the last drive.
+pub fn map_pictures(sample: &SampleMaps) -> Vec<(String, String)> {
+    let (Some(drive), Some(mask)) = (sample.drives.last(), &sample.mask) else { return Vec::new() };
+    let spread = |values: &[f64]| mask.spread(values, f64::NAN);
+    let grid = &mask.grid;
     let picture = |fields: Vec<VoxelField>| {
         VoxelMaps { shape: grid.shape, origin_mm: grid.origin_mm, voxel_mm: grid.voxel_mm, fields }.to_svg()
     };

@@ -1,7 +1,7 @@
 //! The spread found by calibrating on synthetic noisy scans beside the spread promised.
 
 use super::axis::Axis;
-use super::color::{AXIS, GRID, INK, MUTED, SERIES};
+use super::color::{AXIS, GRID, INK, MUTED, of_series};
 use super::number::significant;
 use super::svg::{NORMAL, SMALL, Svg, TITLE, TextStyle};
 use super::text::{shortened, text_width};
@@ -9,7 +9,8 @@ use super::text::{shortened, text_width};
 /// One parameter of one specimen.
 #[derive(Clone, Debug, Default)]
 pub struct SpreadRow {
-    /// Name of the specimen; rows of one specimen have one colour, in the order of first appearance.
+    /// Name of the specimen; rows of one specimen have one colour: `base` and `best` theirs, others in the order of
+    /// first appearance.
     pub specimen: String,
     /// The parameter's symbol.
     pub parameter: String,
@@ -83,7 +84,7 @@ impl SpreadPlot {
                 svg.line([8.0, y - 0.5 * ROW], [columns[2], y - 0.5 * ROW], GRID, 1.0, "");
             }
             svg.text([left - 12.0, y + 0.35 * NORMAL], &row_label(row), &TextStyle::new(NORMAL).end());
-            draw_row(&mut svg, row, &axis, [left, y], SERIES[color % SERIES.len()]);
+            draw_row(&mut svg, row, &axis, [left, y], of_series(&row.specimen, color));
             let found_sd = standard_deviation(&row.found).map_or(f64::NAN, |(_, sd)| sd);
             let with_unit = |v: f64| {
                 let unit = if v.is_finite() { row.unit.as_str() } else { "" };

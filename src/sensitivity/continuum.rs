@@ -49,6 +49,30 @@ pub fn integrate_over_quadrature(
         .collect()
 }
 
+/// 𝒮 as [`integrate_over_quadrature`] gives it, over all scanned blocks; `mean_per_voxel` over their whole volume.
+pub fn integrate_over_blocks(
+    material: &Ogden,
+    blocks: &[ScannedBlock],
+    voxel_volume_mm3: f64,
+) -> Vec<IntegratedSensitivity> {
+    let mut all: Vec<IntegratedSensitivity> = Vec::new();
+    let mut volume_mm3 = 0.0;
+    for block in blocks.iter().filter(|b| b.count > 0) {
+        let (count, mirror) = (f64::from(block.count), block.mesh.mirror);
+        volume_mm3 += count * num_copies(mirror) * block.points.iter().map(|p| p.volume_mm3).sum::<f64>();
+        let own = integrate_over_quadrature(material, block.points, mirror, voxel_volume_mm3);
+        for (index, own) in own.into_iter().enumerate() {
+            if all.len() <= index {
+                all.push(IntegratedSensitivity { sum: 0.0, volume_integral: 0.0, ..own.clone() });
+            }
+            all[index].sum += count * own.sum;
+            all[index].volume_integral += count * own.volume_integral;
+        }
+    }
+    all.iter_mut().for_each(|s| s.mean_per_voxel = s.volume_integral / volume_mm3);
+    all
+}
+
 /// Fisher information of one drive with ∫ dV / V_voxel in place of the sum over voxels.
 ///
 /// `points` come from [`crate::fem::ForwardModel::quadrature_fields`] (element after element, in the order of
@@ -97,28 +121,45 @@ pub struct ForceReadings<'a> {
     pub protocol: &'a Protocol,
 }
 
-/// As [`information_over_quadrature`] for a scan and any number of forces read on the way to it, the scan's own among
-/// them, with the gain and the zero of the load cell as unknown as their protocol says. (The drive's zero is not among
-/// the unknowns here.)
+/// A block in the scanner, on its mesh.
+#[derive(Clone, Copy, Debug)]
+pub struct ScannedBlock<'a> {
+    /// How many such blocks are scanned.
+    pub count: u32,
+    /// The mesh.
+    pub mesh: &'a Mesh,
+    /// From [`crate::fem::ForwardModel::quadrature_fields`].
+    pub points: &'a [QuadraturePoint],
+    /// In the order of [`Ogden::parameters`].
+    pub sensitivities: &'a [ParameterSensitivity],
+}
+
+/// As [`information_over_quadrature`] for a scan of some blocks and any number of forces read on the way to it, the
+/// scan's own among them, with the gain and the zero of the load cell as unknown as their protocol says. (The drive's
+/// zero is not among the unknowns here.)
 ///
 /// # Errors
 /// As [`information_over_quadrature`].
 pub fn information_of_protocol(
     material: &Ogden,
-    mesh: &Mesh,
-    points: &[QuadraturePoint],
-    scanned: &[ParameterSensitivity],
+    blocks: &[ScannedBlock],
     forces: &ForceReadings,
     noise: &MeasurementNoise,
     voxel_volume_mm3: f64,
 ) -> Result<FisherInformation, InformationError> {
-    let fields: Vec<(&[[f64; 3]], f64)> = scanned.iter().map(|s| (&s.displacement[..], 0.0)).collect();
-    let gram = gram_over_quadrature(mesh, points, &fields, noise, voxel_volume_mm3)?;
+    let num = material.parameters().len();
+    let mut gram = DMatrix::zeros(num, num);
+    for block in blocks.iter().filter(|b| b.count > 0) {
+        check_length("sensitivities", block.sensitivities.len(), num)?;
+        let fields: Vec<(&[[f64; 3]], f64)> = block.sensitivities.iter().map(|s| (&s.displacement[..], 0.0)).collect();
+        gram +=
+            gram_over_quadrature(block.mesh, block.points, &fields, noise, voxel_volume_mm3)? * f64::from(block.count);
+    }
     let unknowns: Vec<(Nuisance, f64)> =
         forces.protocol.nuisances().into_iter().filter(|(n, _)| *n != Nuisance::DriveZero).collect();
     let mut joint = JointInformation::of_scan(FisherInformation::from_matrix(material, gram)?, unknowns.len());
     for reading in forces.readings {
-        check_length("a force's sensitivities", reading.sensitivities.len(), scanned.len())?;
+        check_length("a force's sensitivities", reading.sensitivities.len(), num)?;
         let of_unknown = |(unknown, _): &(Nuisance, f64)| match unknown {
             Nuisance::ForceGain => reading.force_n,
             Nuisance::ForceZero | Nuisance::DriveZero => 1.0,

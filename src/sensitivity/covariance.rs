@@ -17,6 +17,7 @@ const NULL_COMPONENT: f64 = 1e-5;
 
 /// What a parameter's standard deviation would be.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct PromisedSd {
     /// `kappa`, `mu_1`, `alpha_1`, …

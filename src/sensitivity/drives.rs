@@ -1,8 +1,9 @@
 //! At which drives a specimen is evaluated, and the search for the drive that reaches a median stretch.
 
 use super::error::EvaluationError;
-use super::observation::Scanner;
-use crate::fem::{Equilibrium, ForwardModel, SolveOptions};
+use super::fixture::Fixture;
+use super::observation::median;
+use crate::fem::{Equilibrium, SolveOptions};
 use crate::material::Ogden;
 use crate::specimen::{Specimen, TestKind};
 use serde::{Deserialize, Serialize};
@@ -22,6 +23,16 @@ pub enum DriveSelection {
     DriveMm(Vec<f64>),
     /// The one at which the median of λ over voxels has this value.
     MedianStretch(f64),
+}
+
+impl DriveSelection {
+    /// How many drives are evaluated.
+    pub fn count(&self) -> usize {
+        match self {
+            DriveSelection::DriveMm(drives_mm) => drives_mm.len(),
+            DriveSelection::MedianStretch(_) => 1,
+        }
+    }
 }
 
 /// Refuses empty, unordered and unreachable selections.
@@ -59,27 +70,36 @@ fn homogeneous_drive_mm(specimen: &Specimen, stretch: f64) -> f64 {
     }
 }
 
-/// Solves for the drive at which the median of λ over voxels is `target`, each equilibrium from the last.
+/// Equilibria of each part of a fixture, and how many were solved for.
+type Paths = (Vec<Vec<Equilibrium>>, usize);
+
+/// Solves for the drive at which the median of λ over all scanned voxels is `target`, each equilibrium from the last.
 pub(super) fn solve_for_median(
-    model: &mut ForwardModel,
-    specimen: &Specimen,
+    fixture: &mut Fixture,
     material: &Ogden,
-    scanner: &Scanner,
     target: f64,
     options: &SolveOptions,
     is_cancelled: &dyn Fn() -> bool,
-) -> Result<(Equilibrium, usize), EvaluationError> {
-    let mut last: Option<Equilibrium> = None;
+) -> Result<Paths, EvaluationError> {
+    let mut last: Vec<Option<Equilibrium>> = fixture.parts().iter().map(|_| None).collect();
     let mut count = 0;
-    find_drive(homogeneous_drive_mm(specimen, target), target, |drive_mm| {
-        let found = model.solve(material, drive_mm, last.as_ref(), options, is_cancelled)?;
-        let median = scanner.median_stretch(&found.displacement)?;
-        last = Some(found);
-        count += 1;
-        Ok(median)
+    let guess_mm = homogeneous_drive_mm(fixture.specimen(), target);
+    find_drive(guess_mm, target, |drive_mm| {
+        let mut stretches = Vec::new();
+        for (part, last) in fixture.parts_mut().iter_mut().zip(&mut last) {
+            let found = part.model.solve(material, drive_mm, last.as_ref(), options, is_cancelled)?;
+            if let Some(scanner) = &part.scanner {
+                let own = scanner.stretches(&found.displacement)?;
+                (0..part.num_scanned).for_each(|_| stretches.extend(&own));
+            }
+            *last = Some(found);
+            count += 1;
+        }
+        Ok(median(stretches).unwrap_or(1.0))
     })?;
     // `find_drive` succeeds only after at least one solve.
-    last.map(|equilibrium| (equilibrium, count)).ok_or(EvaluationError::NoDrive)
+    let found: Option<Vec<Vec<Equilibrium>>> = last.into_iter().map(|e| Some(vec![e?])).collect();
+    found.map(|paths| (paths, count)).ok_or(EvaluationError::NoDrive)
 }
 
 /// Finds the drive at which an increasing function `median_at(drive)` with value 1 at rest has the value `target`:

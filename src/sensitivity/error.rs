@@ -1,6 +1,7 @@
 //! What can go wrong in an evaluation.
 
 use super::information::InformationError;
+use super::protocol::ProtocolMismatch;
 use crate::fem::SolveError;
 use crate::mesh::MeshError;
 use crate::voxel::VoxelError;
@@ -21,6 +22,9 @@ pub enum EvaluationError {
     /// The noise or a sensitivity is unusable.
     #[error(transparent)]
     Information(#[from] InformationError),
+    /// The protocol does not suit the specimen.
+    #[error(transparent)]
+    Protocol(#[from] ProtocolMismatch),
     /// No drive was given.
     #[error("no drive to evaluate; give at least one, in mm")]
     NoDrive,

@@ -1,152 +1,54 @@
 //! Evaluates a specimen: what a scan of it would see and what it would tell about the material.
 
 use super::continuum::largest_principal_stretch;
-use super::covariance::{IDENTIFIABILITY_LIMIT, PromisedSd};
 use super::drives::{DriveSelection, check_drives, solve_for_median};
 use super::error::EvaluationError;
+use super::evaluation_options::EvaluationOptions;
+use super::evaluation_result::{Evaluation, EvaluationNotes, EvaluationStatistics, ForceStep};
+use super::fixture::{Fixture, Part};
 use super::information::FisherInformation;
 use super::joint_information::JointInformation;
-use super::observation::{DriveMaps, DrivenState, EvaluationStep, Scanner, Unknown};
+use super::observation::{DriveMaps, DrivenState, EvaluationStep, Scanner, SeenBlocks, Unknown};
 use super::protocol::{Nuisance, Protocol, SAME_DRIVE_MM};
 use super::scan_settings::ScanSettings;
-use crate::fem::{Equilibrium, ForwardModel, PrepareError, SolveError, SolveOptions, Tangent};
-use crate::material::{Ogden, Parameter};
-use crate::mesh::MeshOptions;
+use super::shares::{BestShares, SharedTime, best_shares};
+use crate::fem::{Equilibrium, Tangent};
+use crate::material::Ogden;
 use crate::provenance::input_hash;
 use crate::specimen::Specimen;
 use crate::voxel::{Sampling, VoxelMask};
-use serde::{Deserialize, Serialize};
-
-/// Settings of an evaluation.
-#[derive(Clone, Debug)]
-pub struct EvaluationOptions {
-    /// The mesh.
-    pub mesh: MeshOptions,
-    /// Sample points per voxel.
-    pub sampling: Sampling,
-    /// The solver.
-    pub solve: SolveOptions,
-    /// Largest relative standard deviation of an identifiable parameter.
-    pub identifiability_limit: f64,
-    /// Standard deviation of ln κ known beforehand, added to the joint information; none by default.
-    pub bulk_log_prior_sd: Option<f64>,
-    /// Forces read beside the scans, and what is not known exactly of the set-up; none by default.
-    pub protocol: Protocol,
-}
-
-impl EvaluationOptions {
-    /// Standard mesh, default sampling and tolerances, no prior.
-    pub fn standard(specimen: &Specimen) -> Self {
-        EvaluationOptions {
-            mesh: MeshOptions::standard(specimen),
-            sampling: Sampling::default(),
-            solve: SolveOptions::default(),
-            identifiability_limit: IDENTIFIABILITY_LIMIT,
-            bulk_log_prior_sd: None,
-            protocol: Protocol::default(),
-        }
-    }
-}
-
-/// Result of an evaluation (`evaluation/1`).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Evaluation {
-    /// Always `evaluation/1`.
-    pub schema: String,
-    /// Drives that are scanned, increasing.
-    pub steps: Vec<EvaluationStep>,
-    /// Drives at which the force alone is read.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub force_steps: Vec<ForceStep>,
-    /// Standard deviations that all drives together promise.
-    pub promised_sd: Vec<PromisedSd>,
-    /// Correlation of the estimates, rows and columns as `promised_sd`; null where undetermined.
-    pub correlation: Vec<Vec<Option<f64>>>,
-    /// Largest over smallest eigenvalue of the relative covariance of all μᵢ, αᵢ; null where undetermined.
-    pub condition_number: Option<f64>,
-    /// Largest principal stretch at any drive.
-    pub largest_principal_stretch: f64,
-    /// Material volume of the mask, mm³.
-    pub voxel_material_volume_mm3: f64,
-    /// The scan.
-    pub scan: ScanSettings,
-    /// What the numbers mean.
-    pub notes: EvaluationNotes,
-    /// Sizes of the computation.
-    pub statistics: EvaluationStatistics,
-    /// Version of the program.
-    pub version: String,
-    /// SHA-256 of specimen, material, scan, drives and settings, hexadecimal.
-    pub input_hash: String,
-}
-
-/// A drive at which the force alone is read.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ForceStep {
-    /// Drive, mm.
-    pub drive_mm: f64,
-    /// Force of all samples together, N.
-    pub force_n: f64,
-}
-
-/// Meaning of the numbers, for readers of the JSON alone.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct EvaluationNotes {
-    /// `integrated_sensitivity`.
-    pub integrated_sensitivity: String,
-    /// `promised_sd`.
-    pub promised_sd: String,
-}
-
-impl Default for EvaluationNotes {
-    fn default() -> Self {
-        EvaluationNotes {
-            integrated_sensitivity: "sum: over voxels of d2Psi/dxi dlambda at the voxel's (lambda, k), 1 for mu and kPa for alpha; \
-                                     mean_per_voxel: sum / num_voxels; volume_integral: sum weighted by the voxel's material \
-                                     volume (mm3), comparable across voxel sizes; kappa's is zero"
-                .into(),
-            promised_sd: "Cramer-Rao bound of a joint fit of all parameters to the voxel displacements and forces; at the top level from \
-                          all drives together, in a step from that drive alone; value in the parameter's unit, null where the \
-                          data do not determine it"
-                .into(),
-        }
-    }
-}
-
-/// Sizes of the computation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct EvaluationStatistics {
-    /// Elements of the mesh.
-    pub num_elements: usize,
-    /// Nodes of the mesh.
-    pub num_nodes: usize,
-    /// Free displacement unknowns.
-    pub num_unknowns: usize,
-    /// Equilibria solved for (more than steps when a drive was searched).
-    pub num_equilibria: usize,
-    /// Sample points of the voxels.
-    pub num_sample_points: usize,
-    /// Sample points dropped between wall and mesh.
-    pub num_dropped_points: usize,
-}
 
 /// What an evaluation holds besides its numbers: for plots and further work.
 #[derive(Clone, Debug)]
 pub struct EvaluationMaps {
-    /// Grid and mask.
-    pub mask: VoxelMask,
-    /// Voxel fields per drive.
-    pub drives: Vec<DriveMaps>,
-    /// Equilibria per drive, on the model's mesh.
-    pub equilibria: Vec<Equilibrium>,
+    /// Of each kind of sample, in the order of [`Specimen::samples`].
+    pub samples: Vec<SampleMaps>,
     /// Information of all drives together, with the prior if any.
     pub information: FisherInformation,
     /// Information of each drive.
     pub information_by_drive: Vec<FisherInformation>,
+    /// What the drives tell, whatever the time that each gets.
+    pub time: SharedTime,
+}
+
+/// What an evaluation holds of one kind of sample.
+#[derive(Clone, Debug)]
+pub struct SampleMaps {
+    /// How many of the kind are scanned.
+    pub num_scanned: u32,
+    /// Grid and mask; `None` where none is scanned.
+    pub mask: Option<VoxelMask>,
+    /// Voxel fields per drive; empty where none is scanned.
+    pub drives: Vec<DriveMaps>,
+    /// Equilibria per drive, on the model's mesh.
+    pub equilibria: Vec<Equilibrium>,
+}
+
+impl EvaluationMaps {
+    /// Equilibria per drive of each kind of sample.
+    pub fn equilibria(&self) -> Vec<Vec<Equilibrium>> {
+        self.samples.iter().map(|s| s.equilibria.clone()).collect()
+    }
 }
 
 /// Meshes, solves and evaluates a specimen.
@@ -162,148 +64,230 @@ pub fn evaluate(
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<(Evaluation, EvaluationMaps), EvaluationError> {
     check_drives(drives)?;
-    let mut model = ForwardModel::of_specimen(specimen, &options.mesh).map_err(|error| match error {
-        PrepareError::Mesh(error) => EvaluationError::from(error),
-        PrepareError::Solve(error) => EvaluationError::from(error),
-    })?;
-    evaluate_model(&mut model, specimen, material, scan, drives, options, is_cancelled)
+    let mut fixture = Fixture::new(specimen, scan, options)?;
+    evaluate_fixture(&mut fixture, material, drives, &[], options, is_cancelled)
 }
 
-/// As [`evaluate`] on a prepared model of `specimen`; `options.mesh` only enters the input hash.
+/// As [`evaluate`] of samples that are meshed and in the scanner; `options.mesh` only enters the input hash.
+/// `neighbours` are equilibria of each part with another material: where one is at a drive asked for, its solution
+/// starts there.
 ///
 /// # Errors
 /// See [`EvaluationError`].
-pub fn evaluate_model(
-    model: &mut ForwardModel,
-    specimen: &Specimen,
+pub fn evaluate_fixture(
+    fixture: &mut Fixture,
     material: &Ogden,
-    scan: &ScanSettings,
     drives: &DriveSelection,
+    neighbours: &[Vec<Equilibrium>],
     options: &EvaluationOptions,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<(Evaluation, EvaluationMaps), EvaluationError> {
     check_drives(drives)?;
-    let scanner = Scanner::new(specimen, model.mesh(), scan, options.sampling)?;
-    let scanned = Scanned { specimen, scan, scanner: &scanner, neighbours: &[] };
-    evaluate_scanned(model, &scanned, material, drives, options, is_cancelled)
-}
-
-/// A specimen in the scanner: what is the same for every material that it may be made of.
-#[derive(Clone, Copy, Debug)]
-pub struct Scanned<'a> {
-    /// The specimen.
-    pub specimen: &'a Specimen,
-    /// The scan.
-    pub scan: &'a ScanSettings,
-    /// The scan of the specimen on the model's mesh.
-    pub scanner: &'a Scanner,
-    /// Equilibria of the model with another material: where one is at a drive asked for, its solution starts there.
-    pub neighbours: &'a [Equilibrium],
-}
-
-/// As [`evaluate_model`], where the scanner is prepared too.
-///
-/// # Errors
-/// See [`EvaluationError`].
-pub fn evaluate_scanned(
-    model: &mut ForwardModel,
-    &Scanned { specimen, scan, scanner, neighbours }: &Scanned,
-    material: &Ogden,
-    drives: &DriveSelection,
-    options: &EvaluationOptions,
-    is_cancelled: &dyn Fn() -> bool,
-) -> Result<(Evaluation, EvaluationMaps), EvaluationError> {
-    check_drives(drives)?;
+    options.protocol.suits(fixture.specimen(), drives.count())?;
     let (equilibria, num_equilibria) = match drives {
         DriveSelection::DriveMm(drives_mm) => {
-            let path = solve_beside(model, material, drives_mm, neighbours, (&options.solve, is_cancelled))?;
-            let count = path.len();
+            let path = fixture.solve_path(material, drives_mm, neighbours, &options.solve, is_cancelled)?;
+            let count = path.iter().map(Vec::len).sum();
             (path, count)
         }
         DriveSelection::MedianStretch(target) => {
-            let (found, count) =
-                solve_for_median(model, specimen, material, scanner, *target, &options.solve, is_cancelled)?;
-            (vec![found], count)
+            solve_for_median(fixture, material, *target, &options.solve, is_cancelled)?
         }
     };
     let nuisances = options.protocol.nuisances();
-    let mut joint = JointInformation::none(material, nuisances.len());
-    let (mut steps, mut maps, mut information_by_drive) = (Vec::new(), Vec::new(), Vec::new());
-    for equilibrium in &equilibria {
-        let stretch = largest_principal_stretch(&model.quadrature_fields(material, equilibrium));
-        let mut tangent = model.tangent(material, equilibrium)?;
-        let sensitivities = tangent.material_sensitivities()?;
-        let state = DrivenState {
-            drive_mm: equilibrium.drive_mm,
-            force_n: equilibrium.force_n,
-            displacement: &equilibrium.displacement,
-            sensitivities: &sensitivities,
-            largest_principal_stretch: stretch,
-            unknowns: &unknowns_at(&nuisances, equilibrium, &mut tangent)?,
-        };
-        let seen = scanner.observe(material, &state, options.identifiability_limit)?;
-        joint.add(&seen.joint)?;
-        information_by_drive.push(seen.information);
-        steps.push(seen.step);
-        maps.push(seen.maps);
+    let mut time = SharedTime {
+        material: material.clone(),
+        voxels: Vec::new(),
+        forces: Vec::new(),
+        on_the_way: JointInformation::none(material, nuisances.len()),
+        unknown_sd: nuisances.iter().map(|n| n.1).collect(),
+        bulk_log_prior_sd: options.bulk_log_prior_sd,
+    };
+    let mut steps = Vec::new();
+    let mut samples: Vec<SampleMaps> =
+        fixture.parts().iter().zip(&equilibria).map(SampleMaps::without_drives).collect();
+    for index in 0..drives.count() {
+        let at_drive: Vec<&Equilibrium> = equilibria.iter().filter_map(|path| path.get(index)).collect();
+        let drive = Drive { is_scanned: true, nuisances: &nuisances };
+        let (seen, at) = drive.see(fixture, material, &at_drive)?;
+        time.voxels.push(at.voxels);
+        time.forces.push(at.force);
+        let drive_mm = at_drive.first().map_or(f64::NAN, |e| e.drive_mm);
+        steps.push(seen.step(drive_mm, &at.forces_n, at.largest_principal_stretch));
+        let scanned = samples.iter_mut().filter(|s| s.num_scanned > 0);
+        scanned.zip(seen.kinds).for_each(|(sample, (_, observed))| sample.drives.push(observed.maps));
     }
-    let force_steps = add_forces(&mut joint, model, material, scan, options, &steps, is_cancelled)?;
-    let sd: Vec<f64> = nuisances.iter().map(|n| n.1).collect();
-    let mut information = joint.about_material(material, &sd)?;
-    if let Some(sd) = options.bulk_log_prior_sd {
-        information.add_log_prior(Parameter::Kappa, sd)?;
-    }
-    let covariance = information.covariance();
-    let evaluation = Evaluation {
+    let force_steps = add_forces(&mut time.on_the_way, fixture, material, options, &steps, is_cancelled)?;
+    let mut evaluation = Evaluation {
         schema: "evaluation/1".into(),
-        promised_sd: covariance.promised_sd(options.identifiability_limit),
-        correlation: covariance.correlation_matrix(),
-        condition_number: covariance.condition_number(&information.shear_indices()),
+        promised_sd: Vec::new(),
+        correlation: Vec::new(),
+        condition_number: None,
         largest_principal_stretch: steps.iter().map(|s| s.largest_principal_stretch).fold(f64::NAN, f64::max),
         steps,
         force_steps,
-        voxel_material_volume_mm3: scanner.mask.material_volume_mm3(),
-        scan: *scan,
+        blocks_scanned: options.protocol.blocks_scanned,
+        scan_share: Vec::new(),
+        best_scan_share: None,
+        voxel_material_volume_mm3: scanned_volume_mm3(fixture),
+        scan: *fixture.scan(),
         notes: EvaluationNotes::default(),
-        statistics: EvaluationStatistics {
-            num_elements: model.mesh().num_elements(),
-            num_nodes: model.mesh().nodes.len(),
-            num_unknowns: model.num_unknowns(),
-            num_equilibria,
-            num_sample_points: scanner.operator.num_points(),
-            num_dropped_points: scanner.operator.num_dropped_points(),
-        },
+        statistics: EvaluationStatistics::of(fixture, num_equilibria),
         version: env!("CARGO_PKG_VERSION").into(),
-        input_hash: hash_of_inputs(specimen, material, scan, drives, options),
+        input_hash: hash_of_inputs(fixture.specimen(), material, fixture.scan(), drives, options),
     };
-    Ok((
-        evaluation,
-        EvaluationMaps { mask: scanner.mask.clone(), drives: maps, equilibria, information, information_by_drive },
-    ))
-}
-
-/// Equilibria at some drives, each from a neighbour at its drive where there is one and that leads there, else from the
-/// last.
-fn solve_beside(
-    model: &mut ForwardModel,
-    material: &Ogden,
-    drives_mm: &[f64],
-    neighbours: &[Equilibrium],
-    (options, is_cancelled): (&SolveOptions, &dyn Fn() -> bool),
-) -> Result<Vec<Equilibrium>, SolveError> {
-    let mut path: Vec<Equilibrium> = Vec::with_capacity(drives_mm.len());
-    for &drive in drives_mm {
-        let beside = neighbours.iter().find(|n| n.drive_mm == drive);
-        let found = beside.and_then(|start| model.solve(material, drive, Some(start), options, is_cancelled).ok());
-        path.push(match found {
-            Some(found) => found,
-            None => model.solve(material, drive, path.last(), options, is_cancelled)?,
-        });
+    let information = FisherInformation::none(material);
+    let mut maps = EvaluationMaps { samples, information, information_by_drive: Vec::new(), time };
+    let (shares, limit) = (&options.protocol.scan_share, options.identifiability_limit);
+    maps.promise(&mut evaluation, shares, limit)?;
+    if shares.len() > 1
+        && let Some(best) = best_shares(&[&maps.time])?
+    {
+        let promised_sd = maps.time.information(&best)?.covariance().promised_sd(limit);
+        evaluation.best_scan_share = Some(BestShares { scan_share: best, promised_sd });
     }
-    Ok(path)
+    Ok((evaluation, maps))
 }
 
-/// How the state of a drive changes with each unknown of the set-up.
+impl EvaluationMaps {
+    /// Fills in what `evaluation`, whose maps these are, promises where its drives get these shares of the time of one
+    /// scan (whole scans where there are none); parameters are identifiable below `identifiability_limit`.
+    ///
+    /// # Errors
+    /// [`EvaluationError::Information`].
+    pub fn promise(
+        &mut self,
+        evaluation: &mut Evaluation,
+        shares: &[f64],
+        identifiability_limit: f64,
+    ) -> Result<(), EvaluationError> {
+        let of_drives: Vec<f64> = (0..evaluation.steps.len()).map(|k| shares.get(k).copied().unwrap_or(1.0)).collect();
+        self.information_by_drive.clear();
+        for (index, (step, share)) in evaluation.steps.iter_mut().zip(&of_drives).enumerate() {
+            let alone = self.time.information_of_drive(index, *share)?;
+            step.promised_sd = alone.covariance().promised_sd(identifiability_limit);
+            self.information_by_drive.push(alone);
+        }
+        self.information = self.time.information(&of_drives)?;
+        let covariance = self.information.covariance();
+        evaluation.promised_sd = covariance.promised_sd(identifiability_limit);
+        evaluation.correlation = covariance.correlation_matrix();
+        evaluation.condition_number = covariance.condition_number(&self.information.shear_indices());
+        evaluation.scan_share = shares.to_vec();
+        Ok(())
+    }
+}
+
+/// Material volume of the voxels of all scanned blocks, mm³.
+fn scanned_volume_mm3(fixture: &Fixture) -> f64 {
+    let of_part = |p: &Part| {
+        let volume = p.scanner.as_ref().map_or(0.0, |s| s.mask.material_volume_mm3());
+        f64::from(p.num_scanned) * volume
+    };
+    fixture.parts().iter().map(of_part).sum()
+}
+
+impl EvaluationStatistics {
+    /// Sums over the kinds of samples.
+    fn of(fixture: &Fixture, num_equilibria: usize) -> EvaluationStatistics {
+        let sum = |of: &dyn Fn(&Part) -> usize| fixture.parts().iter().map(of).sum();
+        let of_scanner = |p: &Part, of: fn(&Scanner) -> usize| p.scanner.as_ref().map_or(0, of);
+        EvaluationStatistics {
+            num_elements: sum(&|p| p.model.mesh().num_elements()),
+            num_nodes: sum(&|p| p.model.mesh().nodes.len()),
+            num_unknowns: sum(&|p| p.model.num_unknowns()),
+            num_equilibria,
+            num_sample_points: sum(&|p| of_scanner(p, |s| s.operator.num_points())),
+            num_dropped_points: sum(&|p| of_scanner(p, |s| s.operator.num_dropped_points())),
+        }
+    }
+}
+
+impl SampleMaps {
+    fn without_drives((part, equilibria): (&Part, &Vec<Equilibrium>)) -> SampleMaps {
+        SampleMaps {
+            num_scanned: part.num_scanned,
+            mask: part.scanner.as_ref().map(|s| s.mask.clone()),
+            drives: Vec::new(),
+            equilibria: equilibria.clone(),
+        }
+    }
+}
+
+/// How a drive is scanned, or its force read.
+struct Drive<'a> {
+    /// Whether it is scanned, or the force alone is read.
+    is_scanned: bool,
+    nuisances: &'a [(Nuisance, f64)],
+}
+
+/// All samples at one drive.
+struct AtDrive {
+    /// Force of all samples of each kind, N.
+    forces_n: Vec<f64>,
+    largest_principal_stretch: f64,
+    /// What the voxels tell in the time of a whole scan.
+    voxels: JointInformation,
+    /// What the force tells.
+    force: JointInformation,
+}
+
+impl Drive<'_> {
+    /// What the scan sees of the samples at the `equilibria` of a drive, one for each kind, and what that and their
+    /// force tell: n blocks of a kind tell n times as much as one.
+    fn see(
+        &self,
+        fixture: &mut Fixture,
+        material: &Ogden,
+        equilibria: &[&Equilibrium],
+    ) -> Result<(SeenBlocks, AtDrive), EvaluationError> {
+        let scan = *fixture.scan();
+        let num = material.parameters().len();
+        let mut voxels = JointInformation::none(material, self.nuisances.len());
+        let (mut by_parameter, mut by_unknown) = (vec![0.0; num], vec![0.0; self.nuisances.len()]);
+        let (mut seen, mut forces_n, mut largest) = (SeenBlocks::default(), Vec::new(), f64::NAN);
+        for (part, equilibrium) in fixture.parts_mut().iter_mut().zip(equilibria) {
+            largest = largest.max(largest_principal_stretch(&part.model.quadrature_fields(material, equilibrium)));
+            let mut tangent = part.model.tangent(material, equilibrium)?;
+            let sensitivities = tangent.material_sensitivities()?;
+            let unknowns = unknowns_at(self.nuisances, equilibrium, &mut tangent)?;
+            by_parameter.iter_mut().zip(&sensitivities).for_each(|(sum, s)| *sum += s.force_n);
+            for ((sum, unknown), (nuisance, _)) in by_unknown.iter_mut().zip(&unknowns).zip(self.nuisances) {
+                // The load cell has one zero, however many samples it carries.
+                *sum = if *nuisance == Nuisance::ForceZero { unknown.force_n } else { *sum + unknown.force_n };
+            }
+            forces_n.push(equilibrium.force_n);
+            if let Some(scanner) = part.scanner.as_ref().filter(|_| self.is_scanned) {
+                let state = DrivenState {
+                    drive_mm: equilibrium.drive_mm,
+                    displacement: &equilibrium.displacement,
+                    sensitivities: &sensitivities,
+                    unknowns: &unknowns,
+                };
+                let observed = scanner.observe(material, &state)?;
+                voxels.add_times(f64::from(part.num_scanned), &observed.joint)?;
+                seen.kinds.push((part.num_scanned, observed));
+            }
+        }
+        let mut force = JointInformation::none(material, self.nuisances.len());
+        force.add_force(&by_parameter, &by_unknown, scan.force_sd_n);
+        Ok((seen, AtDrive { forces_n, largest_principal_stretch: largest, voxels, force }))
+    }
+}
+
+/// How the state of a drive changes with each unknown of the set-up that `protocol` states; `tangent` is that of
+/// `equilibrium`.
+///
+/// # Errors
+/// [`EvaluationError::Solve`].
+pub fn unknowns_of(
+    protocol: &Protocol,
+    equilibrium: &Equilibrium,
+    tangent: &mut Tangent,
+) -> Result<Vec<Unknown>, EvaluationError> {
+    unknowns_at(&protocol.nuisances(), equilibrium, tangent)
+}
+
 fn unknowns_at(
     nuisances: &[(Nuisance, f64)],
     equilibrium: &Equilibrium,
@@ -325,10 +309,9 @@ fn unknowns_at(
 
 /// Adds the forces that are read without a scan, and gives them. A drive that is scanned has its force already.
 fn add_forces(
-    joint: &mut JointInformation,
-    model: &mut ForwardModel,
+    forces: &mut JointInformation,
+    fixture: &mut Fixture,
     material: &Ogden,
-    scan: &ScanSettings,
     options: &EvaluationOptions,
     scanned: &[EvaluationStep],
     is_cancelled: &dyn Fn() -> bool,
@@ -341,14 +324,14 @@ fn add_forces(
     }
     check_drives(&DriveSelection::DriveMm(drives.clone()))?;
     let nuisances = options.protocol.nuisances();
+    let reading = Drive { is_scanned: false, nuisances: &nuisances };
+    let paths = fixture.solve_path(material, &drives, &[], &options.solve, is_cancelled)?;
     let mut steps = Vec::new();
-    for equilibrium in model.solve_path(material, &drives, &options.solve, is_cancelled)? {
-        let mut tangent = model.tangent(material, &equilibrium)?;
-        let forces: Vec<f64> = tangent.material_sensitivities()?.iter().map(|s| s.force_n).collect();
-        let unknowns = unknowns_at(&nuisances, &equilibrium, &mut tangent)?;
-        let of_unknowns: Vec<f64> = unknowns.iter().map(|u| u.force_n).collect();
-        joint.add_force(&forces, &of_unknowns, scan.force_sd_n);
-        steps.push(ForceStep { drive_mm: equilibrium.drive_mm, force_n: equilibrium.force_n });
+    for (index, drive_mm) in drives.into_iter().enumerate() {
+        let at_drive: Vec<&Equilibrium> = paths.iter().filter_map(|path| path.get(index)).collect();
+        let (_, at) = reading.see(fixture, material, &at_drive)?;
+        forces.add(&at.force)?;
+        steps.push(ForceStep { drive_mm, force_n: at.forces_n.iter().sum() });
     }
     Ok(steps)
 }

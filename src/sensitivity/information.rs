@@ -221,13 +221,21 @@ impl FisherInformation {
     /// # Errors
     /// [`InformationError::ParameterMismatch`].
     pub fn add(&mut self, other: &FisherInformation) -> Result<(), InformationError> {
+        self.add_times(1.0, other)
+    }
+
+    /// Adds `factor` times another's.
+    ///
+    /// # Errors
+    /// [`InformationError::ParameterMismatch`].
+    pub(super) fn add_times(&mut self, factor: f64, other: &FisherInformation) -> Result<(), InformationError> {
         // Values are copied, never computed, so equality of bits is what is meant.
         let is_same = self.values.len() == other.values.len()
             && self.values.iter().zip(&other.values).all(|(a, b)| a.to_bits() == b.to_bits());
         if !is_same || self.parameters != other.parameters {
             return Err(InformationError::ParameterMismatch { found: other.names(), expected: self.names() });
         }
-        self.matrix += &other.matrix;
+        self.matrix += &other.matrix * factor;
         Ok(())
     }
 

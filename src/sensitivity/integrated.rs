@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 /// 𝒮_ξ in its three normalisations. Unit of S: 1 for μ, kPa for α. S_μ has the sign of α and S_α the sign of μ
 /// everywhere, so nothing cancels in the sums. κ has no entry: its S is zero.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct IntegratedSensitivity {
     /// `mu_1`, `alpha_1`, …

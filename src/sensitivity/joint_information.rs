@@ -9,16 +9,17 @@ use crate::material::Ogden;
 use nalgebra::DMatrix;
 
 /// How the data of one drive change with an unknown of the set-up.
-pub(super) struct NuisanceColumn {
+#[derive(Clone, Debug)]
+pub struct NuisanceColumn {
     /// Voxel averages of the displacement's change; `None` where it does not change.
-    pub(super) field: Option<Vec<[f64; 3]>>,
+    pub field: Option<Vec<[f64; 3]>>,
     /// The force's change, N.
-    pub(super) force_n: f64,
+    pub force_n: f64,
 }
 
 /// Information about material and unknowns.
 #[derive(Clone, Debug)]
-pub(super) struct JointInformation {
+pub struct JointInformation {
     /// A.
     material: FisherInformation,
     /// C.
@@ -29,19 +30,19 @@ pub(super) struct JointInformation {
 
 impl JointInformation {
     /// No information about `num` unknowns.
-    pub(super) fn none(material: &Ogden, num: usize) -> JointInformation {
+    pub fn none(material: &Ogden, num: usize) -> JointInformation {
         JointInformation::of_scan(FisherInformation::none(material), num)
     }
 
     /// Of a scan that tells nothing of `num` unknowns.
-    pub(super) fn of_scan(material: FisherInformation, num: usize) -> JointInformation {
+    pub fn of_scan(material: FisherInformation, num: usize) -> JointInformation {
         let n = material.parameters().len();
         JointInformation { material, cross: DMatrix::zeros(n, num), own: DMatrix::zeros(num, num) }
     }
 
-    /// Of a scanned drive: `material` is what it tells of the material alone, from `fields` and `forces` (see
-    /// [`FisherInformation::of_drive`]).
-    pub(super) fn of_drive(
+    /// Of a scanned drive: `material` is what it tells of the material alone, from `fields` (mm per unit of each
+    /// parameter, voxel by voxel) and `forces` (N per unit), both as in [`FisherInformation::of_drive`].
+    pub fn of_drive(
         material: FisherInformation,
         fields: &[Vec<[f64; 3]>],
         forces: &[f64],
@@ -68,7 +69,7 @@ impl JointInformation {
     }
 
     /// Adds a force that was read without a scan: its derivatives with respect to material and unknowns.
-    pub(super) fn add_force(&mut self, forces: &[f64], nuisances: &[f64], force_sd_n: f64) {
+    pub fn add_force(&mut self, forces: &[f64], nuisances: &[f64], force_sd_n: f64) {
         self.material.add_force(forces, force_sd_n);
         let weight = 1.0 / (force_sd_n * force_sd_n);
         for (a, of_a) in nuisances.iter().enumerate() {
@@ -85,11 +86,42 @@ impl JointInformation {
     ///
     /// # Errors
     /// [`InformationError::ParameterMismatch`].
-    pub(super) fn add(&mut self, other: &JointInformation) -> Result<(), InformationError> {
+    pub fn add(&mut self, other: &JointInformation) -> Result<(), InformationError> {
         self.material.add(&other.material)?;
         self.cross += &other.cross;
         self.own += &other.own;
         Ok(())
+    }
+
+    /// Adds `factor` times another's: negative where data are taken away that were counted before.
+    ///
+    /// # Errors
+    /// [`InformationError::ParameterMismatch`].
+    pub fn add_times(&mut self, factor: f64, other: &JointInformation) -> Result<(), InformationError> {
+        self.material.add_times(factor, &other.material)?;
+        self.cross += &other.cross * factor;
+        self.own += &other.own * factor;
+        Ok(())
+    }
+
+    /// The same information about relative changes of the parameters, carried to another material of as many terms:
+    /// I_ij ξ_i ξ_j and C_ia ξ_i stay as they are. For averages over materials that a fit leaves possible.
+    ///
+    /// # Errors
+    /// [`InformationError::LengthMismatch`], [`InformationError::NotFinite`].
+    pub fn carried_to(&self, material: &Ogden) -> Result<JointInformation, InformationError> {
+        let values: Vec<f64> = material.parameters().into_iter().map(|p| material.value(p)).collect();
+        let ratio: Vec<f64> = self.material.values().iter().zip(&values).map(|(own, new)| own / new).collect();
+        let n = ratio.len();
+        let matrix = self.material.matrix();
+        let carried = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
+            if i < n && j < n { ratio[i] * matrix[(i, j)] * ratio[j] } else { f64::NAN }
+        });
+        let cross = DMatrix::from_fn(self.cross.nrows(), self.cross.ncols(), |i, a| {
+            ratio.get(i).map_or(f64::NAN, |r| r * self.cross[(i, a)])
+        });
+        let material = FisherInformation::from_matrix(material, carried)?;
+        Ok(JointInformation { material, cross, own: self.own.clone() })
     }
 
     /// What is left for the material once the unknowns, known beforehand to the standard deviations `sd`, are estimated
@@ -97,7 +129,7 @@ impl JointInformation {
     ///
     /// # Errors
     /// [`InformationError::NotFinite`].
-    pub(super) fn about_material(&self, material: &Ogden, sd: &[f64]) -> Result<FisherInformation, InformationError> {
+    pub fn about_material(&self, material: &Ogden, sd: &[f64]) -> Result<FisherInformation, InformationError> {
         if sd.is_empty() {
             self.material.check_finite()?;
             return Ok(self.material.clone());

@@ -5,6 +5,9 @@ mod covariance;
 mod drives;
 mod error;
 mod evaluation;
+mod evaluation_options;
+mod evaluation_result;
+mod fixture;
 mod information;
 mod integrated;
 mod joint_information;
@@ -13,22 +16,25 @@ mod pointwise;
 mod protocol;
 mod scan_settings;
 mod separation;
+mod shares;
 
 pub use continuum::{
-    ForceReading, ForceReadings, information_of_protocol, information_over_quadrature, integrate_over_quadrature,
-    largest_principal_stretch, median_stretch_over_quadrature,
+    ForceReading, ForceReadings, ScannedBlock, information_of_protocol, information_over_quadrature,
+    integrate_over_blocks, integrate_over_quadrature, largest_principal_stretch, median_stretch_over_quadrature,
 };
 pub use covariance::{Covariance, Criterion, IDENTIFIABILITY_LIMIT, PromisedSd};
 pub use drives::DriveSelection;
 pub use error::EvaluationError;
-pub use evaluation::{
-    Evaluation, EvaluationMaps, EvaluationNotes, EvaluationOptions, EvaluationStatistics, ForceStep, Scanned, evaluate,
-    evaluate_model, evaluate_scanned,
-};
+pub use evaluation::{EvaluationMaps, SampleMaps, evaluate, evaluate_fixture, unknowns_of};
+pub use evaluation_options::EvaluationOptions;
+pub use evaluation_result::{Evaluation, EvaluationNotes, EvaluationStatistics, ForceStep};
+pub use fixture::{Fixture, Part};
 pub use information::{FisherInformation, InformationError, MeasurementNoise};
 pub use integrated::{IntegratedSensitivity, integrate_over_voxels, parameter_sensitivity, sensitivity_map};
+pub use joint_information::{JointInformation, NuisanceColumn};
 pub use observation::{DriveMaps, DrivenState, EvaluationStep, Observation, Scanner, Unknown, median};
 pub use pointwise::{PointwiseSensitivity, alpha_sensitivity, mu_sensitivity};
-pub use protocol::Protocol;
+pub use protocol::{Protocol, ProtocolMismatch};
 pub use scan_settings::{PartialVoxels, ScanSettings};
 pub use separation::{MaterialState, Separation, separation_over_quadrature};
+pub use shares::{BestShares, SharedTime, best_shares};

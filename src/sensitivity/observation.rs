@@ -22,13 +22,17 @@ const STRETCH_AXIS_STEP: f64 = 0.1;
 
 /// One drive of an `evaluation/1`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct EvaluationStep {
     /// Drive, mm.
     pub drive_mm: f64,
     /// Force of all samples together, N.
     pub force_n: f64,
-    /// Voxels in the mask.
+    /// Where there are several kinds of samples: the force of all samples of each kind, N.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub force_by_kind_n: Vec<f64>,
+    /// Voxels in the masks of all blocks that are scanned; what follows is over these.
     pub num_voxels: usize,
     /// Median of λ over voxels.
     pub median_stretch: f64,
@@ -62,17 +66,15 @@ pub struct DriveMaps {
     pub histogram: Histogram2d,
 }
 
-/// All that one drive yields.
+/// What the voxels of one block yield at one drive.
 #[derive(Clone, Debug)]
 pub struct Observation {
-    /// For the report; `promised_sd` is filled from `information` without priors.
-    pub step: EvaluationStep,
     /// For plots.
     pub maps: DriveMaps,
-    /// Of this drive.
-    pub information: FisherInformation,
-    /// The same with the unknowns of the set-up.
-    pub(super) joint: JointInformation,
+    /// 𝒮 per parameter.
+    pub integrated_sensitivity: Vec<IntegratedSensitivity>,
+    /// What the voxels tell of the material and the unknowns of the set-up; the force is not in it.
+    pub joint: JointInformation,
 }
 
 /// Median of finite numbers: the middle one, or the mean of the two middle ones; none without any.
@@ -91,14 +93,10 @@ pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
 pub struct DrivenState<'a> {
     /// Drive, mm.
     pub drive_mm: f64,
-    /// Force of all samples together, N.
-    pub force_n: f64,
     /// Nodal displacements, mm.
     pub displacement: &'a [[f64; 3]],
     /// From [`crate::fem::Tangent::material_sensitivities`].
     pub sensitivities: &'a [ParameterSensitivity],
-    /// From [`super::largest_principal_stretch`].
-    pub largest_principal_stretch: f64,
     /// What is not known exactly of the set-up, and how the state changes with it.
     pub unknowns: &'a [Unknown],
 }
@@ -137,26 +135,21 @@ impl Scanner {
         Ok(Scanner { mask, operator, noise: scan.noise(), weights })
     }
 
-    /// Median of λ over voxels for nodal displacements in mm; 1 where no voxel is admissible.
+    /// λ of every voxel for nodal displacements in mm.
     ///
     /// # Errors
     /// [`VoxelError::LengthMismatch`].
-    pub fn median_stretch(&self, displacement: &[[f64; 3]]) -> Result<f64, VoxelError> {
+    pub(super) fn stretches(&self, displacement: &[[f64; 3]]) -> Result<Vec<f64>, VoxelError> {
         let gradients = self.operator.deformation_gradients(displacement)?;
-        Ok(median(gradients.iter().map(|f| decompose(f).stretch_amplitude)).unwrap_or(1.0))
+        Ok(gradients.iter().map(|f| decompose(f).stretch_amplitude).collect())
     }
 
-    /// Observes a solved drive.
+    /// Observes a solved drive of one block.
     ///
     /// # Errors
     /// Lengths that do not match, noise that is not positive: [`EvaluationError::Voxel`],
     /// [`EvaluationError::Information`].
-    pub fn observe(
-        &self,
-        material: &Ogden,
-        state: &DrivenState,
-        identifiability_limit: f64,
-    ) -> Result<Observation, EvaluationError> {
+    pub fn observe(&self, material: &Ogden, state: &DrivenState) -> Result<Observation, EvaluationError> {
         let states: Vec<Decomposition> =
             self.operator.deformation_gradients(state.displacement)?.iter().map(decompose).collect();
         let displacement = self.operator.average(state.displacement)?;
@@ -165,19 +158,18 @@ impl Scanner {
             .iter()
             .map(|s| self.operator.average(&s.displacement))
             .collect::<Result<Vec<_>, _>>()?;
-        let forces: Vec<f64> = state.sensitivities.iter().map(|s| s.force_n).collect();
-        let alone = FisherInformation::of_drive(material, &fields, &self.weights, &forces, &self.noise)?;
+        // The force is that of all samples together: it is not a voxel's.
+        let no_forces = vec![0.0; fields.len()];
+        let alone = FisherInformation::of_drive(material, &fields, &self.weights, &no_forces, &self.noise)?;
         let nuisances = state
             .unknowns
             .iter()
             .map(|u| {
                 let field = u.displacement.as_ref().map(|d| self.operator.average(d)).transpose()?;
-                Ok(NuisanceColumn { field, force_n: u.force_n })
+                Ok(NuisanceColumn { field, force_n: 0.0 })
             })
             .collect::<Result<Vec<_>, VoxelError>>()?;
-        let joint = JointInformation::of_drive(alone, &fields, &forces, &nuisances, &self.weights, &self.noise);
-        let sd: Vec<f64> = state.unknowns.iter().map(|u| u.sd).collect();
-        let information = joint.about_material(material, &sd)?;
+        let joint = JointInformation::of_drive(alone, &fields, &no_forces, &nuisances, &self.weights, &self.noise);
         let largest = states.iter().map(|s| s.stretch_amplitude).fold(1.0, f64::max);
         let end = ((largest - 1.0) / STRETCH_AXIS_STEP).ceil().max(1.0) * STRETCH_AXIS_STEP + 1.0;
         let histogram = Histogram2d::of(
@@ -185,21 +177,60 @@ impl Scanner {
             HistogramAxis { low: 1.0, high: end, num_bins: STRETCH_BINS },
             HistogramAxis { low: 0.0, high: 1.0, num_bins: MODE_BINS },
         )?;
-        let step = EvaluationStep {
-            drive_mm: state.drive_mm,
-            force_n: state.force_n,
-            num_voxels: states.len(),
-            median_stretch: median(states.iter().map(|s| s.stretch_amplitude)).unwrap_or(1.0),
-            median_mode: median(states.iter().filter_map(|s| s.deformation_mode)),
-            largest_voxel_stretch: largest,
-            largest_principal_stretch: state.largest_principal_stretch,
-            num_voxels_without_mode: states.iter().filter(|s| s.deformation_mode.is_none()).count(),
-            integrated_sensitivity: integrate_over_voxels(material, &states, &self.mask),
-            promised_sd: information.covariance().promised_sd(identifiability_limit),
-        };
+        let integrated_sensitivity = integrate_over_voxels(material, &states, &self.mask);
         let sensitivities = shear_parameters(material).map(|p| (p, sensitivity_map(material, p, &states))).collect();
         let maps = DriveMaps { drive_mm: state.drive_mm, displacement, states, sensitivities, histogram };
-        Ok(Observation { step, maps, information, joint })
+        Ok(Observation { maps, integrated_sensitivity, joint })
+    }
+}
+
+/// What the scan sees of all scanned blocks at one drive.
+#[derive(Debug, Default)]
+pub(super) struct SeenBlocks {
+    /// Of each kind of sample that is scanned: how many of it are, and what one of them shows.
+    pub kinds: Vec<(u32, Observation)>,
+}
+
+impl SeenBlocks {
+    /// The voxels' states, those of every block.
+    fn states(&self) -> impl Iterator<Item = &Decomposition> {
+        let blocks = self.kinds.iter().flat_map(|(count, seen)| std::iter::repeat_n(seen, *count as usize));
+        blocks.flat_map(|seen| &seen.maps.states)
+    }
+
+    /// 𝒮 over all of their voxels.
+    fn integrated(&self) -> Vec<IntegratedSensitivity> {
+        let mut all: Vec<IntegratedSensitivity> = Vec::new();
+        let num_voxels = self.states().count();
+        for (count, seen) in &self.kinds {
+            for (index, own) in seen.integrated_sensitivity.iter().enumerate() {
+                if all.len() <= index {
+                    all.push(IntegratedSensitivity { sum: 0.0, volume_integral: 0.0, ..own.clone() });
+                }
+                all[index].sum += f64::from(*count) * own.sum;
+                all[index].volume_integral += f64::from(*count) * own.volume_integral;
+            }
+        }
+        all.iter_mut().for_each(|s| s.mean_per_voxel = s.sum / num_voxels.max(1) as f64);
+        all
+    }
+
+    /// The report's figures of a drive (mm), but for what it promises, with the force of each kind of sample (N) and
+    /// the largest principal stretch in any of them.
+    pub fn step(&self, drive_mm: f64, forces_n: &[f64], largest_principal_stretch: f64) -> EvaluationStep {
+        EvaluationStep {
+            drive_mm,
+            force_n: forces_n.iter().sum(),
+            force_by_kind_n: if forces_n.len() > 1 { forces_n.to_vec() } else { Vec::new() },
+            num_voxels: self.states().count(),
+            median_stretch: median(self.states().map(|s| s.stretch_amplitude)).unwrap_or(1.0),
+            median_mode: median(self.states().filter_map(|s| s.deformation_mode)),
+            largest_voxel_stretch: self.states().map(|s| s.stretch_amplitude).fold(1.0, f64::max),
+            largest_principal_stretch,
+            num_voxels_without_mode: self.states().filter(|s| s.deformation_mode.is_none()).count(),
+            integrated_sensitivity: self.integrated(),
+            promised_sd: Vec::new(),
+        }
     }
 }
 
@@ -227,28 +258,39 @@ mod tests {
         let displacement: Vec<[f64; 3]> = mesh.nodes.iter().map(|x| [0.6 * x[1], 0.0, 0.0]).collect();
         let state = DrivenState {
             drive_mm: 2.4,
-            force_n: 1.5,
             displacement: &displacement,
             sensitivities: &made_up_sensitivities(&mesh),
-            largest_principal_stretch: largest_principal_stretch(&quadrature_points(&mesh, &displacement)),
             unknowns: &[],
         };
-        let seen = scanner.observe(&one_term(), &state, 0.5).unwrap();
+        let stretch = largest_principal_stretch(&quadrature_points(&mesh, &displacement));
         let lambda = 0.3 + 1.09f64.sqrt();
-        assert_eq!(seen.step.num_voxels, 12 * 16 * 12);
         // Affine fields are exact on every mesh; rounding only.
-        assert!((seen.step.median_stretch - lambda).abs() < 1e-11);
-        assert!((seen.step.median_mode.unwrap() - 0.5).abs() < 1e-10);
-        assert!((seen.step.largest_principal_stretch - lambda).abs() < 1e-11);
-        let s_mu = super::super::mu_sensitivity(lambda, 0.5, 1.91).value;
-        let integrated = &seen.step.integrated_sensitivity[0];
-        assert!((integrated.volume_integral / (432.0 * s_mu) - 1.0).abs() < 1e-10);
-        assert!((integrated.sum / (2304.0 * s_mu) - 1.0).abs() < 1e-10);
+        assert!((stretch - lambda).abs() < 1e-11);
+        let seen = scanner.observe(&one_term(), &state).unwrap();
         assert_eq!(seen.maps.histogram.num_voxels(), 2304);
         assert_eq!(seen.maps.sensitivities.len(), 2);
-        assert_eq!(seen.step.promised_sd.len(), 3);
-        let json = serde_json::to_string(&seen.step).unwrap();
-        assert!(json.contains("\"integrated_sensitivity\":[{\"parameter\":\"mu_1\",\"sum\":"));
+        let stretches = scanner.stretches(&displacement).unwrap();
+        assert!((median(stretches).unwrap() - lambda).abs() < 1e-11);
+        let alone = SeenBlocks { kinds: vec![(1, seen.clone())] }.step(2.4, &[1.5], stretch);
+        assert_eq!(alone.num_voxels, 12 * 16 * 12);
+        assert!((alone.median_stretch - lambda).abs() < 1e-11);
+        assert!((alone.median_mode.unwrap() - 0.5).abs() < 1e-10);
+        let s_mu = super::super::mu_sensitivity(lambda, 0.5, 1.91).value;
+        let integrated = &alone.integrated_sensitivity[0];
+        assert!((integrated.volume_integral / (432.0 * s_mu) - 1.0).abs() < 1e-10);
+        assert!((integrated.sum / (2304.0 * s_mu) - 1.0).abs() < 1e-10);
+        let json = serde_json::to_string(&alone).unwrap();
+        assert!(json.contains("\"integrated_sensitivity\":[{\"parameter\":\"mu_1\",\"sum\":"), "{json}");
+        assert!(!json.contains("force_by_kind_n"), "a specimen of one kind of sample is written as ever: {json}");
+        // Two blocks and one: sums are three times as large, means the same.
+        let three = SeenBlocks { kinds: vec![(2, seen.clone()), (1, seen)] };
+        let three = three.step(2.4, &[3.0, 1.5], stretch);
+        assert_eq!((three.num_voxels, three.force_n), (3 * alone.num_voxels, 4.5));
+        assert!((three.median_stretch - alone.median_stretch).abs() < 1e-15);
+        let of_three = &three.integrated_sensitivity[1];
+        let of_one = &alone.integrated_sensitivity[1];
+        assert!((of_three.sum / of_one.sum - 3.0).abs() < 1e-12);
+        assert!((of_three.mean_per_voxel / of_one.mean_per_voxel - 1.0).abs() < 1e-12);
     }
 
     #[test]

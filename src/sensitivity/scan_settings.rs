@@ -1,12 +1,13 @@
 //! The scan of an experiment that is being planned: its grid and its noise.
 
 use super::information::{LEAST_SD, MeasurementNoise};
+#[cfg(feature = "schema")]
 use crate::field::schema::{number_above, numbers, schema_type};
 use crate::field::{FieldError, FieldPath};
 use crate::voxel::VoxelMask;
 use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
 
+#[cfg(feature = "schema")]
 schema_type! {
     /// Three lengths along x, y and z, mm, each above 0.
     PositiveTripleMm = numbers(number_above(0.0), 3..=3);
@@ -15,7 +16,8 @@ schema_type! {
 }
 
 /// How much a partly filled voxel counts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum PartialVoxels {
     /// As every voxel of the mask: `noise_sd_mm` is that of the values given, as in recordings.
@@ -40,22 +42,34 @@ impl PartialVoxels {
 }
 
 /// The scan: grid and noise.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-#[schema(as = ScanSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = ScanSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ScanSettings {
     /// Edges of a voxel, mm.
-    #[schema(value_type = PositiveTripleMm)]
+    #[cfg_attr(feature = "schema", schema(value_type = PositiveTripleMm))]
     pub voxel_mm: [f64; 3],
     /// Standard deviation of a voxel's displacement along x, y, z, mm.
-    #[schema(value_type = PositiveTripleMm)]
+    #[cfg_attr(feature = "schema", schema(value_type = PositiveTripleMm))]
     pub noise_sd_mm: [f64; 3],
     /// Standard deviation of the load cell's force (all samples together), N.
-    #[schema(value_type = ForceSdN)]
+    #[cfg_attr(feature = "schema", schema(value_type = ForceSdN))]
     pub force_sd_n: f64,
     /// Weight of partly filled voxels.
     #[serde(default)]
     pub partial_voxels: PartialVoxels,
+}
+
+impl Default for ScanSettings {
+    /// The paper's voxels, 1 × 0.1875 × 0.75 mm; 0.05 mm and 0.02 N noise.
+    fn default() -> Self {
+        ScanSettings {
+            voxel_mm: [1.0, 0.1875, 0.75],
+            noise_sd_mm: [0.05; 3],
+            force_sd_n: 0.02,
+            partial_voxels: PartialVoxels::default(),
+        }
+    }
 }
 
 impl ScanSettings {

@@ -39,6 +39,8 @@ pub struct Shared {
     pub upload_bodies: Arc<Quota>,
     /// Event streams.
     pub streams: Arc<Quota>,
+    /// Answers that are not small and go out.
+    pub answers: Arc<Quota>,
     /// Turns for quick computations (parsing, meshing, drawing); numerics never run on the readers' threads.
     pub quick: Turns,
     /// One permit per upload that is read.
@@ -78,12 +80,13 @@ impl Shared {
     }
 
     /// What is counted at this moment: name, help and value for the metrics.
-    pub fn now(&self) -> [(&'static str, &'static str, usize); 4] {
+    pub fn now(&self) -> [(&'static str, &'static str, usize); 5] {
         [
             ("lambdak_requests_in_flight", "Requests in work.", self.requests.count()),
             ("lambdak_bodies", "JSON bodies coming in.", self.bodies.count()),
             ("lambdak_upload_bodies", "Uploads coming in.", self.upload_bodies.count()),
             ("lambdak_streams", "Open event streams.", self.streams.count()),
+            ("lambdak_answers", "Answers of more than 64 KiB going out.", self.answers.count()),
         ]
     }
 

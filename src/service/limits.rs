@@ -21,7 +21,10 @@ pub struct Limits {
     pub max_upload_bodies: [usize; 2],
     /// Event streams at a time, and of one caller.
     pub max_streams: [usize; 2],
-    /// Least rate of a body, bytes a second, after a first time without one.
+    /// Answers of more than 64 KiB that go out at a time, and to one caller.
+    pub max_answers: [usize; 2],
+    /// Least rate of a body that comes in and of an answer that goes out, bytes a second, after a first time without
+    /// one.
     pub least_bytes_per_s: f64,
     /// That first time.
     pub body_grace: Duration,
@@ -50,6 +53,7 @@ impl Default for Limits {
             max_bodies: [256, 16],
             max_upload_bodies: [16, 2],
             max_streams: [1024, 256],
+            max_answers: [128, 32],
             least_bytes_per_s: 16384.0,
             body_grace: Duration::from_secs(10),
             max_queued_tasks: 50_000,

@@ -29,7 +29,7 @@ impl Metrics {
     }
 
     /// The text; `now` holds name, help and value of what is counted at this moment.
-    pub fn to_text(&self, store: &Store, signal: &Signal, now: [(&'static str, &'static str, usize); 4]) -> String {
+    pub fn to_text(&self, store: &Store, signal: &Signal, now: &[(&'static str, &'static str, usize)]) -> String {
         let mut text = String::new();
         let head = |text: &mut String, name: &str, kind: &str, help: &str| {
             let _ = writeln!(text, "# HELP {name} {help}\n# TYPE {name} {kind}");
@@ -55,7 +55,7 @@ impl Metrics {
         };
         let int = |a: &AtomicU64| a.load(Ordering::Relaxed) as f64;
         for (name, help, count) in now {
-            single(name, "gauge", help, count as f64);
+            single(name, "gauge", help, *count as f64);
         }
         single("lambdak_turned_away_total", "counter", "Requests refused as too many.", int(&self.turned_away));
         single("lambdak_tasks_finished_total", "counter", "Tasks finished by this process.", int(&signal.finished));

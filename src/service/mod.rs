@@ -12,12 +12,15 @@
 //! * `routes`: the addresses with their OpenAPI 3.1 document.
 
 pub mod access;
+mod answer;
 pub mod app;
 mod body;
 mod hub;
 pub mod limits;
 mod log;
 mod metrics;
+mod open_files;
+mod paced;
 pub mod problem;
 mod quota;
 mod recordings;
@@ -27,6 +30,8 @@ pub mod runner;
 mod server;
 mod signal;
 pub mod store;
+mod surroundings;
+mod tar;
 mod task;
 mod turns;
 mod view;

@@ -2,7 +2,7 @@
 
 use crate::field::{FieldError, in_lines};
 use crate::file::MemoryError;
-use crate::job::{Failure, JobError};
+use crate::job::{Failure, JobError, Refusal};
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
@@ -50,6 +50,7 @@ pub struct Problem {
 pub const CATALOGUE: &[(&str, u16, &str)] = &[
     ("invalid-json", 400, "The body is not JSON"),
     ("invalid-parameter", 400, "A parameter is not usable"),
+    ("schema-mismatch", 400, "The body does not fit the schema of its kind"),
     ("bad-host", 400, "The Host header names another server"),
     ("unauthorized", 401, "A valid token is needed"),
     ("forbidden", 403, "The token's role or the page's origin does not allow this"),
@@ -61,7 +62,7 @@ pub const CATALOGUE: &[(&str, u16, &str)] = &[
     ("too-slow", 408, "The body came too slowly"),
     ("too-large", 413, "The body is too large"),
     ("unsupported-media-type", 415, "The content type is not supported"),
-    ("invalid-input", 422, "The input is not valid"),
+    ("invalid-input", 422, "The input fits its schema, and cannot be computed"),
     ("too-big-a-problem", 422, "The problem is larger than allowed"),
     ("too-costly", 422, "The job is estimated to take longer than allowed"),
     ("time-limit", 422, "The task ran for as long as a task may"),
@@ -105,8 +106,17 @@ impl Problem {
 
     /// `invalid-input` with all offending fields.
     pub fn invalid(errors: Vec<FieldError>) -> Self {
+        Problem::at("invalid-input", errors)
+    }
+
+    /// `schema-mismatch` with all offending fields.
+    pub fn misfit(errors: Vec<FieldError>) -> Self {
+        Problem::at("schema-mismatch", errors)
+    }
+
+    fn at(name: &'static str, errors: Vec<FieldError>) -> Self {
         let detail = in_lines(&errors);
-        Problem { errors: errors.into_iter().map(Into::into).collect(), ..Problem::new("invalid-input", detail) }
+        Problem { errors: errors.into_iter().map(Into::into).collect(), ..Problem::new(name, detail) }
     }
 
     /// With a time after which to try again.
@@ -159,6 +169,15 @@ impl IntoResponse for Problem {
             headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
         }
         response
+    }
+}
+
+impl From<Refusal> for Problem {
+    fn from(refusal: Refusal) -> Self {
+        match refusal {
+            Refusal::Misfit(errors) => Problem::misfit(errors),
+            Refusal::Unfit(errors) => Problem::invalid(errors),
+        }
     }
 }
 

@@ -1,11 +1,13 @@
 //! The service as an axum router, and what every request passes through.
 
 use super::access::{Caller, random_hex};
+use super::answer::placed;
 use super::app::App;
 use super::body::let_run_out;
 use super::problem::Problem;
 use super::{log, routes};
 use axum::Router;
+use axum::body::Bytes;
 use axum::extract::{MatchedPath, Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, header};
 use axum::middleware::Next;
@@ -20,7 +22,7 @@ pub struct Peer(pub Arc<str>);
 /// The whole service.
 pub fn router(app: App) -> Router {
     let (api, document) = routes::open_api();
-    let document: Arc<str> = document.into();
+    let document = Bytes::from(document);
     api.route("/openapi.json", axum::routing::get(move || routes::document(document.clone())))
         .merge(routes::page())
         .fallback(not_found)
@@ -58,7 +60,8 @@ async fn guard(State(app): State<App>, mut request: Request, next: Next) -> Resp
         Ok(caller) => {
             name.clone_from(&caller.name);
             request.extensions_mut().insert(caller.clone());
-            run(&app, request, next, &caller, is_page).await
+            let answer = run(&app, request, next, &caller, is_page).await;
+            if is_page { answer } else { placed(&app, &caller, answer) }
         }
     };
     finish(&app, answer, &Served { id, method, route, path, caller: name, started })

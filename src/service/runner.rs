@@ -2,9 +2,10 @@
 
 use super::log;
 use super::problem::Problem;
-use super::recordings::StoredSurroundings;
+use super::recordings::{self, Space};
 use super::signal::Signal;
 use super::store::{Claimed, Finished, Store, StoreError, TaskResult};
+use super::surroundings::StoredSurroundings;
 use super::task::TaskInput;
 use crate::job::{Failure, JobError, Outcome, kind_of_collection, run};
 use std::path::{Path, PathBuf};
@@ -91,9 +92,9 @@ fn run_task(store: &Store, settings: &WorkerSettings, signal: &Signal, worker: &
     }
     let watch = Watch::default();
     let input = (!task.is_gather).then(|| serde_json::from_str::<TaskInput>(&task.input)).transpose();
-    let limit = match &input {
-        Ok(Some(input)) => Duration::try_from_secs_f64(input.max_seconds).unwrap_or(Duration::MAX),
-        _ => Duration::MAX,
+    let (limit, space) = match &input {
+        Ok(Some(input)) => (Duration::try_from_secs_f64(input.max_seconds).unwrap_or(Duration::MAX), Some(input.space)),
+        _ => (Duration::MAX, None),
     };
     let outcome = std::thread::scope(|scope| {
         let keeper = scope.spawn(|| keep(store, settings, worker, task, &path, &watch));
@@ -117,12 +118,18 @@ fn run_task(store: &Store, settings: &WorkerSettings, signal: &Signal, worker: &
     let outcome = outcome.unwrap_or_else(|_| {
         Err(JobError::Internal("the computation ended with a programming error; please report it".into()))
     });
-    let outcome = outcome.and_then(|outcome| stored(store, task, outcome));
+    let outcome = outcome.map(|outcome| stored(store, task, outcome, space));
+    let failed = |problem: Problem| {
+        signal.failed.fetch_add(1, Ordering::Relaxed);
+        let problem = problem.to_json();
+        ("failed", until_stored(|| store.fail(task, worker, &problem)))
+    };
     let (what, stored) = match outcome {
-        Ok(result) => {
+        Ok(Ok(result)) => {
             signal.finished.fetch_add(1, Ordering::Relaxed);
             ("finished", until_stored(|| store.finish(task, worker, &result)))
         }
+        Ok(Err(problem)) => failed(problem),
         Err(JobError::Stopped { .. }) if started.elapsed() > limit && !signal.is_stopping() => {
             save_checkpoint(store, worker, task, &path);
             signal.failed.fetch_add(1, Ordering::Relaxed);
@@ -138,11 +145,7 @@ fn run_task(store: &Store, settings: &WorkerSettings, signal: &Signal, worker: &
             save_checkpoint(store, worker, task, &path);
             ("stopped", until_stored(|| store.release(task, worker).map(|()| Finished::Taken)))
         }
-        Err(error) => {
-            signal.failed.fetch_add(1, Ordering::Relaxed);
-            let problem = Problem::from(error).to_json();
-            ("failed", until_stored(|| store.fail(task, worker, &problem)))
-        }
+        Err(error) => failed(error.into()),
     };
     let _ = std::fs::remove_file(&path);
     log::info(
@@ -191,11 +194,14 @@ fn run_job(
     kind.job(&body).map_err(JobError::Invalid)?.gather(results)
 }
 
-/// An outcome as it is stored; a recording that the job made is kept for further jobs.
-fn stored(store: &Store, task: &Claimed, outcome: Outcome) -> Result<TaskResult, JobError> {
+/// An outcome as it is stored; a recording that the job made is kept for further jobs, where there is space for it.
+fn stored(store: &Store, task: &Claimed, outcome: Outcome, space: Option<Space>) -> Result<TaskResult, Problem> {
     let recording = outcome.recording();
-    if !recording.is_empty() {
-        super::recordings::keep(store, &task.job_id, recording).map_err(|p| JobError::NoSolution(p.detail))?;
+    if let Some(space) = space
+        && !recording.is_empty()
+    {
+        let owner = store.job(&task.job_id)?.map(|row| row.owner).unwrap_or_default();
+        recordings::keep(store, &owner, space, recording)?;
     }
     let artefact = |f: crate::job::File| (f.name, f.media_type.name().to_string(), f.bytes);
     Ok(TaskResult { result: outcome.result.into_bytes(), artefacts: outcome.files.into_iter().map(artefact).collect() })

@@ -6,6 +6,8 @@ use super::hub::{self, Hub};
 use super::limits::Limits;
 use super::log;
 use super::metrics::Metrics;
+use super::open_files;
+use super::paced::Paced;
 use super::problem::Problem;
 use super::quota::Quota;
 use super::router::{Peer, router};
@@ -188,6 +190,7 @@ pub fn serve(options: &ServeOptions, on_ready: &dyn Fn(SocketAddr)) -> Result<()
         bodies: quota("bodies coming in", options.limits.max_bodies),
         upload_bodies: quota("uploads coming in", options.limits.max_upload_bodies),
         streams: quota("event streams", options.limits.max_streams),
+        answers: quota("large answers going out", options.limits.max_answers),
         quick: Turns::new(2),
         uploads: Arc::new(Semaphore::new(1)),
         ready: tokio::sync::Mutex::default(),
@@ -250,7 +253,8 @@ async fn accept(listener: tokio::net::TcpListener, router: axum::Router, limits:
     let graceful = GracefulShutdown::new();
     let mut http = hyper::server::conn::http1::Builder::new();
     http.timer(TokioTimer::new()).header_read_timeout(limits.head_time).max_headers(64).max_buf_size(64 << 10);
-    let connections = quota("connections", limits.max_connections);
+    let connections = quota("connections", open_files::connections(limits.max_connections));
+    let Limits { least_bytes_per_s, body_grace, .. } = *limits;
     let mut stopped = std::pin::pin!(interrupted());
     let mut end: Option<tokio::time::Instant> = None;
     loop {
@@ -272,13 +276,14 @@ async fn accept(listener: tokio::net::TcpListener, router: axum::Router, limits:
         let address = peer.ip().to_string();
         let Ok(entered) = connections.enter(&address) else { continue };
         let _ = socket.set_nodelay(true);
+        let paced = Paced::new(socket, least_bytes_per_s, body_grace);
         let peer = Peer(address.into());
         let named = router.clone().map_request(move |mut request: hyper::Request<hyper::body::Incoming>| {
             request.extensions_mut().insert(peer.clone());
             request.map(axum::body::Body::new)
         });
         let service = TowerToHyperService::new(named);
-        let connection = graceful.watch(http.serve_connection(TokioIo::new(socket), service));
+        let connection = graceful.watch(http.serve_connection(TokioIo::new(paced), service));
         tokio::spawn(async move {
             let _entered = entered;
             let _ = connection.await;

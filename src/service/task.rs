@@ -1,7 +1,8 @@
 //! What is stored of a task: the kind and request of its job, or of a part of it, and the limits it was accepted with.
 
+use super::recordings::Space;
 use super::store::{NUMBERS_ONLY, NewTask};
-use crate::job::{Job, JobError, job_of_part, kind_of_part, kind_of_task};
+use crate::job::{Job, JobError, Kind, job_of_part, kind_of_part, kind_of_task};
 use serde::{Deserialize, Serialize};
 
 /// A task's input as it is stored.
@@ -16,6 +17,20 @@ pub struct TaskInput {
     pub max_elements: usize,
     /// Most seconds that it may run.
     pub max_seconds: f64,
+    /// Space for the recording that it may make; earlier versions stored none.
+    #[serde(default)]
+    pub space: Space,
+}
+
+/// The limits that a job was accepted with.
+#[derive(Clone, Copy, Debug)]
+pub struct TaskLimits {
+    /// Most elements of a mesh.
+    pub max_elements: usize,
+    /// Most seconds that a task may run.
+    pub max_seconds: f64,
+    /// Space for recordings.
+    pub space: Space,
 }
 
 impl TaskInput {
@@ -31,13 +46,16 @@ impl TaskInput {
 }
 
 /// The tasks into which a job is split, and whether their results are put together at the end.
-pub fn tasks_of(job: &Job, max_elements: usize, max_seconds: f64) -> Result<(Vec<NewTask>, bool), serde_json::Error> {
+pub fn tasks_of(job: &Job, limits: TaskLimits) -> Result<(Vec<NewTask>, bool), serde_json::Error> {
+    let input = |kind: &Kind, request: &serde_json::Value| {
+        let TaskLimits { max_elements, max_seconds, space } = limits;
+        let (kind, request) = (kind.command.into(), request.clone());
+        serde_json::to_string(&TaskInput { kind, request, max_elements, max_seconds, space })
+    };
     let task = |job: &Job| {
         let (key, is_numbers_only) = job.work_key();
         let cache_key = if is_numbers_only { key + NUMBERS_ONLY } else { key };
-        let input =
-            TaskInput { kind: job.kind.command.into(), request: job.request.clone(), max_elements, max_seconds };
-        Ok(NewTask { input: serde_json::to_string(&input)?, cache_key })
+        Ok(NewTask { input: input(job.kind, &job.request)?, cache_key })
     };
     let parts = job.parts();
     if parts.is_empty() {
@@ -46,15 +64,7 @@ pub fn tasks_of(job: &Job, max_elements: usize, max_seconds: f64) -> Result<(Vec
     let tasks = parts.iter().map(|part| match job_of_part(part) {
         Ok(job) => task(&job),
         // A part that cannot be run is a result: it fails when its turn comes.
-        Err(_) => {
-            let input = TaskInput {
-                kind: kind_of_part(part.kind).command.into(),
-                request: part.request.clone(),
-                max_elements,
-                max_seconds,
-            };
-            Ok(NewTask { input: serde_json::to_string(&input)?, cache_key: String::new() })
-        }
+        Err(_) => Ok(NewTask { input: input(kind_of_part(part.kind), &part.request)?, cache_key: String::new() }),
     });
     Ok((tasks.collect::<Result<_, _>>()?, true))
 }

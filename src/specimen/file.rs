@@ -1,18 +1,22 @@
 //! A specimen in a file (`specimen/1`): the fields of [`Specimen`] behind the tag that names the format.
 
+use super::read::SCHEMA;
+#[cfg(feature = "schema")]
 use super::read::{
-    MAX_DIAMETER_MM, MAX_DRIVES, MAX_HOLES, MAX_NAME_LENGTH, MAX_SAMPLES_IN_PARALLEL, MAX_SIZE_MM, MIN_DIAMETER_MM,
-    MIN_SIZE_MM, SCHEMA,
+    MAX_DIAMETER_MM, MAX_DRIVES, MAX_HOLES, MAX_NAME_LENGTH, MAX_OTHER_SAMPLES, MAX_SAMPLES_IN_PARALLEL, MAX_SIZE_MM,
+    MIN_DIAMETER_MM, MIN_SIZE_MM,
 };
-use super::{Block, Hole, Outline, Specimen, TestKind};
+use super::{Block, Hole, Outline, Sample, Specimen, TestKind};
+use crate::field::file_tag;
+#[cfg(feature = "schema")]
 use crate::field::schema::{
-    integer_within, list_of, number, number_within, numbers, schema_of_file, schema_tag, schema_type, text,
+    integer_within, list_of, number, number_within, numbers, schema_of_file, schema_type, text,
 };
 use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
 
-schema_tag!(SpecimenTag, SCHEMA);
+file_tag!(SpecimenTag, SCHEMA);
 
+#[cfg(feature = "schema")]
 schema_type! {
     /// An extent of a block, mm.
     pub(super) ExtentMm = number_within(MIN_SIZE_MM..=MAX_SIZE_MM);
@@ -21,22 +25,24 @@ schema_type! {
     /// A free name.
     pub(crate) Name = text(MAX_NAME_LENGTH);
     /// Holes, all with the same axis.
-    Holes = list_of::<Hole>(0..=MAX_HOLES), of Hole;
+    pub(super) Holes = list_of::<Hole>(0..=MAX_HOLES), of Hole;
     /// Drives, mm, positive and increasing.
     Drives = numbers(number(), 1..=MAX_DRIVES);
+    /// Further samples of a double-lap test that share drive and load cell.
+    OtherSamples = list_of::<Sample>(0..=MAX_OTHER_SAMPLES), of Sample;
     /// How many identical samples share the load cell.
     SamplesInParallel = integer_within(1..=MAX_SAMPLES_IN_PARALLEL as usize);
 }
 
 /// A specimen (`specimen/1`).
-#[derive(Serialize, Deserialize, ToSchema)]
+#[derive(Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = SpecimenSchema))]
 #[serde(deny_unknown_fields, expecting = "struct Specimen")]
-#[schema(as = SpecimenSchema)]
 pub(super) struct SpecimenFile {
     /// Always `specimen/1`.
     schema: SpecimenTag,
     /// Free name.
-    #[schema(value_type = Name)]
+    #[cfg_attr(feature = "schema", schema(value_type = Name))]
     name: String,
     /// How it is held and moved.
     test: TestKind,
@@ -47,15 +53,20 @@ pub(super) struct SpecimenFile {
     outline: Outline,
     /// Holes; all with the same axis.
     #[serde(default)]
-    #[schema(value_type = Holes)]
+    #[cfg_attr(feature = "schema", schema(value_type = Holes))]
     holes: Vec<Hole>,
     /// Drives at which the specimen is scanned, mm, increasing.
-    #[schema(value_type = Drives)]
+    #[cfg_attr(feature = "schema", schema(value_type = Drives))]
     drive_mm: Vec<f64>,
     /// How many identical samples share the load cell; 1 by default.
     #[serde(default = "single_sample")]
-    #[schema(value_type = SamplesInParallel)]
+    #[cfg_attr(feature = "schema", schema(value_type = SamplesInParallel))]
     samples_in_parallel: u32,
+    /// Further samples of a double-lap test that share drive and load cell and are blocks of their own; their forces
+    /// add to the first one's. None by default.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(feature = "schema", schema(value_type = OtherSamples))]
+    other_samples: Vec<Sample>,
 }
 
 fn is_block(outline: &Outline) -> bool {
@@ -68,19 +79,36 @@ fn single_sample() -> u32 {
 
 impl From<SpecimenFile> for Specimen {
     fn from(file: SpecimenFile) -> Specimen {
-        let SpecimenFile { schema: SpecimenTag, name, test, block, outline, holes, drive_mm, samples_in_parallel } =
-            file;
-        Specimen { name, test, block, outline, holes, drive_mm, samples_in_parallel }
+        Specimen {
+            name: file.name,
+            test: file.test,
+            block: file.block,
+            outline: file.outline,
+            holes: file.holes,
+            drive_mm: file.drive_mm,
+            samples_in_parallel: file.samples_in_parallel,
+            other_samples: file.other_samples,
+        }
     }
 }
 
 impl From<Specimen> for SpecimenFile {
     fn from(specimen: Specimen) -> SpecimenFile {
-        let Specimen { name, test, block, outline, holes, drive_mm, samples_in_parallel } = specimen;
-        SpecimenFile { schema: SpecimenTag, name, test, block, outline, holes, drive_mm, samples_in_parallel }
+        SpecimenFile {
+            schema: SpecimenTag,
+            name: specimen.name,
+            test: specimen.test,
+            block: specimen.block,
+            outline: specimen.outline,
+            holes: specimen.holes,
+            drive_mm: specimen.drive_mm,
+            samples_in_parallel: specimen.samples_in_parallel,
+            other_samples: specimen.other_samples,
+        }
     }
 }
 
+#[cfg(feature = "schema")]
 schema_of_file!(Specimen, SpecimenFile);
 
 #[cfg(test)]

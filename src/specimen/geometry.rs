@@ -94,7 +94,7 @@ impl Specimen {
         self.holes.iter().map(defect_of).fold(0.0, f64::max)
     }
 
-    /// Volume of the material, mm³: area of the outline less the holes' circles, times the extrusion.
+    /// Volume of one sample (of the first kind), mm³: area of the outline less the holes' circles, times the extrusion.
     pub fn volume_mm3(&self) -> f64 {
         let outline_area = match self.outline {
             Outline::Block => {
@@ -127,12 +127,12 @@ impl Specimen {
         ligaments
     }
 
-    /// Elongation or slip at which the test reaches a nominal deformation, as a fraction of `drive_mm`: shear
-    /// strain drive/thickness, or stretch 1 + drive/length. For a dumb-bell the length is the one over which the
-    /// narrow portion's strain would give the whole elongation ([`dumbbell::effective_length_mm`]).
+    /// Elongation or slip at which the test reaches a nominal deformation, as a fraction of `drive_mm`: shear strain
+    /// drive/thickness (of the thinnest sample), or stretch 1 + drive/length. For a dumb-bell the length is the one
+    /// over which the narrow portion's strain would give the whole elongation ([`dumbbell::effective_length_mm`]).
     pub fn nominal_deformation(&self, drive_mm: f64) -> f64 {
         match self.test {
-            TestKind::DoubleLapShear => drive_mm / self.block.thickness_mm,
+            TestKind::DoubleLapShear => drive_mm / self.thinnest_mm(),
             TestKind::Uniaxial => 1.0 + drive_mm / self.nominal_length_mm(),
         }
     }
@@ -140,7 +140,7 @@ impl Specimen {
     /// The drive at the limit of what is supported, mm (shear strain 1.5 or nominal stretch 3).
     pub fn max_supported_drive_mm(&self) -> f64 {
         match self.test {
-            TestKind::DoubleLapShear => super::MAX_SHEAR_STRAIN * self.block.thickness_mm,
+            TestKind::DoubleLapShear => super::MAX_SHEAR_STRAIN * self.thinnest_mm(),
             TestKind::Uniaxial => (super::MAX_NOMINAL_STRETCH - 1.0) * self.nominal_length_mm(),
         }
     }

@@ -2,15 +2,17 @@
 
 use super::json::JsonProblem;
 use super::{LigamentKind, LimitsError, MAX_HOLES, MIRROR_TOLERANCE_MM, Specimen};
+#[cfg(feature = "schema")]
 use crate::field::schema::{integer_within, number_above, schema_type};
 use crate::field::{FieldError, FieldPath};
 use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
+#[cfg(feature = "schema")]
 use utoipa::openapi::schema::ArrayBuilder;
 
 /// A largest stretch must be above this: the undeformed body has it.
 const UNDEFORMED_STRETCH: f64 = 1.0;
 
+#[cfg(feature = "schema")]
 schema_type! {
     /// A length, mm, above 0.
     PositiveMm = number_above(0.0);
@@ -32,19 +34,21 @@ const PUNCH_TOLERANCE_MM: f64 = 1e-6;
 const ROUNDING: f64 = 1e-9;
 
 /// Diameters that can be made, mm.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct DiameterRange {
     /// Smallest, mm.
-    #[schema(value_type = PositiveMm)]
+    #[cfg_attr(feature = "schema", schema(value_type = PositiveMm))]
     pub min: f64,
     /// Largest, mm.
-    #[schema(value_type = PositiveMm)]
+    #[cfg_attr(feature = "schema", schema(value_type = PositiveMm))]
     pub max: f64,
 }
 
 /// Mirror planes through the origin that the geometry must have.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Symmetry {
     /// Free.
@@ -93,54 +97,56 @@ impl Symmetry {
 /// assert_eq!(limits.max_holes, None);
 /// # Ok::<(), lambdak::specimen::LimitsError>(())
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ManufacturingLimits {
     /// Thinnest ligament between two holes, mm.
-    #[schema(value_type = PositiveMm)]
+    #[cfg_attr(feature = "schema", schema(value_type = PositiveMm))]
     pub min_ligament_hole_hole_mm: f64,
     /// Thinnest ligament between a hole and a side of the section, mm.
-    #[schema(value_type = PositiveMm)]
+    #[cfg_attr(feature = "schema", schema(value_type = PositiveMm))]
     pub min_ligament_hole_edge_mm: f64,
     /// Continuous range of diameters, mm. Exactly one of this and `punches_mm` is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<DiameterRange>, nullable = false)]
+    #[cfg_attr(feature = "schema", schema(value_type = Option<DiameterRange>, nullable = false))]
     pub diameter_mm: Option<DiameterRange>,
     /// Diameters of the punches or pins at hand, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<Punches>, nullable = false)]
+    #[cfg_attr(feature = "schema", schema(value_type = Option<Punches>, nullable = false))]
     pub punches_mm: Option<Vec<f64>>,
     /// Fewest voxels across any ligament, counted as [`ManufacturingLimits::voxels_across`] does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<PositiveNumber>, nullable = false)]
+    #[cfg_attr(feature = "schema", schema(value_type = Option<PositiveNumber>, nullable = false))]
     pub min_voxels_across_ligament: Option<f64>,
     /// Largest force of the actuator or load cell, all samples together, N.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<PositiveForceN>, nullable = false)]
+    #[cfg_attr(feature = "schema", schema(value_type = Option<PositiveForceN>, nullable = false))]
     pub max_force_n: Option<f64>,
     /// Largest travel of the actuator, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<PositiveMm>, nullable = false)]
+    #[cfg_attr(feature = "schema", schema(value_type = Option<PositiveMm>, nullable = false))]
     pub max_drive_mm: Option<f64>,
     /// Largest principal stretch anywhere, against tearing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<LargestStretch>, nullable = false)]
+    #[cfg_attr(feature = "schema", schema(value_type = Option<LargestStretch>, nullable = false))]
     pub max_local_stretch: Option<f64>,
     /// Most holes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<NumHoles>, nullable = false)]
+    #[cfg_attr(feature = "schema", schema(value_type = Option<NumHoles>, nullable = false))]
     pub max_holes: Option<usize>,
     /// Mirror planes that the geometry must have.
     #[serde(default)]
     pub symmetry: Symmetry,
     /// What a mould maker works to, mm: designs are given in multiples of it, but for punches; 0.1 where left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<PositiveMm>, nullable = false)]
+    #[cfg_attr(feature = "schema", schema(value_type = Option<PositiveMm>, nullable = false))]
     pub dimension_step_mm: Option<f64>,
 }
 
 /// How far a value is from its limit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LimitMargin {
     /// Name of the limit, with its unit, as in [`ManufacturingLimits`].
@@ -165,6 +171,41 @@ impl LimitMargin {
     /// `value` must be at most `limit`. A NaN violates.
     pub fn at_most(name: &str, value: f64, limit: f64) -> Self {
         Self::from_difference(name, value, limit, limit - value)
+    }
+
+    /// What is limited, as people say it; the name itself where it is none of [`ManufacturingLimits`].
+    pub fn plain_name(&self) -> &str {
+        match self.name.as_str() {
+            "min_ligament_hole_hole_mm" => "wall between two holes",
+            "min_ligament_hole_edge_mm" => "wall between a hole and a side",
+            "diameter_mm.min" => "smallest hole",
+            "diameter_mm.max" => "largest hole",
+            "punches_mm" => "hole without a punch",
+            "min_voxels_across_ligament" => "voxels across the thinnest wall",
+            "max_force_n" => "largest force",
+            "max_drive_mm" => "drive",
+            "max_local_stretch" => "largest local stretch",
+            "max_holes" => "number of holes",
+            "symmetry" => "symmetry",
+            other => other,
+        }
+    }
+
+    /// The unit of value and limit; empty for counts and ratios.
+    pub fn unit(&self) -> &'static str {
+        match self.name.as_str() {
+            name if name.ends_with("_mm") || name.starts_with("diameter_mm") || name == "symmetry" => "mm",
+            "max_force_n" => "N",
+            _ => "",
+        }
+    }
+
+    /// Limit, value and margin in words.
+    pub fn in_words(&self) -> String {
+        let unit = self.unit();
+        let with_unit = |value: f64| format!("{value:.3} {unit}").trim_end().to_string();
+        let (value, limit, margin) = (with_unit(self.value), with_unit(self.limit), 100.0 * self.margin_relative);
+        format!("{}: {value} (limit {limit}, margin {margin:.1} %)", self.plain_name())
     }
 
     fn from_difference(name: &str, value: f64, limit: f64, difference: f64) -> Self {
@@ -275,9 +316,23 @@ impl ManufacturingLimits {
     }
 
     /// Margins of every limit on the geometry, by closed forms: thinnest ligament of each kind, diameters, voxels
-    /// across the ligament that has fewest, number of holes, symmetry. Without holes only what applies.
-    /// `voxel_mm`: the scan's voxel along (x, y, z).
+    /// across the ligament that has fewest, number of holes, symmetry. Without holes only what applies; of several
+    /// samples the smallest margin of each limit. `voxel_mm`: the scan's voxel along (x, y, z).
     pub fn check_geometry(&self, specimen: &Specimen, voxel_mm: [f64; 3]) -> Vec<LimitMargin> {
+        let mut worst: Vec<LimitMargin> = Vec::new();
+        for own in specimen.samples().iter().flat_map(|sample| self.check_sample(sample, voxel_mm)) {
+            match worst.iter_mut().find(|m| m.name == own.name) {
+                // A NaN wins, so that it is seen.
+                Some(margin) if !(own.margin_relative >= margin.margin_relative) => *margin = own,
+                Some(_) => {}
+                None => worst.push(own),
+            }
+        }
+        worst
+    }
+
+    /// [`Self::check_geometry`] of one sample.
+    fn check_sample(&self, specimen: &Specimen, voxel_mm: [f64; 3]) -> Vec<LimitMargin> {
         let mut margins = Vec::new();
         let ligaments = specimen.ligaments();
         let is_between_holes = |kind: LigamentKind| matches!(kind, LigamentKind::HoleHole(..));

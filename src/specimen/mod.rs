@@ -3,16 +3,19 @@
 //! Frame (reference): origin at the centre of the undeformed block; x along its length (the pull direction),
 //! y along its thickness, z along its width. Lengths in mm.
 //!
-//! What is supported: a plain block or one standard dumb-bell, with circular holes that all share one axis.
+//! What is supported: a plain block or one standard dumb-bell, with circular holes that all share one axis; in a
+//! double-lap test further blocks beside it ([`Specimen::samples`]).
 //! The mesh is a section extruded along that axis, so holes of two directions in one specimen are refused.
 //! Parsing and validation: [`Specimen::from_json`]. Limits of what can be made: [`ManufacturingLimits`].
 //! Drawings for the mould maker: [`to_svg`], [`to_dxf`], [`to_stl`].
 
+#[cfg(feature = "solids")]
 mod clearance;
 mod drawing;
 mod drawing_dxf;
 mod drawing_labels;
 mod drawing_sheet;
+#[cfg(feature = "triangles")]
 mod drawing_stl;
 mod drawing_svg;
 pub mod dumbbell;
@@ -24,14 +27,17 @@ mod limits;
 mod limits_error;
 mod read;
 mod read_error;
+mod samples;
 #[cfg(test)]
 mod sampling;
 #[cfg(test)]
 mod tests;
 
+#[cfg(feature = "design")]
 pub(crate) use file::Name;
 
 pub use drawing_dxf::to_dxf;
+#[cfg(feature = "triangles")]
 pub use drawing_stl::{DrawingError, to_stl};
 pub use drawing_svg::to_svg;
 pub use geometry::MIRROR_TOLERANCE_MM;
@@ -40,17 +46,17 @@ pub use ligament::{Ligament, LigamentKind, SectionEdge};
 pub use limits::{DiameterRange, LimitMargin, ManufacturingLimits, Symmetry};
 pub use limits_error::LimitsError;
 pub use read::{
-    MAX_DIAMETER_MM, MAX_DRIVES, MAX_HOLES, MAX_NAME_LENGTH, MAX_NOMINAL_STRETCH, MAX_SAMPLES_IN_PARALLEL,
-    MAX_SHEAR_STRAIN, MAX_SIZE_MM, MIN_DIAMETER_MM, MIN_SIZE_MM, SCHEMA, min_meshable_ligament_mm,
+    MAX_DIAMETER_MM, MAX_DRIVES, MAX_HOLES, MAX_NAME_LENGTH, MAX_NOMINAL_STRETCH, MAX_OTHER_SAMPLES,
+    MAX_SAMPLES_IN_PARALLEL, MAX_SHEAR_STRAIN, MAX_SIZE_MM, MIN_DIAMETER_MM, MIN_SIZE_MM, SCHEMA,
+    min_meshable_ligament_mm,
 };
 pub use read_error::SpecimenError;
 
 use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
 
 /// How the specimen is held and moved.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
-#[schema(as = TestSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = TestSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum TestKind {
     /// Faces y = ±thickness/2 bonded to rigid plates; the one at +y moves by +drive along x.
@@ -60,24 +66,24 @@ pub enum TestKind {
 }
 
 /// The bounding block, mm.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-#[schema(as = BlockSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = BlockSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Block {
     /// Extent along x, mm.
-    #[schema(value_type = file::ExtentMm)]
+    #[cfg_attr(feature = "schema", schema(value_type = file::ExtentMm))]
     pub length_mm: f64,
     /// Extent along y, mm.
-    #[schema(value_type = file::ExtentMm)]
+    #[cfg_attr(feature = "schema", schema(value_type = file::ExtentMm))]
     pub thickness_mm: f64,
     /// Extent along z, mm.
-    #[schema(value_type = file::ExtentMm)]
+    #[cfg_attr(feature = "schema", schema(value_type = file::ExtentMm))]
     pub width_mm: f64,
 }
 
 /// The direction of a hole's axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
-#[schema(as = AxisSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = AxisSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum HoleAxis {
     /// Along y, centred at (x, z).
@@ -97,23 +103,23 @@ impl HoleAxis {
 }
 
 /// A circular hole through the whole block.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-#[schema(as = HoleSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = HoleSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Hole {
     /// Direction of the axis.
     pub axis: HoleAxis,
     /// Centre, mm: (x, z) for `thickness`, (x, y) for `width`.
-    #[schema(min_items = 2, max_items = 2)]
+    #[cfg_attr(feature = "schema", schema(min_items = 2, max_items = 2))]
     pub center_mm: [f64; 2],
     /// Diameter, mm.
-    #[schema(value_type = file::DiameterMm)]
+    #[cfg_attr(feature = "schema", schema(value_type = file::DiameterMm))]
     pub diameter_mm: f64,
 }
 
 /// The outline in the (x, z) section, extruded along the thickness.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
-#[schema(as = OutlineSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = OutlineSchema))]
 pub enum Outline {
     /// The plain block.
     #[default]
@@ -134,6 +140,19 @@ impl Outline {
     }
 }
 
+/// A sample that shares plates' drive and load cell with another one, and is a block of its own.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = SampleSchema))]
+#[serde(deny_unknown_fields)]
+pub struct Sample {
+    /// Bounding block.
+    pub block: Block,
+    /// Holes; all with the same axis.
+    #[serde(default)]
+    #[cfg_attr(feature = "schema", schema(value_type = file::Holes))]
+    pub holes: Vec<Hole>,
+}
+
 /// A specimen; in JSON `specimen/1`, with the tag `schema` before its fields.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "file::SpecimenFile", into = "file::SpecimenFile")]
@@ -150,6 +169,9 @@ pub struct Specimen {
     pub holes: Vec<Hole>,
     /// Drives at which the specimen is scanned, mm, increasing.
     pub drive_mm: Vec<f64>,
-    /// How many identical samples share the load cell.
+    /// How many samples like this one share the load cell.
     pub samples_in_parallel: u32,
+    /// Further samples that share drive and load cell, in a double-lap test: blocks of their own size, with holes of
+    /// their own. The forces of all samples add.
+    pub other_samples: Vec<Sample>,
 }

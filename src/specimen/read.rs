@@ -20,6 +20,8 @@ pub const MAX_HOLES: usize = 64;
 pub const MAX_DRIVES: usize = 1000;
 /// Most samples that share a load cell.
 pub const MAX_SAMPLES_IN_PARALLEL: u32 = 64;
+/// Most kinds of samples beside the first one: each is a model of its own.
+pub const MAX_OTHER_SAMPLES: usize = 7;
 /// Longest name, characters.
 pub const MAX_NAME_LENGTH: usize = 200;
 /// Largest supported shear strain, drive / thickness.
@@ -68,7 +70,7 @@ impl Specimen {
     }
 
     /// Checks everything that the types do not. The first problem found is returned, in this order: name, block,
-    /// outline, holes, ligaments, drives, samples.
+    /// outline, holes, ligaments, drives, samples, the same of other samples.
     ///
     /// # Errors
     /// [`SpecimenError`] with the value, the limit and what to change.
@@ -88,22 +90,45 @@ impl Specimen {
         if length > MAX_NAME_LENGTH || has_control {
             problems.push(SpecimenError::BadName { length, has_control, limit: MAX_NAME_LENGTH });
         }
-        for (name, value_mm) in self.extents() {
-            let field = || FieldPath::of("block").name(name);
-            problems.extend(check_size(field, value_mm, MIN_SIZE_MM, MAX_SIZE_MM));
-        }
-        self.check_outline(&mut problems);
-        self.check_holes(&mut problems);
-        // Ligaments mean something only where the holes and the block do.
-        if problems.is_empty() {
-            problems.extend(self.thin_ligaments());
-        }
+        self.check_shape(&mut problems);
         self.check_drives(&mut problems);
         if self.samples_in_parallel == 0 || self.samples_in_parallel > MAX_SAMPLES_IN_PARALLEL {
             let (value, limit) = (self.samples_in_parallel, MAX_SAMPLES_IN_PARALLEL);
             problems.push(SpecimenError::SamplesOutOfRange { value, limit });
         }
+        self.check_other_samples(&mut problems);
         problems
+    }
+
+    /// Block, outline, holes and ligaments.
+    fn check_shape(&self, problems: &mut Vec<SpecimenError>) {
+        let num_before = problems.len();
+        for (name, value_mm) in self.extents() {
+            let field = || FieldPath::of("block").name(name);
+            problems.extend(check_size(field, value_mm, MIN_SIZE_MM, MAX_SIZE_MM));
+        }
+        self.check_outline(problems);
+        self.check_holes(problems);
+        // Ligaments mean something only where the holes and the block do.
+        if problems.len() == num_before {
+            problems.extend(self.thin_ligaments());
+        }
+    }
+
+    fn check_other_samples(&self, problems: &mut Vec<SpecimenError>) {
+        let count = self.other_samples.len();
+        if count > MAX_OTHER_SAMPLES {
+            problems.push(SpecimenError::TooManyOtherSamples { count, limit: MAX_OTHER_SAMPLES });
+            return;
+        }
+        if count > 0 && self.test == TestKind::Uniaxial {
+            problems.push(SpecimenError::OtherSamplesInTension { count });
+        }
+        for (index, sample) in self.other_samples.iter().enumerate() {
+            let mut own = Vec::new();
+            self.as_sample(sample).check_shape(&mut own);
+            problems.extend(own.into_iter().map(|e| SpecimenError::OtherSample { index, error: Box::new(e) }));
+        }
     }
 
     /// Extents of the block by name, mm.

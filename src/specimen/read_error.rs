@@ -166,6 +166,31 @@ pub enum SpecimenError {
         /// Most.
         limit: u32,
     },
+    /// More kinds of samples than supported.
+    #[error("other_samples has {count} entries; use at most {limit}")]
+    TooManyOtherSamples {
+        /// How many.
+        count: usize,
+        /// Most.
+        limit: usize,
+    },
+    /// Samples of different kinds are pulled side by side.
+    #[error(
+        "other_samples has {count} entries in a uniaxial test; only a double-lap shear test may hold unlike samples: leave \
+         them out, or test them one after the other"
+    )]
+    OtherSamplesInTension {
+        /// How many.
+        count: usize,
+    },
+    /// Something is wrong with a further sample.
+    #[error("other_samples[{index}]: {error}")]
+    OtherSample {
+        /// Which.
+        index: usize,
+        /// What is wrong.
+        error: Box<SpecimenError>,
+    },
     /// The block is not the bounding box of the standard's dumb-bell.
     #[error(
         "{field} is {value_mm} mm; outline iso37_type4 has {standard_mm} mm there: set it, or leave out the outline"
@@ -253,6 +278,14 @@ impl SpecimenError {
             E::SamplesOutOfRange { value, limit } => {
                 FieldError::new("/samples_in_parallel", value, format!("from 1 to {limit}"))
             }
+            E::TooManyOtherSamples { count, limit } => {
+                FieldError::new("/other_samples", format!("a list of {count}"), format!("at most {limit} samples"))
+            }
+            E::OtherSamplesInTension { count } => {
+                FieldError::new("/other_samples", format!("a list of {count}"), "left out in a uniaxial test")
+                    .remedy("only a double-lap shear test may hold unlike samples; test them one after the other")
+            }
+            E::OtherSample { index, error } => error.field_error().below(&format!("/other_samples/{index}")),
             E::NotTheStandardsBlock { field, value_mm, standard_mm } => {
                 FieldError::new(field.pointer(), value_mm, format!("{standard_mm} mm, as the standard has it"))
                     .remedy("set it, or leave out the outline")

@@ -24,6 +24,7 @@ pub(crate) fn any_layout() -> impl Strategy<Value = Specimen> {
                 holes: holes.into_iter().map(place).collect(),
                 drive_mm: vec![0.3 * thickness_mm, thickness_mm],
                 samples_in_parallel: 2,
+                other_samples: Vec::new(),
             }
         },
     )
@@ -59,5 +60,6 @@ pub(crate) fn dumbbell_with_hole() -> impl Strategy<Value = Specimen> {
         holes: vec![Hole { axis: HoleAxis::Thickness, center_mm: [x, z], diameter_mm }],
         drive_mm: vec![5.0],
         samples_in_parallel: 1,
+        other_samples: Vec::new(),
     })
 }

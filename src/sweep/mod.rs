@@ -7,6 +7,7 @@
 
 mod column_names;
 mod error;
+#[cfg(feature = "parquet")]
 mod parquet;
 mod points;
 mod result;
@@ -22,6 +23,7 @@ mod target;
 mod task;
 
 pub use error::{StoreError, SweepError};
+#[cfg(feature = "parquet")]
 pub use parquet::to_parquet;
 pub use points::latin_hypercube_points;
 pub use result::{SweepCell, SweepResult};

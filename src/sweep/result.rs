@@ -2,11 +2,14 @@
 
 use super::study::SweepStudy;
 use super::table::{Cells, SweepTable};
+use crate::field::schema::{number, schema_type};
 use crate::provenance::VERSION;
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+use utoipa::openapi::schema::{ObjectBuilder, OneOfBuilder, Type};
 
 /// A finished sweep.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SweepResult {
     /// Always `sweep/1`.
@@ -20,11 +23,20 @@ pub struct SweepResult {
     /// Names of the columns.
     pub columns: Vec<String>,
     /// The table, one list of cells per row.
+    #[schema(value_type = Vec<Vec<CellSchema>>)]
     pub rows: Vec<Vec<SweepCell>>,
     /// Version of the program.
     pub version: String,
     /// SHA-256 of the study, hexadecimal.
     pub input_hash: String,
+}
+
+schema_type! {
+    /// A cell of the table: a number, a word, or nothing where it is missing.
+    pub CellSchema = OneOfBuilder::new()
+        .item(number())
+        .item(ObjectBuilder::new().schema_type(Type::String))
+        .item(ObjectBuilder::new().schema_type(Type::Null));
 }
 
 /// A cell of the table.

@@ -1,6 +1,7 @@
 //! The sweep study (`sweep-study/1`).
 
 use super::target::Target;
+use crate::field::schema::{integer_within, schema_type};
 use crate::material::Ogden;
 use crate::mesh::MeshSize;
 use crate::provenance::{VERSION, input_hash};
@@ -13,6 +14,11 @@ use utoipa::ToSchema;
 pub const SCHEMA: &str = "sweep-study/1";
 /// Most tasks of a study.
 pub(super) const MAX_TASKS: usize = 10_000_000;
+
+schema_type! {
+    /// A number of points of a sweep.
+    pub NumPoints = integer_within(1..=MAX_TASKS);
+}
 
 /// A sweep: every design of a sampled space, with every material.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -77,7 +83,7 @@ pub struct SampleRange {
     pub max: f64,
     /// Values of a grid, evenly spaced, ends included.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[schema(value_type = Option<NumPoints>, nullable = false)]
     pub count: Option<usize>,
 }
 
@@ -90,6 +96,7 @@ pub enum Sampling {
     /// `count` points; each variable's range is cut into `count` strata and each stratum hit once.
     LatinHypercube {
         /// Number of points.
+        #[schema(value_type = NumPoints)]
         count: usize,
     },
     /// These points, one row each, in the order of the variables.

@@ -3,7 +3,8 @@
 use super::study::{NamedMaterial, SCHEMA, Sampling, SweepStudy, SweepVariable};
 use super::study_error::SweepStudyError;
 use crate::design::Inline;
-use crate::field::schema::{schema_of_file, schema_tag};
+use crate::field::file_tag;
+use crate::field::schema::{Seed, schema_of_file};
 use crate::field::{FieldError, read};
 use crate::material::Ogden;
 use crate::mesh::MeshSize;
@@ -13,7 +14,7 @@ use serde::Deserialize;
 use std::path::Path;
 use utoipa::ToSchema;
 
-schema_tag!(SweepStudyTag, SCHEMA);
+file_tag!(SweepStudyTag, SCHEMA);
 
 /// A sweep study (`sweep-study/1`), with specimen and materials spelled out.
 #[derive(Deserialize, ToSchema)]
@@ -42,6 +43,7 @@ struct StudyFile {
     mesh: MeshSize,
     /// Seed of the Latin hypercube; 1 by default.
     #[serde(default = "default_seed")]
+    #[schema(value_type = Seed, default = default_seed)]
     seed: u64,
 }
 

@@ -8,6 +8,7 @@ use serde::Serialize;
 ///
 /// The affine of a NIfTI image with this grid has `voxel_mm` on its diagonal and `origin_mm` in its last column.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct VoxelGrid {
     /// Centre of voxel (0, 0, 0), mm in the specimen's frame.
     pub origin_mm: [f64; 3],

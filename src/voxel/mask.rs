@@ -133,6 +133,7 @@ pub(crate) mod tests {
             holes: vec![],
             drive_mm: vec![5.0],
             samples_in_parallel: 2,
+            other_samples: Vec::new(),
         }
     }
 

@@ -37,6 +37,7 @@ pub fn specimen(test: TestKind, extents: Vector, axis: HoleAxis, holes: &[Vector
         holes: holes.iter().map(|h| Hole { axis, center_mm: [h[0], h[1]], diameter_mm: h[2] }).collect(),
         drive_mm: vec![1.0],
         samples_in_parallel: 1,
+        other_samples: Vec::new(),
     }
 }
 

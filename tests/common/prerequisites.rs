@@ -28,7 +28,7 @@ pub enum Prerequisite {
     Mount,
     /// CalculiX (`ccx`).
     Calculix,
-    /// Leave to open some 1,100 files in one process and 550 in another.
+    /// Leave to open some 1,400 files in a process.
     OpenFiles,
 }
 

@@ -1,6 +1,8 @@
 //! The real binary on a free port, and a small HTTP client.
 #![allow(dead_code)]
 
+pub mod tar;
+
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -42,6 +44,19 @@ impl Reply {
 
 pub fn lambdak() -> Command {
     Command::new(env!("CARGO_BIN_EXE_lambdak"))
+}
+
+/// What a request is refused for that does not fit its schema, and one that fits and cannot be computed.
+pub const MISFIT: (u16, &str) = (400, "schema-mismatch");
+pub const UNFIT: (u16, &str) = (422, "invalid-input");
+
+impl Reply {
+    /// Holds the reply to be a refusal of this status and cause whose first error is at `pointer`.
+    pub fn is_refused(&self, (status, cause): (u16, &str), pointer: &str) {
+        let body = self.json();
+        let found = (self.status, self.cause(), body["errors"][0]["pointer"].as_str().unwrap_or_default().to_string());
+        assert_eq!(found, (status, cause.to_string(), pointer.to_string()), "{body}");
+    }
 }
 
 impl Service {
@@ -180,18 +195,24 @@ pub fn small_sweep(count: usize) -> Value {
     json!({ "name": "kill", "base": small_evaluation(1.0), "vary": [{ "pointer": "/drive_mm/0", "values": values }] })
 }
 
-/// A tar entry with a right checksum.
-pub fn tar_entry(name: &str, kind: u8, bytes: &[u8]) -> Vec<u8> {
-    let mut header = [0u8; 512];
-    header[..name.len()].copy_from_slice(name.as_bytes());
-    header[124..135].copy_from_slice(format!("{:011o}", bytes.len()).as_bytes());
-    header[148..156].fill(b' ');
-    header[156] = kind;
-    let sum: u64 = header.iter().map(|b| u64::from(*b)).sum();
-    header[148..154].copy_from_slice(format!("{sum:06o}").as_bytes());
-    header[154] = 0;
-    let mut out = header.to_vec();
-    out.extend_from_slice(bytes);
-    out.resize(out.len().div_ceil(512) * 512, 0);
-    out
+/// A scan that takes a fraction of a second, and leaves a recording.
+pub fn small_scan(drive_mm: f64) -> Value {
+    json!({
+        "specimen": shipped("solid-shear.json"), "drive_mm": [drive_mm], "mesh": 5.0, "voxel_mm": [2.0, 1.0, 2.0],
+        "mm_per_radian": [2.0, 2.0, 2.0], "noise_sd_mm": [0.01, 0.01, 0.01],
+    })
+}
+
+/// Adds a token NAME:ROLE to the file, and gives it.
+pub fn add_token(tokens: &Path, name: &str) -> String {
+    let made = lambdak().args(["serve", "--add-token", name, "--tokens"]).arg(tokens).output().unwrap();
+    assert!(made.status.success(), "{made:?}");
+    String::from_utf8(made.stdout).unwrap().trim().to_string()
+}
+
+/// Sets a quota of the file's token of this index.
+pub fn set_quota(tokens: &Path, index: usize, quota: &str, value: u64) {
+    let mut file: Value = serde_json::from_str(&std::fs::read_to_string(tokens).unwrap()).unwrap();
+    file["tokens"][index][quota] = json!(value);
+    std::fs::write(tokens, file.to_string()).unwrap();
 }

@@ -80,6 +80,7 @@ impl MaterialCause for Compressibility {
             evidence,
             effect_rms_mm: free.prediction.trace.plus(-1.0, &stiff.prediction.trace).rms_mm(),
             experiments: Vec::new(),
+            own_remedy: String::new(),
             source: Source::Material(bulk_ratio),
         };
         Ok(Some(MaterialFinding { found, nominal: Some(stiff), current: free }))

@@ -1,5 +1,6 @@
 //! A stiff or soft place inside the sample.
 
+use super::cut::Slit;
 use crate::diagnosis::balls::{Ball, change_of_ball, log_factor_of_ball};
 use crate::diagnosis::candidate::Candidate;
 use crate::diagnosis::cause::{Category, Cause, CauseName, CauseParameter};
@@ -25,6 +26,9 @@ pub(super) const ENTRY: Entry = Entry { name: NAME, remedy: REMEDY, origin: Orig
 /// taken are some three times this width apart.
 const EDGE_MM: f64 = 0.25;
 
+/// Below this ln of the factor a soft place may be none: a cut lets go as much.
+const HOLLOW: f64 = -1.8;
+
 /// A ball whose stiffness is the surroundings' times a factor.
 pub struct Inclusion {
     /// Where the search for it starts: centre, mm.
@@ -43,10 +47,18 @@ pub struct Inclusion {
 /// badly. The best stiff and the best soft one are then taken, because a stiff one above the middle and a soft one
 /// below look alike.
 fn suspects(search: &mut Search) -> Result<Vec<Candidate>, DiagnosisError> {
-    let balls = match search.stiffness_map()? {
+    let mut balls = match search.stiffness_map()? {
         Some(map) => map.balls.clone(),
         None => return Ok(Vec::new()),
     };
+    // Where a ball is in the fit already, a second one would mend the shape of the first.
+    let known: Vec<&Supposed> = search.current.causes.iter().filter(|s| s.cause.name() == NAME).collect();
+    balls.retain(|ball| {
+        known.iter().all(|s| {
+            let away = (0..3).map(|a| (s.values[1 + a] - ball.center_mm[a]).powi(2)).sum::<f64>().sqrt();
+            away > s.values[4] + ball.radius_mm
+        })
+    });
     let best = balls.first().map_or(0.0, |b| b.explained);
     let is_worth = best > EVIDENCE && best > WORTH_A_FIT * search.top;
     let mut starts: Vec<(f64, Candidate)> = Vec::new();
@@ -71,7 +83,8 @@ fn first_order(ball: &Ball) -> (f64, Candidate) {
 /// equilibrium.
 fn with_full_stiffness(search: &mut Search, ball: &Ball) -> Result<Option<(f64, Candidate)>, DiagnosisError> {
     let (_, mut candidate) = first_order(ball);
-    let supposed = [Supposed { cause: candidate.cause.clone(), values: candidate.values.clone() }];
+    let mut supposed = search.current.causes.clone();
+    supposed.push(Supposed { cause: candidate.cause.clone(), values: candidate.values.clone() });
     match search.laboratory.predict(&search.current.material, &scene_of(&supposed), search.is_cancelled) {
         Ok(found) => {
             let change = found.trace.plus(-1.0, &search.current.prediction.trace);
@@ -138,6 +151,16 @@ impl Cause for Inclusion {
     fn apply_wider(&self, values: &[f64], scene: &mut Scene) -> bool {
         scene.stiffness.push(ball(values, 2.0 * EDGE_MM));
         true
+    }
+
+    fn look_alikes(&self, values: &[f64], specimen: &Specimen) -> Vec<Arc<dyn Cause>> {
+        if values[0] > HOLLOW {
+            return Vec::new();
+        }
+        Slit::across(specimen, [values[1], values[2], values[3]], values[4])
+            .into_iter()
+            .map(|slit| Arc::new(slit) as Arc<dyn Cause>)
+            .collect()
     }
 
     fn location(&self, values: &[f64], _: &Specimen) -> Option<Location> {

@@ -5,21 +5,23 @@
 //! or [`super::material_cause::MaterialCause`].
 
 mod background;
-mod block;
 mod bond;
 mod cell;
 mod compliance;
 mod compressibility;
+mod cut;
 mod debond;
 mod fibre;
 mod gain;
 mod gradient;
 mod hole;
 mod inclusion;
+mod law;
 mod layer;
 mod mount;
 mod mullins;
 mod offaxis;
+mod outline;
 mod registration;
 mod relaxation;
 mod slack;
@@ -43,6 +45,7 @@ pub(super) const REGISTRY: &[Entry] = &[
     terms::ENTRY,
     wrap::ENTRY,
     gradient::ENTRY,
+    law::ENTRY,
     swelling::ENTRY,
     tilt::ENTRY,
     offaxis::ENTRY,
@@ -58,11 +61,12 @@ pub(super) const REGISTRY: &[Entry] = &[
     debond::ENTRY,
     bond::ENTRY,
     inclusion::ENTRY,
+    cut::ENTRY,
     travel::ENTRY,
     registration::OF_SET_UP,
     swelling::OF_SET_UP,
     layer::ENTRY,
-    block::ENTRY,
+    outline::ENTRY,
 ];
 
 /// The causes that act where the sample is held. They say nothing of a part of it whose boundary was measured.
@@ -76,9 +80,16 @@ pub(super) const AT_BOUNDARY: &[CauseName] = &[
     bond::ENTRY.name,
     travel::ENTRY.name,
     layer::ENTRY.name,
-    block::ENTRY.name,
+    outline::ENTRY.name,
 ];
 
 /// The causes that act inside the sample. They say little of a misfit that vanishes once the boundary is as measured.
-pub(super) const INSIDE: &[CauseName] =
-    &[gradient::ENTRY.name, swelling::ENTRY.name, hole::ENTRY.name, fibre::ENTRY.name, inclusion::ENTRY.name];
+pub(super) const INSIDE: &[CauseName] = &[
+    gradient::ENTRY.name,
+    law::ENTRY.name,
+    swelling::ENTRY.name,
+    hole::ENTRY.name,
+    cut::ENTRY.name,
+    fibre::ENTRY.name,
+    inclusion::ENTRY.name,
+];

@@ -55,6 +55,7 @@ impl MaterialCause for Terms {
             evidence,
             effect_rms_mm: richer.prediction.trace.plus(-1.0, &case.current.prediction.trace).rms_mm(),
             experiments: Vec::new(),
+            own_remedy: String::new(),
             source: Source::Material(last_term),
         };
         Ok(Some(MaterialFinding { found, nominal: None, current: richer }))

@@ -107,7 +107,7 @@ fn fit_table(fit: &CurveFit) -> String {
 /// Joint fits, the one that is used, and what it predicts of curves kept back.
 pub(in crate::job) fn curves(sequence: &CurveFitSequence, used: &CurveFit, kept_back: &[CurveMatch]) -> String {
     let mut text = sequence_table(sequence);
-    text += &format!("\n{} terms\n", used.num_terms);
+    text += &format!("\n{} term{}\n", used.num_terms, if used.num_terms == 1 { "" } else { "s" });
     text += &fit_table(used);
     for m in kept_back {
         text += &format!(

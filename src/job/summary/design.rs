@@ -2,22 +2,31 @@
 
 use super::num;
 use crate::design::{DesignEntry, DesignResult};
+use crate::specimen::LimitMargin;
 
 /// The result as text.
 pub(in crate::job) fn design(result: &DesignResult) -> String {
     let mut text = format!("{}\n\n", result.name);
+    let advice = &result.recommendation;
+    for said in [&advice.make, &advice.precision, &advice.assumptions] {
+        text += &format!("{said}\n\n");
+    }
     for sentence in &result.findings {
         text += &format!("* {sentence}\n");
     }
-    text += "\n  design                                     drive mm   force N   gain   closest limit\n";
+    text += "\n  design                                     drive mm   largest force N   gain   closest limit\n";
     let line = |label: &str, e: &DesignEntry| {
         format!(
-            "  {:<42} {:>8} {:>9} {:>6}   {}\n",
+            "  {:<42} {:>8} {:>17} {:>6}   {}\n",
             label,
             num(e.specimen.drive_mm.last().copied().unwrap_or(0.0), 5),
             num(e.force_n(), 4),
             num(e.objective, 4),
-            if e.is_within_limits { e.closest_limit.clone() } else { format!("not kept: {}", e.not_kept()) }
+            if e.is_within_limits {
+                e.limits.first().map_or("none".into(), LimitMargin::in_words)
+            } else {
+                format!("not kept: {}", e.not_kept())
+            }
         )
     };
     text += &line("base", &result.base);
@@ -44,7 +53,6 @@ pub(in crate::job) fn design(result: &DesignResult) -> String {
                 let show = |v: Option<f64>, digits: usize| {
                     v.filter(|v| v.is_finite()).map_or("-".into(), |v| num(v, digits + 1))
                 };
-                let ratio = p.promised_sd.map(|sd| p.found_sd / sd);
                 text += &format!(
                     "  {:<10} {:<10} {:>11} {:>12} {:>12} {:>13} {:>7} {:>7}\n",
                     label,
@@ -53,11 +61,14 @@ pub(in crate::job) fn design(result: &DesignResult) -> String {
                     show(Some(p.mean), 4),
                     show(Some(p.found_sd), 4),
                     show(p.promised_sd, 4),
-                    show(ratio, 2),
+                    show(p.found_over_promised(), 2),
                     p.draws
                 );
             }
         }
+    }
+    for doubt in result.verification_doubts() {
+        text += &format!("\n* Caution. {doubt}\n");
     }
     for sentence in result.verification_failures() {
         text += &format!("\n* {sentence}\n");

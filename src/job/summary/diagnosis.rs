@@ -51,15 +51,17 @@ pub(in crate::job) fn diagnosis(r: &DiagnosisResult, d: &Diagnosis) -> String {
         }
     }
     text += &format!(
-        "\nchi2 per datum      {} -> {}\nmisfit beyond noise {} -> {} mm rms (allowance {})\nkept back           {} -> {} mm rms\n",
+        "\nchi2 per datum      {} -> {}\nmisfit beyond noise {} -> {} mm rms (allowance {})\n",
         num(r.chi2_per_datum.before, 5),
         num(r.chi2_per_datum.after, 5),
         num(r.structured_rms_mm.before, 5),
         num(r.structured_rms_mm.after, 5),
-        num(r.allowance_mm, 5),
-        num(r.kept_back_rms_mm.before, 5),
-        num(r.kept_back_rms_mm.after, 5)
+        num(r.allowance_mm, 5)
     );
+    if let Some(kept_back) = &r.kept_back_rms_mm {
+        let [before, after] = [kept_back.before, kept_back.after].map(|rms| num(rms, 5));
+        text += &format!("kept back           {before} -> {after} mm rms\n");
+    }
     if let Some(m) = &r.modulus_against_belief {
         text += &format!("\n{}\n", m.in_words());
     }

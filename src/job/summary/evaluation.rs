@@ -1,12 +1,15 @@
 //! An evaluation as text.
 
 use super::num;
-use crate::sensitivity::Evaluation;
+use crate::sensitivity::{Evaluation, PromisedSd};
 
 /// The evaluation as text.
 pub(in crate::job) fn evaluation(name: &str, evaluation: &Evaluation) -> String {
     let mut text = format!("{name}\n");
-    for step in &evaluation.steps {
+    if evaluation.blocks_scanned > 1 {
+        text += &format!("{} blocks scanned together\n", evaluation.blocks_scanned);
+    }
+    for (index, step) in evaluation.steps.iter().enumerate() {
         text += &format!(
             "\ndrive {} mm: force {} N, {} voxels, median stretch {}, largest {}\n",
             step.drive_mm,
@@ -15,6 +18,13 @@ pub(in crate::job) fn evaluation(name: &str, evaluation: &Evaluation) -> String 
             num(step.median_stretch, 4),
             num(step.largest_voxel_stretch, 4)
         );
+        if let Some(share) = evaluation.scan_share.get(index) {
+            text += &format!("  scanned in {} % of the time of one scan\n", num(100.0 * share, 3));
+        }
+        if !step.force_by_kind_n.is_empty() {
+            let forces: Vec<String> = step.force_by_kind_n.iter().map(|f| num(*f, 4)).collect();
+            text += &format!("  of this each kind of sample: {} N\n", forces.join(", "));
+        }
         text += "  parameter   integrated sensitivity: sum   mean per voxel   volume integral (mm³)\n";
         for s in &step.integrated_sensitivity {
             text += &format!(
@@ -30,7 +40,19 @@ pub(in crate::job) fn evaluation(name: &str, evaluation: &Evaluation) -> String 
         text += &format!("\ndrive {} mm: force {} N, read without a scan\n", step.drive_mm, num(step.force_n, 4));
     }
     text += "\npromised standard deviations, all drives together\n";
-    for p in &evaluation.promised_sd {
+    text += &promised(&evaluation.promised_sd);
+    if let Some(best) = &evaluation.best_scan_share {
+        let shares: Vec<String> = best.scan_share.iter().map(|s| format!("{:.1} %", 100.0 * s)).collect();
+        text += &format!("\nbest shares of the scan's time: {}; they promise\n", shares.join(", "));
+        text += &promised(&best.promised_sd);
+    }
+    text
+}
+
+/// Standard deviations, a line each.
+fn promised(list: &[PromisedSd]) -> String {
+    let mut text = String::new();
+    for p in list {
         text += &match (p.value, p.relative_sd) {
             (Some(sd), Some(relative)) => format!(
                 "  {:<10} {:>12} ({} %){}\n",

@@ -53,7 +53,9 @@ pub(in crate::job) fn import(result: &ImportResult) -> String {
         text += &format!("noise (x, y, z): {} mm\n", sd.map(|x| num(x, 5)).join(", "));
     }
     for step in &result.steps {
-        text += &format!("\ndrive {} mm: {} voxels with all three components\n", step.drive_mm, step.num_complete);
+        let what = if result.is_raw { "raw phases" } else { "all three components" };
+        let force = step.force_n.map_or(String::new(), |f| format!("; force {} N", num(f, 5)));
+        text += &format!("\ndrive {} mm: {} voxels with {what}{force}\n", step.drive_mm, step.num_complete);
         let Some(report) = &step.reconstruction else { continue };
         for (axis, c) in ["x", "y", "z"].iter().zip(&report.components) {
             text += &format!(

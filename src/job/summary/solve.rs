@@ -21,6 +21,10 @@ pub(in crate::job) fn solve(name: &str, result: &SolveResult) -> String {
             num(step.jacobian_range[0], 4),
             num(step.jacobian_range[1], 4)
         );
+        if !step.force_by_kind_n.is_empty() {
+            let forces: Vec<String> = step.force_by_kind_n.iter().map(|f| num(*f, 5)).collect();
+            text += &format!("           each kind of sample: {} N\n", forces.join(", "));
+        }
     }
     text
 }

@@ -4,6 +4,10 @@
 //! hand read no cells, in which MR-u laboratories keep their fields, or bound no decompression.
 
 mod v5;
+#[cfg(feature = "matlab")]
+mod v73;
+#[cfg(not(feature = "matlab"))]
+#[path = "no_v73.rs"]
 mod v73;
 
 use crate::file::{MemoryError, ReadingMemory};
@@ -49,6 +53,11 @@ pub enum MatError {
     /// Neither version 5 nor 7.3.
     #[error("not a MATLAB file of version 5 or 7.3 (version 4 is not read: save it with -v7)")]
     NotMat,
+    /// Version 7.3, without whose reader the library was built.
+    #[error(
+        "a MATLAB file of version 7.3, which lambdak was built without: turn on its feature `matlab`, or save the file with -v7"
+    )]
+    NoHdf5,
     /// Cut short or inconsistent.
     #[error("the file is damaged: {what}")]
     Damaged {

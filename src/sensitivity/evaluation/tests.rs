@@ -3,7 +3,9 @@
 use super::super::continuum::tests::block;
 use super::super::information::tests::one_term;
 use super::*;
-use crate::fem::SolveError;
+use crate::fem::{SolveError, SolveOptions};
+use crate::mesh::MeshOptions;
+use crate::sensitivity::ProtocolMismatch;
 
 fn scan() -> ScanSettings {
     serde_json::from_str(
@@ -48,6 +50,25 @@ fn coarse_scan() -> ScanSettings {
     ScanSettings { voxel_mm: [1.0, 0.5, 1.0], ..scan() }
 }
 
+/// The information of one drive at which `specimen` is measured as `protocol` says, on a coarse mesh.
+fn information(specimen: &Specimen, scan: &ScanSettings, protocol: Protocol) -> FisherInformation {
+    // One recipe for all, as a fixture carries it from sample to sample.
+    let mesh = MeshOptions::scaled(&with_hole(), 2.5).carried(&with_hole(), specimen);
+    let options = EvaluationOptions { mesh, protocol, ..EvaluationOptions::standard(specimen) };
+    let drives = DriveSelection::DriveMm(vec![1.5]);
+    evaluate(specimen, &one_term(), scan, &drives, &options, &|| false).unwrap().1.information
+}
+
+fn blocks(blocks_scanned: u32) -> Protocol {
+    Protocol { blocks_scanned, ..Protocol::default() }
+}
+
+/// With the samples that `others` are beside the specimen's own.
+fn beside(specimen: Specimen, others: &[&Specimen]) -> Specimen {
+    let of = |s: &&Specimen| crate::specimen::Sample { block: s.block, holes: s.holes.clone() };
+    Specimen { other_samples: others.iter().map(of).collect(), ..specimen }
+}
+
 fn with_hole() -> Specimen {
     let hole =
         crate::specimen::Hole { axis: crate::specimen::HoleAxis::Thickness, center_mm: [0.5, 0.0], diameter_mm: 3.0 };
@@ -64,6 +85,7 @@ fn information_agrees_with_differences() {
         ..EvaluationOptions::standard(&specimen)
     };
     let base = seen(&specimen, &one_term(), &options);
+    let num_voxels = base.samples[0].mask.as_ref().unwrap().num_voxels();
     let (mut fields, mut forces) = (Vec::new(), Vec::new());
     for parameter in one_term().parameters() {
         let value = one_term().value(parameter);
@@ -73,12 +95,13 @@ fn information_agrees_with_differences() {
             material.set(parameter, value + step);
             seen(&specimen, &material, &options)
         });
+        let [plus, minus] = [&plus.samples[0], &minus.samples[0]];
         let difference =
             |c: usize, v: usize| (plus.drives[0].displacement[v][c] - minus.drives[0].displacement[v][c]) / (2.0 * h);
-        fields.push((0..base.mask.num_voxels()).map(|v| [0, 1, 2].map(|c| difference(c, v))).collect::<Vec<_>>());
+        fields.push((0..num_voxels).map(|v| [0, 1, 2].map(|c| difference(c, v))).collect::<Vec<_>>());
         forces.push((plus.equilibria[0].force_n - minus.equilibria[0].force_n) / (2.0 * h));
     }
-    let weights = vec![1.0; base.mask.num_voxels()];
+    let weights = vec![1.0; num_voxels];
     let by_differences =
         FisherInformation::of_drive(&one_term(), &fields, &weights, &forces, &coarse_scan().noise()).unwrap();
     let (a, b) = (base.information.matrix(), by_differences.matrix());
@@ -87,6 +110,65 @@ fn information_agrees_with_differences() {
             let scale = (a[(i, i)] * a[(j, j)]).sqrt();
             // Truncation (10⁻³)² and solver residue 10⁻¹¹ / 10⁻³ over relative displacement changes of 10⁻².
             assert!((a[(i, j)] - b[(i, j)]).abs() < 1e-4 * scale, "{i} {j}: {} {}", a[(i, j)], b[(i, j)]);
+        }
+    }
+}
+
+/// A listed sample that equals the first is the same as two in parallel, and n blocks and a part of a scan's time weigh
+/// the voxels alone.
+#[test]
+fn equal_blocks_and_shares_weigh_the_voxels() {
+    let pair = Specimen { samples_in_parallel: 2, ..with_hole() };
+    let listed = beside(with_hole(), &[&with_hole()]);
+    let scan = coarse_scan();
+    let of = |specimen: &Specimen, protocol: Protocol| information(specimen, &scan, protocol).matrix().clone();
+    let (one, two) = (of(&pair, blocks(1)), of(&pair, blocks(2)));
+    let half = of(&pair, Protocol { scan_share: vec![0.5], ..blocks(1) });
+    let [listed_one, listed_two] = [1, 2].map(|n| of(&listed, blocks(n)));
+    for i in 0..3 {
+        for j in 0..3 {
+            let scale = (two[(i, i)] * two[(j, j)]).sqrt();
+            let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-9 * scale, "{i} {j}: {a} {b}");
+            // The same numbers in another order of sums.
+            close(listed_one[(i, j)], one[(i, j)]);
+            close(listed_two[(i, j)], two[(i, j)]);
+            // V + F with one block, 2 V + F with two, V/2 + F in half of the time.
+            close(two[(i, j)] - one[(i, j)], 2.0 * (one[(i, j)] - half[(i, j)]));
+        }
+    }
+    let too_many = EvaluationOptions { protocol: blocks(3), ..EvaluationOptions::standard(&pair) };
+    let drives = DriveSelection::DriveMm(vec![1.5]);
+    let refused = evaluate(&pair, &one_term(), &scan, &drives, &too_many, &|| false);
+    let mismatch = ProtocolMismatch::BlocksScanned { value: 3, num_samples: 2 };
+    assert!(matches!(refused, Err(EvaluationError::Protocol(m)) if m == mismatch));
+}
+
+/// Unlike blocks: the information about displacements is the sum of both blocks' own, and the load cell tells the sum
+/// of both forces.
+#[test]
+fn unlike_blocks_add_their_voxels_and_share_one_force() {
+    let first = with_hole();
+    let mut second = block("thicker");
+    second.block.thickness_mm *= 1.4;
+    // Next to no voxels, and next to no load cell.
+    let forces_alone = ScanSettings { noise_sd_mm: [1e8; 3], ..coarse_scan() };
+    let voxels_alone = ScanSettings { force_sd_n: 1e8, ..coarse_scan() };
+    let of = |s: &Specimen, scan: &ScanSettings, n: u32| information(s, scan, blocks(n)).matrix().clone();
+    // ∂F/∂ξ over σ: the information of a force is the square of it.
+    let slope = |s: &Specimen| -> Vec<f64> {
+        let of_force = of(s, &forces_alone, 1);
+        (0..3).map(|i| of_force[(1, i)] / of_force[(1, 1)].sqrt()).collect()
+    };
+    let (of_first, of_second) = (slope(&first), slope(&second));
+    let voxels = of(&first, &voxels_alone, 1) + of(&second, &voxels_alone, 1);
+    let both = of(&beside(first, &[&second]), &coarse_scan(), 2);
+    for i in 0..3 {
+        for j in 0..3 {
+            let force = (of_first[i] + of_second[i]) * (of_first[j] + of_second[j]);
+            let scale = (both[(i, i)] * both[(j, j)]).sqrt();
+            // The scans "alone" leave 10⁻¹⁸ of the other; the rest is the rounding of that small remainder's root.
+            let expected = voxels[(i, j)] + force;
+            assert!((both[(i, j)] - expected).abs() < 1e-6 * scale, "{i} {j}: {} {expected}", both[(i, j)]);
         }
     }
 }
@@ -135,7 +217,7 @@ fn evaluates_at_a_median_stretch() {
     assert!((evaluation.steps[0].median_stretch - 1.2).abs() <= 1e-5);
     assert!(evaluation.statistics.num_equilibria <= 8, "{}", evaluation.statistics.num_equilibria);
     assert!(evaluation.promised_sd[0].relative_sd.unwrap() < 0.05);
-    assert_eq!(maps.drives[0].states.len(), evaluation.steps[0].num_voxels);
+    assert_eq!(maps.samples[0].drives[0].states.len(), evaluation.steps[0].num_voxels);
     let text = serde_json::to_string(&evaluation).unwrap();
     let again: Evaluation = serde_json::from_str(&text).unwrap();
     assert_eq!(again.input_hash, evaluation.input_hash);

@@ -1,11 +1,13 @@
 // Results side by side: figures, promised deviations, maps and drawings of any jobs of one or of several kinds.
 
 import { getJson } from "./api.js";
+import { foundWords } from "./diagnosis.js";
 import { fill, h, sheet, term } from "./dom.js";
 import { figure } from "./figures.js";
 import { digits, interval, known, percent, sensitivityUnit, symbol, unitOf, withUnit } from "./numbers.js";
-import { shapes, table } from "./parts.js";
+import { numbered, shapes, table } from "./parts.js";
 import { readResult } from "./result.js";
+import { slicesView } from "./slices.js";
 import { jobName, learnTitles } from "./titles.js";
 import { COMPARED, GLOSSARY, KINDS, VERDICTS } from "./words.js";
 
@@ -85,7 +87,7 @@ const LINES = {
   "diagnosis/1": (r) => [
     fit(r.chi2_per_datum.after),
     line("verdict", "Verdict", null, VERDICTS[r.verdict]?.[0] ?? r.verdict),
-    line("causes", "What was found", null, r.causes.map((c) => c.description).join("; ") || "nothing"),
+    line("causes", "What was found", null, foundWords(r.causes).join("; ") || "nothing"),
     ...ofParameters(r.material_parameters),
   ],
 };
@@ -99,6 +101,20 @@ const FIGURES = [
   [["residual-histogram.svg"], "misfit in units of the noise"],
   [["correlation.svg"], "correlation of the estimates"],
 ];
+
+/** What a result left unexplained, one map per drive: words and address. */
+const RESIDUALS = {
+  "calibration/1": ({ result, files }) =>
+    numbered(files, /^misfit_(\d+)_(\d+)\.nii\.gz$/).map(([name], i) => ({
+      href: files.get(name).href,
+      drive: result.steps[i] ? `drive ${digits(result.steps[i].drive_mm, 3)} mm` : `scan ${i + 1}`,
+    })),
+  "diagnosis/1": ({ files }) =>
+    numbered(files, /^residual_after_(\d+)\.nii\.gz$/).map(([name, n]) => ({
+      href: files.get(name).href,
+      drive: `scan ${n}`,
+    })),
+};
 
 /** What a column is called. */
 const called = ({ job }) => `${jobName(job)} (${KINDS[job.kind] ?? job.kind})`;
@@ -171,6 +187,25 @@ async function surfaces(columns) {
   );
 }
 
+/** Maps of what each result leaves, side by side: one set per drive that at least two of them have. */
+function residuals(columns) {
+  const found = columns
+    .map((c) => ({ name: called(c), maps: RESIDUALS[c.result.schema]?.(c) ?? [] }))
+    .filter(({ maps }) => maps.length > 0);
+  const sets = [];
+  for (let i = 0; found.filter(({ maps }) => i < maps.length).length > 1; i += 1) {
+    const there = found.filter(({ maps }) => i < maps.length);
+    const drives = [...new Set(there.map(({ maps }) => maps[i].drive))];
+    sets.push({
+      label: drives.find((words) => words.startsWith("drive")) ?? drives[0],
+      panels: there.map(({ name, maps }) => ({ label: name, href: maps[i].href })),
+    });
+  }
+  return slicesView("What each leaves: measured less predicted", sets, {
+    note: "All are cut at the same place and share one scale of colours.",
+  });
+}
+
 /** A chooser of a further job to stand beside. */
 function adder(ids, jobs) {
   const free = jobs.filter((j) => j.state === "succeeded" && COMPARED.has(j.kind) && !ids.includes(j.id));
@@ -212,6 +247,7 @@ export async function compareView(content, text) {
       adder(ids, jobs),
     ),
     await surfaces(columns),
+    residuals(columns),
     await pictures(columns),
   );
 }

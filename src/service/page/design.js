@@ -52,13 +52,14 @@ function verification(result) {
       withUnit(digits(p.found_sd, 2), unit),
       withUnit(digits(p.promised_sd, 2), unit),
       p.draws,
+      p.doubts?.length ? `no: ${p.doubts.join("; ")}` : "yes",
     ];
   });
   return (
     rows.length > 0 &&
     sheet(
       "Verification on synthetic noisy scans, chosen design",
-      table(["Parameter", "Truth", "Mean", "Found deviation", "Promised", "Draws"], rows),
+      table(["Parameter", "Truth", "Mean", "Found deviation", "Promised", "Draws", "To be trusted"], rows),
     )
   );
 }
@@ -84,6 +85,7 @@ export function design(result, files, study) {
           "Use this design",
         ),
       ),
+      ...Object.values(result.recommendation ?? {}).map((said) => h("p", {}, said)),
       h(
         "ul",
         { class: "findings" },

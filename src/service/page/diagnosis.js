@@ -118,13 +118,17 @@ async function materialSheet(result, recording) {
   );
 }
 
+/** The causes in words, each kind once with how often it was found. */
+export const foundWords = (causes) =>
+  [...new Set(causes.map((c) => c.description))].map((words) => {
+    const count = causes.filter((c) => c.description === words).length;
+    return count > 1 ? `${words} (${count} times)` : words;
+  });
+
 /** What was wrong, in a few sentences. */
 function summary(result) {
   const [words, kind] = VERDICTS[result.verdict] ?? [result.verdict, "warn"];
-  const found = [...new Set(result.causes.map((c) => c.description))].map((words) => {
-    const count = result.causes.filter((c) => c.description === words).length;
-    return count > 1 ? `${words} (${count} times)` : words;
-  });
+  const found = foundWords(result.causes);
   return h(
     "section",
     { class: "sheet" },
@@ -137,11 +141,15 @@ function summary(result) {
     bigNumbers([
       [change(result.chi2_per_datum, ""), "χ² per datum (noise alone: 1)", GLOSSARY["χ² per datum"]],
       [change(result.structured_rms_mm, "mm"), "misfit beyond noise, rms"],
-      [
-        change(result.kept_back_rms_mm, "mm"),
-        "misfit of data kept back, rms, noise included",
-        GLOSSARY["data kept back"],
-      ],
+      ...(result.kept_back_rms_mm
+        ? [
+            [
+              change(result.kept_back_rms_mm, "mm"),
+              "misfit of data kept back, rms, noise included",
+              GLOSSARY["data kept back"],
+            ],
+          ]
+        : []),
     ]),
     h(
       "p",

@@ -123,3 +123,6 @@ export function choice({ label, options, value, put, meaning, wide, changed, ...
     ),
   );
 }
+
+/** Fields side by side. */
+export const fields = (...children) => h("div", { class: "fields" }, children);

@@ -1,5 +1,6 @@
 // A look at a recording before anything is fitted: its maps, drive by drive, and its load curve.
 
+import { getBlob, getJson } from "./api.js";
 import { h, sheet } from "./dom.js";
 import { linePlot } from "./lines.js";
 import { digits, plain } from "./numbers.js";
@@ -47,6 +48,20 @@ async function loadCurve(file, steps) {
   );
 }
 
+/** A file of this computer as it is, one of the service by its address. */
+const sourceOf = (file) => (file.href ? { href: file.href } : { blob: file });
+
+/** The files of a recording that the service keeps: each is read when it is shown. */
+export async function keptFiles(id) {
+  const { artefacts } = await getJson(`/v1/recordings/${id}/files`);
+  return artefacts.map(({ name, href, num_bytes: size }) => ({
+    name,
+    size,
+    href,
+    text: async () => (await getBlob(href)).text(),
+  }));
+}
+
 /** Maps of what the recording holds: displacements, or the phases that become displacements by an import. */
 function maps(steps, byName, mask) {
   const there = (names) => [names].flat().filter((n) => typeof n === "string" && byName.has(n));
@@ -54,13 +69,19 @@ function maps(steps, byName, mask) {
   const displacements = steps.flatMap((s) =>
     there(s.displacement).map((name) => ({
       label: drive(s),
-      panels: [{ label: "Displacement as recorded", blob: byName.get(name) }],
+      panels: [{ label: "Displacement as recorded", ...sourceOf(byName.get(name)) }],
     })),
   );
   const phases = steps.flatMap((s) =>
     there(s.raw?.phase).map((name, i) => ({
       label: `${drive(s)}, phase along ${"xyz"[i]}`,
-      panels: [{ label: "Phase as recorded", blob: byName.get(name), mask: byName.get(mask) }],
+      panels: [
+        {
+          label: "Phase as recorded",
+          ...sourceOf(byName.get(name)),
+          mask: byName.has(mask) && sourceOf(byName.get(mask)),
+        },
+      ],
     })),
   );
   return [

@@ -68,7 +68,10 @@ function bounds(values, [nx, ny, nz]) {
   return found.map(([low, high], a) => (high < low ? [0, [nx, ny, nz][a] - 1] : [low, high]));
 }
 
-/** The slice's values of one component, row by row from the top, and its width and height. */
+/**
+ * The slice's values of one component, row by row from the top, and its width and height; no values where the image has
+ * no such slice.
+ */
 export function slice(image, component, [across, up, through], index) {
   const { shape, bounds: ends } = image;
   const [nx, ny] = shape;
@@ -77,6 +80,7 @@ export function slice(image, component, [across, up, through], index) {
   const values = new Float32Array(width * height);
   const place = [0, 0, 0];
   place[through] = index;
+  if (index < 0 || index >= shape[through]) return { width, height, values: values.fill(NaN) };
   for (let row = 0; row < height; row += 1) {
     place[up] = ends[up][1] - row;
     for (let column = 0; column < width; column += 1) {

@@ -8,8 +8,9 @@ import { editor } from "./editor.js";
 import { markErrors, unreadField } from "./field.js";
 import { livePanel } from "./live.js";
 import { planBar, undoKeys } from "./plan_bar.js";
-import { goalForm, limitsForm, materialForm, scanForm, specimenForm } from "./plan_forms.js";
+import { materialForm, specimenForm } from "./plan_forms.js";
 import { startJob } from "./start.js";
+import { goalForm, limitsForm, scanForm } from "./study_forms.js";
 import { sweepForm } from "./sweep.js";
 import { inWords } from "./words.js";
 

@@ -1,7 +1,8 @@
 // How far a job is: the whole of it, what it does now, and how long it will take.
 
 import { fill, h } from "./dom.js";
-import { digits, duration } from "./numbers.js";
+import { digits, duration, plain } from "./numbers.js";
+import { sectionPicture } from "./section_drawing.js";
 
 /** Stages of a design search in their order: words, and how much work each is by the study's budget. */
 const SEARCH = {
@@ -37,8 +38,16 @@ const WORDS = {
   contours: "drawing contours",
 };
 
+/** A stage of a calibration: the number of terms that is tried, or a fit with so many that has ended. */
+function termWords(stage) {
+  const [, n, has] = stage.match(/^(\d+) terms?( from)?/) ?? [];
+  if (!n) return null;
+  const terms = n === "1" ? "one term" : `${n} terms`;
+  return has ? `fitting ${terms}: one of the starts has settled` : `fitting ${terms}`;
+}
+
 /** What a job does now, in words. */
-const stageWords = (stage) => SEARCH[stage]?.[0] ?? WORDS[stage] ?? stage;
+const stageWords = (stage) => SEARCH[stage]?.[0] ?? WORDS[stage] ?? termWords(stage) ?? stage;
 
 function searchPart(progress, request) {
   const budget = request?.budget ?? {};
@@ -64,7 +73,37 @@ function diagnosisPart(progress, request) {
   return null;
 }
 
-const PARTS = { designs: searchPart, diagnoses: diagnosisPart };
+
+/**
+ * A calibration tries one number of terms after the other, each from some starts; then come a finer mesh, profiles and
+ * contours where they are asked for. How much work each is: a fit with one term counts one.
+ */
+function calibrationPart(progress, request) {
+  const most = request?.num_terms ?? 3;
+  const later = 0.4 * (request?.num_starts ?? 3);
+  const ofTerms = (n) => (n <= 0 ? 0 : 1 + later * (n - 1));
+  const stages = [
+    ["finer mesh", request?.has_mesh_allowance === false ? 0 : 1],
+    ["bound of kappa", 0.2],
+    ["profiles", request?.has_profiles ? 0.5 * (1 + 2 * most) : 0],
+    ["contours", request?.has_contours ? 8 : 0],
+  ];
+  const whole = stages.reduce((sum, [, weight]) => sum + weight, ofTerms(most));
+  const begun = progress.stage.match(/^(\d+) terms?( from)?/);
+  if (begun) {
+    const n = Math.min(Number(begun[1]), most);
+    const within = begun[2] ? 0.5 * (ofTerms(n) - ofTerms(n - 1)) : 0;
+    return (ofTerms(n - 1) + within) / whole;
+  }
+  let done = ofTerms(most);
+  for (const [stage, weight] of stages) {
+    if (stage === progress.stage) return done / whole;
+    done += weight;
+  }
+  return null;
+}
+
+const PARTS = { designs: searchPart, diagnoses: diagnosisPart, calibrations: calibrationPart };
 
 /** The part of a job that is done, from 0 to 1; null where it cannot be told. */
 export function partDone(job, request) {
@@ -93,14 +132,25 @@ export function progressView(request, usual) {
   const element = h("div", {});
   const steps = h("ol", { class: "quiet" });
   const done = h("details", {}, h("summary", {}, "What it has done"), steps);
+  const picture = h("div", {});
   const past = [];
   const gains = [];
+  let drawn = "";
   let most = null; // What is done is not undone: a search that goes back a stage does not go back in the whole.
   const remember = (p, spent) => {
     const words = stageWords(p.stage);
     if (past.at(-1)?.words !== words) past.push({ words, at: spent });
     const gain = p.best ? digits(p.best, 3) : null;
     if (gain && gains.at(-1) !== gain) gains.push(gain);
+    const best = JSON.stringify(p.best_specimen ?? null);
+    if (p.best_specimen && best !== drawn) {
+      drawn = best;
+      const specimen = p.best_specimen;
+      const drive = plain(Math.max(...specimen.drive_mm), 3);
+      const holes = `${specimen.holes.length} ${specimen.holes.length === 1 ? "hole" : "holes"}`;
+      const words = `The best design so far: ${holes}, drive ${drive} mm`;
+      fill(picture, h("figure", { class: "best" }, sectionPicture(specimen, words), h("figcaption", {}, words)));
+    }
   };
   const now = (job) => {
     const p = job.progress;
@@ -140,6 +190,7 @@ export function progressView(request, usual) {
           .join(" · "),
       ),
       gains.length > 1 && h("p", { class: "quiet" }, `Gains found: ${gains.slice(-8).join(" → ")}`),
+      picture,
       past.length > 1 && done,
     );
   }

@@ -3,99 +3,12 @@
 import { Failure, getJson, remove, upload } from "./api.js";
 import { fill, h, say, sheet } from "./dom.js";
 import { dropPlace, unpacked } from "./drop.js";
-import { look } from "./look.js";
+import { keptFiles, look } from "./look.js";
 import { digits, many, plain } from "./numbers.js";
 import { table } from "./parts.js";
-import { startJob } from "./start.js";
+import { starters } from "./recording_starters.js";
 import { tar } from "./tar.js";
 import { askName, recordingName } from "./titles.js";
-
-/** Recordings that were uploaded from this page, to look at again: files by identifier. */
-const here = new Map();
-
-/** What several recordings are started with, and one. */
-const several = (ids) => (ids.length === 1 ? { recording: ids[0] } : { recordings: ids });
-
-const options = (label, list) =>
-  h(
-    "select",
-    { "aria-label": label },
-    list.map(([value, text]) => h("option", { value }, text)),
-  );
-
-/** What a fit can be told: mesh, number of terms, material as believed. */
-function settings(library) {
-  const mesh = options("Mesh", [
-    ["", "default mesh"],
-    ["2", "coarse mesh"],
-    ["1", "standard mesh"],
-  ]);
-  const terms = options("Number of terms", [
-    ["", "number of terms: chosen"],
-    ["1", "one term"],
-    ["2", "two terms"],
-    ["3", "three terms"],
-  ]);
-  const material = options("Material as believed", [
-    ["", "material unknown"],
-    ...library.materials.map((m, i) => [i, m.name]),
-  ]);
-  const factor = () => (mesh.value === "" ? {} : { mesh_factor: Number(mesh.value) });
-  return {
-    mesh,
-    terms,
-    material,
-    calibration: (ids) => ({
-      recordings: ids,
-      ...(terms.value === "" ? {} : { num_terms: Number(terms.value) }),
-      ...factor(),
-    }),
-    diagnosis: (ids) => ({
-      ...several(ids),
-      ...(material.value === "" ? {} : { material: library.materials[Number(material.value)].material }),
-      ...factor(),
-    }),
-  };
-}
-
-/** Buttons that start work on recordings; `ids()` are theirs. */
-function starters(library, ids, fail, isRaw = false) {
-  const chosen = settings(library);
-  const start = (label, cls, kind, body) =>
-    h(
-      "button",
-      {
-        type: "button",
-        class: `main ${cls}`,
-        onclick: async (event) => {
-          const button = event.currentTarget;
-          button.disabled = true;
-          try {
-            await startJob(kind, body());
-          } catch (error) {
-            fail(error);
-            button.disabled = false;
-          }
-        },
-      },
-      label,
-    );
-  if (isRaw)
-    return h(
-      "div",
-      { class: "row" },
-      start("Import: unwrap the phases", "import", "imports", () => ({ recording: ids()[0] })),
-    );
-  return h(
-    "div",
-    { class: "row starters" },
-    start("Calibrate", "calibrate", "calibrations", () => chosen.calibration(ids())),
-    h("div", {}, chosen.terms),
-    start("Diagnose", "diagnose", "diagnoses", () => chosen.diagnosis(ids())),
-    h("div", {}, chosen.material),
-    h("div", {}, chosen.mesh),
-  );
-}
 
 export async function recordingsView(content, signal) {
   const library = await getJson("/v1/library");
@@ -143,9 +56,11 @@ export async function recordingsView(content, signal) {
     draw();
   };
 
-  async function show(files) {
+  /** Shows a recording; `read` gives its files. */
+  async function show(read) {
+    fill(problem);
     try {
-      fill(view, await look(files));
+      fill(view, await look(await read()));
     } catch (error) {
       fill(view);
       fail(error);
@@ -156,7 +71,7 @@ export async function recordingsView(content, signal) {
     try {
       state.files = await unpacked(files);
       keepButton.disabled = state.files.length === 0;
-      if (state.files.length > 0) await show(state.files);
+      if (state.files.length > 0) await show(() => state.files);
     } catch (error) {
       fail(error);
     }
@@ -184,8 +99,7 @@ export async function recordingsView(content, signal) {
         fill(problem);
         keepButton.disabled = true;
         try {
-          const kept = await upload("/v1/recordings", await tar(state.files));
-          here.set(kept.id, state.files);
+          await upload("/v1/recordings", await tar(state.files));
           say("Kept.");
           fill(view);
           await load();
@@ -247,8 +161,18 @@ export async function recordingsView(content, signal) {
               h("input", { type: "checkbox", checked: state.chosen.has(recording.id), onchange: choose }),
               "with others",
             ),
-          here.has(recording.id) &&
-            h("button", { type: "button", onclick: () => show(here.get(recording.id)) }, "Look"),
+          h(
+            "button",
+            {
+              type: "button",
+              class: "look",
+              onclick: async () => {
+                await show(() => keptFiles(recording.id));
+                view.scrollIntoView({ block: "start" });
+              },
+            },
+            "Look",
+          ),
           h(
             "button",
             {

@@ -146,6 +146,22 @@ function marks(model, section, { text }) {
   ]);
 }
 
+/** Lengths to a hundredth of a millimetre: a picture that is not edited needs no more. */
+const rounded = (specimen) =>
+  JSON.parse(JSON.stringify(specimen, (_, v) => (typeof v === "number" ? Math.round(100 * v) / 100 : v)));
+
+/** A picture of a specimen that is not edited. */
+export function sectionPicture(exact, label) {
+  const specimen = rounded(exact);
+  const svg = s("svg", { class: "section still", role: "img", "aria-label": label });
+  const { under, over } = drawSection(svg, { specimen, limits: {} });
+  const holes = specimen.holes.map(({ center_mm: [x, y], diameter_mm: d }) =>
+    s("circle", { class: "hole", cx: x, cy: -y, r: d / 2 }),
+  );
+  svg.append(...[under, holes, over].flat(Infinity));
+  return svg;
+}
+
 /** Everything but the holes; `svg` takes its frame. */
 export function drawSection(svg, model) {
   const section = sectionOf(model.specimen);

@@ -97,9 +97,10 @@ function scaleOf(limit, unit) {
 }
 
 /** The image of a panel, within its mask where it has one. */
-async function imageOf({ href, blob, mask }) {
-  const image = await readImage(blob ?? (await getBlob(href)));
-  return mask ? masked(image, await readImage(mask)) : image;
+async function imageOf({ mask, ...panel }) {
+  const read = async ({ href, blob }) => readImage(blob ?? (await getBlob(href)));
+  const image = await read(panel);
+  return mask ? masked(image, await read(mask)) : image;
 }
 
 /** The part of a map that lies beyond its scale, in words. */
@@ -109,10 +110,13 @@ function beyond(cut, limit) {
   return part > 0.02 ? `; ${Math.round(100 * part)} % of it lies beyond the colours` : "";
 }
 
+/** The number of the slice of an image that is nearest to `at`, mm along an axis. */
+const indexAt = (image, axis, at) => Math.round((at - image.origin[axis]) / image.voxel[axis]);
+
 /**
- * Maps of `sets`: [{ label, panels: [{ label, href or blob, mask }] }]. A set's panels share the scale of panel
- * `scale`; the slice shown first is the one with the most to see in panel `aimed`. `components` names what an image
- * holds.
+ * Maps of `sets`: [{ label, panels: [{ label, href or blob, mask: { href or blob } }] }]. A set's panels are cut at the
+ * same place and share the scale of panel `scale`; the slice shown first is the one with the most to see in panel
+ * `aimed`. `components` names what an image holds.
  */
 export function slicesView(title, sets, { note, scale = 0, aimed = 0, unit = "mm", components = DISPLACEMENT } = {}) {
   if (sets.length === 0) return null;
@@ -191,7 +195,7 @@ export function slicesView(title, sets, { note, scale = 0, aimed = 0, unit = "mm
     fill(
       panels,
       loaded.map((image, i) => {
-        const cut = slice(image, state.component, axes, state.index);
+        const cut = slice(image, state.component, axes, indexAt(image, axes[2], at));
         const label = set.panels[i].label;
         return h(
           "figure",
@@ -217,7 +221,8 @@ export function slicesView(title, sets, { note, scale = 0, aimed = 0, unit = "mm
     button.disabled = false;
   }
 
-  const names = sets[0].panels.map((p) => p.label.toLowerCase());
+  const names = sets[0].panels.map((p) => p.label);
+  const scales = names.length === 2 ? ["on the left", "on the right"] : names.map((name) => `of ${name}`);
   const element = h(
     "section",
     { class: "sheet slices" },
@@ -237,7 +242,7 @@ export function slicesView(title, sets, { note, scale = 0, aimed = 0, unit = "mm
         PLANES.map(([a, b]) => `${AXES[a]} and ${AXES[b]}`),
         "plane",
       ),
-      names.length > 1 && pick("Colours reach to the values", ["on the left", "on the right"], "scale"),
+      names.length > 1 && pick("Colours reach to the values", scales, "scale"),
       h("label", { class: "wide" }, "Slice ", where, range),
     ),
     panels,

@@ -122,6 +122,7 @@ export const KINDS = {
   imports: "import",
   calibrations: "calibration",
   diagnoses: "diagnosis",
+  "next-scans": "next scan",
   solves: "solution",
   "load-curve-diagnoses": "load-curve diagnosis",
   "curve-fits": "fit of curves",

@@ -51,6 +51,6 @@ pub(super) async fn ready(State(app): State<App>) -> Result<&'static str, Proble
 pub(super) async fn metrics(State(app): State<App>, Extension(caller): Extension<Caller>) -> Result<Response, Problem> {
     caller.require(Role::Admin)?;
     let shared = app.clone();
-    let text = app.with_store(move |store| Ok(shared.metrics.to_text(store, &shared.signal, shared.now()))).await?;
+    let text = app.with_store(move |store| Ok(shared.metrics.to_text(store, &shared.signal, &shared.now()))).await?;
     Ok(([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], text).into_response())
 }

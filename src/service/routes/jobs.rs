@@ -25,7 +25,7 @@ use utoipa::IntoParams;
 #[into_params(parameter_in = Query)]
 pub(super) struct ListQuery {
     /// Only of this kind.
-    #[param(max_length = 40, nullable = false)]
+    #[param(nullable = false)]
     kind: Option<String>,
     /// Only in this state.
     #[param(nullable = false)]

@@ -12,8 +12,8 @@ pub use assets::page;
 
 use super::app::App;
 use axum::Router;
+use axum::body::Bytes;
 use axum::response::{IntoResponse, Response};
-use std::sync::Arc;
 use utoipa::OpenApi;
 use utoipa::openapi::security::{Http, HttpAuthScheme, SecurityScheme};
 use utoipa_axum::router::OpenApiRouter;
@@ -37,6 +37,8 @@ pub fn open_api() -> (Router<App>, String) {
     let (router, mut document) = OpenApiRouter::with_openapi(Document::openapi())
         .routes(routes!(recordings::list, recordings::upload))
         .routes(routes!(recordings::get, recordings::delete))
+        .routes(routes!(recordings::files))
+        .routes(routes!(recordings::file))
         .routes(routes!(jobs::list))
         .routes(routes!(jobs::get, jobs::delete))
         .routes(routes!(jobs::cancel))
@@ -67,6 +69,6 @@ pub fn open_api() -> (Router<App>, String) {
 }
 
 /// `/openapi.json`.
-pub async fn document(text: Arc<str>) -> Response {
-    ([(axum::http::header::CONTENT_TYPE, "application/json")], text.to_string()).into_response()
+pub async fn document(text: Bytes) -> Response {
+    ([(axum::http::header::CONTENT_TYPE, "application/json")], text).into_response()
 }

@@ -2,7 +2,7 @@
 
 use crate::design::Study;
 use crate::field::FieldError;
-use crate::job::{QuickResponse, defaults, quick_response, seconds_per_drive};
+use crate::job::{QuickResponse, RequestSchema, defaults, quick_response, seconds_per_drive};
 use crate::material::Ogden;
 use crate::mesh::{MeshSize, mesh_specimen};
 use crate::service::access::{Caller, Role};
@@ -10,9 +10,11 @@ use crate::service::app::App;
 use crate::service::body::receive_json;
 use crate::service::problem::{FieldProblem, Problem};
 use crate::specimen::{LimitMargin, ManufacturingLimits, Specimen, to_svg};
+use crate::voxel::VoxelGrid;
 use axum::Json;
 use axum::extract::{Extension, Request, State};
 use serde::{Deserialize, Serialize};
+use std::sync::OnceLock;
 use utoipa::ToSchema;
 
 /// A specimen to check.
@@ -37,6 +39,9 @@ pub(super) struct CheckRequest {
     #[serde(default)]
     material: Option<Ogden>,
 }
+
+/// The schema of checks.
+static CHECK_SCHEMA: OnceLock<RequestSchema> = OnceLock::new();
 
 /// A limit and how far it is.
 #[derive(Debug, Serialize, ToSchema)]
@@ -108,9 +113,9 @@ pub(super) struct Checked {
     margins: Vec<Margin>,
     /// The limits that were not checked.
     unchecked: Vec<Unchecked>,
-    /// Volume of material, mm³.
+    /// Volume of one sample, of the first kind, mm³.
     volume_mm3: Option<f64>,
-    /// Drawing, SVG.
+    /// Drawing of it, SVG.
     drawing_svg: Option<String>,
     /// Cost, where it can be meshed.
     #[schema(nullable = true)]
@@ -172,20 +177,28 @@ fn check(request: &CheckRequest, most_seconds: f64) -> Result<Checked, Problem> 
         return Ok(checked);
     }
     let voxel = request.voxel_mm;
-    let grid = crate::voxel::VoxelGrid::covering(specimen, voxel).map_err(|e| {
+    let samples = specimen.samples();
+    let unusable = |e: crate::voxel::VoxelError| {
         let error = FieldError::new("/voxel_mm", format!("{voxel:?}"), "usable");
         Problem::invalid(vec![error.remedy(e.to_string())])
-    })?;
+    };
+    let grids =
+        samples.iter().map(|s| VoxelGrid::covering(s, voxel)).collect::<Result<Vec<_>, _>>().map_err(unusable)?;
     if let Some(limits) = &request.limits {
         checked.margins = limits.check_geometry(specimen, voxel).into_iter().map(Margin::from).collect();
         check_response(request, limits, &mut checked);
         checked.margins.sort_by(|a, b| a.margin_relative.total_cmp(&b.margin_relative));
     }
-    checked.drawing_svg = Some(to_svg(specimen));
-    match mesh_specimen(specimen, &request.mesh.options(specimen)) {
-        Ok(mesh) => {
-            let (num_elements, num_nodes, num_voxels) = (mesh.num_elements(), mesh.nodes.len(), grid.num_voxels());
-            let seconds_per_drive = seconds_per_drive(num_nodes, num_voxels);
+    // The first sample's: the page shows one.
+    checked.drawing_svg = samples.first().map(to_svg);
+    let meshes = samples.iter().map(|s| mesh_specimen(s, &request.mesh.options(s))).collect::<Result<Vec<_>, _>>();
+    match meshes {
+        Ok(meshes) => {
+            let num_elements = meshes.iter().map(|m| m.num_elements()).sum();
+            let num_nodes = meshes.iter().map(|m| m.nodes.len()).sum();
+            let num_voxels = grids.iter().map(VoxelGrid::num_voxels).sum();
+            let each = meshes.iter().zip(&grids);
+            let seconds_per_drive = each.map(|(m, g)| seconds_per_drive(m.nodes.len(), g.num_voxels())).sum::<f64>();
             let seconds = seconds_per_drive * specimen.drive_mm.len() as f64;
             checked.cost = Some(Cost { num_elements, num_nodes, num_voxels, seconds_per_drive, seconds, most_seconds });
             checked.is_valid = checked.margins.iter().all(|m| m.is_satisfied);
@@ -209,7 +222,13 @@ pub(super) async fn check_specimen(
     let body = receive_json(&app, request).await?;
     let most_seconds = app.limits.max_job_time.as_secs_f64();
     let work = app.compute(&caller.share, move || {
-        let request: CheckRequest = crate::field::read(&body.value).map_err(|e| Problem::invalid(vec![e]))?;
+        let schema = CHECK_SCHEMA.get_or_init(RequestSchema::of::<CheckRequest>);
+        let errors = schema.errors(&body.value);
+        if !errors.is_empty() {
+            return Err(Problem::misfit(errors));
+        }
+        let request: CheckRequest =
+            crate::field::read(&schema.settled(&body.value)).map_err(|e| Problem::invalid(vec![e]))?;
         check(&request, most_seconds)
     });
     Ok(Json(app.answer(&caller, app.limits.request_time, work).await?))
@@ -231,6 +250,7 @@ pub(super) struct Library {
 
 /// A material with its name.
 #[derive(Debug, Serialize, ToSchema)]
+#[schema(as = ShippedMaterial)]
 pub(super) struct NamedMaterial {
     /// Name.
     name: String,

@@ -1,18 +1,21 @@
 //! Recordings: upload, list.
 
 use crate::file::StopFlag;
-use crate::job::ScratchFolder;
+use crate::job::{MediaType, ScratchFolder};
 use crate::recording::ReadLimits;
 use crate::service::access::{Caller, Role};
+use crate::service::answer::{Stored, stored};
 use crate::service::app::App;
 use crate::service::body::{let_run_out, receive_file};
 use crate::service::problem::Problem;
 use crate::service::recordings::{self, Space};
-use crate::service::store::{Removed, Store, UploadRow};
+use crate::service::store::{KeptFile, Removed, Store, UploadRow};
+use crate::service::tar::unpack;
+use crate::service::view::{ArtefactList, ArtefactView};
 use crate::specimen::Specimen;
 use axum::Json;
 use axum::extract::{Extension, Path, Request, State};
-use axum::http::{StatusCode, header};
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use std::fs::File;
@@ -107,7 +110,64 @@ pub(super) async fn list(State(app): State<App>) -> Result<Json<RecordingList>, 
 ), tag = "recordings")]
 pub(super) async fn get(State(app): State<App>, Path(id): Path<String>) -> Result<Json<RecordingView>, Problem> {
     let row = app.with_store(move |store| store.upload(&id)).await?;
-    row.map(|row| Json(row.into())).ok_or_else(|| Problem::new("not-found", "there is no such recording"))
+    row.map(|row| Json(row.into())).ok_or_else(missing)
+}
+
+/// The files of a recording.
+#[utoipa::path(get, path = "/v1/recordings/{id}/files", operation_id = "list_recording_files", params(("id" = String, Path, description = "Identifier")), responses(
+    (status = 200, description = "The files", body = ArtefactList),
+    (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
+), tag = "recordings")]
+pub(super) async fn files(State(app): State<App>, Path(id): Path<String>) -> Result<Json<ArtefactList>, Problem> {
+    let key = id.clone();
+    let files = app.with_store(move |store| store.upload_files(&key)).await?;
+    if files.is_empty() {
+        return Err(missing());
+    }
+    let view = |file: KeptFile| ArtefactView {
+        href: format!("/v1/recordings/{id}/files/{}", file.name),
+        media_type: media_type(&file.name).name().into(),
+        name: file.name,
+        num_bytes: file.num_bytes,
+        sha256: file.sha,
+    };
+    Ok(Json(ArtefactList { artefacts: files.into_iter().map(view).collect() }))
+}
+
+/// One file of a recording.
+#[utoipa::path(get, path = "/v1/recordings/{id}/files/{name}", operation_id = "get_recording_file", params(
+    ("id" = String, Path, description = "Identifier"), ("name" = String, Path, description = "Name in the list"),
+), responses(
+    (status = 200, description = "The file", content(
+        (Binary = "application/gzip"), (Binary = "application/octet-stream"), (String = "text/csv"),
+        (serde_json::Value = "application/json"),
+    )),
+    (status = 304, description = "Unchanged"),
+    (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
+), tag = "recordings")]
+pub(super) async fn file(
+    State(app): State<App>,
+    Path((id, name)): Path<(String, String)>,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    // The name is compared with the list, never used as a path.
+    let find = move |store: &Store| Ok(store.upload_files(&id)?.into_iter().find(|file| file.name == name));
+    let file = app.with_store(find).await?;
+    let file = file.ok_or_else(|| Problem::new("not-found", "the recording has no such file"))?;
+    let media_type = media_type(&file.name).name().into();
+    stored(&app, &headers, &Stored { sha: file.sha, media_type, name: Some(file.name) }).await
+}
+
+/// What an uploaded file is sent as: what recordings are made of by its name, anything else as bytes.
+fn media_type(name: &str) -> MediaType {
+    match MediaType::of_name(name) {
+        known @ (MediaType::Json | MediaType::Csv | MediaType::Nifti) => known,
+        _ => MediaType::Binary,
+    }
+}
+
+fn missing() -> Problem {
+    Problem::new("not-found", "there is no such recording")
 }
 
 /// Delete a recording. Jobs that have ended keep their results.
@@ -120,7 +180,6 @@ pub(super) async fn delete(
     Extension(caller): Extension<Caller>,
     Path(id): Path<String>,
 ) -> Result<StatusCode, Problem> {
-    let missing = || Problem::new("not-found", "there is no such recording");
     let key = id.clone();
     let row = app.with_store(move |store| store.upload(&key)).await?.ok_or_else(missing)?;
     caller.require_owner(&row.owner, "recording")?;
@@ -131,8 +190,9 @@ pub(super) async fn delete(
     }
 }
 
-/// Upload a recording: a tar file of its folder. Its content is read and checked before it is kept.
-#[utoipa::path(post, path = "/v1/recordings", operation_id = "upload_recording", request_body(content((Binary = "application/x-tar"), (Binary = "application/octet-stream")), description = "A tar file of the recording's folder"), responses(
+/// Upload a recording: a tar file of its folder. Its content is read and checked before it is kept. The media type
+/// `application/x-tar` is taken, too.
+#[utoipa::path(post, path = "/v1/recordings", operation_id = "upload_recording", request_body(content = Binary, content_type = "application/octet-stream", description = "A tar file of the recording's folder"), responses(
     (status = 201, description = "Kept", body = RecordingView, headers(("Location" = String, description = "The recording"))),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "recordings")]
@@ -154,7 +214,7 @@ pub(super) async fn upload(
     }
     // Before the body: where there is no space at all nobody need send it.
     let promised = request.headers().get(header::CONTENT_LENGTH).and_then(|v| v.to_str().ok()?.parse().ok());
-    let (store, owner, space) = (app.store.clone(), caller.name.clone(), space_of(&app, &caller));
+    let (store, owner, space) = (app.store.clone(), caller.name.clone(), Space::of(&app, &caller));
     let space =
         app.compute(&caller.share, move || recordings::check_space(&store, &owner, promised.unwrap_or(0), space)).await;
     if let Err(problem) = space {
@@ -167,17 +227,13 @@ pub(super) async fn upload(
 
 /// Keeps an upload whose body has come.
 async fn keep(app: &App, caller: &Caller, file: File) -> Result<Response, Problem> {
-    let max = (app.limits.max_upload_bytes, space_of(app, caller));
+    let max = (app.limits.max_upload_bytes, Space::of(app, caller));
     let owner = caller.name.clone();
     let store = app.store.clone();
     let row = app.read_upload(move |stop| keep_upload(&store, file, owner, (max, stop))).await?;
     let row = row.ok_or_else(|| Problem::new("internal", "the recording was not kept"))?;
     let location = format!("/v1/recordings/{}", row.id);
     Ok((StatusCode::CREATED, [(header::LOCATION, location)], Json(RecordingView::from(row))).into_response())
-}
-
-fn space_of(app: &App, caller: &Caller) -> Space {
-    Space { all: app.limits.max_uploads_bytes as u64, of_owner: caller.max_recordings_bytes }
 }
 
 /// Takes the tar file apart, reads the recording, and keeps it.
@@ -188,18 +244,10 @@ fn keep_upload(
     ((max, space), stop): ((usize, Space), StopFlag),
 ) -> Result<Option<UploadRow>, Problem> {
     let scratch = ScratchFolder::new().map_err(recordings::scratch_failed)?;
-    let names = recordings::unpack(std::io::BufReader::new(file), scratch.path(), max)?;
+    let names = unpack(std::io::BufReader::new(file), scratch.path(), max)?;
     let mut limits = ReadLimits::upload();
     limits.memory.stop = stop;
     let upload = recordings::upload_of(scratch.path(), names, owner, &limits)?;
-    let length = upload.files.iter().map(|f| f.num_bytes).sum();
-    // A recording that is kept already takes no more space.
-    if store.upload(&upload.id)?.is_none() {
-        recordings::check_space(store, &upload.owner, length, space)?;
-    }
-    // A file is held by its reader, by the statement and by the database when it is stored.
-    let memory = limits.memory.begin();
-    memory.take("the upload's largest file", 3 * upload.files.iter().map(|f| f.num_bytes).max().unwrap_or(0))?;
-    store.put_upload(&upload)?;
+    recordings::put(store, &upload, space)?;
     Ok(store.upload(&upload.id)?)
 }

@@ -2,53 +2,21 @@
 
 use super::jobs::find;
 use super::recordings::Binary;
+use crate::job::MediaType;
+use crate::service::answer::{Stored, stored};
 use crate::service::app::App;
 use crate::service::problem::Problem;
+use crate::service::store::Store;
 use crate::service::view::{ArtefactList, ArtefactView};
 use axum::Json;
 use axum::extract::{Path, State};
-use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::http::{HeaderMap, HeaderValue, header};
 use axum::response::{IntoResponse, Response};
-use serde::Serialize;
 use utoipa::ToSchema;
 
-/// An answer under its content's name: unchanged content is not sent twice.
-fn content(headers: &HeaderMap, sha: &str, media_type: &str, bytes: Vec<u8>, name: Option<&str>) -> Response {
-    let tag = format!("\"{sha}\"");
-    let known = headers.get(header::IF_NONE_MATCH).and_then(|v| v.to_str().ok()).unwrap_or_default();
-    let is_known = known.split(',').any(|t| t.trim().trim_start_matches("W/") == tag);
-    let mut answer =
-        if is_known { StatusCode::NOT_MODIFIED.into_response() } else { (StatusCode::OK, bytes).into_response() };
-    let out = answer.headers_mut();
-    if let Ok(value) = HeaderValue::from_str(&tag) {
-        out.insert(header::ETAG, value);
-    }
-    out.insert(header::CACHE_CONTROL, HeaderValue::from_static("private, max-age=0, must-revalidate"));
-    if !is_known && let Ok(value) = HeaderValue::from_str(media_type) {
-        out.insert(header::CONTENT_TYPE, value);
-    }
-    if let Some(name) = name {
-        // Names are the program's own: letters, digits, dots and hyphens.
-        if let Ok(value) = HeaderValue::from_str(&format!("inline; filename=\"{name}\"")) {
-            out.insert(header::CONTENT_DISPOSITION, value);
-        }
-    }
-    answer
-}
-
-/// A job's result: what every one of them has, beside the fields of its own schema.
-#[derive(Debug, Serialize, ToSchema)]
-pub(super) struct JobResult {
-    /// Which kind of result it is, with its version, such as `evaluation/1`.
-    schema: String,
-    /// Version of the program.
-    version: String,
-    /// SHA-256 of everything that went into it, hexadecimal; not in comparisons and lists.
-    input_hash: Option<String>,
-    /// The fields of the kind.
-    #[serde(flatten)]
-    fields: std::collections::BTreeMap<String, serde_json::Value>,
-}
+/// A job's result; its schema is that of its kind, and added where all kinds are described.
+#[derive(ToSchema)]
+pub(super) struct JobResult;
 
 /// A job's result: `evaluation/1`, `design/1`, …
 #[utoipa::path(get, path = "/v1/jobs/{id}/result", operation_id = "get_result", params(("id" = String, Path, description = "Identifier")), responses(
@@ -61,18 +29,13 @@ pub(super) async fn result(
     Path(id): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let found = app
-        .with_store(move |store| {
-            let Some(job) = store.job(&id)? else { return Ok(None) };
-            let bytes = if job.result_sha.is_empty() { None } else { store.blob(&job.result_sha)? };
-            Ok(Some((job, bytes)))
-        })
-        .await?;
-    let Some((job, bytes)) = found else { return Err(Problem::new("not-found", "there is no such job")) };
-    let Some(bytes) = bytes else {
+    let job = app.with_store(move |store| store.job(&id)).await?;
+    let job = job.ok_or_else(|| Problem::new("not-found", "there is no such job"))?;
+    if job.result_sha.is_empty() {
         return Err(Problem::new("not-finished", format!("the job is {}; a result comes with success", job.state)));
-    };
-    Ok(content(&headers, &job.result_sha, "application/json", bytes, None))
+    }
+    let content = Stored { sha: job.result_sha, media_type: MediaType::Json.name().into(), name: None };
+    stored(&app, &headers, &content).await
 }
 
 /// The body that the job was made from.
@@ -123,17 +86,12 @@ pub(super) async fn artefact(
     Path((id, name)): Path<(String, String)>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    let found = app
-        .with_store(move |store| {
-            // The name is compared with the list, never used as a path.
-            let Some(row) = store.artefacts(&id)?.into_iter().find(|row| row.name == name) else { return Ok(None) };
-            let bytes = store.blob(&row.sha)?;
-            Ok(bytes.map(|bytes| (row, bytes)))
-        })
-        .await?;
-    let (row, bytes) = found.ok_or_else(|| Problem::new("not-found", "the job has no such file"))?;
-    let mut answer = content(&headers, &row.sha, &row.media_type, bytes, Some(&row.name));
-    if row.media_type == "text/html" {
+    // The name is compared with the list, never used as a path.
+    let find = move |store: &Store| Ok(store.artefacts(&id)?.into_iter().find(|row| row.name == name));
+    let row = app.with_store(find).await?.ok_or_else(|| Problem::new("not-found", "the job has no such file"))?;
+    let content = Stored { sha: row.sha, media_type: row.media_type, name: Some(row.name) };
+    let mut answer = stored(&app, &headers, &content).await?;
+    if content.media_type == MediaType::Html.name() {
         // A report is a page of its own: no scripts, nothing from elsewhere.
         answer.headers_mut().insert(
             header::CONTENT_SECURITY_POLICY,

@@ -1,15 +1,15 @@
 //! Submitting jobs: one address per kind, with the schema of the kind's own request.
 
 use crate::field::FieldError;
-use crate::job::{Job, KINDS, Kind};
+use crate::job::{Job, KINDS, Kind, RecordingOutline};
 use crate::service::access::{Caller, Role, random_hex};
 use crate::service::app::App;
 use crate::service::body::{JsonBody, let_run_out, receive_json};
 use crate::service::problem::Problem;
+use crate::service::recordings::{Space, outline_of};
 use crate::service::store::{Idempotency, NewJob, Submitted, sha256_hex};
-use crate::service::task::tasks_of;
+use crate::service::task::{TaskLimits, tasks_of};
 use crate::service::view::JobView;
-use crate::specimen::Specimen;
 use axum::Router;
 use axum::extract::{Extension, Query, Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
@@ -17,7 +17,8 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::post;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
-use utoipa::openapi::{OpenApi, Paths};
+use utoipa::openapi::schema::Schema;
+use utoipa::openapi::{OpenApi, Paths, RefOr};
 use utoipa::{PartialSchema, ToSchema};
 
 async fn receive(app: App, caller: Caller, request: Request, kind: &'static Kind) -> Result<Response, Problem> {
@@ -44,16 +45,17 @@ async fn submit(
     let max_elements = caller.max_elements.unwrap_or(usize::MAX).min(app.limits.max_elements);
     let canonical = value.to_string();
     // The request is read once; from here on it is typed.
-    let job = app.compute(&caller.share, move || kind.job(&value).map_err(Problem::invalid)).await?;
-    let specimens = specimens_of(app, &job).await?;
+    let job = app.compute(&caller.share, move || kind.read(&value).map_err(Problem::from)).await?;
+    let recordings = recordings_of(app, &job).await?;
+    let inputs = job.inputs().into_iter().map(|wanted| wanted.name).collect();
     let most_seconds = app.limits.max_job_time.as_secs_f64();
+    let limits = TaskLimits { max_elements, max_seconds: most_seconds, space: Space::of(app, caller) };
     let (title, tasks, has_gather, estimated_seconds) = app
         .compute(&caller.share, move || {
-            job.check_size(&specimens, max_elements).map_err(|e| Problem::from(crate::job::JobError::TooBig(e)))?;
-            let estimated_seconds = job.estimated_seconds();
+            job.check_size(&recordings, max_elements).map_err(|e| Problem::from(crate::job::JobError::TooBig(e)))?;
+            let estimated_seconds = job.estimated_seconds(&recordings);
             check_cost(estimated_seconds, most_seconds)?;
-            let (tasks, has_gather) =
-                tasks_of(&job, max_elements, most_seconds).map_err(|e| Problem::new("internal", e.to_string()))?;
+            let (tasks, has_gather) = tasks_of(&job, limits).map_err(|e| Problem::new("internal", e.to_string()))?;
             Ok((job.title(), tasks, has_gather, estimated_seconds))
         })
         .await?;
@@ -71,6 +73,7 @@ async fn submit(
         owner: caller.name.clone(),
         title,
         body: canonical,
+        inputs,
         tasks,
         has_gather,
     };
@@ -139,14 +142,17 @@ fn check_cost(estimated_seconds: Option<f64>, most_seconds: f64) -> Result<(), P
 fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, Problem> {
     let Some(value) = headers.get("idempotency-key") else { return Ok(None) };
     match value.to_str() {
-        Ok(key) if (1..=200).contains(&key.len()) => Ok(Some(key.into())),
-        _ => Err(Problem::new("invalid-parameter", "Idempotency-Key must have 1 to 200 printable ASCII characters")),
+        Ok(key) if (1..=200).contains(&key.len()) && key.bytes().all(|b| b.is_ascii_graphic()) => Ok(Some(key.into())),
+        _ => Err(Problem::new(
+            "invalid-parameter",
+            "Idempotency-Key must have 1 to 200 printable ASCII characters, and no space",
+        )),
     }
 }
 
-/// The specimens of the recordings that a job reads; that there are such recordings is checked on the way.
-async fn specimens_of(app: &App, job: &Job) -> Result<Vec<Specimen>, Problem> {
-    let mut specimens = Vec::new();
+/// What is known of the recordings that a job reads; that there are such recordings is checked on the way.
+async fn recordings_of(app: &App, job: &Job) -> Result<Vec<RecordingOutline>, Problem> {
+    let mut outlines = Vec::new();
     for wanted in job.inputs() {
         let name = wanted.name.clone();
         let row = app.with_store(move |store| store.upload(&name)).await?;
@@ -154,11 +160,27 @@ async fn specimens_of(app: &App, job: &Job) -> Result<Vec<Specimen>, Problem> {
             let error = FieldError::new(wanted.pointer, wanted.name, "the identifier of an uploaded recording");
             Problem::invalid(vec![error.remedy("upload it first")])
         };
-        let row = row.ok_or_else(missing)?;
-        let manifest: serde_json::Value = serde_json::from_str(&row.manifest).unwrap_or_default();
-        specimens.extend(Specimen::deserialize(&manifest["specimen"]));
+        outlines.extend(outline_of(&row.ok_or_else(missing)?.manifest));
     }
-    Ok(specimens)
+    Ok(outlines)
+}
+
+/// Says which kinds the list of jobs can be asked for.
+///
+/// # Errors
+/// Where a schema is none that OpenAPI knows.
+fn describe_filter(document: &mut OpenApi) -> Result<(), serde_json::Error> {
+    let names: Vec<&str> = KINDS.iter().map(|kind| kind.collection).collect();
+    let schema: RefOr<Schema> = serde_json::from_value(json!({ "type": "string", "enum": names }))?;
+    let list = document.paths.paths.get_mut("/v1/jobs").and_then(|path| path.get.as_mut());
+    for parameter in list.and_then(|list| list.parameters.as_mut()).into_iter().flatten() {
+        if let RefOr::T(parameter) = parameter
+            && parameter.name == "kind"
+        {
+            parameter.schema = Some(schema.clone());
+        }
+    }
+    Ok(())
 }
 
 /// The addresses of all kinds.
@@ -178,10 +200,24 @@ pub(super) fn router() -> Router<App> {
 pub(super) fn describe(document: &mut OpenApi) -> Result<(), serde_json::Error> {
     let components = document.components.get_or_insert_with(Default::default);
     components.schemas.insert(Estimate::name().into_owned(), Estimate::schema());
-    let mut paths = serde_json::Map::new();
+    let (mut paths, mut results) = (serde_json::Map::new(), Vec::new());
     for kind in &KINDS {
-        for (name, schema) in kind.schemas() {
-            components.schemas.entry(name).or_insert(schema);
+        let result = kind.result();
+        results.extend(result.names.iter().map(|name| json!({ "$ref": format!("#/components/schemas/{name}") })));
+        for name in result.names {
+            let own = result.parts.iter().find(|part| part.0 == name).map(|part| part.1.clone());
+            components.schemas.extend(own.map(|schema| (name, schema)));
+        }
+    }
+    let own: Vec<String> = KINDS.iter().flat_map(|kind| kind.result().names).collect();
+    for kind in &KINDS {
+        let parts = kind.schemas().into_iter().chain(kind.result().parts);
+        for (name, schema) in parts.filter(|(name, _)| !own.contains(name)) {
+            let is_another = |known| serde_json::to_value(known).ok() != serde_json::to_value(&schema).ok();
+            if components.schemas.get(&name).is_some_and(is_another) {
+                return Err(serde::de::Error::custom(format!("two schemas are called {name}")));
+            }
+            components.schemas.insert(name, schema);
         }
         let problem = json!({ "application/problem+json": { "schema": { "$ref": "#/components/schemas/Problem" } } });
         let accepted = json!({ "application/json": { "schema": { "$ref": "#/components/schemas/JobView" } } });
@@ -217,7 +253,10 @@ pub(super) fn describe(document: &mut OpenApi) -> Result<(), serde_json::Error> 
         } });
         paths.insert(format!("/v1/{}", kind.collection), operation);
     }
+    let any =
+        json!({ "description": "A job's result, by the kind of the job: `schema` says which.", "oneOf": results });
+    components.schemas.insert("JobResult".into(), serde_json::from_value(any)?);
     let described: Paths = serde_json::from_value(paths.into())?;
     document.paths.paths.extend(described.paths);
-    Ok(())
+    describe_filter(document)
 }

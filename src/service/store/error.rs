@@ -57,6 +57,12 @@ pub enum StoreError {
         /// Whether it is the token's own quota.
         is_quota: bool,
     },
+    /// A file to keep cannot be read.
+    #[error("a file to keep cannot be read: {0}")]
+    Unreadable(std::io::Error),
+    /// A file that is kept cannot be written where it is wanted.
+    #[error("a kept file cannot be written: {0}")]
+    Unwritable(std::io::Error),
     /// A value in the database is not what was written.
     #[error("the database holds an unreadable {what}")]
     Corrupt {

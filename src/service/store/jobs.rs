@@ -16,6 +16,8 @@ pub struct NewJob {
     pub title: String,
     /// The request's body, JSON.
     pub body: String,
+    /// Recordings that it reads.
+    pub inputs: Vec<String>,
     /// What there is to run.
     pub tasks: Vec<NewTask>,
     /// Whether a last task puts the others' results together.
@@ -114,6 +116,13 @@ pub struct ArtefactRow {
     pub sha: String,
     /// Length.
     pub num_bytes: i64,
+}
+
+impl ArtefactRow {
+    /// From name, media type, SHA-256 and length.
+    pub(super) fn of(row: &super::Row) -> ArtefactRow {
+        ArtefactRow { name: row.text(0), media_type: row.text(1), sha: row.text(2), num_bytes: row.int(3) }
+    }
 }
 
 /// Numbers of jobs by (kind, state) and of tasks by state.
@@ -292,10 +301,7 @@ impl Store {
             "SELECT name, media_type, sha, num_bytes FROM artefacts WHERE job_id = $1 ORDER BY name, task_index",
             &[job.into()],
         )?;
-        Ok(rows
-            .iter()
-            .map(|r| ArtefactRow { name: r.text(0), media_type: r.text(1), sha: r.text(2), num_bytes: r.int(3) })
-            .collect())
+        Ok(rows.iter().map(ArtefactRow::of).collect())
     }
 
     /// Cancels a job that has not ended; a running task is told at its next heartbeat. False where there is no such
@@ -411,6 +417,12 @@ fn insert(t: &mut Transaction, job: &NewJob) -> Result<(), StoreError> {
             revision.into(),
         ],
     )?;
+    for input in &job.inputs {
+        t.execute(
+            "INSERT INTO job_inputs (job_id, upload_id) VALUES ($1, $2) ON CONFLICT DO NOTHING",
+            &[(&job.id).into(), input.into()],
+        )?;
+    }
     let add = |t: &mut Transaction, index: usize, role: &str, state: &str, input: &str, key: &str| {
         t.execute(
             "INSERT INTO tasks (job_id, task_index, role, state, input, cache_key, attempt, losses, worker, lease_ms, problem, \

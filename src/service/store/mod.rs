@@ -8,6 +8,7 @@
 //! | equal evaluations are computed once | results are kept under their content's key; equal tasks never run together |
 //! | a task that ends its worker cannot do so for ever | [`MAX_LOSSES`], then it is put aside with a problem |
 
+mod blobs;
 mod database;
 mod error;
 mod jobs;
@@ -20,9 +21,10 @@ pub use error::StoreError;
 pub use jobs::{ArtefactRow, Idempotency, JobFilter, JobRow, NewJob, NewTask, Submitted, TaskRow};
 pub use removal::Removed;
 pub use tasks::{Claimed, Finished, TaskResult};
-pub use uploads::{NewUpload, UploadFile, UploadRow};
+pub use uploads::{KeptFile, NewUpload, UploadFile, UploadRow};
 
 use crate::provenance::VERSION;
+use blobs::{put_blob, put_bytes};
 use sha2::{Digest, Sha256};
 use std::path::Path;
 
@@ -33,7 +35,7 @@ pub const NUMBERS_ONLY: &str = ":numbers";
 /// What the disk must still take for the service to be ready, bytes.
 const PROBE_BYTES: usize = 64 << 10;
 /// Version of the tables.
-const SCHEMA_VERSION: &str = "1";
+const SCHEMA_VERSION: &str = "2";
 
 /// SHA-256, hexadecimal.
 pub fn sha256_hex(bytes: &[u8]) -> String {
@@ -95,19 +97,27 @@ impl Store {
                 // Two programs that start together make the tables once.
                 inner.execute("SELECT pg_advisory_xact_lock(7153402)", &[])?;
             }
+            t.batch("CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL)")?;
+            let was = t.query("SELECT value FROM meta WHERE key = 'schema'", &[])?;
+            let found = was.first().map_or(SCHEMA_VERSION.into(), |r| r.text(0));
+            let is_of_version_1 = found == "1";
+            if !is_of_version_1 && found != SCHEMA_VERSION {
+                return Err(StoreError::OtherSchema { found, expected: SCHEMA_VERSION });
+            }
+            if is_of_version_1 {
+                // What is known of evaluations is there to save time: jobs hold their results themselves.
+                t.batch("DROP TABLE results")?;
+            }
             t.batch(include_str!("schema.sql"))?;
+            if is_of_version_1 {
+                t.batch(include_str!("from_version_1.sql"))?;
+            }
             t.execute(
                 "INSERT INTO meta (key, value) VALUES ('schema', $1) ON CONFLICT DO NOTHING",
                 &[SCHEMA_VERSION.into()],
             )?;
             t.execute("INSERT INTO revisions (id, last) VALUES (1, 0) ON CONFLICT DO NOTHING", &[])?;
-            let found = t.query("SELECT value FROM meta WHERE key = 'schema'", &[])?;
-            let found = found.first().map(|r| r.text(0)).unwrap_or_default();
-            if found == SCHEMA_VERSION {
-                Ok(())
-            } else {
-                Err(StoreError::OtherSchema { found, expected: SCHEMA_VERSION })
-            }
+            Ok(())
         })
     }
 
@@ -172,24 +182,6 @@ impl Store {
             Ok(())
         })
     }
-
-    /// Bytes under a SHA-256.
-    ///
-    /// # Errors
-    /// [`StoreError`].
-    pub fn blob(&self, sha: &str) -> Result<Option<Vec<u8>>, StoreError> {
-        Ok(self.database.read("SELECT bytes FROM blobs WHERE sha = $1", &[sha.into()])?.first().map(|r| r.blob(0)))
-    }
-}
-
-/// Keeps bytes; equal ones once.
-fn put_blob(t: &mut Transaction, bytes: Vec<u8>) -> Result<String, StoreError> {
-    let (sha, length) = (sha256_hex(&bytes), bytes.len());
-    t.execute(
-        "INSERT INTO blobs (sha, bytes, num_bytes) VALUES ($1, $2, $3) ON CONFLICT DO NOTHING",
-        &[(&sha).into(), bytes.into(), length.into()],
-    )?;
-    Ok(sha)
 }
 
 /// The next revision; taking it serialises writers, so revisions become visible in their order.
@@ -212,4 +204,57 @@ fn lock_job(t: &mut Transaction, job: &str) -> Result<bool, StoreError> {
         Transaction::Postgres(_) => "SELECT id FROM jobs WHERE id = $1 FOR UPDATE",
     };
     Ok(!t.query(sql, &[job.into()])?.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Tables as version 1 had them, with a job that reads an upload and a file that both share.
+    const VERSION_1: &str = "
+        CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
+        INSERT INTO meta VALUES ('schema', '1');
+        CREATE TABLE jobs (
+            id TEXT PRIMARY KEY, kind TEXT NOT NULL, owner TEXT NOT NULL, title TEXT NOT NULL, body TEXT NOT NULL,
+            version TEXT NOT NULL, state TEXT NOT NULL, num_tasks BIGINT NOT NULL, num_done BIGINT NOT NULL,
+            progress TEXT NOT NULL, problem TEXT NOT NULL, result_sha TEXT NOT NULL, cancel_requested BIGINT NOT NULL,
+            created_ms BIGINT NOT NULL, started_ms BIGINT NOT NULL, finished_ms BIGINT NOT NULL,
+            revision BIGINT NOT NULL);
+        INSERT INTO jobs VALUES ('job', 'calibrations', 'anna', 'a job', '{\"recordings\":[\"upload\"]}', '0', 'queued',
+            1, 0, '', '', 'sha', 0, 1, 0, 0, 1);
+        CREATE TABLE blobs (sha TEXT PRIMARY KEY, bytes BLOB NOT NULL, num_bytes BIGINT NOT NULL);
+        INSERT INTO blobs VALUES ('sha', x'0102', 2);
+        CREATE TABLE results (
+            cache_key TEXT PRIMARY KEY, result_sha TEXT NOT NULL, artefacts TEXT NOT NULL, created_ms BIGINT NOT NULL);
+        INSERT INTO results VALUES ('key', 'sha', '[]', 1);
+        CREATE TABLE uploads (
+            id TEXT PRIMARY KEY, owner TEXT NOT NULL, title TEXT NOT NULL, manifest TEXT NOT NULL,
+            num_bytes BIGINT NOT NULL, created_ms BIGINT NOT NULL);
+        INSERT INTO uploads VALUES ('upload', 'anna', 'an upload', '{}', 2, 1);";
+
+    #[test]
+    fn tables_of_version_1_are_taken_over() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let old = rusqlite::Connection::open(folder.path().join("lambdak.sqlite")).expect("a file");
+        old.execute_batch(VERSION_1).expect("tables");
+        drop(old);
+        for _ in 0..2 {
+            let store = Store::open_folder(folder.path()).expect("taken over, and opened again");
+            assert_eq!(store.blob("sha").expect("an answer"), Some(vec![1, 2]));
+            assert_eq!(store.delete_upload("upload").expect("an answer"), Removed::InUse, "an unfinished job reads it");
+            assert_eq!(store.job("job").expect("an answer").expect("the job").title, "a job");
+        }
+    }
+
+    #[test]
+    fn tables_of_an_unknown_version_are_left_alone() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let other = rusqlite::Connection::open(folder.path().join("lambdak.sqlite")).expect("a file");
+        let meta =
+            "CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL); INSERT INTO meta VALUES ('schema', '9')";
+        other.execute_batch(meta).expect("a table");
+        assert!(matches!(Store::open_folder(folder.path()), Err(StoreError::OtherSchema { .. })));
+        let tables = other.query_row("SELECT count(*) FROM sqlite_master WHERE type = 'table'", [], |row| row.get(0));
+        assert_eq!(tables, Ok(1), "nothing was made");
+    }
 }

@@ -15,12 +15,20 @@ CREATE TABLE IF NOT EXISTS tasks (
     started_ms BIGINT NOT NULL, finished_ms BIGINT NOT NULL, PRIMARY KEY (job_id, task_index));
 CREATE INDEX IF NOT EXISTS tasks_by_state ON tasks (state);
 CREATE UNIQUE INDEX IF NOT EXISTS tasks_running_once ON tasks (cache_key) WHERE state = 'running' AND cache_key <> '';
-CREATE TABLE IF NOT EXISTS blobs (sha TEXT PRIMARY KEY, bytes BLOB NOT NULL, num_bytes BIGINT NOT NULL);
+CREATE TABLE IF NOT EXISTS job_inputs (
+    job_id TEXT NOT NULL REFERENCES jobs (id) ON DELETE CASCADE, upload_id TEXT NOT NULL, PRIMARY KEY (job_id, upload_id));
+CREATE TABLE IF NOT EXISTS blobs (sha TEXT PRIMARY KEY, num_bytes BIGINT NOT NULL);
+CREATE TABLE IF NOT EXISTS blob_parts (
+    sha TEXT NOT NULL REFERENCES blobs (sha) ON DELETE CASCADE, part BIGINT NOT NULL, bytes BLOB NOT NULL,
+    PRIMARY KEY (sha, part));
 CREATE TABLE IF NOT EXISTS artefacts (
     job_id TEXT NOT NULL REFERENCES jobs (id) ON DELETE CASCADE, task_index BIGINT NOT NULL, name TEXT NOT NULL,
     media_type TEXT NOT NULL, sha TEXT NOT NULL, num_bytes BIGINT NOT NULL, PRIMARY KEY (job_id, task_index, name));
 CREATE TABLE IF NOT EXISTS results (
-    cache_key TEXT PRIMARY KEY, result_sha TEXT NOT NULL, artefacts TEXT NOT NULL, created_ms BIGINT NOT NULL);
+    cache_key TEXT PRIMARY KEY, result_sha TEXT NOT NULL, created_ms BIGINT NOT NULL);
+CREATE TABLE IF NOT EXISTS result_files (
+    cache_key TEXT NOT NULL REFERENCES results (cache_key) ON DELETE CASCADE, name TEXT NOT NULL,
+    media_type TEXT NOT NULL, sha TEXT NOT NULL, num_bytes BIGINT NOT NULL, PRIMARY KEY (cache_key, name));
 CREATE TABLE IF NOT EXISTS checkpoints (
     job_id TEXT NOT NULL REFERENCES jobs (id) ON DELETE CASCADE, task_index BIGINT NOT NULL, bytes BLOB NOT NULL,
     PRIMARY KEY (job_id, task_index));
@@ -40,3 +48,6 @@ CREATE INDEX IF NOT EXISTS jobs_by_result ON jobs (result_sha);
 CREATE INDEX IF NOT EXISTS artefacts_by_content ON artefacts (sha);
 CREATE INDEX IF NOT EXISTS upload_files_by_content ON upload_files (sha);
 CREATE INDEX IF NOT EXISTS results_by_content ON results (result_sha);
+CREATE INDEX IF NOT EXISTS result_files_by_content ON result_files (sha);
+CREATE INDEX IF NOT EXISTS job_inputs_by_upload ON job_inputs (upload_id);
+

@@ -1,8 +1,7 @@
 //! Tasks: claiming, heartbeats, results, failures, checkpoints.
 
-use super::{MAX_LOSSES, Store, StoreError, Transaction, Value, lock_job, put_blob, touch};
+use super::{ArtefactRow, MAX_LOSSES, Store, StoreError, Transaction, Value, lock_job, put_bytes, touch};
 use crate::provenance::VERSION;
-use serde::{Deserialize, Serialize};
 
 /// A claimed task.
 #[derive(Clone, Debug)]
@@ -41,14 +40,6 @@ pub enum Finished {
     Taken,
     /// The task is no longer this attempt's: cancelled, or given to another worker.
     NotOurs,
-}
-
-#[derive(Serialize, Deserialize)]
-struct KnownArtefact {
-    name: String,
-    media_type: String,
-    sha: String,
-    num_bytes: i64,
 }
 
 impl Store {
@@ -160,25 +151,20 @@ impl Store {
             if !is_ours(t, task, worker)? {
                 return Ok(Finished::NotOurs);
             }
-            let sha = put_blob(t, result.result.clone())?;
-            let mut known = Vec::new();
+            let sha = put_bytes(t, &result.result)?;
+            let mut files = Vec::new();
             for (name, media_type, bytes) in &result.artefacts {
-                known.push(KnownArtefact {
+                files.push(ArtefactRow {
                     name: name.clone(),
                     media_type: media_type.clone(),
-                    sha: put_blob(t, bytes.clone())?,
+                    sha: put_bytes(t, bytes)?,
                     num_bytes: bytes.len() as i64,
                 });
             }
             if !task.cache_key.is_empty() {
-                let list = serde_json::to_string(&known).map_err(|_| StoreError::Corrupt { what: "artefact list" })?;
-                t.execute(
-                    "INSERT INTO results (cache_key, result_sha, artefacts, created_ms) VALUES ($1, $2, $3, {now}) \
-                     ON CONFLICT DO NOTHING",
-                    &[(&task.cache_key).into(), (&sha).into(), list.into()],
-                )?;
+                remember(t, &task.cache_key, &sha, &files)?;
             }
-            complete(t, &task.job_id, task.index, task.is_gather, &sha, &known)?;
+            complete(t, &task.job_id, task.index, task.is_gather, &sha, &files)?;
             Ok(Finished::Taken)
         })
     }
@@ -261,11 +247,19 @@ impl Store {
     /// [`StoreError`].
     pub fn task_results(&self, job: &str) -> Result<Vec<(Vec<u8>, String)>, StoreError> {
         let rows = self.database.read(
-            "SELECT b.bytes, t.problem FROM tasks t LEFT JOIN blobs b ON b.sha = t.result_sha \
-             WHERE t.job_id = $1 AND t.role = 'task' ORDER BY t.task_index",
+            "SELECT t.task_index, t.problem, p.part, p.bytes FROM tasks t LEFT JOIN blob_parts p ON p.sha = t.result_sha \
+             WHERE t.job_id = $1 AND t.role = 'task' ORDER BY t.task_index, p.part",
             &[job.into()],
         )?;
-        Ok(rows.iter().map(|r| (r.blob(0), r.text(1))).collect())
+        let mut results: Vec<(Vec<u8>, String)> = Vec::new();
+        for row in &rows {
+            // A result of several parts has several rows.
+            match results.last_mut() {
+                Some(last) if row.int(2) > 0 => last.0.extend(row.blob(3)),
+                _ => results.push((row.blob(3), row.text(1))),
+            }
+        }
+        Ok(results)
     }
 
     /// Says that a worker lives.
@@ -295,6 +289,30 @@ impl Store {
     }
 }
 
+/// Keeps a result and its files under the key of its content.
+fn remember(t: &mut Transaction, cache_key: &str, sha: &str, files: &[ArtefactRow]) -> Result<(), StoreError> {
+    let made = t.execute(
+        "INSERT INTO results (cache_key, result_sha, created_ms) VALUES ($1, $2, {now}) ON CONFLICT DO NOTHING",
+        &[cache_key.into(), sha.into()],
+    )?;
+    if made == 0 {
+        return Ok(());
+    }
+    for file in files {
+        t.execute(
+            "INSERT INTO result_files (cache_key, name, media_type, sha, num_bytes) VALUES ($1, $2, $3, $4, $5)",
+            &[
+                cache_key.into(),
+                (&file.name).into(),
+                (&file.media_type).into(),
+                (&file.sha).into(),
+                file.num_bytes.into(),
+            ],
+        )?;
+    }
+    Ok(())
+}
+
 fn is_ours(t: &mut Transaction, task: &Claimed, worker: &str) -> Result<bool, StoreError> {
     let held = t.execute(
         "UPDATE tasks SET worker = worker WHERE job_id = $1 AND task_index = $2 AND attempt = $3 AND worker = $4 \
@@ -311,23 +329,19 @@ pub(super) fn finish_from_known(
     index: i64,
     cache_key: &str,
 ) -> Result<bool, StoreError> {
-    let select = "SELECT result_sha, artefacts FROM results WHERE cache_key = $1";
+    let select = "SELECT result_sha FROM results WHERE cache_key = $1";
     let mut rows = t.query(select, &[cache_key.into()])?;
-    let mut with_artefacts = true;
-    if let Some(full) = cache_key.strip_suffix(super::NUMBERS_ONLY)
-        && rows.is_empty()
-    {
-        rows = t.query(select, &[full.into()])?;
-        with_artefacts = false;
+    let mut files = Vec::new();
+    match cache_key.strip_suffix(super::NUMBERS_ONLY) {
+        Some(full) if rows.is_empty() => rows = t.query(select, &[full.into()])?,
+        _ => {
+            let columns = "SELECT name, media_type, sha, num_bytes FROM result_files WHERE cache_key = $1";
+            files.extend(t.query(columns, &[cache_key.into()])?.iter().map(ArtefactRow::of));
+        }
     }
     let Some(row) = rows.first() else { return Ok(false) };
-    let mut known: Vec<KnownArtefact> =
-        serde_json::from_str(&row.text(1)).map_err(|_| StoreError::Corrupt { what: "artefact list" })?;
-    if !with_artefacts {
-        known.clear();
-    }
     t.execute("UPDATE jobs SET started_ms = {now} WHERE id = $1 AND started_ms = 0", &[job.into()])?;
-    complete(t, job, index, false, &row.text(0), &known)?;
+    complete(t, job, index, false, &row.text(0), &files)?;
     Ok(true)
 }
 
@@ -337,7 +351,7 @@ fn complete(
     index: i64,
     is_gather: bool,
     sha: &str,
-    artefacts: &[KnownArtefact],
+    artefacts: &[ArtefactRow],
 ) -> Result<(), StoreError> {
     t.execute(
         "UPDATE tasks SET state = 'succeeded', result_sha = $3, problem = '', completions = completions + 1, \

@@ -1,6 +1,7 @@
 //! Uploaded recordings: their files as blobs. A name from outside is a column's value, never a path.
 
 use super::{Store, StoreError, put_blob};
+use std::fs::File;
 use std::path::PathBuf;
 
 /// An upload to keep.
@@ -48,6 +49,17 @@ pub struct UploadRow {
     pub created_ms: i64,
 }
 
+/// A file of an upload as stored.
+#[derive(Clone, Debug)]
+pub struct KeptFile {
+    /// Name.
+    pub name: String,
+    /// SHA-256 of its content, hexadecimal.
+    pub sha: String,
+    /// Length.
+    pub num_bytes: i64,
+}
+
 impl Store {
     /// Keeps an upload; an equal one is kept once.
     ///
@@ -70,13 +82,12 @@ impl Store {
             if made == 0 {
                 return Ok(());
             }
-            for UploadFile { name, path, .. } in &upload.files {
-                let bytes = std::fs::read(path).map_err(|source| StoreError::Folder { path: path.clone(), source })?;
-                let length = bytes.len();
-                let sha = put_blob(t, bytes)?;
+            for UploadFile { name, path, num_bytes, sha } in &upload.files {
+                let failed = |source| StoreError::Folder { path: path.clone(), source };
+                put_blob(t, sha, *num_bytes, &mut File::open(path).map_err(failed)?)?;
                 t.execute(
                     "INSERT INTO upload_files (upload_id, name, sha, num_bytes) VALUES ($1, $2, $3, $4)",
-                    &[(&upload.id).into(), name.into(), sha.into(), length.into()],
+                    &[(&upload.id).into(), name.into(), sha.into(), (*num_bytes as usize).into()],
                 )?;
             }
             Ok(())
@@ -107,26 +118,15 @@ impl Store {
         Ok(rows.first().map(upload_of))
     }
 
-    /// Names of an upload's files.
+    /// An upload's files, by name.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn upload_file_names(&self, id: &str) -> Result<Vec<String>, StoreError> {
-        let rows =
-            self.database.read("SELECT name FROM upload_files WHERE upload_id = $1 ORDER BY name", &[id.into()])?;
-        Ok(rows.iter().map(|r| r.text(0)).collect())
-    }
-
-    /// Bytes of one of an upload's files; empty where there is none of the name.
-    ///
-    /// # Errors
-    /// [`StoreError`].
-    pub fn upload_file(&self, id: &str, name: &str) -> Result<Vec<u8>, StoreError> {
-        let rows = self.database.read(
-            "SELECT b.bytes FROM upload_files f JOIN blobs b ON b.sha = f.sha WHERE f.upload_id = $1 AND f.name = $2",
-            &[id.into(), name.into()],
-        )?;
-        Ok(rows.first().map(|r| r.blob(0)).unwrap_or_default())
+    pub fn upload_files(&self, id: &str) -> Result<Vec<KeptFile>, StoreError> {
+        let rows = self
+            .database
+            .read("SELECT name, sha, num_bytes FROM upload_files WHERE upload_id = $1 ORDER BY name", &[id.into()])?;
+        Ok(rows.iter().map(|r| KeptFile { name: r.text(0), sha: r.text(1), num_bytes: r.int(2) }).collect())
     }
 
     /// An owner's largest uploads; anybody's where `owner` is empty.

@@ -9,7 +9,7 @@ use crate::diagnosis::scene::Scene;
 use crate::specimen::{Outline, Specimen};
 use std::sync::Arc;
 
-const NAME: CauseName = CauseName::new("geometry");
+const NAME: CauseName = CauseName::new("outline");
 /// What a laboratory can do about it.
 const REMEDY: &str =
     "Measure the block as cast (length, width, thickness, slant of its faces) and give the specimen those sizes.";

@@ -1,0 +1,104 @@
+//! Forces that are compared, those read on the way to a scan among them, and what is unknown of the load cell.
+//!
+//! A load cell's gain and zero are common to all its readings. With what is known of them beforehand, readings F have
+//! the covariance C = diag(σ²) + σ_gain² F Fᵀ + σ_zero² 1 1ᵀ; weighing them by C⁻¹ is the same as estimating gain and
+//! zero beside the material.
+
+use super::error::CalibrationError;
+use crate::recording::Recording;
+use crate::sensitivity::Protocol;
+use nalgebra::{DMatrix, DVector};
+
+/// A force with its uncertainty.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ObservedForce {
+    /// All samples together, N.
+    pub value_n: f64,
+    /// Standard deviation, N.
+    pub sd_n: f64,
+}
+
+/// A force read at a drive at which nothing was scanned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ForceOnTheWay {
+    /// The drive, mm.
+    pub drive_mm: f64,
+    /// The force.
+    pub force: ObservedForce,
+}
+
+/// What is unknown of the load cell, alike for all its readings.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LoadCell {
+    /// Standard deviation of its gain, as a part of the force.
+    pub gain_sd: f64,
+    /// Standard deviation of its zero, N.
+    pub zero_sd_n: f64,
+}
+
+impl LoadCell {
+    /// That of a protocol.
+    pub fn of_protocol(protocol: &Protocol) -> LoadCell {
+        LoadCell { gain_sd: protocol.force_gain_sd, zero_sd_n: protocol.force_zero_sd_n }
+    }
+
+    /// C (N²) of readings `forces_n` with the standard deviations `sd_n` of their own.
+    pub(super) fn covariance(&self, forces_n: &[f64], sd_n: &[f64]) -> DMatrix<f64> {
+        let mut covariance = DMatrix::from_diagonal(&DVector::from_iterator(sd_n.len(), sd_n.iter().map(|s| s * s)));
+        for (i, a) in forces_n.iter().enumerate() {
+            for (j, b) in forces_n.iter().enumerate() {
+                covariance[(i, j)] += (self.gain_sd * a) * (self.gain_sd * b) + self.zero_sd_n * self.zero_sd_n;
+            }
+        }
+        covariance
+    }
+
+    /// C⁻¹ (N⁻²) of the same. Readings have standard deviations above zero, so that C is positive definite.
+    pub(super) fn precision(&self, forces_n: &[f64], sd_n: &[f64]) -> DMatrix<f64> {
+        // W = D − D B (I + Bᵀ D B)⁻¹ Bᵀ D with D = diag(1/σ²) and B = [σ_gain F, σ_zero 1] (Woodbury).
+        let num = sd_n.len();
+        let own = DVector::from_iterator(num, sd_n.iter().map(|s| 1.0 / (s * s)));
+        let shared = DMatrix::from_fn(num, 2, |i, a| if a == 0 { self.gain_sd * forces_n[i] } else { self.zero_sd_n });
+        let weighed = DMatrix::from_fn(num, 2, |i, a| own[i] * shared[(i, a)]);
+        let inner = DMatrix::identity(2, 2) + shared.transpose() * &weighed;
+        let mut precision = DMatrix::from_diagonal(&own);
+        // I + something positive has an inverse.
+        if let Some(inverse) = inner.try_inverse() {
+            precision -= &weighed * inverse * weighed.transpose();
+        }
+        precision
+    }
+}
+
+/// The forces that `recording`'s load curve has at the drives at which `protocol` reads the force alone, on the way to
+/// the largest drive; readings have the standard deviation of the first step that states one, else `force_sd_n`.
+///
+/// # Errors
+/// [`CalibrationError::NoForceReading`]: there is no load curve, or it does not come that far.
+pub(super) fn read_on_the_way(
+    recording: &Recording,
+    protocol: &Protocol,
+    force_sd_n: f64,
+) -> Result<Vec<ForceOnTheWay>, CalibrationError> {
+    let largest_mm = recording.steps.iter().map(|s| s.drive_mm).fold(0.0, f64::max);
+    let sd_n = recording.steps.iter().find_map(|s| s.force_sd_n).unwrap_or(force_sd_n);
+    let is_scanned = |drive_mm: f64| recording.steps.iter().any(|s| Protocol::is_same_drive(s.drive_mm, drive_mm));
+    let mut readings = Vec::new();
+    for drive_mm in protocol.on_the_way_to(largest_mm).force_drives_mm().into_iter().filter(|d| !is_scanned(*d)) {
+        let Some(load) = &recording.load else {
+            return Err(CalibrationError::NoForceReading { drive_mm, reason: "the recording has no load curve" });
+        };
+        let Some(value_n) = load.first_force_n(drive_mm) else {
+            return Err(CalibrationError::NoForceReading {
+                drive_mm,
+                reason: "its load curve does not pass that drive",
+            });
+        };
+        readings.push(ForceOnTheWay { drive_mm, force: ObservedForce { value_n, sd_n } });
+    }
+    Ok(readings)
+}
+
+#[cfg(test)]
+#[path = "force_readings_tests.rs"]
+mod tests;

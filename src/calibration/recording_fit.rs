@@ -1,0 +1,104 @@
+//! A material fitted to recordings: the estimate, its uncertainty, and what it predicts.
+
+use super::options::Held;
+use super::prediction::{Prediction, SolverWork};
+use crate::fem::Equilibrium;
+use crate::material::{Ogden, Parameter};
+use crate::sensitivity::{Covariance, FisherInformation};
+
+/// A material fitted to recordings.
+#[derive(Clone, Debug)]
+pub struct RecordingFit {
+    /// The estimate.
+    pub material: Ogden,
+    /// Fisher information at the estimate with the objective's weights, prior included.
+    pub information: FisherInformation,
+    /// Covariance of the estimate under the noise: the inverse information, or the sandwich where weights and noise
+    /// differ.
+    pub covariance: Covariance,
+    /// χ²: values by their variances, filtered ones once per acquired voxel.
+    pub chi2: f64,
+    /// χ² over its expectation: 1 where model and noise are right.
+    pub chi2_per_datum: f64,
+    /// What the covariance is to be multiplied with because the misfit is more than noise; 1 where it is not.
+    pub misfit_factor: f64,
+    /// √(objective − its expectation) where the misfit is more than noise, else zero: the size of the structured misfit
+    /// in units of the noise. An error of that size and of the shape of a parameter's sensitivity would shift the
+    /// parameter by this times its standard deviation (Cauchy–Schwarz).
+    pub structured_misfit: f64,
+    /// Numbers compared.
+    pub num_data: usize,
+    /// The paper's ℓ_u, mean over drives.
+    pub loss_u: f64,
+    /// The paper's ℓ_F, mean over drives with a force; none without forces.
+    pub loss_f: Option<f64>,
+    /// Whether the optimum was reached within the iterations allowed.
+    pub is_converged: bool,
+    /// Iterations made, rejected ones included.
+    pub iterations: usize,
+    /// Distance from the optimum of the linear model, in standard deviations.
+    pub distance: f64,
+    /// Limits at which the estimate stands, in words.
+    pub reached_limits: Vec<String>,
+    /// The objective at the start and after every accepted step.
+    pub history: Vec<f64>,
+    /// What the fit took, its start included.
+    pub work: SolverWork,
+    /// Parameters that were not fitted.
+    pub held: Held,
+    pub(super) predictions: Vec<Prediction>,
+}
+
+impl RecordingFit {
+    /// Standard deviation of a parameter from the noise, widened where the misfit is more than noise; none where the
+    /// data do not determine it or it was held.
+    pub fn sd(&self, parameter: Parameter) -> Option<f64> {
+        let index = self.information.index_of(parameter).ok()?;
+        if self.held.contains(index) {
+            return None;
+        }
+        Some(self.covariance.sd(index)? * self.misfit_factor.sqrt())
+    }
+
+    /// The largest shift of a parameter that a structured error as large as the structured misfit could make.
+    pub fn possible_shift(&self, parameter: Parameter) -> Option<f64> {
+        let index = self.information.index_of(parameter).ok()?;
+        let plain = self.information.covariance().sd(index).filter(|_| !self.held.contains(index))?;
+        Some(plain * self.structured_misfit)
+    }
+
+    /// ½ Σ μᵢαᵢ, kPa, and its standard deviation by the delta method.
+    pub fn initial_shear_modulus(&self) -> (f64, Option<f64>) {
+        let terms = &self.material.terms;
+        let value = self.material.initial_shear_modulus_kpa();
+        let mut gradient = vec![0.0];
+        for term in terms {
+            gradient.extend([0.5 * term.alpha, 0.5 * term.mu_kpa]);
+        }
+        let is_known = !self.held.contains(1);
+        let sd = self.covariance.sd_along(&gradient).filter(|_| is_known);
+        (value, sd.map(|sd| sd * self.misfit_factor.sqrt()))
+    }
+
+    /// Equilibria of the sample that one recording is of, one per drive.
+    pub fn states(&self, recording: usize) -> &[Equilibrium] {
+        &self.predictions[recording].states
+    }
+
+    /// Force of all samples of one recording at a drive, N.
+    pub fn force_n(&self, recording: usize, step: usize) -> f64 {
+        self.predictions[recording].forces_n[step]
+    }
+
+    /// What the estimate predicts of a drive: displacements of the compared voxels, mm.
+    pub fn predicted(&self, recording: usize, step: usize) -> &[[f64; 3]] {
+        &self.predictions[recording].displacements[step]
+    }
+
+    /// How that changes with every parameter, in the order of [`Ogden::parameters`]: displacements of the compared
+    /// voxels (mm per unit) and the force (N per unit).
+    pub fn sensitivities(&self, recording: usize, step: usize) -> (&[Vec<[f64; 3]>], &[f64]) {
+        let prediction = &self.predictions[recording];
+        (&prediction.sensitivities[step], &prediction.force_sensitivities[step])
+    }
+}

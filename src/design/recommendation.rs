@@ -1,0 +1,168 @@
+//! What a planner should do after a search: what to make, how to scan it and why, how precise that is, and what the
+//! figures assume.
+
+use super::entry::DesignEntry;
+use super::findings::{Equals, symbol};
+use super::study::Study;
+use super::words::{listed, sample_in_words, short_number};
+use crate::sensitivity::Protocol;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// What to do, in words.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Recommendation {
+    /// What to make, how to scan it, and why.
+    pub make: String,
+    /// How precisely one scan of it tells the parameters.
+    pub precision: String,
+    /// What these figures assume of scanner, load cell and blocks.
+    pub assumptions: String,
+}
+
+impl Recommendation {
+    /// Of the design that is simplest to make of those equal to the best.
+    pub(super) fn new(study: &Study, base: &DesignEntry, ranked: &[DesignEntry], equals: Equals) -> Recommendation {
+        let Some(chosen) = ranked.get(equals.simplest).or(ranked.first()) else { return Recommendation::default() };
+        let advice = if chosen.is_design_of(base) {
+            format!(
+                "Keep the base specimen. {} No design within the limits was found to be better.",
+                scan_like_this(study, chosen)
+            )
+        } else {
+            let number = if equals.simplest == 0 {
+                String::new()
+            } else {
+                format!(", number {} of the list", equals.simplest + 1)
+            };
+            format!(
+                "Make \"{}\"{number}: {}. {} {}",
+                chosen.specimen.name,
+                shape(chosen),
+                scan_like_this(study, chosen),
+                because(base, ranked, equals, chosen)
+            )
+        };
+        Recommendation { make: advice, precision: precision(base, chosen), assumptions: assumptions(study, chosen) }
+    }
+}
+
+/// Every sample's block and holes.
+fn shape(entry: &DesignEntry) -> String {
+    let samples = entry.specimen.samples();
+    match samples.as_slice() {
+        [one] => sample_in_words(one),
+        several => {
+            let of_each = several.iter().enumerate().map(|(n, s)| format!("sample {} {}", n + 1, sample_in_words(s)));
+            listed(&of_each.collect::<Vec<_>>())
+        }
+    }
+}
+
+fn drive_mm(entry: &DesignEntry) -> f64 {
+    entry.specimen.drive_mm.last().copied().unwrap_or(0.0)
+}
+
+fn scan_like_this(study: &Study, entry: &DesignEntry) -> String {
+    let blocks = match study.protocol.blocks_scanned {
+        1 => String::new(),
+        n => format!(", {n} blocks together"),
+    };
+    let forces = study.protocol.on_the_way_to(drive_mm(entry)).force_drives_mm();
+    let on_the_way = if forces.is_empty() {
+        String::new()
+    } else {
+        let drives: Vec<String> = forces.iter().map(|d| short_number(*d)).collect();
+        format!(", and read the force at {} mm on the way to it", listed(&drives))
+    };
+    let scans = match &entry.evaluation.scan_share[..] {
+        [] => format!("once at a drive of {} mm", short_number(drive_mm(entry))),
+        shares => {
+            let steps = entry.evaluation.steps.iter().zip(shares);
+            let each = steps.map(|(step, share)| {
+                format!("at {} mm in {:.0} % of the time of one scan", short_number(step.drive_mm), 100.0 * share)
+            });
+            listed(&each.collect::<Vec<_>>())
+        }
+    };
+    format!("Scan it {scans}{blocks}{on_the_way}.")
+}
+
+fn because(base: &DesignEntry, ranked: &[DesignEntry], equals: Equals, chosen: &DesignEntry) -> String {
+    let gain = format!("{:.3} ± {:.3} times", chosen.objective, chosen.objective * chosen.mesh_relative_sd);
+    let scanned = format!("the base specimen scanned in the same way at {} mm", short_number(drive_mm(base)));
+    match ranked.first() {
+        Some(best) if equals.simplest > 0 => format!(
+            "Why: it is simpler to make than the best that was found, and as good within what meshes leave open ({gain} as good as \
+             {scanned} by the study's objective; the best: {:.3}).",
+            best.objective
+        ),
+        _ => format!(
+            "Why: by the study's objective it is {gain} as good as {scanned}, and nothing better was found within the limits."
+        ),
+    }
+}
+
+/// Relative standard deviations of every μᵢ and αᵢ of each material, those of the base beside them.
+fn precision(base: &DesignEntry, chosen: &DesignEntry) -> String {
+    let percent = |sd: Option<f64>| sd.map_or("not at all".to_string(), |sd| format!("{} %", short_number(100.0 * sd)));
+    let of_materials = chosen.by_material.iter().zip(&base.by_material).map(|(own, of_base)| {
+        let shear = own.evaluation.promised_sd.iter().filter(|p| p.parameter != "kappa");
+        let each = shear.map(|p| {
+            let there = of_base.evaluation.promised_sd.iter().find(|b| b.parameter == p.parameter);
+            let there = there.and_then(|b| b.relative_sd);
+            format!("{} to {} (base: {})", symbol(&p.parameter), percent(p.relative_sd), percent(there))
+        });
+        format!("of material \"{}\" {}", own.material, listed(&each.collect::<Vec<_>>()))
+    });
+    format!(
+        "One such scan promises, as one standard deviation of a fit of all parameters: {}.",
+        of_materials.collect::<Vec<_>>().join("; ")
+    )
+}
+
+/// The scan and the load cell that the figures are of.
+fn assumptions(study: &Study, entry: &DesignEntry) -> String {
+    let (scan, protocol) = (&study.scan, &study.protocol);
+    let [x, y, z] = scan.voxel_mm.map(short_number);
+    let [a, b, c] = scan.noise_sd_mm.map(short_number);
+    let noise = if a == b && b == c {
+        format!("{a} mm along every axis")
+    } else {
+        format!("{a}, {b} and {c} mm along x, y and z")
+    };
+    let num_samples = entry.specimen.num_samples();
+    let blocks = match (protocol.blocks_scanned, num_samples) {
+        (1, 1) => "one sample, which is scanned".to_string(),
+        (blocks, _) => format!("{blocks} of {num_samples} samples scanned"),
+    };
+    format!(
+        "Assumed are voxels of {x} × {y} × {z} mm whose displacement has a noise of {noise}, a force of all samples together read to \
+         {} N{}, and {blocks}.",
+        short_number(scan.force_sd_n),
+        set_up(protocol)
+    )
+}
+
+/// What is not known of the set-up.
+fn set_up(protocol: &Protocol) -> String {
+    let mut unknown = Vec::new();
+    if protocol.force_gain_sd > 0.0 {
+        unknown.push(format!("gain is known to {} %", short_number(100.0 * protocol.force_gain_sd)));
+    }
+    if protocol.force_zero_sd_n > 0.0 {
+        unknown.push(format!("zero is known to {} N", short_number(protocol.force_zero_sd_n)));
+    }
+    let cell = if unknown.is_empty() {
+        " by a perfect load cell".to_string()
+    } else {
+        format!(" by a load cell whose {}", listed(&unknown))
+    };
+    let drive = if protocol.drive_zero_sd_mm > 0.0 {
+        format!(", a drive whose zero is known to {} mm", short_number(protocol.drive_zero_sd_mm))
+    } else {
+        String::new()
+    };
+    format!("{cell}{drive}")
+}

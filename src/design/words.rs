@@ -1,0 +1,90 @@
+//! Shapes, numbers and lists in words.
+
+use crate::specimen::{HoleAxis, Specimen};
+
+/// "a", "a and b", "a, b and c".
+pub fn listed(items: &[String]) -> String {
+    match items {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+/// Two significant digits of what is below ten, else none behind the point that say nothing: 0.27, 3.4, 45, 0.1875.
+pub fn short_number(value: f64) -> String {
+    let exact = format!("{value}");
+    // What people wrote is kept as they wrote it.
+    if exact.len() <= 6 {
+        return exact;
+    }
+    let digits = if value.abs() >= 10.0 || value.abs() < f64::MIN_POSITIVE {
+        0
+    } else {
+        (1 - value.abs().log10().floor() as i32).clamp(0, 12) as usize
+    };
+    format!("{value:.digits$}")
+}
+
+/// The holes of one sample in brief, equal diameters together: `2 × ⌀5.0 + ⌀2.4`.
+pub fn holes_in_brief(specimen: &Specimen) -> String {
+    let mut groups: Vec<(String, usize)> = Vec::new();
+    for hole in &specimen.holes {
+        let diameter = format!("⌀{:.1}", hole.diameter_mm);
+        match groups.iter_mut().find(|(d, _)| *d == diameter) {
+            Some((_, count)) => *count += 1,
+            None => groups.push((diameter, 1)),
+        }
+    }
+    let list: Vec<String> = groups.into_iter().map(|(d, n)| if n > 1 { format!("{n} × {d}") } else { d }).collect();
+    let along_width = specimen.hole_axis() == Some(HoleAxis::Width);
+    match list.as_slice() {
+        [] => "solid".into(),
+        list => format!("{}{}", list.join(" + "), if along_width { " (along the width)" } else { "" }),
+    }
+}
+
+/// The block of one sample: length × thickness × width, mm.
+pub fn block_in_brief(specimen: &Specimen) -> String {
+    let b = &specimen.block;
+    format!("{:.1} × {:.2} × {:.1}", b.length_mm, b.thickness_mm, b.width_mm)
+}
+
+/// One sample in words: a block of … mm without holes, or with these.
+pub fn sample_in_words(specimen: &Specimen) -> String {
+    let block = format!("a block of {} mm (length × thickness × width)", block_in_brief(specimen));
+    if specimen.holes.is_empty() {
+        return format!("{block} without holes");
+    }
+    let direction = specimen.extrusion_axis().name();
+    let plural = if specimen.holes.len() == 1 { "a hole" } else { "holes" };
+    let brief = holes_in_brief(specimen).replace(" (along the width)", "");
+    format!("{block} with {plural} along the {direction}, {brief} mm")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_and_numbers() {
+        let of = |n: usize| listed(&(0..n).map(|i| i.to_string()).collect::<Vec<_>>());
+        assert_eq!([of(0), of(1), of(2), of(3)], ["", "0", "0 and 1", "0, 1 and 2"]);
+        let numbers = [0.2724891, 3.44444, 45.057, 0.1875, 7.0, 0.02, 123.456];
+        assert_eq!(numbers.map(short_number), ["0.27", "3.4", "45.057", "0.1875", "7", "0.02", "123"]);
+    }
+
+    #[test]
+    fn shapes() {
+        let text = include_str!("../../geometries/two-hole-shear.json");
+        let mut specimen = Specimen::from_json(text).expect("the published specimen");
+        assert_eq!(holes_in_brief(&specimen), "2 × ⌀5.0");
+        let words = sample_in_words(&specimen);
+        let expected =
+            "a block of 25.4 × 6.40 × 19.1 mm (length × thickness × width) with holes along the thickness, 2 × ⌀5.0 mm";
+        assert_eq!(words, expected);
+        specimen.holes.clear();
+        assert_eq!(holes_in_brief(&specimen), "solid");
+        assert!(sample_in_words(&specimen).ends_with("without holes"));
+    }
+}

@@ -1,0 +1,322 @@
+//! The stage of a diagnosis that names causes: single ones round by round, the set-up as a whole where they leave much,
+//! and what later causes made needless out again.
+
+use super::cause_fit::CauseFit;
+use super::diagnose::Run;
+use super::error::DiagnosisError;
+use super::evidence::{EVIDENCE, OF_IMAGE_ALONE, UNEXPLAINED, is_large_force, penalty};
+use super::findings::Findings;
+use super::inference::Inference;
+use super::interior::InteriorTest;
+use super::leftover::leftover;
+use super::metric::Metric;
+use super::nominal::fit_with_terms;
+use super::rounds::{Asked, RoundLimits, add_causes, fit_round, score_round};
+use super::set_up::{fit_set_up, is_set_up_promising, simplest_set_up};
+use super::supposed::Supposed;
+use super::thinning::{Needed, named_causes, thinned};
+use super::trace::Trace;
+use std::cell::{Cell, RefCell};
+
+/// The set-up as a whole is looked at where single causes leave more than this part of the misfit (rms), or more than
+/// could be called explained.
+const SET_UP_LEAVES: f64 = 0.25;
+/// It is gone on from where it leaves less than this part of what they leave (rms).
+const SET_UP_GAINS: f64 = 0.7;
+
+/// Single causes are given up for the set-up where the first explains less than this part of the deviance, or where one
+/// explains a smaller part of what was left than the one before it did.
+const LEAST_OF_FIRST: f64 = 0.2;
+
+/// Where causes leave a misfit unexplained, one that alone explained at least this part of what the first did is tried
+/// in its place: the greedy choice between two that explain nearly the same may be the wrong one.
+const NEARLY_AS_MUCH: f64 = 0.95;
+/// What is found from there is kept where it leaves less than this part (rms).
+const OTHER_START_GAINS: f64 = 0.9;
+
+/// The artefacts among the causes of a fit.
+fn artefacts_of(fitted: &CauseFit) -> Vec<Supposed> {
+    fitted.causes.iter().filter(|c| c.cause.is_artefact()).cloned().collect()
+}
+
+/// Whether causes that leave `left_mm` of `before_mm` (rms) explain a misfit as far as single causes can be asked to:
+/// else the set-up as a whole is fitted in their place.
+fn is_explained(left_mm: f64, before_mm: f64, allowance_mm: f64) -> bool {
+    left_mm < (SET_UP_LEAVES * before_mm).max(allowance_mm) && left_mm < UNEXPLAINED * allowance_mm
+}
+
+/// Whether causes, found one after the other, explain less and less of what was left (`lefts`, before the first and
+/// after each): right ones explain more and more of it, down to nothing.
+fn explain_ever_less(lefts: &[f64]) -> bool {
+    let shares: Vec<f64> = lefts.windows(2).map(|pair| 1.0 - pair[1] / pair[0]).collect();
+    match shares[..] {
+        [] => false,
+        [first] => first < LEAST_OF_FIRST,
+        [.., before, last] => last < before,
+    }
+}
+
+/// What was found with the set-up as a whole in the fit.
+struct WithSetUp {
+    findings: Findings,
+    /// What its misfits are weighed by ([`Inference::discrepancy_mm2`]).
+    discrepancy_mm2: [f64; 3],
+}
+
+impl Run<'_> {
+    /// Tests, fits and names causes, round by round. Where the interior test found that the inside fits, causes there
+    /// wait. Where single causes leave much of the misfit, the set-up as a whole is fitted in their place, and rounds
+    /// go on from that.
+    pub(super) fn add_causes(&mut self) -> Result<(), DiagnosisError> {
+        let measured = self.measured();
+        let limits = RoundLimits { max_causes: self.options.max_causes, has_load_curve: self.load.is_some() };
+        if self.findings.causes.len() >= limits.max_causes {
+            return Ok(());
+        }
+        let at_boundary = self.registry.clone().without_inside();
+        let everything =
+            Asked { registry: self.registry, with_terms: self.options.prior.is_none(), evidence: EVIDENCE };
+        let does_inside_wait = self.interior.as_ref().is_some_and(InteriorTest::inside_fits);
+        let first = if does_inside_wait {
+            Asked { registry: &at_boundary, with_terms: false, evidence: EVIDENCE }
+        } else {
+            everything
+        };
+        let Run { inference, findings, observed, .. } = self;
+        let left_mm =
+            |fitted: &CauseFit, metric: &Metric| leftover(observed, &fitted.residual, metric).structured_rms_mm;
+        let before_mm = left_mm(&findings.current, &inference.metric);
+        // What is no more than a mesh's has no cause but in the image.
+        if before_mm < inference.allowance_mm && !is_large_force(observed, &findings.current.residual) {
+            let of_image = self.registry.clone().of_image_alone(&observed.specimen);
+            let asked = Asked { registry: &of_image, with_terms: false, evidence: OF_IMAGE_ALONE * EVIDENCE };
+            return add_causes(inference, findings, &measured, limits, &|_, _| Some(asked));
+        }
+        let begun = findings.current.clone();
+        let scored = score_round(inference, first, findings, limits)?;
+        // What is no more than a mesh's needs no set-up.
+        let is_promising = before_mm > inference.allowance_mm
+            && is_set_up_promising(inference, first.registry, &findings.current, &scored.candidates)?;
+        // What was left of the deviance after each cause so far.
+        let lefts = RefCell::new(vec![inference.misfit_beyond_noise(&findings.current)]);
+        let are_given_up = Cell::new(false);
+        let to_ask = |inference: &Inference, findings: &Findings| {
+            let left = left_mm(&findings.current, &inference.metric);
+            lefts.borrow_mut().push(inference.misfit_beyond_noise(&findings.current));
+            let is_explained = is_explained(left, before_mm, inference.allowance_mm);
+            are_given_up.set(is_promising && !is_explained && explain_ever_less(&lefts.borrow()));
+            let asked = if is_explained { everything } else { first };
+            (!are_given_up.get()).then_some(asked)
+        };
+        if fit_round(inference, findings, &measured, &scored)? {
+            add_causes(inference, findings, &measured, limits, &to_ask)?;
+        }
+        let are_all_asked = !(does_inside_wait || are_given_up.get());
+        if are_all_asked {
+            self.start_otherwise(begun, &measured, limits)?;
+            self.fit_material_anew(&measured, limits)?;
+        }
+        let Some(with_set_up) = self.with_set_up(&measured, limits, is_promising)? else {
+            return if are_all_asked { Ok(()) } else { self.ask_all(&measured, limits) };
+        };
+        if !are_all_asked && !self.is_explained_by(&with_set_up.findings) {
+            self.ask_all(&measured, limits)?;
+        }
+        if self.left_mm(&with_set_up.findings.current) < SET_UP_GAINS * self.left_mm(&self.findings.current) {
+            self.go_on_with(with_set_up);
+        }
+        Ok(())
+    }
+
+    /// Where causes leave a misfit unexplained and another cause alone explained nearly as much of it as the first one
+    /// found: adds causes from `begun`, the fit before the first round, without that first one in the first round, and
+    /// goes on from there where that leaves clearly less.
+    fn start_otherwise(
+        &mut self,
+        begun: CauseFit,
+        measured: &Trace,
+        limits: RoundLimits,
+    ) -> Result<(), DiagnosisError> {
+        let Some(first) = self.findings.causes.iter().find(|c| c.is_of_fit()).map(|c| c.name) else { return Ok(()) };
+        let alone = self.findings.ranked.iter().filter(|r| r.round == 1).filter_map(|r| Some((r, r.fitted?)));
+        let best = alone.clone().map(|(_, fitted)| fitted).fold(0.0, f64::max);
+        let has_rival = alone.clone().any(|(r, fitted)| r.identity.name != first && fitted > NEARLY_AS_MUCH * best);
+        if !has_rival || self.is_explained_by(&self.findings) {
+            return Ok(());
+        }
+        self.tell("starting from another cause that explains nearly as much as the first");
+        let others = self.registry.clone().without(&[first])?;
+        let num_begun = begun.causes.len();
+        let from_begun = self.findings.going_on_from(begun);
+        let mut before = std::mem::replace(&mut self.findings, from_begun);
+        let Run { inference, registry, findings, options, .. } = self;
+        let with_terms = options.prior.is_none();
+        let added = add_causes(inference, findings, measured, limits, &|_, findings| {
+            let is_first = findings.current.causes.len() == num_begun;
+            Some(Asked { registry: if is_first { &others } else { registry }, with_terms, evidence: EVIDENCE })
+        });
+        if added.is_err() || self.left_mm(&self.findings.current) >= OTHER_START_GAINS * self.left_mm(&before.current) {
+            (before.ranked, before.maps) =
+                (std::mem::take(&mut self.findings.ranked), std::mem::take(&mut self.findings.maps));
+            self.findings = before;
+        }
+        if self.is_cancelled() { added } else { Ok(()) }
+    }
+
+    /// Goes on with single causes where they were given up, or not all of them asked.
+    fn ask_all(&mut self, measured: &Trace, limits: RoundLimits) -> Result<(), DiagnosisError> {
+        let Run { inference, registry, findings, options, .. } = self;
+        let everything = Asked { registry, with_terms: options.prior.is_none(), evidence: EVIDENCE };
+        add_causes(inference, findings, measured, limits, &|_, _| Some(everything))?;
+        self.fit_material_anew(measured, limits)
+    }
+
+    /// Where causes leave more than a mesh does: fits the material from its start again, now that they are in the fit,
+    /// and goes on from there where that explains more. The nominal fit took terms to make up for what causes do, from
+    /// which a fit does not find back. In the end, what later causes made needless goes.
+    fn fit_material_anew(&mut self, measured: &Trace, limits: RoundLimits) -> Result<(), DiagnosisError> {
+        let is_believed = self.options.prior.is_some();
+        let current = &self.findings.current;
+        if !is_believed && !current.causes.is_empty() && self.left_mm(current) > self.inference.allowance_mm {
+            self.tell("fitting the material anew, with the causes found");
+            let (causes, deviance) = (current.causes.clone(), current.deviance);
+            let num_terms = current.material.terms.len();
+            match fit_with_terms(&mut self.inference, measured, &self.start, &causes) {
+                Ok(anew) => {
+                    let num_more = anew.material.terms.len() as f64 - num_terms as f64;
+                    let cost = num_more * penalty(&self.inference.metric, 2);
+                    if deviance - anew.deviance - cost > EVIDENCE {
+                        self.findings.current = anew;
+                        let Run { inference, registry, findings, .. } = self;
+                        let everything = Asked { registry, with_terms: true, evidence: EVIDENCE };
+                        add_causes(inference, findings, measured, limits, &|_, _| Some(everything))?;
+                    }
+                }
+                Err(error) if self.is_cancelled() => return Err(error),
+                Err(_) => {}
+            }
+        }
+        self.leave_out_what_is_not_needed(measured)
+    }
+
+    /// What a fit leaves beyond noise, mm rms.
+    fn left_mm(&self, fitted: &CauseFit) -> f64 {
+        leftover(self.observed, &fitted.residual, &self.inference.metric).structured_rms_mm
+    }
+
+    /// Whether findings explain the misfit as far as causes can be asked to.
+    fn is_explained_by(&self, findings: &Findings) -> bool {
+        let (before, left) = (self.left_mm(&findings.nominal), self.left_mm(&findings.current));
+        is_explained(left, before, self.inference.allowance_mm)
+    }
+
+    /// Goes on with the set-up as a whole and the weights that belong to it.
+    fn go_on_with(&mut self, with_set_up: WithSetUp) {
+        let WithSetUp { mut findings, discrepancy_mm2 } = with_set_up;
+        (findings.ranked, findings.maps) =
+            (std::mem::take(&mut self.findings.ranked), std::mem::take(&mut self.findings.maps));
+        self.findings = findings;
+        self.inference.weigh_by(discrepancy_mm2);
+    }
+
+    /// Takes out of the fit the causes that `measured`, or later causes, have made needless.
+    pub(super) fn leave_out_what_is_not_needed(&mut self, measured: &Trace) -> Result<(), DiagnosisError> {
+        let Run { inference, findings, .. } = self;
+        let num_causes = findings.current.causes.len();
+        if num_causes > 1 {
+            findings.current = thinned(inference, measured, findings.current.clone(), Needed::ByEvidence)?;
+            if findings.current.causes.len() < num_causes {
+                self.name_causes_of_fit()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The set-up as a whole with causes added to it, where what was named so far leaves much of the misfit and the
+    /// set-up `is_promising`. `None` where it is not asked for, or has no fit.
+    fn with_set_up(
+        &mut self,
+        measured: &Trace,
+        limits: RoundLimits,
+        is_promising: bool,
+    ) -> Result<Option<WithSetUp>, DiagnosisError> {
+        let is_asked = is_promising && !self.is_explained_by(&self.findings);
+        if !is_asked || self.registry.set_up(self.observed).is_empty() {
+            return Ok(None);
+        }
+        self.tell("fitting the set-up as a whole: plates, rig, layers, block");
+        // Without the further terms that the nominal fit took to make up for the set-up.
+        let start = CauseFit {
+            material: self.start.clone(),
+            causes: artefacts_of(&self.findings.current),
+            ..self.findings.nominal.clone()
+        };
+        let Run { inference, registry, .. } = self;
+        let fitted = fit_set_up(inference, registry, measured, &start)
+            .and_then(|fitted| simplest_set_up(inference, registry, measured, fitted));
+        let found = match fitted {
+            Ok(fitted) => self.and_causes(fitted, measured, limits),
+            Err(error) => Err(error),
+        };
+        self.inference.forget_discrepancy();
+        match found {
+            Ok(found) => Ok(Some(found)),
+            Err(error) if self.is_cancelled() => Err(error),
+            Err(_) => Ok(None),
+        }
+    }
+
+    /// What is found from `fitted` on, a fit of the set-up as a whole; the findings so far stay as they are, but for
+    /// the list of what was tested.
+    fn and_causes(
+        &mut self,
+        fitted: CauseFit,
+        measured: &Trace,
+        limits: RoundLimits,
+    ) -> Result<WithSetUp, DiagnosisError> {
+        let from_set_up = self.findings.going_on_from(fitted);
+        let before = std::mem::replace(&mut self.findings, from_set_up);
+        self.findings.nominal.deviance = self.inference.misfit_of(&self.findings.nominal.residual);
+        let added = self.add_causes_to_set_up(measured, limits);
+        let mut findings = std::mem::replace(&mut self.findings, before);
+        (self.findings.ranked, self.findings.maps) =
+            (std::mem::take(&mut findings.ranked), std::mem::take(&mut findings.maps));
+        self.findings.num_rounds = findings.num_rounds;
+        added.map(|()| WithSetUp { findings, discrepancy_mm2: self.inference.discrepancy_mm2 })
+    }
+
+    /// Adds causes to the set-up as a whole, and names all of them.
+    fn add_causes_to_set_up(&mut self, measured: &Trace, limits: RoundLimits) -> Result<(), DiagnosisError> {
+        self.name_causes_of_fit()?;
+        let Run { inference, registry, findings, options, .. } = self;
+        let everything = Asked { registry, with_terms: options.prior.is_none(), evidence: EVIDENCE };
+        let num_before = findings.current.causes.len();
+        add_causes(inference, findings, measured, limits, &|_, _| Some(everything))?;
+        if findings.current.causes.len() > num_before {
+            findings.current = simplest_set_up(inference, registry, measured, findings.current.clone())?;
+            self.name_causes_of_fit()?;
+        }
+        Ok(())
+    }
+
+    /// Names the causes that are in the fit, with the evidence for each among all others.
+    fn name_causes_of_fit(&mut self) -> Result<(), DiagnosisError> {
+        let named = named_causes(&mut self.inference, &self.findings.current)?;
+        self.findings.causes.retain(|c| !c.is_of_fit());
+        self.findings.causes.extend(named);
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three causes alike: a third, a half, all. Causes that stand for others: a half, then less and less.
+    #[test]
+    fn causes_that_explain_ever_less_are_given_up() {
+        assert!(!explain_ever_less(&[9.0]));
+        assert!(!explain_ever_less(&[9.0, 6.0]) && !explain_ever_less(&[9.0, 6.0, 3.0]));
+        assert!(explain_ever_less(&[9.0, 8.0]) && explain_ever_less(&[9.0, 5.0, 3.5]));
+    }
+}

@@ -1,0 +1,259 @@
+//! What is known so far: the law fitted to all recordings, its information, its misfit and the states it has visited.
+
+use super::correction::without_mesh_error;
+use super::discrepancy::Discrepancy;
+use super::error::NextError;
+use super::options::{NextOptions, Plan};
+use super::scanned::{ForceRead, ScannedStep};
+use super::visited::Visited;
+use crate::calibration::{
+    CalibrateOptions, CalibrationProblem, Objective, Observed, RecordingFit, TermCount, calibrate,
+};
+use crate::kinematics::{Decomposition, IDENTITY, decompose};
+use crate::material::Ogden;
+use crate::mesh::MeshOptions;
+use crate::sensitivity::{Covariance, FisherInformation, JointInformation, median, unknowns_of};
+use crate::specimen::Specimen;
+use nalgebra::{DMatrix, SymmetricEigen};
+
+/// Most terms where BIC chooses.
+const MAX_TERMS: usize = 3;
+/// Starts of every number of terms.
+const NUM_STARTS: usize = 2;
+/// A parameter that the recordings do not determine counts as known to this relative standard deviation.
+pub(super) const UNKNOWN_RELATIVE_SD: f64 = 1.0;
+/// Materials that candidates are averaged over differ from the estimate by at most this part of each parameter.
+const MOST_CHANGE: f64 = 0.3;
+/// Where they would differ by less than this, the estimate stands for them all.
+const LEAST_CHANGE: f64 = 1e-3;
+
+/// A material that the posterior leaves possible.
+#[derive(Clone, Debug)]
+pub(super) struct Point {
+    /// Its weight in averages.
+    pub(super) weight: f64,
+    /// The material.
+    pub(super) material: Ogden,
+}
+
+/// What is known so far.
+pub(super) struct Posterior {
+    /// The estimate.
+    pub(super) material: Ogden,
+    /// Of all recordings about material and unknowns of the set-up, with the discrepancy in their noise.
+    pub(super) information: JointInformation,
+    /// To what the unknowns are known beforehand.
+    pub(super) unknown_sd: Vec<f64>,
+    /// The misfit beyond noise.
+    pub(super) discrepancy: Discrepancy,
+    /// The states visited.
+    pub(super) visited: Visited,
+    /// χ² over its expectation.
+    pub(super) chi2_per_datum: f64,
+    /// Remarks of the fit.
+    pub(super) notes: Vec<String>,
+}
+
+impl Posterior {
+    /// Fits `observed` together.
+    ///
+    /// # Errors
+    /// [`NextError`].
+    pub(super) fn new(
+        observed: &[Observed],
+        plan: &Plan,
+        options: &NextOptions,
+        on_stage: &dyn Fn(&str),
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Posterior, NextError> {
+        let mesh = |s: &Specimen, factor: f64| MeshOptions::scaled(s, factor);
+        let settings = |terms: TermCount, num_starts: usize| CalibrateOptions {
+            terms,
+            mesh_factor: options.mesh_factor,
+            has_mesh_allowance: false,
+            num_starts,
+            ..CalibrateOptions::default()
+        };
+        let corrected = if options.has_mesh_correction {
+            on_stage("error of the mesh");
+            let first = calibrate(observed, &mesh, &settings(TermCount::Fixed(1), 1), on_stage, is_cancelled)?;
+            without_mesh_error(observed, &first.fit, options.mesh_factor, is_cancelled)?
+        } else {
+            observed.to_vec()
+        };
+        on_stage("what is known so far");
+        let terms = options.num_terms.map_or(TermCount::Auto { max: MAX_TERMS }, TermCount::Fixed);
+        let found = calibrate(&corrected, &mesh, &settings(terms, NUM_STARTS), on_stage, is_cancelled)?;
+        let mut problem = CalibrationProblem::new(&corrected, &|s| mesh(s, options.mesh_factor), Objective::Weighted)?;
+        let discrepancy = Discrepancy::of(&corrected, &found.fit);
+        let seen = Seen::of(&mut problem, &found.fit, plan)?;
+        let visited = Visited::of(seen.states.iter().flatten().flatten());
+        let mut information = JointInformation::none(&found.fit.material, seen.unknown_sd.len());
+        for (r, steps) in seen.steps.iter().enumerate() {
+            for (s, step) in steps.iter().enumerate() {
+                let here = &corrected[r];
+                let num = num_done(&corrected, &here.specimen, here.steps[s].drive_mm) as f64;
+                let (material, num_unknowns) = (&found.fit.material, seen.unknown_sd.len());
+                // Scans of one drive share their discrepancy: each has its part of what their mean tells.
+                let of_all = step.information(material, num_unknowns, num, &discrepancy)?;
+                information.add_times(1.0 / num, &of_all)?;
+            }
+        }
+        Ok(Posterior {
+            material: found.fit.material.clone(),
+            information,
+            unknown_sd: seen.unknown_sd,
+            discrepancy,
+            visited,
+            chi2_per_datum: found.fit.chi2_per_datum,
+            notes: found.notes,
+        })
+    }
+
+    /// Information about the material, with `more` about material and unknowns, the unknowns estimated too.
+    ///
+    /// # Errors
+    /// [`NextError::Evaluation`] for what is not finite.
+    pub(super) fn about_material(&self, more: Option<&JointInformation>) -> Result<FisherInformation, NextError> {
+        let mut all = self.information.clone();
+        if let Some(more) = more {
+            all.add(more)?;
+        }
+        Ok(all.about_material(&self.material, &self.unknown_sd)?)
+    }
+
+    /// Materials to average over: three points of Gauss–Hermite quadrature along the direction in which the relative
+    /// parameters are known least.
+    ///
+    /// # Errors
+    /// [`NextError::Evaluation`] for what is not finite.
+    pub(super) fn points(&self) -> Result<Vec<Point>, NextError> {
+        let information = self.about_material(None)?;
+        let shear = information.shear_indices();
+        let change = least_known_direction(&information.covariance(), &shear, information.values());
+        let step = change.iter().map(|c| c.abs()).fold(0.0, f64::max);
+        let alone = vec![Point { weight: 1.0, material: self.material.clone() }];
+        if step < LEAST_CHANGE {
+            return Ok(alone);
+        }
+        let part = (MOST_CHANGE / step).min(1.0);
+        let moved = |sign: f64| -> Option<Point> {
+            let mut material = self.material.clone();
+            for (&index, change) in shear.iter().zip(&change) {
+                let parameter = information.parameters()[index];
+                let value = information.values()[index];
+                material.set(parameter, value + sign * part * change * value.abs());
+            }
+            material.validate().ok().map(|()| Point { weight: 1.0 / 6.0, material })
+        };
+        let sides: Vec<Point> = [-1.0, 1.0].into_iter().filter_map(moved).collect();
+        let center = Point { weight: 2.0 / 3.0, material: self.material.clone() };
+        Ok(std::iter::once(center).chain(sides).collect())
+    }
+}
+
+/// √3 standard deviations along the leading direction of the relative covariance of the parameters `shear`.
+fn least_known_direction(covariance: &Covariance, shear: &[usize], values: &[f64]) -> Vec<f64> {
+    let relative = DMatrix::from_fn(shear.len(), shear.len(), |a, b| {
+        let (i, j) = (shear[a], shear[b]);
+        match covariance.covariance(i, j) {
+            Some(both) => both / (values[i] * values[j]).abs(),
+            None if i == j => UNKNOWN_RELATIVE_SD * UNKNOWN_RELATIVE_SD,
+            None => 0.0,
+        }
+    });
+    let eigen = SymmetricEigen::new(relative);
+    let leading = eigen.eigenvalues.imax();
+    let size = (3.0 * eigen.eigenvalues[leading].max(0.0)).sqrt();
+    eigen.eigenvectors.column(leading).iter().map(|v| v * size).collect()
+}
+
+/// How many of the recordings scanned this specimen at this drive.
+pub(super) fn num_done(observed: &[Observed], specimen: &Specimen, drive_mm: f64) -> usize {
+    let is_at = |o: &Observed| o.steps.iter().any(|s| is_same_drive(s.drive_mm, drive_mm));
+    observed.iter().filter(|o| is_same_body(&o.specimen, specimen) && is_at(o)).count()
+}
+
+/// Whether two drives are one: actuators keep a micrometre.
+pub(super) fn is_same_drive(a: f64, b: f64) -> bool {
+    (a - b).abs() < 1e-3
+}
+
+/// Whether two specimens differ by name and drives alone.
+pub(super) fn is_same_body(a: &Specimen, b: &Specimen) -> bool {
+    let body = |s: &Specimen| Specimen { name: String::new(), drive_mm: Vec::new(), ..s.clone() };
+    body(a) == body(b)
+}
+
+/// What the recordings tell, at the estimate.
+struct Seen {
+    /// Per recording and drive.
+    steps: Vec<Vec<ScannedStep>>,
+    /// Per recording and drive: the voxels' states.
+    states: Vec<Vec<Vec<Decomposition>>>,
+    unknown_sd: Vec<f64>,
+}
+
+impl Seen {
+    fn of(problem: &mut CalibrationProblem, fit: &RecordingFit, plan: &Plan) -> Result<Seen, NextError> {
+        problem.refuse_unlike_samples("what to scan next")?;
+        let observed = problem.observed();
+        let mut seen = Seen { steps: Vec::new(), states: Vec::new(), unknown_sd: Vec::new() };
+        for (r, (model, view)) in problem.models_and_views().enumerate() {
+            let recording = &observed[r];
+            let (mut steps, mut states) = (Vec::new(), Vec::new());
+            for (s, equilibrium) in fit.states(r).iter().enumerate() {
+                let measured = &recording.steps[s];
+                let of_voxels: Vec<Decomposition> = view
+                    .gradients(&equilibrium.displacement)?
+                    .iter()
+                    .map(|g| decompose(&[0, 1, 2].map(|i| [0, 1, 2].map(|j| IDENTITY[i][j] + g[i][j]))))
+                    .collect();
+                let mut tangent = model.tangent(&fit.material, equilibrium)?;
+                let unknowns = unknowns_of(&plan.study.protocol, equilibrium, &mut tangent)?;
+                let (fields, forces) = fit.sensitivities(r, s);
+                let is_whole = |u: &[f64; 3]| u.iter().all(|x| x.is_finite());
+                let weights: Vec<f64> = measured
+                    .displacement
+                    .iter()
+                    .zip(&fields[0])
+                    .map(|(u, f)| f64::from(u8::from(is_whole(u) && is_whole(f))))
+                    .collect();
+                // What is missing must not enter a product.
+                let filled = |field: &[[f64; 3]]| -> Vec<[f64; 3]> {
+                    field.iter().map(|u| if is_whole(u) { *u } else { [0.0; 3] }).collect()
+                };
+                let by_unknown = unknowns
+                    .iter()
+                    .map(|u| u.displacement.as_ref().map(|d| view.average(d).map(|f| filled(&f))).transpose())
+                    .collect::<Result<Vec<_>, _>>()?;
+                steps.push(ScannedStep {
+                    by_parameter: fields.iter().map(|f| filled(f)).collect(),
+                    by_unknown,
+                    // The states that the law was fitted to are those visited.
+                    beyond: vec![0.0; weights.len()],
+                    weights,
+                    noise_mm2: recording.noise_sd_mm.map(|sd| sd * sd * recording.noise_correlation()),
+                    voxel_mm3: recording.mask.grid.voxel_volume_mm3(),
+                    force: measured.force.map(|force| ForceRead {
+                        force_n: equilibrium.force_n,
+                        by_parameter: forces.to_vec(),
+                        by_unknown: unknowns.iter().map(|u| u.force_n).collect(),
+                        sd_n: force.sd_n,
+                        beyond: 0.0,
+                    }),
+                });
+                states.push(of_voxels);
+                seen.unknown_sd = unknowns.iter().map(|u| u.sd).collect();
+            }
+            seen.steps.push(steps);
+            seen.states.push(states);
+        }
+        Ok(seen)
+    }
+}
+
+/// The typical distance of voxels beyond the states visited: their median.
+pub(super) fn typical(beyond: &[f64]) -> f64 {
+    median(beyond.iter().copied()).unwrap_or(0.0)
+}

@@ -1,0 +1,201 @@
+// The forms of a study: scan, limits, goal of a search.
+
+import { choice, field, fields } from "./field.js";
+import { GLOSSARY, OBJECTIVES } from "./words.js";
+
+/** The scan's fields. */
+export const scanForm = (model, edited) =>
+  fields(
+    field({
+      label: "Voxel x, y, z, mm",
+      kind: "triple",
+      value: model.scan.voxel_mm.join(", "),
+      example: "1, 0.19, 0.75",
+      pointer: "/scan/voxel_mm",
+      put: (v) => {
+        model.scan.voxel_mm = v;
+      },
+      changed: edited,
+    }),
+    field({
+      label: "Noise x, y, z, mm",
+      kind: "triple",
+      value: model.scan.noise_sd_mm.join(", "),
+      example: "0.05, 0.05, 0.05",
+      pointer: "/scan/noise_sd_mm",
+      put: (v) => {
+        model.scan.noise_sd_mm = v;
+      },
+      meaning: "Standard deviation of a voxel's displacement along each axis.",
+      changed: edited,
+    }),
+    field({
+      label: "Noise of the force, N",
+      value: model.scan.force_sd_n,
+      example: "0.02",
+      pointer: "/scan/force_sd_n",
+      put: (v) => {
+        model.scan.force_sd_n = v;
+      },
+      changed: edited,
+    }),
+  );
+
+/** Limits that may be left out: key, words, an example. */
+const OPTIONAL = [
+  ["min_voxels_across_ligament", "Voxels across a ligament", "2"],
+  ["max_force_n", "Largest force, N", "40"],
+  ["max_drive_mm", "Largest drive, mm", "7"],
+  ["max_local_stretch", "Largest local stretch", "3.5"],
+  ["max_holes", "Most holes", "5"],
+];
+
+export function limitsForm(model, edited) {
+  const { limits } = model;
+  const limit = (key, label, example) =>
+    field({
+      label,
+      value: limits[key],
+      example,
+      pointer: `/limits/${key}`,
+      put: (v) => {
+        limits[key] = v;
+      },
+      changed: edited,
+    });
+  const diameter = (end, label) =>
+    limits.diameter_mm &&
+    field({
+      label,
+      value: limits.diameter_mm[end],
+      example: "2",
+      pointer: `/limits/diameter_mm/${end}`,
+      put: (v) => {
+        limits.diameter_mm[end] = v;
+      },
+      changed: edited,
+    });
+  return fields(
+    limit("min_ligament_hole_hole_mm", "Ligament between holes, mm", "1.5"),
+    limit("min_ligament_hole_edge_mm", "Ligament to an edge, mm", "1.2"),
+    diameter("min", "Smallest diameter, mm"),
+    diameter("max", "Largest diameter, mm"),
+    OPTIONAL.map(([key, label, example]) =>
+      field({
+        label,
+        kind: "optional",
+        value: limits[key],
+        example,
+        pointer: `/limits/${key}`,
+        put: (v) => {
+          if (v === undefined) delete limits[key];
+          else limits[key] = v;
+        },
+        placeholder: "no limit",
+        changed: edited,
+      }),
+    ),
+    choice({
+      label: "Symmetry",
+      value: limits.symmetry ?? "none",
+      options: [
+        ["none", "none"],
+        ["mirror_x", "x"],
+        ["mirror_z", "z"],
+        ["mirror_x_and_z", "x and z"],
+        ["point", "about the centre"],
+      ],
+      put: (v) => {
+        limits.symmetry = v;
+      },
+      changed: edited,
+    }),
+  );
+}
+
+export function goalForm(model, edited) {
+  const count = (label, value, put, pointer, meaning) =>
+    field({ label, kind: "whole", value, put, pointer, example: "4", meaning, changed: edited });
+  const { vary, budget } = model;
+  const drive = (end, label) =>
+    field({
+      label,
+      value: vary.drive_mm[end],
+      example: "5",
+      pointer: `/vary/drive_mm/${end}`,
+      put: (v) => {
+        vary.drive_mm[end] = v;
+      },
+      changed: edited,
+    });
+  const holes = (end, label) =>
+    count(
+      label,
+      vary.hole_count[end],
+      (v) => {
+        vary.hole_count[end] = v;
+      },
+      `/vary/hole_count/${end}`,
+    );
+  const chosen = OBJECTIVES.find(([key]) => key === model.objective.kind)?.[1] ?? "";
+  return fields(
+    choice({
+      label: "Objective",
+      wide: true,
+      value: model.objective.kind,
+      options: OBJECTIVES,
+      put: (v) => {
+        model.objective.kind = v;
+      },
+      meaning: GLOSSARY[chosen] ?? GLOSSARY.gain,
+      changed: edited,
+    }),
+    holes("min", "Holes, at least"),
+    holes("max", "Holes, at most"),
+    drive("min", "Drive, at least, mm"),
+    drive("max", "Drive, at most, mm"),
+    count(
+      "Designs sampled",
+      budget.explore,
+      (v) => {
+        budget.explore = v;
+      },
+      "/budget/explore",
+      "Designs spread over the whole space before any is improved.",
+    ),
+    count(
+      "Designs improved",
+      budget.refine,
+      (v) => {
+        budget.refine = v;
+      },
+      "/budget/refine",
+    ),
+    count(
+      "Steps of each",
+      budget.iterations ?? 6,
+      (v) => {
+        budget.iterations = v;
+      },
+      "/budget/iterations",
+    ),
+    count(
+      "Designs confirmed",
+      budget.confirm,
+      (v) => {
+        budget.confirm = v;
+      },
+      "/budget/confirm",
+      "The best designs, evaluated again on the standard mesh.",
+    ),
+    count(
+      "Verification draws (0: none)",
+      model.draws,
+      (v) => {
+        model.draws = v;
+      },
+      "/verification/draws",
+      "Synthetic noisy scans on which the chosen design is calibrated: the proof of its promise.",
+    ),
+  );
+}
