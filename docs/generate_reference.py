@@ -36,7 +36,7 @@ FILES = [
 ANCHORS = {schema: re.sub(r"\W", "", title) for title, schema, _, _ in FILES}
 
 COMMANDS = [
-    ["solve"], ["evaluate"], ["scan"], ["import"], ["calibrate"], ["diagnose"], ["design"], ["sweep"], ["sweep", "merge"], ["compare"],
+    ["solve"], ["evaluate"], ["scan"], ["import"], ["calibrate"], ["diagnose"], ["next"], ["design"], ["sweep"], ["sweep", "merge"], ["compare"],
     ["uniaxial"], ["curves"], ["export", "material"], ["export", "model"], ["paper-tables"], ["prove-diagnosis"], ["run"], ["serve"],
     ["worker"],
 ]
@@ -198,7 +198,7 @@ def wrapped(text, width=138):
 # Where a command is explained.
 EXPLAINED = {
     "solve": "tutorial-specimen.md#forces-and-fields", "evaluate": "tutorial-specimen.md#what-a-scan-would-tell", "scan": "tutorial-scan.md",
-    "import": "tutorial-import.md", "calibrate": "calibration.md", "diagnose": "diagnosis.md", "design": "tutorial-design.md",
+    "import": "tutorial-import.md", "calibrate": "calibration.md", "diagnose": "diagnosis.md", "next": "next-scan.md", "design": "tutorial-design.md",
     "sweep": "sweeps.md", "sweep merge": "sweeps.md#shards-without-a-clusters-scheduler", "compare": "sweeps.md#comparison",
     "uniaxial": "tutorial-curves.md#one-curve", "curves": "tutorial-curves.md#several-tests-together-one-kept-back",
     "export material": "export.md", "export model": "export.md#models", "paper-tables": "paper-comparison.md#tables-1-to-3-and-figure-8",
