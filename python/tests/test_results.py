@@ -21,7 +21,9 @@ needs_tables = unittest.skipUnless(HAS_TABLES, "pandas and xarray are not instal
 
 class Parts(Scratch):
     def test_specimens_and_materials_come_back_from_json(self):
-        for part in (bar(), block(), bar(holes=[lk.Hole((1.5, 0.25), 2.0, axis="width")], outline="block")):
+        thicker = lk.Sample(12, 5, 9, holes=[lk.Hole((0, 0), 2)])
+        bent = bar(holes=[lk.Hole((1.5, 0.25), 2.0, axis="width")], outline="block")
+        for part in (bar(), block(), bent, block().replace(other_samples=[thicker])):
             self.assertEqual(type(part).from_json(part.to_json()), part)
             part.to_json(self.folder / "part.json")
             self.assertEqual(type(part).from_json(self.folder / "part.json"), part)
@@ -98,6 +100,24 @@ class Results(Scratch):
         self.assertTrue(all(path.name.startswith("2-") for path in both.diagnoses[1].pictures))
         if HAS_TABLES:
             self.assertEqual(both.diagnoses[1].to_xarray()["residual_after"].shape, (2, 19, 17, 16, 3))
+
+    @needs_repository
+    def test_the_next_scan(self):
+        block = lk.Specimen(
+            length_mm=12, thickness_mm=4, width_mm=9, test="double_lap_shear", drive_mm=[2], samples_in_parallel=2
+        )
+        made = lk.scan(block, ecoflex(), voxel_mm=[1, 0.5, 1], mesh=2.0, seed=1).recording
+        study = REPOSITORY / "geometries" / "studies" / "two-hole-shear.json"
+        answer = lk.next_scan(made, study, num_terms=1, mesh_factor=4, num_drives=1, precision=0.5)
+        self.assertEqual(answer.verdict, "reached")
+        self.assertEqual(set(answer.relative_sd), {"mu_1", "alpha_1"})
+        # The study's base, and the block again, which needs no change of the specimen.
+        self.assertEqual(len(answer.candidates), 2)
+        again = next(c for c in answer.candidates if c.is_repeat)
+        self.assertEqual((again.drive_mm, again.minutes), ((2.0,), 12))
+        for candidate in answer.candidates:
+            for name, sd in candidate.promised_relative_sd.items():
+                self.assertLess(sd, answer.relative_sd[name])
 
     def test_a_study_names_files_beside_it(self):
         (self.folder / "study").mkdir()
@@ -197,6 +217,7 @@ class Requests(unittest.TestCase):
         "import": (lk.import_recording,),
         "calibrate": (lk.calibrate,),
         "diagnose": (lk.diagnose, lk.diagnose_together),
+        "next": (lk.next_scan,),
         "curves": (lk.curves,),
         "uniaxial": (lk.uniaxial,),
         "export-material": (lk.export_material,),
@@ -211,8 +232,8 @@ class Requests(unittest.TestCase):
             fields = re.findall(r"^\| `([a-z_0-9.]+)` ", section, re.M)
             self.assertGreater(len(fields), 2, kind)
             taken = {name for function in functions for name in inspect.signature(function).parameters}
-            # A recording to import is named among the files.
-            taken |= {"recording"} if kind == "import" else set()
+            # A recording to import is named among the files; raw phases would be no Recording.
+            taken |= {"recording", "is_raw"} if kind == "import" else set()
             for name in fields:
                 top, _, below = name.partition(".")
                 # `fit` and `columns` of curves are arguments of their own.

@@ -27,6 +27,7 @@ from ._functions import (
     evaluate,
     export_material,
     import_recording,
+    next_scan,
     run,
     scan,
     solve,
@@ -50,6 +51,8 @@ from ._results import (
     IntegratedSensitivity,
     MaterialCard,
     MaterialExport,
+    NextCandidate,
+    NextScan,
     Place,
     PromisedSd,
     Result,
@@ -58,7 +61,7 @@ from ._results import (
     Solution,
     SolveStep,
 )
-from ._specimen import Hole, Material, ScanSettings, Specimen, Term
+from ._specimen import Hole, Material, Sample, ScanSettings, Specimen, Term
 
 try:
     __version__ = version("lambdak")
@@ -86,6 +89,8 @@ __all__ = [
     "MaterialCard",
     "MaterialExport",
     "MissingPackageError",
+    "NextCandidate",
+    "NextScan",
     "NoSolutionError",
     "Place",
     "ProgramError",
@@ -93,6 +98,7 @@ __all__ = [
     "PromisedSd",
     "Recording",
     "Result",
+    "Sample",
     "Scan",
     "ScanSettings",
     "ScanStep",
@@ -113,6 +119,7 @@ __all__ = [
     "evaluate",
     "export_material",
     "import_recording",
+    "next_scan",
     "program_path",
     "program_version",
     "run",

@@ -29,6 +29,7 @@ from ._results import (
     Diagnosis,
     Evaluation,
     MaterialExport,
+    NextScan,
     Result,
     Scan,
     Solution,
@@ -154,6 +155,7 @@ def scan(
     kspace: Optional[Fields] = None,
     is_raw: Optional[bool] = None,
     seed: Optional[int] = None,
+    sample: Optional[int] = None,
     mesh: Optional[Mesh] = None,
     is_whole: Optional[bool] = None,
     name: Optional[str] = None,
@@ -176,6 +178,7 @@ def scan(
         kspace=kspace,
         is_raw=is_raw,
         seed=seed,
+        sample=sample,
         mesh=mesh,
         is_whole=is_whole,
         name=name,
@@ -189,6 +192,8 @@ def import_recording(
     specimen: Optional[Specimen] = None,
     *,
     form: Optional[str] = None,
+    series: Optional[Union[PathLike, Mapping[str, Any]]] = None,
+    phase_range: Optional[Sequence[float]] = None,
     drive_mm: Optional[Numbers] = None,
     load_csv: Optional[PathLike] = None,
     unit: Optional[str] = None,
@@ -208,14 +213,20 @@ def import_recording(
     threads: Optional[int] = None,
     on_progress: Optional[OnProgress] = None,
 ) -> Recording:
-    """A recording from MATLAB files, point clouds or NIfTI images, or, where `files` is one folder, from raw phases."""
+    """A recording from MATLAB files, point clouds or NIfTI images; where `files` is one folder, from raw phases.
+
+    With `form="dicom"` or `form="paravision"`, `files` are files and folders of a scanner, and `series` (a mapping or a
+    JSON file) says which of them is what.
+    """
     listed = [files] if isinstance(files, (str, os.PathLike)) else list(files)
     paths = [str(Path(file).resolve()) for file in listed]
-    is_recording = len(paths) == 1 and Path(paths[0]).is_dir()
+    is_recording = form is None and len(paths) == 1 and Path(paths[0]).is_dir()
     request = given(
         recording=paths[0] if is_recording else None,
         files=None if is_recording else paths,
         form=form,
+        series=None if series is None else read_json(series),
+        phase_range=phase_range,
         specimen=specimen,
         drive_mm=_drives(drive_mm),
         load_csv=None if load_csv is None else _text(load_csv),
@@ -259,6 +270,7 @@ def calibrate(
     has_mesh_allowance: Optional[bool] = None,
     num_starts: Optional[int] = None,
     end_margin_mm: Optional[float] = None,
+    protocol: Optional[Fields] = None,
     has_profiles: Optional[bool] = None,
     has_contours: Optional[bool] = None,
     folder: Optional[PathLike] = None,
@@ -279,11 +291,53 @@ def calibrate(
         has_mesh_allowance=has_mesh_allowance,
         num_starts=num_starts,
         end_margin_mm=end_margin_mm,
+        protocol=protocol,
         has_profiles=has_profiles,
         has_contours=has_contours,
     )
     done = _run("calibrate", request, folder, threads, on_progress)
     return Calibration.of(done.result, done.folder, sources)
+
+
+def next_scan(
+    recordings: Union[Recorded, Sequence[Recorded]],
+    study: Union[Fields, PathLike],
+    *,
+    specimens: Optional[Sequence[Specimen]] = None,
+    drive_mm: Optional[Numbers] = None,
+    num_drives: Optional[int] = None,
+    num_terms: Optional[int] = None,
+    precision: Optional[float] = None,
+    precision_by_parameter: Optional[Mapping[str, float]] = None,
+    scan_minutes: Optional[float] = None,
+    change_minutes: Optional[float] = None,
+    mesh_factor: Optional[float] = None,
+    has_mesh_correction: Optional[bool] = None,
+    folder: Optional[PathLike] = None,
+    threads: Optional[int] = None,
+    on_progress: Optional[OnProgress] = None,
+) -> NextScan:
+    """What to scan next, given one recording or several, and what it is worth; whether it is enough.
+
+    `study` is a `study/1` as `design` takes it: its base specimen and `specimens` are the candidates.
+    """
+    sources = _sources(recordings)
+    request = given(
+        recordings=[_named(one) for one in sources],
+        study=_spelled_out(_study(study)),
+        specimens=None if specimens is None else [one.to_dict() for one in specimens],
+        drive_mm=drive_mm,
+        num_drives=num_drives,
+        num_terms=num_terms,
+        precision=precision,
+        precision_by_parameter=precision_by_parameter,
+        scan_minutes=scan_minutes,
+        change_minutes=change_minutes,
+        mesh_factor=mesh_factor,
+        has_mesh_correction=has_mesh_correction,
+    )
+    done = _run("next", request, folder, threads, on_progress)
+    return NextScan.of(done.result, done.folder, sources)
 
 
 def diagnose(
@@ -393,6 +447,16 @@ def _study(study: Union[Fields, PathLike]) -> Dict[str, Any]:
             if isinstance(entry, dict) and isinstance(entry.get("material"), str):
                 entry["material"] = str(beside / entry["material"])
     return found
+
+
+def _spelled_out(study: Dict[str, Any]) -> Dict[str, Any]:
+    """The study with the files that it names read: a request holds no names of files."""
+    if isinstance(study.get("base"), str):
+        study["base"] = read_json(study["base"])
+    for entry in study.get("materials") or []:
+        if isinstance(entry, dict) and isinstance(entry.get("material"), str):
+            entry["material"] = read_json(entry["material"])
+    return study
 
 
 def uniaxial(

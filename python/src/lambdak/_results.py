@@ -347,6 +347,71 @@ class Calibration(Result):
         return f"Ogden material of {terms}; χ² per datum {self.chi2_per_datum:.3g}"
 
 
+@dataclass(frozen=True)
+class NextCandidate:
+    """A scan that may come next."""
+
+    name: str
+    specimen: str
+    drive_mm: Tuple[float, ...]
+    is_repeat: bool
+    minutes: float
+    promised_relative_sd: Mapping[str, float]
+    gain_per_minute: float
+    num_scans_to_precision: Optional[int]
+
+
+@dataclass(frozen=True, eq=False)
+class NextScan(Result):
+    """What to scan next (`next/1`). `candidates` stand from the best on; `verdict` is none where no precision is asked."""
+
+    sentence: str
+    material: Material
+    relative_sd: Mapping[str, float]
+    candidates: Tuple[NextCandidate, ...]
+    verdict: Optional[str]
+
+    @classmethod
+    def of(cls, raw: Mapping[str, Any], folder: Path, sources: Sources) -> "NextScan":
+        """From the program's JSON."""
+        names = [p["name"] for p in raw["parameters"]]
+        candidates = tuple(
+            NextCandidate(
+                c["name"],
+                c["specimen"],
+                tuple(c["drive_mm"]),
+                c["is_repeat"],
+                c["minutes"],
+                dict(zip(names, c["promised_relative_sd"])),
+                c["gain_per_minute"],
+                c["num_scans_to_precision"],
+            )
+            for c in raw["candidates"]
+        )
+        return cls(
+            raw,
+            folder,
+            sources,
+            sentence=raw["sentence"],
+            material=Material._of_program(raw["material"]),
+            relative_sd={p["name"]: p["relative_sd"] for p in raw["parameters"]},
+            candidates=candidates,
+            verdict=raw["stop"]["verdict"] if raw["stop"] else None,
+        )
+
+    def _rows(self) -> List[Row]:
+        rows: List[Row] = []
+        for candidate in self.candidates:
+            row: Row = {"candidate": candidate.name, "minutes": candidate.minutes}
+            row.update({f"relative_sd_{name}": sd for name, sd in candidate.promised_relative_sd.items()})
+            row.update(gain_per_minute=candidate.gain_per_minute)
+            rows.append(row)
+        return rows
+
+    def _heading(self) -> str:
+        return self.sentence
+
+
 def _images(result: Result, index: int, names: Mapping[str, str]) -> Any:
     """Images of vectors on the grid and drives of one of a result's recordings."""
     source = result.sources[index]
@@ -428,7 +493,7 @@ class Diagnosis(Result):
     material: Material
     parameters: Mapping[str, Estimate]
     chi2_per_datum: BeforeAfter
-    kept_back_rms_mm: BeforeAfter
+    kept_back_rms_mm: Optional[BeforeAfter]
     left_at: Optional[Place]
     file_prefix: str = field(repr=False)
 
@@ -447,7 +512,7 @@ class Diagnosis(Result):
             material=Material._of_program(raw["material"]),
             parameters=_estimates(raw["material_parameters"]),
             chi2_per_datum=_before_after(raw["chi2_per_datum"]),
-            kept_back_rms_mm=_before_after(raw["kept_back_rms_mm"]),
+            kept_back_rms_mm=_before_after(kept) if (kept := raw.get("kept_back_rms_mm")) else None,
             left_at=_place(raw.get("left_at")),
             file_prefix=prefix,
         )
@@ -559,6 +624,8 @@ class Design(Result):
     simplest: Candidate
     """Of those that meshes cannot tell from the best, the one that is the simplest to make."""
     findings: Tuple[str, ...]
+    recommendation: str
+    """What to make, how to scan it, and why."""
 
     @classmethod
     def of(cls, raw: Mapping[str, Any], folder: Path) -> "Design":
@@ -573,6 +640,7 @@ class Design(Result):
             ranked=ranked,
             simplest=ranked[raw["simplest"]],
             findings=tuple(raw["findings"]),
+            recommendation=raw["recommendation"]["make"],
         )
 
     def _rows(self) -> List[Row]:
@@ -594,7 +662,7 @@ class Design(Result):
         return rows
 
     def _heading(self) -> str:
-        return self.findings[0] if self.findings else ""
+        return self.recommendation
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,6 +28,10 @@ _CHECKS: Dict[str, Tuple[str, Dict[str, Any]]] = {
 }
 
 
+# Extents of a block.
+_EXTENTS = ("length_mm", "thickness_mm", "width_mm")
+
+
 def _check(part: str, value: Dict[str, Any]) -> None:
     problems = _problems(part, encoded(value))
     if problems:
@@ -72,11 +76,49 @@ class Hole:
 
 
 @dataclass(frozen=True)
+class Sample:
+    """A further sample of a double-lap test: a block of its own that shares drive and load cell with the others."""
+
+    length_mm: float
+    thickness_mm: float
+    width_mm: float
+    holes: Tuple[Hole, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in _EXTENTS:
+            object.__setattr__(self, name, plain(getattr(self, name)))
+        object.__setattr__(self, "holes", tuple(self.holes))
+
+    def to_dict(self) -> Dict[str, Any]:
+        """As `specimen/1` holds it."""
+        block = {name: getattr(self, name) for name in _EXTENTS}
+        return {"block": block, "holes": [hole.to_dict() for hole in self.holes]}
+
+    @classmethod
+    def _of_program(cls, found: Dict[str, Any]) -> "Sample":
+        only_known(found, ("block", "holes"), "a further sample")
+        return cls(**_block(found), holes=_holes(found))
+
+
+def _block(found: Dict[str, Any]) -> Dict[str, float]:
+    only_known(found["block"], _EXTENTS, "the block")
+    return dict(found["block"])
+
+
+def _holes(found: Dict[str, Any]) -> Tuple[Hole, ...]:
+    holes = found.get("holes") or []
+    for hole in holes:
+        only_known(hole, ("axis", "center_mm", "diameter_mm"), "a hole")
+    return tuple(Hole(**hole) for hole in holes)
+
+
+@dataclass(frozen=True)
 class Specimen:
     """A specimen (`specimen/1`): a block with holes, how it is held, and the drives at which it is scanned.
 
     Lengths are in mm. The frame has its origin at the block's centre: x along the length (the pull direction), y along
-    the thickness, z along the width. `test` is `double_lap_shear` or `uniaxial`.
+    the thickness, z along the width. `test` is `double_lap_shear` or `uniaxial`. A double-lap test may hold further
+    samples, unlike the first; their forces add.
     """
 
     length_mm: float
@@ -88,6 +130,7 @@ class Specimen:
     samples_in_parallel: Optional[int] = None
     outline: Optional[str] = None
     name: str = "specimen"
+    other_samples: Tuple[Sample, ...] = ()
 
     def __init__(
         self,
@@ -101,10 +144,11 @@ class Specimen:
         samples_in_parallel: Optional[int] = None,
         outline: Optional[str] = None,
         name: str = "specimen",
+        other_samples: Sequence[Sample] = (),
     ) -> None:
         values = {"length_mm": length_mm, "thickness_mm": thickness_mm, "width_mm": width_mm, "test": test}
         self._set(holes=tuple(holes), outline=outline, name=name, drive_mm=_tuple(drive_mm), **plain(values))
-        self._set(samples_in_parallel=plain(samples_in_parallel))
+        self._set(samples_in_parallel=plain(samples_in_parallel), other_samples=tuple(other_samples))
         _check("specimen", self.to_dict())
 
     def _set(self, **values: Any) -> None:
@@ -122,15 +166,11 @@ class Specimen:
     def _of_program(cls, found: Dict[str, Any]) -> "Specimen":
         """What the program has written or checked."""
         own = ("name", "test", "drive_mm", "samples_in_parallel", "outline")
-        only_known(found, (*own, "schema", "block", "holes"), "the specimen")
-        only_known(found["block"], ("length_mm", "thickness_mm", "width_mm"), "the block")
-        holes = []
-        for hole in found.get("holes") or []:
-            only_known(hole, ("axis", "center_mm", "diameter_mm"), "a hole")
-            holes.append(Hole(**hole))
+        only_known(found, (*own, "schema", "block", "holes", "other_samples"), "the specimen")
         specimen = object.__new__(cls)
-        specimen._set(samples_in_parallel=None, outline=None)
-        specimen._set(holes=tuple(holes), **found["block"], **{name: found[name] for name in own if name in found})
+        others = tuple(Sample._of_program(sample) for sample in found.get("other_samples") or [])
+        specimen._set(samples_in_parallel=None, outline=None, other_samples=others)
+        specimen._set(holes=_holes(found), **_block(found), **{name: found[name] for name in own if name in found})
         specimen._set(drive_mm=tuple(found["drive_mm"]))
         return specimen
 
@@ -141,6 +181,8 @@ class Specimen:
     def to_dict(self) -> Dict[str, Any]:
         """The object of a `specimen/1`."""
         optional = given(outline=self.outline, samples_in_parallel=self.samples_in_parallel)
+        if self.other_samples:
+            optional["other_samples"] = [sample.to_dict() for sample in self.other_samples]
         return {
             "schema": "specimen/1",
             "name": self.name,
