@@ -34,6 +34,9 @@ const SPONGE_COUNTS: f64 = 1.0 / 3.0;
 /// How often fits are gone on with as what they look like.
 const MAX_LOOK_ALIKES: usize = 2;
 
+/// Parts of what first order promises from which a fit starts, one after the other until one has an equilibrium.
+const SHORTER_STARTS: [f64; 3] = [1.0, 0.4, 0.1];
+
 /// Fits that ended early may lie so many times that apart from where they would have ended.
 const NEAR_TOLERANCES: f64 = 5.0;
 
@@ -279,9 +282,12 @@ fn tried(
     }
     (inference.progress)(&format!("round {}: fitting '{}'", findings.num_rounds, cause.description()));
     let current = &findings.current;
-    let mut supposed = current.causes.clone();
-    supposed.push(Supposed { cause: cause.clone(), values: values.to_vec() });
-    let fit = inference.fit_with_leaps(measured, &current.material, &supposed, known).ok()?;
+    let mut fit_from = |values: Vec<f64>| {
+        let mut supposed = current.causes.clone();
+        supposed.push(Supposed { cause: cause.clone(), values });
+        inference.fit_with_leaps(measured, &current.material, &supposed, known).ok()
+    };
+    let fit = SHORTER_STARTS.into_iter().find_map(|part| fit_from(between(&cause.start(), values, part)))?;
     let gain = gain_of(inference, current, &fit);
     // Suspects without an identity of their own, as two balls, share the last entry.
     let identity = cause.identity();
@@ -289,6 +295,11 @@ fn tried(
         ranked.fitted = Some(gain);
     }
     Some(Trial { gain, fit, is_settled: false })
+}
+
+/// A start `part` of the way from one to the other.
+fn between(from: &[f64], to: &[f64], part: f64) -> Vec<f64> {
+    from.iter().zip(to).map(|(a, b)| a + part * (b - a)).collect()
 }
 
 /// By how much the deviance of `current` falls with the last cause of `fit`, less what its parameters cost.
