@@ -78,8 +78,8 @@ fn proposals_keep_the_limits() {
     assert!(found.ranked[0].objective.is_finite());
 }
 
-/// The solid block is improved on the fine mesh for the comparison, in the race of all structures or by proposals of its
-/// own, which are of no other structure.
+/// The solid block is improved on the fine mesh for the comparison, in the race of all structures or by proposals of
+/// its own, which are of no other structure.
 #[test]
 fn the_solid_block_is_improved_too() {
     let mut study = small_study();

@@ -20,8 +20,8 @@ pub struct LawCurve {
     pub points: Vec<[f64; 3]>,
 }
 
-/// The curves of a fit's material, up to the stretch of pure shear at which the correction's reach ends; empty where the
-/// fit has no correction of the law.
+/// The curves of a fit's material, up to the stretch of pure shear at which the correction's reach ends; empty where
+/// the fit has no correction of the law.
 pub fn law_curves(fitted: &CauseFit) -> Vec<LawCurve> {
     let Some(law) = fitted.scene().law else { return Vec::new() };
     let terms: Vec<ShearTerm> = fitted.material.terms.iter().map(|t| ShearTerm::from(*t)).collect();

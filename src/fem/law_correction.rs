@@ -8,8 +8,8 @@ use crate::material::Lanes;
 ///
 /// Δψ = r (c₁ t̂²/2 + c₂ t̂³/3) + c₃ d t̂ + c₄ d²/(2 (r + t)).
 ///
-/// c₁ and c₂ change how the material stiffens, c₃ and c₄ how that depends on the mode of deformation (d vanishes in pure
-/// and in simple shear). Far beyond the reach r the stress of c₁ and c₂ dies out: what data do not tell is not
+/// c₁ and c₂ change how the material stiffens, c₃ and c₄ how that depends on the mode of deformation (d vanishes in
+/// pure and in simple shear). Far beyond the reach r the stress of c₁ and c₂ dies out: what data do not tell is not
 /// extrapolated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LawCorrection {

@@ -285,7 +285,8 @@ fn varied<const FMA: bool>(
     found
 }
 
-/// What the material's parameter, the factor on the stiffness, the law's correction and fibres do to P at fixed F and p.
+/// What the material's parameter, the factor on the stiffness, the law's correction and fibres do to P at fixed F
+/// and p.
 #[inline(always)]
 fn other_stress_rate(input: &ElementInput, variation: &Variation, out: &ElementOutput, g: usize) -> Tensor {
     let f = &out.deformation_gradient[g];

@@ -1,6 +1,7 @@
 //! Calibrate: the material from recordings, with its uncertainty and the number of terms.
 
-use super::request::{InputForm, InputUse, RecordingOutline};
+use super::input_use::{InputForm, InputUse};
+use super::request::RecordingOutline;
 use super::subject::check_mesh;
 use super::{Context, JobError, Outcome, Progress, Request, ResultSchema, Run, cost, defaults, summary};
 use crate::calibration::{

@@ -1,8 +1,8 @@
 //! What a job will take, before it runs: estimates to decide by.
 //!
 //! All are counted in equilibria: what one drive of an evaluation takes ([`seconds_per_drive`]) on the job's mesh,
-//! times how many of them the job's kind needs. How many that is was measured with the release profile on one thread: the
-//! processor seconds of a whole job over those of one equilibrium at each of its drives.
+//! times how many of them the job's kind needs. How many that is was measured with the release profile on one thread:
+//! the processor seconds of a whole job over those of one equilibrium at each of its drives.
 
 use super::request::RecordingOutline;
 use crate::mesh::{MeshOptions, mesh_specimen};

@@ -1,6 +1,7 @@
 //! Diagnose: where recordings and their model differ, and what physics was left out.
 
-use super::request::{InputForm, InputUse, RecordingOutline};
+use super::input_use::{InputForm, InputUse};
+use super::request::RecordingOutline;
 use super::subject::check_mesh;
 use super::{Context, JobError, Outcome, Progress, Request, ResultSchema, Run, cost, summary};
 use crate::calibration::Boundary;

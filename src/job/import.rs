@@ -2,8 +2,8 @@
 
 use super::import_result::{ImportResult, ImportStep};
 use super::import_series::{ScannerForm, check_series, open_scanner};
+use super::input_use::{InputForm, InputUse};
 use super::outcome::{RECORDING_FIELD, WithRecording, recording_identifier, to_json};
-use super::request::{InputForm, InputUse};
 use super::{Context, JobError, Outcome, Request, ResultSchema, Run, summary};
 use crate::acquisition::unwrap::{Method, UnwrapOptions};
 use crate::acquisition::{Anchor, ReconstructOptions, StepReport, reconstruct};

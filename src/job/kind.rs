@@ -1,7 +1,8 @@
 //! What a kind of job is, and a job of any kind.
 
+use super::input_use::InputUse;
 use super::part::Part;
-use super::request::{Context, InputUse, RecordingOutline, Request, Run};
+use super::request::{Context, RecordingOutline, Request, Run};
 use super::schema::{RequestField, RequestSchema};
 use super::{Failure, Input, JobError, Outcome, ResultSchema, Surroundings};
 use crate::field::{FieldError, printable};

@@ -1,6 +1,7 @@
 //! Next: which drive, protocol or specimen should be scanned next, and what that is worth.
 
-use super::request::{InputForm, InputUse, RecordingOutline};
+use super::input_use::{InputForm, InputUse};
+use super::request::RecordingOutline;
 use super::subject::check_mesh;
 use super::{Context, JobError, Outcome, Progress, Request, ResultSchema, Run, cost, defaults, summary};
 use crate::calibration::{CalibrateOptions, Observed};

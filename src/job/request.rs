@@ -1,5 +1,6 @@
 //! What every kind of request and every checked request can do.
 
+use super::input_use::InputUse;
 use super::{JobError, Outcome, Part, Progress, ResultSchema, Surroundings};
 use crate::field::FieldError;
 use crate::recording::{RawRecording, ReadRecording};
@@ -41,40 +42,6 @@ pub trait Request: Serialize + DeserializeOwned + ToSchema + Send + Sync + 'stat
     /// # Errors
     /// Everything that is wrong with it, each with its JSON pointer.
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>>;
-}
-
-/// What a job reads under a name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum InputForm {
-    /// A recording of displacements.
-    Displacements,
-    /// A recording of wrapped phases.
-    RawPhases,
-    /// A file of a laboratory's own format, or a folder of such files.
-    File,
-}
-
-/// Something that a request names and the job reads.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct InputUse {
-    /// JSON pointer to the name.
-    pub pointer: String,
-    /// The name: a path for the command, an identifier for the service.
-    pub name: String,
-    /// What is read.
-    pub form: InputForm,
-}
-
-impl InputUse {
-    /// `names`, which stand in a list at `pointer`.
-    pub fn of_list(pointer: &str, names: &[String], form: InputForm) -> Vec<InputUse> {
-        let of = |(index, name): (usize, &String)| InputUse {
-            pointer: format!("{pointer}/{index}"),
-            name: name.clone(),
-            form,
-        };
-        names.iter().enumerate().map(of).collect()
-    }
 }
 
 /// What is known of a recording before it is read: enough to check a mesh and to estimate a cost.

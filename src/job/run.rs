@@ -1,9 +1,9 @@
 //! Runs a job: as a whole, or in parts on all threads.
 
+use super::input_use::InputUse;
 use super::kind::Job;
 use super::part::Part;
 use super::registry::kind_of_part;
-use super::request::InputUse;
 use super::{Failure, Input, InputFile, JobError, Outcome, Progress, Surroundings};
 use crate::recording::{RawRecording, ReadRecording};
 use rayon::prelude::*;

@@ -1,7 +1,7 @@
 //! What a running job is given by the door through which it came.
 
 use super::JobError;
-use super::request::{InputForm, InputUse};
+use super::input_use::{InputForm, InputUse};
 use crate::recording::{RawRecording, ReadRecording};
 use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};

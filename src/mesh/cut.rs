@@ -55,8 +55,8 @@ pub fn section_axes(specimen: &Specimen) -> [usize; 2] {
     [0, if along_width { 1 } else { 2 }]
 }
 
-/// A mesh of triangles of the whole `specimen`, whose elements part along `cut`: nodes inside the line stand there twice,
-/// once for each side. The cut must lie inside the section and keep clear of the holes.
+/// A mesh of triangles of the whole `specimen`, whose elements part along `cut`: nodes inside the line stand there
+/// twice, once for each side. The cut must lie inside the section and keep clear of the holes.
 ///
 /// # Errors
 /// As [`mesh_specimen_along`](super::mesh_specimen_along).

@@ -1,5 +1,6 @@
 //! Jobs: submitting, reading, listing, cancelling, resuming.
 
+use super::artefact_row::ArtefactRow;
 use super::{Store, StoreError, Transaction, Value, lock_job, next_revision, touch};
 use crate::provenance::VERSION;
 
@@ -103,26 +104,6 @@ pub struct TaskRow {
     pub result_sha: String,
     /// Problem, JSON; empty without one.
     pub problem: String,
-}
-
-/// An artefact as stored.
-#[derive(Clone, Debug)]
-pub struct ArtefactRow {
-    /// Name in the job.
-    pub name: String,
-    /// Media type.
-    pub media_type: String,
-    /// SHA-256 of the bytes.
-    pub sha: String,
-    /// Length.
-    pub num_bytes: i64,
-}
-
-impl ArtefactRow {
-    /// From name, media type, SHA-256 and length.
-    pub(super) fn of(row: &super::Row) -> ArtefactRow {
-        ArtefactRow { name: row.text(0), media_type: row.text(1), sha: row.text(2), num_bytes: row.int(3) }
-    }
 }
 
 /// Numbers of jobs by (kind, state) and of tasks by state.

@@ -8,6 +8,7 @@
 //! | equal evaluations are computed once | results are kept under their content's key; equal tasks never run together |
 //! | a task that ends its worker cannot do so for ever | [`MAX_LOSSES`], then it is put aside with a problem |
 
+mod artefact_row;
 mod blobs;
 mod database;
 mod error;
@@ -16,15 +17,15 @@ mod removal;
 mod tasks;
 mod uploads;
 
+pub use artefact_row::ArtefactRow;
 pub use database::{Database, Row, Transaction, Value};
 pub use error::StoreError;
-pub use jobs::{ArtefactRow, Idempotency, JobFilter, JobRow, NewJob, NewTask, Submitted, TaskRow};
+pub use jobs::{Idempotency, JobFilter, JobRow, NewJob, NewTask, Submitted, TaskRow};
 pub use removal::Removed;
 pub use tasks::{Claimed, Finished, TaskResult};
 pub use uploads::{KeptFile, NewUpload, UploadFile, UploadRow};
 
 use crate::provenance::VERSION;
-use blobs::{put_blob, put_bytes};
 use sha2::{Digest, Sha256};
 use std::path::Path;
 

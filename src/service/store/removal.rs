@@ -156,7 +156,8 @@ fn drop_unused(t: &mut Transaction, blobs: &[Row]) -> Result<(), StoreError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::service::store::{NewJob, NewTask, NewUpload, Submitted, TaskResult, UploadFile, put_bytes, sha256_hex};
+    use crate::service::store::blobs::put_bytes;
+    use crate::service::store::{NewJob, NewTask, NewUpload, Submitted, TaskResult, UploadFile, sha256_hex};
     use std::path::Path;
 
     fn upload(folder: &Path, id: &str, contents: [&str; 2]) -> NewUpload {

@@ -1,6 +1,8 @@
 //! Tasks: claiming, heartbeats, results, failures, checkpoints.
 
-use super::{ArtefactRow, MAX_LOSSES, Store, StoreError, Transaction, Value, lock_job, put_bytes, touch};
+use super::artefact_row::ArtefactRow;
+use super::blobs::put_bytes;
+use super::{MAX_LOSSES, Store, StoreError, Transaction, Value, lock_job, touch};
 use crate::provenance::VERSION;
 
 /// A claimed task.

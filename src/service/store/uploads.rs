@@ -1,6 +1,7 @@
 //! Uploaded recordings: their files as blobs. A name from outside is a column's value, never a path.
 
-use super::{Store, StoreError, put_blob};
+use super::blobs::put_blob;
+use super::{Store, StoreError};
 use std::fs::File;
 use std::path::PathBuf;
 
