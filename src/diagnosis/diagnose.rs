@@ -6,6 +6,7 @@ use super::conclusion::{explain_too_little, kept_back, verdict_on};
 use super::error::DiagnosisError;
 use super::findings::Findings;
 use super::found::FoundCause;
+use super::further_term::without_needless_terms;
 use super::inference::{Inference, KNOWN_LOG_SD};
 use super::interior::{InteriorTest, test_interior};
 use super::laboratory::Laboratory;
@@ -374,12 +375,23 @@ impl<'a> Run<'a> {
                 if n == 1 {
                     // What our mesh alone called for.
                     self.attempt("needless causes", |run| run.leave_out_what_is_not_needed(&seen[n]))?;
+                    self.attempt("needless terms", |run| run.leave_out_terms(&seen[n]))?;
                 }
             }
             self.widen_intervals(n, &settings[n], defect.as_ref())?;
             self.mesh_defect = defect.or(self.mesh_defect.take());
         }
         Ok(seen)
+    }
+
+    /// Takes Ogden terms that `measured` does not call for beside the causes out of the fit.
+    fn leave_out_terms(&mut self, measured: &Trace) -> Result<(), DiagnosisError> {
+        let is_believed = self.options.prior.is_some();
+        if !is_believed {
+            let fitted = self.findings.current.clone();
+            self.findings.current = without_needless_terms(&mut self.inference, measured, fitted)?;
+        }
+        Ok(())
     }
 
     /// Corrects one fit, the nominal one (0) or that with the causes (1); gives what the finer mesh predicts beyond

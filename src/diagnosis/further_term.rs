@@ -1,4 +1,4 @@
-//! Whether a recording calls for one more Ogden term.
+//! Whether a recording calls for one more Ogden term, or for all that a fit has.
 
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
@@ -34,7 +34,7 @@ pub(super) fn further_term(
     measured: &Trace,
     current: &CauseFit,
 ) -> Result<Option<(CauseFit, f64)>, DiagnosisError> {
-    let least = EVIDENCE.max(SMALLEST_SHARE * inference.misfit_beyond_noise(current));
+    let least = called_for(inference, current);
     let mut best: Option<CauseFit> = None;
     let beyond_noise = inference.misfit_beyond_noise(current);
     for term in promising_terms(inference, current, LEAST_PROMISE * least) {
@@ -52,6 +52,60 @@ pub(super) fn further_term(
     let effect = found.prediction.trace.plus(-1.0, &current.prediction.trace);
     let is_used = gain > least && is_large(inference.laboratory.observed(), &effect, inference.allowance_mm);
     Ok(is_used.then_some((found, gain)))
+}
+
+/// How much a term must lower the deviance of a fit without it, beyond what its parameters cost.
+fn called_for(inference: &Inference, without: &CauseFit) -> f64 {
+    EVIDENCE.max(SMALLEST_SHARE * inference.misfit_beyond_noise(without))
+}
+
+/// The fit without the Ogden terms that are no longer called for: a fit to other data took them, to make up for our
+/// mesh's error or for a cause that has been found since. The terms that make up the least of the modulus are tried.
+///
+/// # Errors
+/// [`DiagnosisError`]: the work was cancelled.
+pub(super) fn without_needless_terms(
+    inference: &mut Inference,
+    measured: &Trace,
+    mut fitted: CauseFit,
+) -> Result<CauseFit, DiagnosisError> {
+    while fitted.material.terms.len() > 1 {
+        let share = |n: &usize| (fitted.material.terms[*n].mu_kpa * fitted.material.terms[*n].alpha).abs();
+        let mut order: Vec<usize> = (0..fitted.material.terms.len()).collect();
+        order.sort_by(|a, b| share(a).total_cmp(&share(b)));
+        let mut simpler: Option<CauseFit> = None;
+        for &dropped in order.iter().take(MAX_FITS) {
+            match fit_without_term(inference, measured, &fitted, dropped) {
+                Ok(found) if simpler.as_ref().is_none_or(|s| found.deviance < s.deviance) => simpler = Some(found),
+                Err(error) if (inference.is_cancelled)() => return Err(error),
+                _ => {}
+            }
+        }
+        let Some(found) = simpler else { break };
+        let missed = found.deviance - fitted.deviance - penalty(&inference.metric, 2);
+        if missed > called_for(inference, &found) {
+            break;
+        }
+        (inference.progress)("an Ogden term is not needed any more");
+        fitted = found;
+    }
+    Ok(fitted)
+}
+
+/// The fit with one term fewer, from where the others make up for its part of the modulus.
+fn fit_without_term(
+    inference: &mut Inference,
+    measured: &Trace,
+    fitted: &CauseFit,
+    dropped: usize,
+) -> Result<CauseFit, DiagnosisError> {
+    let mut simpler = fitted.material.clone();
+    simpler.terms.remove(dropped);
+    let factor = shear_modulus(&fitted.material) / shear_modulus(&simpler);
+    for term in &mut simpler.terms {
+        term.mu_kpa *= factor;
+    }
+    inference.fit(measured, &simpler, &fitted.causes)
 }
 
 /// The fit with one more term, from as much of it as has an equilibrium.

@@ -3,7 +3,7 @@
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
 use super::evidence::ROUGH_TOLERANCE;
-use super::further_term::further_term;
+use super::further_term::{further_term, without_needless_terms};
 use super::inference::Inference;
 use super::laboratory::Laboratory;
 use super::scene::Scene;
@@ -47,8 +47,14 @@ pub(super) fn fit_nominal(
 ) -> Result<CauseFit, DiagnosisError> {
     let settings = inference.settings;
     inference.settings.relative_tolerance = ROUGH_TOLERANCE;
-    let found =
-        if is_believed { inference.fit(measured, start, &[]) } else { fit_with_terms(inference, measured, start, &[]) };
+    let found = if is_believed {
+        inference.fit(measured, start, &[])
+    } else {
+        let fitted = fit_with_terms(inference, measured, start, &[]);
+        // Of the terms that the start had, not all may be called for any more.
+        let has_more = start.terms.len() > 1;
+        fitted.and_then(|f| if has_more { without_needless_terms(inference, measured, f) } else { Ok(f) })
+    };
     inference.settings = settings;
     found
 }
