@@ -66,17 +66,9 @@ pub(super) fn explain_too_little(verdict: Verdict, [before, after]: [f64; 2]) ->
     verdict == Verdict::Unexplained && after.powi(2) > UNEXPLAINED_SHARE * before.powi(2)
 }
 
-/// What fits to one half of the voxels say.
-pub(super) struct KeptBack {
-    /// Rms misfit (mm) on the blocks of voxels that the fits did not see, without and with the causes.
-    pub(super) rms_mm: [f64; 2],
-    /// Half the difference of each parameter between the fits to the two halves, with the causes (the standard
-    /// deviation of the whole by half samples, McCarthy 1969), in the order and units of [`CauseFit::sd`].
-    pub(super) half_differences: Vec<f64>,
-}
-
 /// Fits each of the two models to the two colours of a chequerboard of blocks in turn and predicts the other colour.
-/// `seen` is what each of the two models is compared with.
+/// `seen` is what each of the two models is compared with. Gives the rms misfit (mm) on the blocks that the fits did not
+/// see, without and with the causes.
 ///
 /// # Errors
 /// [`DiagnosisError`]: no equilibrium, or the work was cancelled.
@@ -84,13 +76,12 @@ pub(super) fn kept_back(
     inference: &mut Inference,
     seen: &[Trace; 2],
     fits: [&CauseFit; 2],
-) -> Result<KeptBack, DiagnosisError> {
+) -> Result<[f64; 2], DiagnosisError> {
     let observed = inference.laboratory.observed();
     let colours = chequerboard(observed);
     let bulks = [inference.nominal_bulk, inference.settings.bulk];
     let mut squares = [0.0; 2];
     let mut count = 0.0;
-    let mut halves: Vec<Vec<f64>> = Vec::new();
     for colour in [false, true] {
         let metric = inference.metric_of(&|v| colours[v] != colour);
         for (n, fitted) in fits.into_iter().enumerate() {
@@ -105,19 +96,9 @@ pub(super) fn kept_back(
                     }
                 }
             }
-            if n == 1 {
-                halves.push(values_of(&found));
-            }
         }
     }
-    let half_differences = halves[0].iter().zip(&halves[1]).map(|(a, b)| 0.5 * (a - b).abs()).collect();
-    Ok(KeptBack { rms_mm: squares.map(|s| (s / f64::max(count, 1.0)).sqrt()), half_differences })
-}
-
-/// The parameters of a fit: the material's, then those of the causes.
-fn values_of(fitted: &CauseFit) -> Vec<f64> {
-    let material = fitted.material.parameters().into_iter().map(|p| fitted.material.value(p));
-    material.chain(fitted.causes.iter().flat_map(|c| c.values.iter().copied())).collect()
+    Ok(squares.map(|s| (s / f64::max(count, 1.0)).sqrt()))
 }
 
 /// The colour of every voxel on a chequerboard of blocks in the plane of x and z.

@@ -435,7 +435,7 @@ impl<'a> Run<'a> {
 
     /// Looks at what is left, predicts data that were kept back, and says how the diagnosis ended.
     fn conclude(mut self, seen: &[Trace; 2]) -> Result<Diagnosis, DiagnosisError> {
-        let Findings { nominal, mut current, mut causes, mut alternatives, ranked, maps, .. } = self.findings;
+        let Findings { nominal, current, mut causes, mut alternatives, ranked, maps, .. } = self.findings;
         (self.inference.progress)("predicting voxel blocks that were kept back");
         let kept_back = match kept_back(&mut self.inference, seen, [&nominal, &current]) {
             Ok(kept_back) => Some(kept_back),
@@ -447,12 +447,6 @@ impl<'a> Run<'a> {
                 None
             }
         };
-        if let Some(kept_back) = kept_back.as_ref().filter(|_| self.inference.accepts_discrepancy()) {
-            // What is left is no noise: neighbours share it, and halves of the voxels tell what that does.
-            for (sd, half) in current.sd.iter_mut().zip(&kept_back.half_differences) {
-                *sd = sd.hypot(*half);
-            }
-        }
         // Parameters as in the last fit, all causes together.
         for cause in &mut causes {
             cause.refresh(&current, self.observed);
@@ -472,7 +466,7 @@ impl<'a> Run<'a> {
             nominal,
             corrected: current,
             left,
-            kept_back_rms_mm: kept_back.map(|k| k.rms_mm),
+            kept_back_rms_mm: kept_back,
             ranked,
             load: self.load,
             maps,

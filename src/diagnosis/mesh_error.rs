@@ -10,6 +10,7 @@
 //!   edge twice as wide makes.
 
 use super::cause_fit::CauseFit;
+use super::clusters::clustered_sd;
 use super::error::DiagnosisError;
 use super::fit::{derivatives, fit, normal_matrix, scales};
 use super::laboratory::Laboratory;
@@ -123,8 +124,8 @@ impl<'a> Finer<'a> {
     }
 }
 
-/// Adds the meshes' share to the standard deviations of `fitted`, found by `laboratory` on a mesh of `mesh_factor` and
-/// corrected by `defect`.
+/// Makes the standard deviations of `fitted`, found by `laboratory` on a mesh of `mesh_factor` and corrected by
+/// `defect`, at least as large as what the fit leaves calls for ([`clustered_sd`]), and adds the meshes' share.
 ///
 /// # Errors
 /// [`DiagnosisError`]: the coarser model has no equilibrium, or the work was cancelled.
@@ -142,6 +143,9 @@ pub fn widen(
     let weighed = metric.weigh_all(&columns);
     let matrix = normal_matrix(metric, &weighed, &fitted.material, &fitted.causes, settings);
     let Some(factor) = matrix.cholesky() else { return Ok(()) };
+    if let Some(clustered) = clustered_sd(observed, metric, fitted, settings, &columns) {
+        fitted.sd.iter_mut().zip(clustered).for_each(|(sd, clustered)| *sd = sd.max(clustered));
+    }
     let shift_by = |change: &Trace| {
         let change = metric.weigh(change);
         factor.solve(&DVector::from_iterator(weighed.len(), weighed.iter().map(|c| metric.inner(c, &change))))

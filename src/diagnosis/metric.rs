@@ -29,6 +29,7 @@ const FORCE_COMMON: f64 = 0.004;
 const FORCE_EACH: f64 = 0.001;
 
 /// The inner product ⟨a, b⟩ = aᵀ C⁻¹ b of traces.
+#[derive(Clone)]
 pub struct Metric {
     precision: [f64; 3],
     /// Per step and voxel: whether all of it counts.
@@ -125,6 +126,16 @@ impl Metric {
         self.precision = [0, 1, 2].map(|c| 1.0 / (1.0 / self.precision[c] + variance_mm2[c]));
         self.capacitance = self.capacitances();
         self
+    }
+
+    /// The same for the voxels alone for which `is_kept`.
+    pub(super) fn of_part(&self, is_kept: &dyn Fn(usize) -> bool) -> Metric {
+        let mut part = self.clone();
+        for used in &mut part.is_used {
+            used.iter_mut().enumerate().for_each(|(v, used)| *used &= is_kept(v));
+        }
+        part.capacitance = part.capacitances();
+        part
     }
 
     /// S⁻¹ + Bᵀ N⁻¹ B per component.

@@ -18,6 +18,7 @@ mod case;
 mod cause;
 mod cause_fit;
 mod causes;
+mod clusters;
 mod conclusion;
 mod cross_prediction;
 mod diagnose;

@@ -38,10 +38,10 @@ pub(super) fn material() -> Ogden {
 }
 
 /// A deterministic number that stands for noise: near Gaussian, of unit variance.
-struct Noise(u64);
+pub(super) struct Noise(pub(super) u64);
 
 impl Noise {
-    fn next(&mut self) -> f64 {
+    pub(super) fn next(&mut self) -> f64 {
         // The sum of twelve uniform numbers less six; a linear congruential generator is random enough for a field of
         // noise.
         let mut uniform = || {
