@@ -312,7 +312,7 @@ impl Assembler {
     ) -> Result<(), StepFailure> {
         let mesh = self.mesh();
         let at = Configuration { material, positions: &mesh.nodes, displacement: &state.displacement };
-        into.stands_at = None;
+        (into.stands_at, into.has_tangent) = (None, false);
         into.residual.clear();
         into.residual.resize(mesh.nodes.len(), [0.0; 3]);
         into.condensation.resize(mesh.num_elements(), Condensation::empty());
@@ -330,6 +330,34 @@ impl Assembler {
         }
         self.add_spring_stiffness(blocks);
         self.topology().pin(blocks);
+        into.spring_forces = self.add_spring_forces(state.drive_mm, &state.displacement, &mut into.residual);
+        into.has_tangent = true;
+        Ok(())
+    }
+
+    /// As [`Self::linearise`], the residual alone: the tangent stays that of an earlier state.
+    ///
+    /// # Errors
+    /// [`StepFailure::InvertedElement`]; the residual is then of no use.
+    pub(super) fn evaluate(
+        &self,
+        material: &Ogden,
+        state: &Equilibrium,
+        into: &mut Linearisation,
+    ) -> Result<(), StepFailure> {
+        let mesh = self.mesh();
+        let at = Configuration { material, positions: &mesh.nodes, displacement: &state.displacement };
+        (into.stands_at, into.has_tangent) = (None, false);
+        into.residual.fill([0.0; 3]);
+        let mut out = ElementOutput::default();
+        for &e in &self.topology().element_order {
+            let e = e as usize;
+            if !self.kernels.residual(self.tables(), &self.input(e, &at, Some(&state.pressure)), &mut out) {
+                return Err(StepFailure::InvertedElement { element: e, jacobian: out.min_jacobian });
+            }
+            scatter(mesh.element(e), &out.residual, &mut into.residual);
+            into.condensation[e].keep_gap(&out);
+        }
         into.spring_forces = self.add_spring_forces(state.drive_mm, &state.displacement, &mut into.residual);
         Ok(())
     }

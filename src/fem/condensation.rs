@@ -25,6 +25,11 @@ impl Condensation {
         self.bulk = out.bulk;
         self.divergence = out.divergence;
     }
+
+    /// Keeps the pressure gap of an element's residual; B and D stay those of the last tangent.
+    pub(super) fn keep_gap(&mut self, out: &ElementOutput) {
+        self.pressure_gap = out.pressure_gap;
+    }
 }
 
 /// δp of every element from δu at the nodes (mm): D B δu + gap, with the B and D of the last tangent.

@@ -210,7 +210,7 @@ impl ForwardModel {
     }
 
     /// The tangent of an equilibrium of `material` of this mesh, with the departures of this model. Just after the
-    /// solve that found the equilibrium it costs nothing; else one assembly and one factorisation.
+    /// solve that found the equilibrium it costs one assembly at most; else one assembly and one factorisation.
     ///
     /// # Errors
     /// [`SolveError::Diverged`] where the state inverts an element, [`SolveError::Linear`] if the tangent is not

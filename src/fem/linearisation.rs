@@ -14,7 +14,9 @@ pub(super) struct Linearisation {
     pub(super) spring_forces: Vec<(u32, [f64; 3])>,
     /// What the update of the pressures needs, per element.
     pub(super) condensation: Vec<Condensation>,
-    /// The equilibrium at which the tangent was assembled, if it was at one.
+    /// Whether the tangent is that of the state whose residual this is, and not of an earlier one.
+    pub(super) has_tangent: bool,
+    /// The equilibrium whose residual this is, if it is that of one.
     pub(super) stands_at: Option<Serial>,
 }
 
@@ -26,6 +28,7 @@ impl Linearisation {
             residual: Vec::new(),
             spring_forces: Vec::new(),
             condensation: Vec::new(),
+            has_tangent: false,
             stands_at: None,
         }
     }

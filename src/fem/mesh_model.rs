@@ -69,7 +69,7 @@ impl MeshModel {
     }
 
     /// The tangent of an equilibrium of `material`: the one just solved with where it is that equilibrium's, else
-    /// assembled and factorised.
+    /// assembled, and factorised unless the equilibrium was just found.
     ///
     /// # Errors
     /// [`SolveError::Diverged`] where an element is inverted, [`SolveError::Linear`] where there is no factor.
@@ -80,11 +80,15 @@ impl MeshModel {
     ) -> Result<Tangent<'a>, SolveError> {
         let there = &mut self.linearisation;
         let stands_there = equilibrium.serial.is_some() && there.stands_at == equilibrium.serial;
-        if !(stands_there && there.system.has_factor()) {
+        // A solve that ended with a kept tangent has a factor near enough to be a preconditioner.
+        let has_factor = stands_there && there.system.has_factor();
+        if !(has_factor && there.has_tangent) {
             self.assembler
                 .linearise(material, equilibrium, there)
                 .map_err(|cause| SolveError::diverged_at(equilibrium.drive_mm, cause))?;
-            there.system.factorise()?;
+            if !has_factor {
+                there.system.factorise()?;
+            }
             there.stands_at = equilibrium.serial;
         }
         Ok(Tangent { assembler: self.assembler.clone(), material, equilibrium, system: there.system.share() })

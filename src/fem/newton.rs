@@ -17,6 +17,17 @@ const REUSE_BELOW: f64 = 1e-4;
 /// Conjugate-gradient iterations that such a factor is given: they cost as much as a new one.
 const REUSE_ITERATIONS: usize = 10;
 
+/// Relative residual below which the tangent at hand is kept for the steps that follow (the chord method): it hardly
+/// changes any more, and a residual alone costs an eighth of residual and tangent.
+const KEEP_TANGENT_BELOW: f64 = 1e-2;
+
+/// A step with a kept tangent must bring the residual down to this part of what it was; else a new one is assembled.
+const KEPT_TANGENT_GAINS: f64 = 0.1;
+
+/// With a kept tangent convergence is linear, and the last residual no better than what was asked for. It is brought to
+/// this part of the tolerance, so that equilibria are as good as by Newton's steps.
+const KEPT_TANGENT_TOLERANCE: f64 = 0.1;
+
 /// A run of Newton's method on one mesh with one material.
 pub(super) struct Newton<'a> {
     /// The mesh and its departures.
@@ -95,11 +106,16 @@ impl Newton<'_> {
         let mut worst = f64::INFINITY;
         let mut last = f64::INFINITY;
         let mut iteration = 0;
+        let mut keeps_tangent = false;
         loop {
             if (self.is_cancelled)() {
                 return Err(StepFailure::NotConverged { iterations: iteration, residual: last });
             }
-            if let Err(failure) = self.assembler.linearise(self.material, &trial, self.linearisation) {
+            let evaluated = match keeps_tangent {
+                true => self.assembler.evaluate(self.material, &trial, self.linearisation),
+                false => self.assembler.linearise(self.material, &trial, self.linearisation),
+            };
+            if let Err(failure) = evaluated {
                 // The step inverts an element: take half of it, or give up.
                 match &mut update {
                     Some(u) if u.length > 0.1 => {
@@ -111,9 +127,14 @@ impl Newton<'_> {
                 }
             }
             let right = self.assembler.collect(&self.linearisation.residual, -1.0);
-            last = norm(&right) / self.reaction_scale();
-            if last < self.options.tolerance {
+            let before = std::mem::replace(&mut last, norm(&right) / self.reaction_scale());
+            let part = if keeps_tangent { KEPT_TANGENT_TOLERANCE } else { 1.0 };
+            if last < part * self.options.tolerance {
                 return Ok(finished(self.assembler, self.linearisation, trial));
+            }
+            if keeps_tangent && !(last < KEPT_TANGENT_GAINS * before) {
+                keeps_tangent = false;
+                continue;
             }
             // A residual that grows past every earlier one by far is not coming back.
             if !last.is_finite() || iteration >= self.options.max_iterations || (iteration > 3 && last > 1e3 * worst) {
@@ -124,8 +145,9 @@ impl Newton<'_> {
             self.statistics.newton_iterations += 1;
             // Near the solution the factor of an earlier iterate is as good a preconditioner as a new one is, and
             // cheaper.
-            let is_near = iteration > 1 && last < REUSE_BELOW;
+            let is_near = keeps_tangent || iteration > 1 && last < REUSE_BELOW;
             let delta = self.assembler.spread(&self.newton_step(right, last, is_near)?);
+            keeps_tangent = last < KEEP_TANGENT_BELOW;
             let delta_pressure = pressure_update(self.assembler.mesh(), &self.linearisation.condensation, &delta);
             let next = Update { from: trial.clone(), delta, delta_pressure, length: 1.0 };
             next.apply(&mut trial);
