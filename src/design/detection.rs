@@ -4,8 +4,8 @@
 //! A design's gain in one of them is the base's size over its own. Sizes are compared where both designs have them:
 //!
 //! * Of several holes the worst counts, the one whose error must be largest to be named. A design without holes has no
-//!   hole that could be wrong: it has no gain there, neither good nor bad, and is as good as the base where nothing else
-//!   counts.
+//!   hole that could be wrong: it has no gain there, neither good nor bad, and is as good as the base where nothing
+//!   else counts.
 //! * The third parameter of a hole is its place across, whatever the direction of the hole.
 //! * A cause that is looked for at several drives alone is not counted against a base that is scanned at one.
 //! * A size that would never be named counts as the largest that it may have.

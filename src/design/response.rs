@@ -21,8 +21,8 @@ pub struct Response {
     /// deviations; 0 for the first material, and where the study does not ask to tell materials apart.
     #[serde(default)]
     pub log_separation: f64,
-    /// ln of the sizes of errors that a diagnosis would name, in the order of what the study counts; `None` for what the
-    /// design does not have. Empty where the study does not ask for them.
+    /// ln of the sizes of errors that a diagnosis would name, in the order of what the study counts; `None` for what
+    /// the design does not have. Empty where the study does not ask for them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub log_detectable: Vec<Option<f64>>,
     /// ln of the force in N.

@@ -129,7 +129,7 @@ fn a_rival_is_left_behind_by_what_it_cannot_explain() {
     assert!(ahead(of(6.0, 1.0), of(1.0, 1.0), 0.5) > ahead(of(6.0, 1.0), of(3.0, 1.0), 0.5));
     // A cause that counts for a third stays behind one that explains half of its effect.
     assert_eq!(ahead(of(6.0, 1.0 / 3.0), of(1.0, 1.0), 0.5), f64::INFINITY);
-    // Without chance in it (λ large): (1 − ρ) λ = the cost of five parameters more, less the five that it fits to noise.
+    // Without chance in it: (1 − ρ) λ = the cost of five parameters more, less the five that they fit to noise.
     let root = ahead(of(6.0, 1.0), of(1.0, 1.0), 0.0);
     assert!(root.powi(2) > 45.0 && root.powi(2) < 45.0 + 2.0 * 1.2816 * 2.0 * 60f64.sqrt(), "{}", root.powi(2));
 }

@@ -76,8 +76,8 @@ impl Run for CheckedStudy {
     fn estimated_seconds(&self, _: &[RecordingOutline]) -> Option<f64> {
         let (study, budget) = (&self.0, self.0.budget);
         let num_searched = budget.refine.saturating_mul(budget.iterations).saturating_add(budget.explore);
-        // Every material is a solve of its own; what a diagnosis would find takes about as much again.
-        let num_solves = if study.objective.kind == ObjectiveKind::Detect { 2 } else { 1 };
+        // Every material is a solve of its own; what a diagnosis would find takes about twice as much again.
+        let num_solves = if study.objective.kind == ObjectiveKind::Detect { 3 } else { 1 };
         let num_materials = num_solves * study.materials.len().max(1);
         let search = cost::seconds(&study.base, &MeshOptions::search(&study.base), None, num_materials)?;
         let voxel_mm = Some(study.scan.voxel_mm);
