@@ -87,6 +87,12 @@ class Results(Scratch):
         numbers = lk.evaluate(bar(), ecoflex(), scan=scanner, mesh="search", has_files=False)
         self.assertEqual(numbers.pictures, [])
         self.assertEqual(numbers.promised_sd, one.promised_sd)
+        self.assertEqual(one.detectable, ())
+        found = lk.evaluate(bar(), ecoflex(), scan=scanner, mesh="search", has_detectable=True, has_files=False)
+        sizes = {d.parameter: d for d in found.detectable if d.cause in ("gain", "hole")}
+        self.assertTrue(0 < sizes["relative_gain_error_x"].size < 0.5)
+        self.assertEqual(sizes["diameter_error_mm"].description[:6], "hole 0")
+        self.assertIn(sizes["diameter_error_mm"].limited_by, ("noise", "allowance", "rival"))
 
     def test_a_diagnosis_of_two(self):
         first, second = (lk.scan(block(), ecoflex(), seed=seed, name=f"s{seed}", **COARSE).folder for seed in (5, 6))

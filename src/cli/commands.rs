@@ -67,6 +67,7 @@ const EVALUATE: &[Flag] = &[
     Flag::of("drive-zero-sd", "protocol/drive_zero_sd_mm"),
     Flag::of("blocks-scanned", "protocol/blocks_scanned"),
     Flag::of("scan-shares", "protocol/scan_share"),
+    Flag::of("detect", "has_detectable"),
 ];
 const SCAN: &[Flag] = &[
     Flag::read("material", "material", JsonFile),

@@ -31,6 +31,9 @@ pub enum ObjectiveKind {
     /// T-optimal: how far every material's scan is from the closest fit of an earlier material to it, in noise standard
     /// deviations. Materials stand from the simple to the rich.
     TellApart,
+    /// How small errors of the experiment may be and still be named by a diagnosis with 90 % probability: size of the
+    /// base over own size, for every parameter of the objective's `causes`.
+    Detect,
 }
 
 impl ObjectiveKind {
@@ -53,6 +56,7 @@ impl ObjectiveKind {
                 "T-optimal figure (distance of a material's scan from the closest fit of an earlier material)"
             }
             ObjectiveKind::WorstRelativeSd => "largest relative standard deviation of a single parameter",
+            ObjectiveKind::Detect => "smallest errors of the experiment that a diagnosis would name",
         }
     }
 }
@@ -185,6 +189,11 @@ pub struct Objective {
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     #[schema(value_type = BTreeMap<String, ParameterWeight>)]
     pub parameter_weights: BTreeMap<String, f64>,
+    /// Causes that count for `detect`, by name (`gain`) or by one of their parameters (`hole/diameter_error_mm`); gain,
+    /// hole and registration where there are none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 100)]
+    pub causes: Vec<String>,
     /// Besides: whose μᵢ and αᵢ may not be promised a larger standard deviation than by the base.
     pub guard_promised_sd: Guard,
 }
@@ -207,6 +216,9 @@ impl Objective {
         }
         if self.combine == Combine::Weighted && !self.kind.counts_sensitivity() {
             problems.push(StudyError::NothingToWeigh);
+        }
+        if !self.causes.is_empty() && self.kind != ObjectiveKind::Detect {
+            problems.push(StudyError::CausesUnused);
         }
         for (name, weight) in &self.parameter_weights {
             if !parameters_of_materials.iter().flatten().any(|p| p == name) {
@@ -231,6 +243,9 @@ impl Objective {
             text += &format!(" (𝒮 as {})", self.normalisation.words());
         }
         text += &format!(", as gains over the base specimen; combined as {}", self.combine.words());
+        if !self.causes.is_empty() {
+            text += &format!("; of the causes {}", self.causes.join(", "));
+        }
         if !self.parameter_weights.is_empty() {
             let list: Vec<String> = self.parameter_weights.iter().map(|(p, w)| format!("{p} {w}")).collect();
             text += &format!(" ({}; others 1)", list.join(", "));

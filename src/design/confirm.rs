@@ -6,6 +6,7 @@
 //! logarithms over them count, and their scatter is the mesh's uncertainty of a gain.
 
 use super::aim::{Normalisation, ObjectiveKind};
+use super::detection::{counted, log_sizes, sizes_of};
 use super::evaluation_failure::EvaluationFailure;
 use super::evaluator::{Evaluated, Evaluator};
 use super::fidelity::Fidelity;
@@ -126,7 +127,7 @@ pub fn confirm(
     for factor in MESHES {
         let mesh = MeshOptions::graded(specimen, factor);
         let options = EvaluationOptions { mesh, ..EvaluationOptions::standard(specimen) };
-        evaluated = by_material(study, specimen, options, is_cancelled)?;
+        evaluated = by_material(study, specimen, options, factor, is_cancelled)?;
         responses_by_mesh.push(responses(study, specimen, &evaluated, is_cancelled)?);
     }
     let responses = mean_over_meshes(&responses_by_mesh);
@@ -158,7 +159,8 @@ fn mean_over_meshes(by_mesh: &[Vec<Response>]) -> Vec<Response> {
         let all: Vec<Vec<f64>> = by_mesh.iter().map(|r| r[sample].to_vector()).collect();
         let num = all.len() as f64;
         let mean = |entry: usize| all.iter().map(|v| v[entry]).sum::<f64>() / num;
-        Response::from_vector(&(0..all[0].len()).map(mean).collect::<Vec<_>>())
+        let num_parameters = by_mesh[0][sample].log_integrated.len();
+        Response::from_vector(&(0..all[0].len()).map(mean).collect::<Vec<_>>(), num_parameters)
     };
     (0..num_samples).map(of_sample).collect()
 }
@@ -178,7 +180,7 @@ pub fn estimate(
     let mesh = fidelity.mesh_options(specimen);
     let sampling = Sampling::on_elements_of(mesh.section_size_mm, study.scan.voxel_mm);
     let options = EvaluationOptions { mesh, sampling, ..EvaluationOptions::standard(specimen) };
-    let by_material = by_material(study, specimen, options, is_cancelled)?;
+    let by_material = by_material(study, specimen, options, fidelity.factor(), is_cancelled)?;
     let responses = if study.budget.variants_in_search {
         responses(study, specimen, &by_material, is_cancelled)?
     } else {
@@ -187,11 +189,13 @@ pub fn estimate(
     Ok(Evaluated { responses, gradients: Vec::new() })
 }
 
-/// Every prior's central values, at the specimen's last drive.
+/// Every prior's central values, at the specimen's last drive; on the mesh of `options`, whose elements are those of
+/// the standard one times `mesh_factor`.
 fn by_material(
     study: &Study,
     specimen: &Specimen,
     options: EvaluationOptions,
+    mesh_factor: f64,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Vec<MaterialEvaluation>, EvaluationFailure> {
     let mut evaluated: Vec<(Evaluation, EvaluationMaps)> = Vec::new();
@@ -219,6 +223,11 @@ fn by_material(
     }
     if specimen.drive_mm.len() > 1 {
         share_time(&mut evaluated, options.identifiability_limit).map_err(failure)?;
+    }
+    if study.objective.kind == ObjectiveKind::Detect {
+        for (prior, (evaluation, _)) in study.materials.iter().zip(&mut evaluated) {
+            evaluation.detectable = sizes_of(study, specimen, &prior.material, evaluation, mesh_factor, is_cancelled)?;
+        }
     }
     let mut by_material: Vec<MaterialEvaluation> = Vec::new();
     for (prior, (evaluation, maps)) in study.materials.iter().zip(evaluated) {
@@ -263,10 +272,11 @@ fn responses(
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Vec<Response>, EvaluationFailure> {
     let samples = sample_materials(&study.materials);
-    let central: Vec<Vec<f64>> = by_material.iter().map(|m| m.response(study).to_vector()).collect();
+    let central: Vec<Response> = by_material.iter().map(|m| m.response(study)).collect();
     if samples.len() == central.len() {
-        return Ok(central.iter().map(|v| Response::from_vector(v)).collect());
+        return Ok(central);
     }
+    let central: Vec<Vec<f64>> = central.iter().map(Response::to_vector).collect();
     let searched = Evaluator::with_variants(study).evaluate(specimen, None, is_cancelled)?;
     let coarse: Vec<Vec<f64>> = searched.responses.iter().map(Response::to_vector).collect();
     let of_sample = |index: usize| {
@@ -274,7 +284,8 @@ fn responses(
         // A prior's central values come first among its samples.
         let centre = samples.iter().position(|s| s.prior == prior).unwrap_or(index);
         let moved = central[prior].iter().zip(coarse[index].iter().zip(&coarse[centre]));
-        Response::from_vector(&moved.map(|(value, (variant, centre))| value + variant - centre).collect::<Vec<_>>())
+        let moved: Vec<f64> = moved.map(|(value, (variant, centre))| value + variant - centre).collect();
+        Response::from_vector(&moved, searched.responses[index].log_integrated.len())
     };
     Ok((0..samples.len()).map(of_sample).collect())
 }
@@ -326,11 +337,16 @@ impl MaterialEvaluation {
         let sensitivities = self.evaluation.steps.last().map_or(&[][..], |step| &step.integrated_sensitivity);
         let promised = self.evaluation.promised_sd.iter().filter(|p| p.parameter != "kappa");
         let c = &self.relative_sd_by_criterion;
+        let log_detectable = match (study.objective.kind, counted(study)) {
+            (ObjectiveKind::Detect, Ok(counted)) => log_sizes(&counted, &self.evaluation.detectable),
+            _ => Vec::new(),
+        };
         Response {
             log_integrated: sensitivities.iter().map(|s| normalised(s, normalisation).max(1e-300).ln()).collect(),
             log_relative_sd: promised.map(|p| log_or_undetermined(p.relative_sd)).collect(),
             log_criteria: [c.d_optimal, c.a_optimal, c.e_optimal, c.worst_parameter].map(log_or_undetermined),
             log_separation: log_separation(self.separation_sd),
+            log_detectable,
             log_force: self.force_n.abs().max(1e-12).ln(),
             log_stretch: self.tearing_stretch.ln(),
         }
@@ -437,11 +453,11 @@ mod tests {
             log_relative_sd: vec![-x, 0.5 * x],
             log_criteria: [x; 4],
             log_separation: 0.0,
+            log_detectable: vec![Some(x), None],
             log_force: 3.0 * x,
             log_stretch: x,
         };
         let mean = mean_over_meshes(&[vec![response(1.0), response(5.0)], vec![response(3.0), response(7.0)]]);
-        let expected: Vec<Vec<f64>> = [2.0, 6.0].into_iter().map(|x| response(x).to_vector()).collect();
-        assert_eq!(mean.iter().map(Response::to_vector).collect::<Vec<_>>(), expected);
+        assert_eq!(mean, [2.0, 6.0].map(response));
     }
 }

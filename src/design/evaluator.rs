@@ -292,6 +292,7 @@ impl<'a> Evaluator<'a> {
             log_relative_sd: shear.iter().map(|&i| log_or_undetermined(covariance.relative_sd(i))).collect(),
             log_criteria: criteria_as_relative_sd(&covariance, &shear).map(log_or_undetermined),
             log_separation: 0.0,
+            log_detectable: Vec::new(),
             log_force: force_n.abs().max(1e-12).ln(),
             log_stretch: stretches.fold(1.0, f64::max).ln(),
         })

@@ -22,12 +22,20 @@ pub enum Fidelity {
 }
 
 impl Fidelity {
+    /// Element size along the plates, as a factor on the standard one.
+    pub(super) fn factor(self) -> f64 {
+        match self {
+            Fidelity::Coarse => COARSE_FACTOR,
+            Fidelity::Fine => FINE_FACTOR,
+        }
+    }
+
     /// The mesh. The fine one is graded toward the plates as a confirmation's: what the edges do to a coarser grading
     /// is not what they do there.
     pub fn mesh_options(self, specimen: &Specimen) -> MeshOptions {
         let options = match self {
-            Fidelity::Coarse => MeshOptions::scaled(specimen, COARSE_FACTOR),
-            Fidelity::Fine => MeshOptions::graded(specimen, FINE_FACTOR),
+            Fidelity::Coarse => MeshOptions::scaled(specimen, self.factor()),
+            Fidelity::Fine => MeshOptions::graded(specimen, self.factor()),
         };
         MeshOptions { hole_segments: 8, ..options }
     }

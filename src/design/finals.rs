@@ -1,6 +1,7 @@
 //! The end of a search: confirmation of the finalists on the finer mesh, and the repair of those that keep a limit in
 //! the search and break it there.
 
+use super::aim::ObjectiveKind;
 use super::confirm::{Confirmed, confirm};
 use super::evaluation_failure::EvaluationFailure;
 use super::local::{LocalSettings, improve};
@@ -95,8 +96,9 @@ impl SearchRun<'_> {
         let best_kept = ranked.iter().filter(is_kept).map(|c| c.objective).fold(0.0, f64::max);
         broken.retain(|(_, _, objective)| *objective > best_kept);
         broken.sort_by(|a, b| b.2.total_cmp(&a.2));
-        // Gradients are of one scan alone.
-        broken.truncate(if study.vary.earlier_scan_mm.is_some() { 0 } else { MAX_REPAIRS });
+        // Gradients are of one scan alone, and know nothing of what a diagnosis would find.
+        let has_gradients = study.vary.earlier_scan_mm.is_none() && study.objective.kind != ObjectiveKind::Detect;
+        broken.truncate(if has_gradients { MAX_REPAIRS } else { 0 });
         let in_integrals = match broken.is_empty() {
             true => None,
             false => Some(self.reference_from(self.evaluated(base_specimen, None), state)?),
@@ -112,10 +114,13 @@ impl SearchRun<'_> {
                 ranked.push(repaired);
             }
         }
-        if !ranked.iter().any(|c| c.is_within_limits) && base.is_within_limits {
-            let mut only = base.clone();
-            only.remark = Some("The base specimen itself: no other design kept every limit at confirmation.".into());
-            ranked.push(only);
+        let is_better = |c: &Confirmed| c.is_within_limits && c.objective >= base.objective;
+        if !ranked.iter().any(is_better) && base.is_within_limits {
+            let mut itself = base.clone();
+            let is_only = !ranked.iter().any(|c| c.is_within_limits);
+            let why = if is_only { "kept every limit" } else { "within the limits was as good" };
+            itself.remark = Some(format!("The base specimen itself: no other design {why} at confirmation."));
+            ranked.push(itself);
         }
         ranked.sort_by(|a, b| b.is_within_limits.cmp(&a.is_within_limits).then(b.objective.total_cmp(&a.objective)));
         if !ranked.first().is_some_and(|best| best.is_within_limits) {

@@ -1,8 +1,9 @@
 //! What a result says, in plain words: each sentence is computed from the numbers beside it.
 
-use super::aim::Normalisation;
+use super::aim::{Normalisation, ObjectiveKind};
 use super::disagreement::{Disagreement, information_gain, integrated_gain};
 use super::entry::DesignEntry;
+use super::found_sizes::sizes_in_words;
 use super::study::Study;
 use super::words::listed;
 use crate::sensitivity::IDENTIFIABILITY_LIMIT;
@@ -71,6 +72,9 @@ pub fn findings(
     said.extend(what_is_simpler(ranked, equals));
     said.extend(what_size_does(study, base, best));
     said.extend(how_far_apart(base, best));
+    if study.objective.kind == ObjectiveKind::Detect {
+        said.extend(sizes_in_words(study, base, best));
+    }
     for (index, prior) in study.materials.iter().enumerate() {
         said.extend(gains_of_material(best, &prior.name));
         said.extend(what_holes_do(base, ranked, index, &prior.name));

@@ -4,6 +4,7 @@ mod aim;
 mod candidate;
 mod checkpoint;
 mod confirm;
+mod detection;
 mod disagreement;
 mod entry;
 mod evaluation_failure;
@@ -12,6 +13,7 @@ mod explore;
 mod fidelity;
 mod finals;
 mod findings;
+mod found_sizes;
 #[cfg(test)]
 mod grid_tests;
 mod inline;

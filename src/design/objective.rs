@@ -2,6 +2,7 @@
 //! limit just met; larger is better.
 
 use super::aim::{Combine, ObjectiveKind};
+use super::detection::log_gains;
 use super::evaluator::Evaluated;
 use super::material_samples::MaterialSample;
 use super::response::Response;
@@ -57,6 +58,7 @@ impl<'a> Reference<'a> {
             ObjectiveKind::AOptimal => criterion(1),
             ObjectiveKind::EOptimal => criterion(2),
             ObjectiveKind::WorstRelativeSd => criterion(3),
+            ObjectiveKind::Detect => log_gains(&response.log_detectable, &base.log_detectable),
             ObjectiveKind::TellApart if prior == 0 => Vec::new(),
             ObjectiveKind::TellApart => vec![response.log_separation - base.log_separation],
         }
@@ -132,8 +134,9 @@ impl<'a> Reference<'a> {
             }
             judged.worst_margins.push(worst);
             for v in 0..num_variables {
-                let zero = |s: usize| Response::from_vector(&vec![0.0; self.base[s].to_vector().len()]);
-                let slope = |s: usize| Response::from_vector(&evaluated.gradients[s][v]);
+                let like = |s: usize, v: &[f64]| Response::from_vector(v, self.base[s].log_integrated.len());
+                let zero = |s: usize| like(s, &vec![0.0; self.base[s].to_vector().len()]);
+                let slope = |s: usize| like(s, &evaluated.gradients[s][v]);
                 judged.gain_gradients[v].extend(mean(&|s| self.gains(prior, &slope(s), &zero(s))));
                 for &s in &of_prior {
                     // The margins are affine in the responses: their slope is the difference from the constant part.

@@ -23,6 +23,7 @@ fn response(integrated: [f64; 2], sd: [f64; 2], force: f64, stretch: f64) -> Res
         log_relative_sd: sd.map(f64::ln).to_vec(),
         log_criteria: [0.0; 4],
         log_separation: 0.0,
+        log_detectable: Vec::new(),
         log_force: force.ln(),
         log_stretch: stretch.ln(),
     }

@@ -21,6 +21,10 @@ pub struct Response {
     /// deviations; 0 for the first material, and where the study does not ask to tell materials apart.
     #[serde(default)]
     pub log_separation: f64,
+    /// ln of the sizes of errors that a diagnosis would name, in the order of what the study counts; `None` for what
+    /// the design does not have. Empty where the study does not ask for them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub log_detectable: Vec<Option<f64>>,
     /// ln of the force in N.
     pub log_force: f64,
     /// ln of the principal stretch exceeded in [`TEARING_FRACTION`] of the volume.
@@ -48,22 +52,19 @@ pub(super) fn normalised(sensitivity: &IntegratedSensitivity, normalisation: Nor
 }
 
 impl Response {
-    /// Numbers that every response has whatever its number of parameters: criteria, separation, force and stretch.
-    const NUM_WITHOUT_PARAMETER: usize = 4 + 3;
-
     /// All numbers in one list, in a fixed order: 𝒮 and the relative standard deviation of every μᵢ and αᵢ, then the
-    /// four criteria, the separation, the force and the stretch.
+    /// four criteria, the separation, the force and the stretch, and the sizes of errors (NaN for `None`).
     pub fn to_vector(&self) -> Vec<f64> {
         let mut v = self.log_integrated.clone();
         v.extend(&self.log_relative_sd);
         v.extend(self.log_criteria);
         v.extend([self.log_separation, self.log_force, self.log_stretch]);
+        v.extend(self.log_detectable.iter().map(|size| size.unwrap_or(f64::NAN)));
         v
     }
 
-    /// The inverse of [`Self::to_vector`].
-    pub fn from_vector(v: &[f64]) -> Response {
-        let num_parameters = (v.len() - Self::NUM_WITHOUT_PARAMETER) / 2;
+    /// The inverse of [`Self::to_vector`] for a material with so many μᵢ and αᵢ.
+    pub fn from_vector(v: &[f64], num_parameters: usize) -> Response {
         let (log_integrated, rest) = v.split_at(num_parameters);
         let (log_relative_sd, rest) = rest.split_at(num_parameters);
         Response {
@@ -71,6 +72,7 @@ impl Response {
             log_relative_sd: log_relative_sd.to_vec(),
             log_criteria: [rest[0], rest[1], rest[2], rest[3]],
             log_separation: rest[4],
+            log_detectable: rest[7..].iter().map(|size| size.is_finite().then_some(*size)).collect(),
             log_force: rest[5],
             log_stretch: rest[6],
         }

@@ -1,6 +1,7 @@
 //! Which rules a study violates.
 
 use super::aim::ObjectiveKind;
+use super::detection::{countable, counted};
 use super::study::{MaterialPrior, Range, Study};
 use super::study_error::StudyError;
 use super::study_limits::{
@@ -130,10 +131,21 @@ impl Study {
         if self.objective.kind == ObjectiveKind::TellApart && num_blocks > 1 {
             problems.push(StudyError::SeveralBlocksToTellApart);
         }
+        if self.objective.kind == ObjectiveKind::Detect && num_blocks > 1 {
+            problems.push(StudyError::SeveralBlocksToDiagnose);
+        }
         let is_uncertain = self.materials.iter().any(|prior| prior.relative_sd > 0.0);
         let needs_integrals = self.budget.refine > 0 || is_uncertain || self.objective.kind == ObjectiveKind::TellApart;
         if self.vary.earlier_scan_mm.is_some() && needs_integrals {
             problems.push(StudyError::EarlierScanNeedsVoxels);
+        }
+        if self.objective.kind == ObjectiveKind::Detect {
+            if self.budget.refine > 0 || is_uncertain {
+                problems.push(StudyError::DetectNeedsVoxels);
+            }
+            if let Err(name) = counted(self) {
+                problems.push(StudyError::UnknownCause { name, known: countable(self) });
+            }
         }
         if !base.other_samples.is_empty() && self.tests().contains(&TestKind::Uniaxial) {
             problems.push(StudyError::OtherSamplesInTension);

@@ -127,6 +127,29 @@ pub enum StudyError {
          and protocol.blocks_scanned, or choose another objective"
     )]
     SeveralBlocksToTellApart,
+    /// What would be found is to be told of several blocks, of which a diagnosis sees one.
+    #[error(
+        "objective.kind: detect is supported for one scanned block without other samples; leave out base.other_samples and \
+         protocol.blocks_scanned, or choose another objective"
+    )]
+    SeveralBlocksToDiagnose,
+    /// Gradients and variants of the priors know nothing of what a diagnosis would find.
+    #[error(
+        "objective.kind: detect has no gradients and is not judged at the priors' variants; set budget.refine and every \
+         relative_sd to 0, or choose another objective"
+    )]
+    DetectNeedsVoxels,
+    /// No recording is tested for a cause that is to count.
+    #[error("objective.causes: '{name}' is not tested for every recording; there are {}", known.join(", "))]
+    UnknownCause {
+        /// The entry.
+        name: String,
+        /// What there is: cause and parameter.
+        known: Vec<String>,
+    },
+    /// Causes are named that nothing counts.
+    #[error("objective.causes: only `kind: detect` counts them; leave them out or choose that kind")]
+    CausesUnused,
     /// Gradients, variants of the priors and distances of materials are of one scan alone.
     #[error(
         "vary.earlier_scan_mm: gradients, the priors' variants and tell_apart are of one scan alone; set budget.refine and \
@@ -214,6 +237,20 @@ impl StudyError {
                 FieldError::new("/objective/kind", "\"tell_apart\"", "another kind for several blocks")
                     .remedy("or leave out base.other_samples and protocol.blocks_scanned")
             }
+            E::SeveralBlocksToDiagnose => {
+                FieldError::new("/objective/kind", "\"detect\"", "another kind for several blocks")
+                    .remedy("or leave out base.other_samples and protocol.blocks_scanned")
+            }
+            E::DetectNeedsVoxels => {
+                let allowed = "another kind where budget.refine or a relative_sd is above 0";
+                FieldError::new("/objective/kind", "\"detect\"", allowed).remedy("or set both to 0")
+            }
+            E::UnknownCause { name, known } => {
+                FieldError::new("/objective/causes", format!("{name:?}"), "causes for which every recording is tested")
+                    .remedy(format!("there are {}", known.join(", ")))
+            }
+            E::CausesUnused => FieldError::new("/objective/causes", "given", "left out")
+                .remedy("only `kind: detect` counts causes"),
             E::EarlierScanNeedsVoxels => {
                 let allowed = "left out where budget.refine or a relative_sd is above 0, and with tell_apart";
                 FieldError::new("/vary/earlier_scan_mm", "given", allowed).remedy("these are of one scan alone")

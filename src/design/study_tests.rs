@@ -141,6 +141,38 @@ fn blocks_and_what_varies_of_them_fit_together() {
     assert_eq!(told_apart, ["/objective/kind"]);
 }
 
+/// What would be found is told of one block by the scan's voxels alone, and of causes that every recording is tested
+/// for.
+#[test]
+fn a_study_of_what_would_be_found_is_checked() {
+    let detect = |more: Value| {
+        let mut objective = json!({ "kind": "detect" });
+        objective.as_object_mut().expect("an object").extend(more.as_object().expect("an object").clone());
+        ("/objective", objective)
+    };
+    let budget = |refine: usize| ("/budget", json!({ "refine": refine }));
+    let mut fine = whole();
+    fine["objective"] = json!({ "kind": "detect", "causes": ["gain", "hole/center_error_x_mm"] });
+    fine["budget"] = json!({ "refine": 0 });
+    assert!(Study::from_request(&fine).is_ok());
+    assert_eq!(pointers(&[detect(json!({})), budget(3)]), ["/objective/kind"]);
+    assert_eq!(
+        pointers(&[detect(json!({})), budget(0), ("/materials/0/relative_sd", json!(0.1))]),
+        ["/objective/kind"]
+    );
+    assert_eq!(pointers(&[detect(json!({ "causes": ["debond"] })), budget(0)]), ["/objective/causes"]);
+    assert_eq!(pointers(&[("/objective", json!({ "causes": ["gain"] }))]), ["/objective/causes"]);
+    assert_eq!(
+        pointers(&[
+            detect(json!({})),
+            budget(0),
+            ("/protocol", json!({ "blocks_scanned": 2 })),
+            ("/base/samples_in_parallel", json!(2))
+        ]),
+        ["/objective/kind"]
+    );
+}
+
 #[test]
 fn a_request_names_no_files() {
     assert_eq!(pointers(&[("/base", json!("two-hole-shear.json"))]), ["/base"]);

@@ -4,6 +4,7 @@
 use super::cause::CauseName;
 use super::conclusion::{explain_too_little, kept_back, verdict_on};
 use super::error::DiagnosisError;
+use super::evidence::ALLOWANCE_OF_DRIVE;
 use super::findings::Findings;
 use super::found::FoundCause;
 use super::further_term::without_needless_terms;
@@ -29,13 +30,11 @@ use crate::mesh::MeshOptions;
 use crate::recording::Recording;
 
 /// Standard deviation of ln κ of the material believed.
-const BELIEVED_LOG_SD: f64 = 0.5;
+pub(super) const BELIEVED_LOG_SD: f64 = 0.5;
 /// Most iterations of a fit.
 const MAX_ITERATIONS: usize = 12;
 /// A fit ends when a step would lower the deviance by less than this.
 const TOLERANCE: f64 = 0.3;
-/// The allowance where none is stated, as a part of the largest drive.
-const ALLOWANCE_OF_DRIVE: f64 = 1e-3;
 
 /// The interior is tested where the misfit beyond noise exceeds this multiple of the allowance (rms).
 const INTERIOR_ABOVE: f64 = 2.0;

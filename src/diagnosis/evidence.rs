@@ -21,6 +21,11 @@ pub(super) const WORTH_A_FIT: f64 = 0.1;
 pub(super) const SMALLEST_SHARE: f64 = 0.02;
 /// The same part where all models are exact but for the mesh.
 const SMALLEST_SHARE_OF_EXACT: f64 = 0.004;
+/// The gain of a smooth field without a mechanism counts for this part: it takes up what several causes leave, and
+/// each of them first explains a part of that. What later causes make needless is taken out at the end.
+pub(super) const SPONGE_COUNTS: f64 = 1.0 / 3.0;
+/// The allowance where none is stated, as a part of the largest drive.
+pub(super) const ALLOWANCE_OF_DRIVE: f64 = 1e-3;
 /// Structured misfit that is left counts as unexplained above this multiple of the allowance (rms).
 pub(super) const UNEXPLAINED: f64 = 2.0;
 /// An effect counts as physics where its displacement (rms) exceeds this multiple of the allowance, or its force the
@@ -39,13 +44,24 @@ pub(super) fn penalty(metric: &Metric, num_parameters: usize) -> f64 {
 
 /// Whether a change of the forces, or what is left of them, is more than noise and a mesh's error.
 pub(super) fn is_large_force(observed: &Observed, change: &Trace) -> bool {
+    times_to_large_force(observed, change) < 1.0
+}
+
+/// The multiple of a change of the forces beyond which it is more than noise and a mesh's error; infinite where it
+/// changes none.
+pub(super) fn times_to_large_force(observed: &Observed, change: &Trace) -> f64 {
     let forces = observed.steps.iter().zip(&change.force);
-    let is_large = |f: &ObservedForce, change: f64| change.abs() > 4.0 * f.sd_n + 0.01 * f.value_n.abs();
-    forces.filter_map(|(s, change)| s.force.map(|f| is_large(&f, *change))).any(|large| large)
+    let times = |f: &ObservedForce, change: f64| (4.0 * f.sd_n + 0.01 * f.value_n.abs()) / change.abs();
+    forces.filter_map(|(s, change)| s.force.map(|f| times(&f, *change))).fold(f64::INFINITY, f64::min)
 }
 
 /// Whether a change of the prediction is large enough to be more than a mesh's.
 pub(super) fn is_large(observed: &Observed, effect: &Trace, allowance_mm: f64) -> bool {
+    times_to_large(observed, effect, allowance_mm) < 1.0
+}
+
+/// The multiple of a change of the prediction beyond which it is more than a mesh's; infinite where nothing changes.
+pub(super) fn times_to_large(observed: &Observed, effect: &Trace, allowance_mm: f64) -> f64 {
     let last = Trace { displacement: effect.displacement.last().cloned().into_iter().collect(), force: vec![] };
-    is_large_force(observed, effect) || last.rms_mm() > SMALLEST_EFFECT * allowance_mm
+    times_to_large_force(observed, effect).min(SMALLEST_EFFECT * allowance_mm / last.rms_mm())
 }

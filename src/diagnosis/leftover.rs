@@ -20,6 +20,16 @@ pub struct Leftover {
     pub location: Option<Location>,
 }
 
+/// Root mean square of what the means over boxes show of a change of the displacement without noise, mm: what
+/// [`Leftover::structured_rms_mm`] is expected to be where that change is left.
+pub(super) fn structure_of(observed: &Observed, change: &Trace, metric: &Metric) -> f64 {
+    let means = BoxMeans::of(observed, &change.displacement, &|step, voxel| metric.is_used(step, voxel));
+    // The means take off what noise would add, of which there is none here.
+    let noise_mm2 = |c: usize| observed.noise_sd_mm[c].powi(2) * observed.noise_correlation() / means.voxels_per_box;
+    let squares: f64 = (0..3).map(|c| means.excess_mm2[c] + noise_mm2(c)).sum();
+    (squares / 3.0).max(0.0).sqrt()
+}
+
 /// What is left of a recording: χ² per datum and the misfit beyond noise, from means over boxes.
 pub(super) fn leftover(observed: &Observed, residual: &Trace, metric: &Metric) -> Leftover {
     let means = BoxMeans::of(observed, &residual.displacement, &|step, voxel| metric.is_used(step, voxel));

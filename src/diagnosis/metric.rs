@@ -41,6 +41,8 @@ pub struct Metric {
     variances: Vec<f64>,
     /// Per step: drive / largest drive.
     scale: Vec<f64>,
+    /// Per step: its part of the time of a scan. The variance of the noise is as much larger.
+    share: Vec<f64>,
     capacitance: Vec<Cholesky<f64, Dyn>>,
     force_precision: DMatrix<f64>,
     /// Which steps have a force.
@@ -111,6 +113,7 @@ impl Metric {
             boxes,
             num_boxes,
             variances: variance,
+            share: vec![1.0; scale.len()],
             scale,
             capacitance: Vec::new(),
             force_precision,
@@ -138,15 +141,23 @@ impl Metric {
         part
     }
 
+    /// The same where the steps get these parts of the time of a whole scan, in which the noise is what is stated: its
+    /// variance is as much larger. Steps without an entry get a whole scan.
+    pub(super) fn with_time_shares(mut self, shares: &[f64]) -> Metric {
+        self.share.iter_mut().zip(shares).for_each(|(own, share)| *own = *share);
+        self.capacitance = self.capacitances();
+        self
+    }
+
     /// S⁻¹ + Bᵀ N⁻¹ B per component.
     fn capacitances(&self) -> Vec<Cholesky<f64, Dyn>> {
         let n = self.num_boxes;
         let mut gram = DMatrix::<f64>::zeros(n, n);
-        for (used, scale) in self.is_used.iter().zip(&self.scale) {
+        for ((used, scale), share) in self.is_used.iter().zip(&self.scale).zip(&self.share) {
             for (boxes, _) in self.boxes.iter().zip(used).filter(|(_, used)| **used) {
                 for &i in boxes {
                     for &j in boxes {
-                        gram[(i as usize, j as usize)] += scale * scale;
+                        gram[(i as usize, j as usize)] += share * scale * scale;
                     }
                 }
             }
@@ -170,14 +181,16 @@ impl Metric {
         let mut moments = [0, 1, 2].map(|_| DVector::<f64>::zeros(self.num_boxes));
         let root = self.precision.map(f64::sqrt);
         let mut white = Vec::with_capacity(3 * trace.displacement.iter().map(Vec::len).sum::<usize>());
-        for ((field, used), scale) in trace.displacement.iter().zip(&self.is_used).zip(&self.scale) {
+        let steps = self.is_used.iter().zip(self.scale.iter().zip(&self.share));
+        for (field, (used, (scale, share))) in trace.displacement.iter().zip(steps) {
+            let of_share = share.sqrt();
             for ((u, boxes), used) in field.iter().zip(&self.boxes).zip(used) {
                 for c in 0..3 {
                     let counts = *used && u[c].is_finite();
-                    white.push(if counts { root[c] * u[c] } else { 0.0 });
+                    white.push(if counts { of_share * root[c] * u[c] } else { 0.0 });
                     if counts {
                         for &i in boxes {
-                            moments[c][i as usize] += scale * self.precision[c] * u[c];
+                            moments[c][i as usize] += share * scale * self.precision[c] * u[c];
                         }
                     }
                 }

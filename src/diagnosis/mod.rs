@@ -7,6 +7,7 @@
 //!   with it.
 //! * A misfit counts by its pattern and size: noise and what meshes may leave are in its weights ([`Metric`]).
 //! * [`together()`] looks at several diagnosed recordings.
+//! * [`detectable()`] says of a scan that is planned how small each cause may be and still be named.
 //!
 //! A new cause is a file in `causes` and a line in the registry there. A program on the library needs neither: it
 //! implements [`Cause`], adds its cause to a [`Registry`] and calls [`diagnose_with`] (`examples/own_cause.rs`).
@@ -21,6 +22,7 @@ mod causes;
 mod clusters;
 mod conclusion;
 mod cross_prediction;
+mod detectable;
 mod diagnose;
 mod division;
 mod elastic_table;
@@ -52,8 +54,10 @@ mod memory_kernel;
 mod mesh_error;
 mod metric;
 mod nominal;
+mod noncentral;
 mod options;
 mod outcome;
+mod planned;
 mod prior;
 mod ranked;
 mod registry;
@@ -76,6 +80,7 @@ pub use crate::rate::{BeforeAfter, Verdict};
 pub use cause::{Category, Cause, CauseIdentity, CauseName, CauseParameter, Course};
 pub use cause_fit::CauseFit;
 pub use cross_prediction::CrossPrediction;
+pub use detectable::{DETECTION_PROBABILITY, Detectable, detectable};
 pub use diagnose::{diagnose, diagnose_with};
 pub use division::Division;
 pub use error::DiagnosisError;
@@ -93,6 +98,7 @@ pub use mesh_error::MeshDefect;
 pub use metric::Metric;
 pub use options::DiagnosisOptions;
 pub use outcome::Diagnosis;
+pub use planned::PlannedScan;
 pub use prior::{BulkPrior, FitSettings, ShearPrior};
 pub use ranked::Ranked;
 pub use registry::{Registry, answers, cause_names};

@@ -168,6 +168,22 @@ impl Registry {
         self.entries.iter().flat_map(of_entry).chain(self.own.iter().cloned()).collect()
     }
 
+    /// The parameters of the causes for which every recording of a specimen is tested, each once: the cause, the
+    /// parameter's number among those of that name, and its name. A cause that holds others of its name adds none.
+    pub fn tested_parameters(&self, specimen: &Specimen) -> Vec<(CauseName, usize, String)> {
+        let mut found: Vec<(CauseName, usize, String)> = Vec::new();
+        for cause in self.tested(specimen).iter().filter(|c| !c.is_several_in_one()) {
+            for parameter in cause.parameters() {
+                let own = || found.iter().filter(|(name, ..)| *name == cause.name());
+                let place = own().count();
+                if !own().any(|(_, _, known)| *known == parameter.name) {
+                    found.push((cause.name(), place, parameter.name));
+                }
+            }
+        }
+        found
+    }
+
     /// The parts of the set-up of a recording.
     pub(super) fn set_up(&self, observed: &Observed) -> Vec<Arc<dyn Cause>> {
         let of_entry = |entry: &Entry| match entry.origin {

@@ -5,7 +5,7 @@ use super::candidate::Candidate;
 use super::cause::Cause;
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
-use super::evidence::{EVIDENCE, ROUGH_TOLERANCE, is_large, penalty, smallest_share};
+use super::evidence::{EVIDENCE, ROUGH_TOLERANCE, SPONGE_COUNTS, is_large, penalty, smallest_share};
 use super::experiment::experiments;
 use super::findings::Findings;
 use super::found::FoundCause;
@@ -26,10 +26,6 @@ const AMBIGUITY: f64 = 15.0;
 /// A candidate is fitted where it explains, to first order, more than this part of the smallest share that is called
 /// for: a full fit may explain several times what first order promises.
 const LEAST_PROMISE: f64 = 0.25;
-
-/// The gain of a smooth field without a mechanism counts for this part: it takes up what several causes leave, and
-/// each of them first explains a part of that. What later causes make needless is taken out at the end.
-const SPONGE_COUNTS: f64 = 1.0 / 3.0;
 
 /// How often fits are gone on with as what they look like.
 const MAX_LOOK_ALIKES: usize = 2;

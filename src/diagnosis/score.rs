@@ -52,7 +52,7 @@ impl<'a> ScoreTest<'a> {
         gram.fill_upper_triangle_with_lower_triangle();
         let gradient =
             self.metric.products(&weighed, &self.residual).column(0) - projected.tr_mul(&self.nuisance_residual);
-        Prepared { gram, gradient }
+        Prepared { gram, gradient, projected }
     }
 
     /// Tests all of `directions` together.
@@ -67,12 +67,22 @@ impl ScoreTest<'_> {
     /// What all of `directions` together explain where something is believed of each: `precision` per direction, in
     /// its units.
     pub fn explained_believed(&self, directions: &[Trace], precision: &[f64]) -> f64 {
-        let Prepared { mut gram, gradient } = self.prepare(directions);
+        let Prepared { mut gram, gradient, .. } = self.prepare(directions);
         for (i, p) in precision.iter().enumerate() {
             gram[(i, i)] += p;
         }
         gram.cholesky().map_or(0.0, |factor| gradient.dot(&factor.solve(&gradient)))
     }
+}
+
+/// The inverse of the products of directions, those that depend on others left out. They are scaled to a unit diagonal
+/// first, so that directions of different units can be told from dependent ones.
+fn scaled_inverse(gram: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = gram.nrows();
+    let scale = DVector::from_fn(n, |i, _| 1.0 / gram[(i, i)].max(1e-30).sqrt());
+    let scaled = DMatrix::from_fn(n, n, |i, j| gram[(i, j)] * scale[i] * scale[j]);
+    let inverse = scaled.pseudo_inverse(1e-8).unwrap_or_else(|_| DMatrix::zeros(n, n));
+    DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j])
 }
 
 /// Products of directions with a residual and with each other.
@@ -81,19 +91,33 @@ pub struct Prepared {
     pub gram: DMatrix<f64>,
     /// ⟨dᵢ, residual⟩ likewise.
     pub gradient: DVector<f64>,
+    /// Per nuisance direction (row) and direction (column): how far the nuisance follows in its place.
+    pub projected: DMatrix<f64>,
 }
 
 impl Prepared {
     /// Deviance explained by all directions and their coefficients.
     pub fn solve(&self) -> (f64, Vec<f64>) {
-        let n = self.gradient.len();
-        // Scaled to a unit diagonal, so that directions of different units can be told from dependent ones.
-        let scale = DVector::from_fn(n, |i, _| 1.0 / self.gram[(i, i)].max(1e-30).sqrt());
-        let scaled = DMatrix::from_fn(n, n, |i, j| self.gram[(i, j)] * scale[i] * scale[j]);
-        let right = self.gradient.component_mul(&scale);
-        let solution =
-            scaled.pseudo_inverse(1e-8).map(|inverse| inverse * &right).unwrap_or_else(|_| DVector::zeros(n));
-        (right.dot(&solution), solution.component_mul(&scale).iter().copied().collect())
+        let solution = scaled_inverse(&self.gram) * &self.gradient;
+        (self.gradient.dot(&solution), solution.iter().copied().collect())
+    }
+
+    /// What some of the directions explain of another one's unit change: the fall of the deviance.
+    pub fn explained_of(&self, some: &[usize], other: usize) -> f64 {
+        let cross = self.part(some, &[other]);
+        (cross.tr_mul(&(scaled_inverse(&self.part(some, some)) * &cross)))[(0, 0)]
+    }
+
+    /// How much two sets of directions have in common: the sum of the squared cosines of the angles between them, from
+    /// 0 to the smaller of their numbers.
+    pub fn overlap(&self, some: &[usize], others: &[usize]) -> f64 {
+        let cross = self.part(some, others);
+        let [own, theirs] = [some, others].map(|set| scaled_inverse(&self.part(set, set)));
+        (own * &cross * theirs * cross.transpose()).trace()
+    }
+
+    fn part(&self, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
+        DMatrix::from_fn(rows.len(), columns.len(), |i, j| self.gram[(rows[i], columns[j])])
     }
 
     /// Deviance explained by a sum of some directions with weights, and its coefficient.

@@ -8,14 +8,16 @@ use super::error::DiagnosisError;
 use super::evidence::{EVIDENCE, WORTH_A_FIT};
 use super::fit::{STEP, prior_scales};
 use super::inference::Inference;
+use super::laboratory::{Laboratory, Prediction};
 use super::maps::ScoreMap;
 use super::prior::FitSettings;
 use super::registry::Registry;
 use super::score::ScoreTest;
 use super::search::Search;
-use super::supposed::{Path, Supposed, paths_of};
+use super::supposed::{Path, Supposed, paths_of, scene_of};
 use super::trace::Trace;
 use crate::calibration::Observed;
+use crate::material::Ogden;
 use std::sync::Arc;
 
 /// Most full fits per round.
@@ -55,8 +57,8 @@ pub(super) fn score_suspects(
     scope: RoundScope,
 ) -> Result<RoundScores, DiagnosisError> {
     let observed = inference.laboratory.observed();
-    let suspects = suspects_of(registry, observed, current, scope.has_load_curve);
-    let (nuisance, directions) = directions_of(inference, current, &suspects)?;
+    let suspects = suspects_of(registry, observed, &current.causes, scope.has_load_curve);
+    let (nuisance, directions) = directions_of(&mut inference.laboratory, Place::of(current), &suspects)?;
     let Inference { laboratory, metric, settings, is_cancelled, .. } = inference;
     let test = ScoreTest::new(metric, &current.residual, &nuisance, &nuisance_priors(current, settings));
     let mut candidates: Vec<Candidate> = suspects
@@ -82,7 +84,7 @@ pub(super) fn score_of_set_up(
     current: &CauseFit,
 ) -> Result<f64, DiagnosisError> {
     let parts = registry.set_up(inference.laboratory.observed());
-    let (nuisance, directions) = directions_of(inference, current, &parts)?;
+    let (nuisance, directions) = directions_of(&mut inference.laboratory, Place::of(current), &parts)?;
     let test =
         ScoreTest::new(&inference.metric, &current.residual, &nuisance, &nuisance_priors(current, &inference.settings));
     let precision: Vec<f64> = parts.iter().flat_map(|c| c.parameters()).map(|p| prior_scales(&p).powi(-2)).collect();
@@ -123,36 +125,59 @@ pub(super) fn has_several_drives(observed: &Observed) -> bool {
 /// The suspects for which every recording is tested, as far as this recording can tell of them. What is in the fit
 /// already is free there and is not tested again: nor are plain motions where the plates are free, nor what takes up
 /// whatever is smooth where the set-up is in the fit.
-fn suspects_of(
+pub(super) fn suspects_of(
     registry: &Registry,
     observed: &Observed,
-    current: &CauseFit,
+    found: &[Supposed],
     has_load_curve: bool,
 ) -> Vec<Arc<dyn Cause>> {
     let has_several_drives = has_several_drives(observed);
-    let has = |is: fn(&dyn Cause) -> bool| current.causes.iter().any(|s| is(&*s.cause));
-    let (is_said, has_set_up) = (registry.special_cases(&current.causes), has(|c| c.is_of_set_up()));
+    let has = |is: fn(&dyn Cause) -> bool| found.iter().any(|s| is(&*s.cause));
+    let (is_said, has_set_up) = (registry.special_cases(found), has(|c| c.is_of_set_up()));
     registry
         .tested(&observed.specimen)
         .into_iter()
         .filter(|c| !(has_load_curve && c.is_read_from_load_curve()))
         .filter(|c| has_several_drives || !c.needs_several_drives())
         .filter(|c| !(is_said.contains(&c.name()) || has_set_up && c.is_sponge()))
-        .filter(|c| !current.causes.iter().any(|s| s.cause.identity() == c.identity()))
-        .filter(|c| !(c.is_several_in_one() && current.causes.iter().any(|s| s.cause.name() == c.name())))
+        .filter(|c| !found.iter().any(|s| s.cause.identity() == c.identity()))
+        .filter(|c| !(c.is_several_in_one() && found.iter().any(|s| s.cause.name() == c.name())))
         .collect()
 }
 
-/// Changes of the prediction: with the scaled parameters of the fit so far, and per suspect with its own, in scales.
-fn directions_of(
-    inference: &mut Inference,
-    current: &CauseFit,
+/// Where changes of the prediction are looked at.
+#[derive(Clone, Copy)]
+pub(super) struct Place<'p> {
+    /// The material.
+    pub(super) material: &'p Ogden,
+    /// The causes found so far.
+    pub(super) causes: &'p [Supposed],
+    /// What both predict.
+    pub(super) prediction: &'p Prediction,
+}
+
+impl<'p> Place<'p> {
+    /// Where a fit ended.
+    fn of(fitted: &'p CauseFit) -> Place<'p> {
+        Place { material: &fitted.material, causes: &fitted.causes, prediction: &fitted.prediction }
+    }
+}
+
+/// Changes of the prediction: with the scaled parameters of the material and the causes at `place`, and per suspect
+/// with its own, in scales.
+///
+/// # Errors
+/// [`DiagnosisError::Solve`].
+pub(super) fn directions_of(
+    laboratory: &mut Laboratory,
+    place: Place,
     suspects: &[Arc<dyn Cause>],
 ) -> Result<(Vec<Trace>, Vec<Vec<Trace>>), DiagnosisError> {
+    let Place { material, causes, prediction } = place;
     let with_suspect: Vec<Vec<Supposed>> = suspects
         .iter()
         .map(|cause| {
-            let mut all = current.causes.clone();
+            let mut all = causes.to_vec();
             all.push(Supposed { cause: cause.clone(), values: cause.start() });
             all
         })
@@ -166,10 +191,9 @@ fn directions_of(
             paths.split_off(paths.len() - cause.parameters().len())
         })
         .collect();
-    let known = paths_of(&current.causes);
+    let known = paths_of(causes);
     let paths: Vec<&Path> = known.iter().chain(own.iter().flatten()).collect();
-    let (material, scene) = (&current.material, current.scene());
-    let mut columns = inference.laboratory.derivatives(material, &scene, &current.prediction, true, &paths, STEP)?;
+    let mut columns = laboratory.derivatives(material, &scene_of(causes), prediction, true, &paths, STEP)?;
     let parameters = material.parameters();
     let mut rest = columns.split_off(parameters.len() + known.len());
     for (trace, p) in columns.iter_mut().zip(&parameters) {

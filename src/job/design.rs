@@ -5,8 +5,8 @@ use super::subject::{add_drawings, check_count, num_elements};
 use super::{Context, JobError, Outcome, Progress, RecordingOutline, Request, ResultSchema, Run, cost, summary};
 use crate::calibration::{ParameterSpread, VerifyOptions, verify_in_full};
 use crate::design::{
-    Checkpoint, CheckpointError, DesignEntry, DesignResult, MaterialVerification, SearchError, Study, Unfinished,
-    VerificationSettings, search, study_hash,
+    Checkpoint, CheckpointError, DesignEntry, DesignResult, MaterialVerification, ObjectiveKind, SearchError, Study,
+    Unfinished, VerificationSettings, search, study_hash,
 };
 use crate::field::FieldError;
 use crate::material::Ogden;
@@ -76,8 +76,9 @@ impl Run for CheckedStudy {
     fn estimated_seconds(&self, _: &[RecordingOutline]) -> Option<f64> {
         let (study, budget) = (&self.0, self.0.budget);
         let num_searched = budget.refine.saturating_mul(budget.iterations).saturating_add(budget.explore);
-        // Every material is a solve of its own.
-        let num_materials = study.materials.len().max(1);
+        // Every material is a solve of its own; what a diagnosis would find takes about twice as much again.
+        let num_solves = if study.objective.kind == ObjectiveKind::Detect { 3 } else { 1 };
+        let num_materials = num_solves * study.materials.len().max(1);
         let search = cost::seconds(&study.base, &MeshOptions::search(&study.base), None, num_materials)?;
         let voxel_mm = Some(study.scan.voxel_mm);
         let confirm = cost::seconds(&study.base, &MeshOptions::standard(&study.base), voxel_mm, num_materials)?;

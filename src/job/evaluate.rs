@@ -1,11 +1,12 @@
 //! Evaluate: what a scan of a specimen would see and what it would tell about the material.
 
+use super::detectable::{check_detectable, detectable_sizes, detection_seconds};
 use super::subject::{add_drawings, check_meshes, driven, model_of, name_of_sample};
 use super::{Context, JobError, Outcome, RecordingOutline, Request, ResultSchema, Run, cost, defaults, summary};
 use crate::field::FieldError;
 use crate::material::Ogden;
 use crate::mesh::MeshSize;
-use crate::report::{bar_pictures, histogram_picture, map_pictures, surface_json, vtu_of};
+use crate::report::{bar_pictures, detectable_picture, histogram_picture, map_pictures, surface_json, vtu_of};
 use crate::sensitivity::{
     DriveSelection, Evaluation, EvaluationError, EvaluationMaps, EvaluationOptions, Fixture, Protocol, ScanSettings,
     evaluate_fixture,
@@ -54,6 +55,10 @@ pub struct EvaluationRequest {
     /// Mesh the whole specimen even where it has mirror planes.
     #[serde(default)]
     pub is_whole: bool,
+    /// Whether the result says how small errors of the experiment may be and still be named by a diagnosis with 90 %
+    /// probability (`detectable`). It takes one more equilibrium of the whole sample at every drive.
+    #[serde(default)]
+    pub has_detectable: bool,
     /// Whether pictures, fields and drawings are made; without them there are numbers alone.
     #[serde(default = "defaults::yes")]
     #[schema(default = defaults::yes)]
@@ -92,6 +97,9 @@ impl EvaluationRequest {
             (None, None) => DriveSelection::DriveMm(self.specimen.drive_mm.clone()),
         };
         self.protocol.suits(&self.specimen, drives.count()).map_err(|e| vec![e.field_error().below("/protocol")])?;
+        if self.has_detectable {
+            check_detectable(&self.specimen, &self.scan, &self.protocol, drives.count()).map_err(|e| vec![e])?;
+        }
         Ok(CheckedEvaluation { request: self, drives })
     }
 }
@@ -155,21 +163,23 @@ impl Run for CheckedEvaluation {
             // The drive is looked for first.
             DriveSelection::MedianStretch(_) => MEDIAN_STRETCH_SOLVES,
         };
-        let voxel_mm = Some(self.request.scan.voxel_mm);
-        cost::seconds(&self.request.specimen, &self.options().mesh, voxel_mm, num_drives)
+        let EvaluationRequest { specimen, scan, has_detectable, .. } = &self.request;
+        let evaluation = cost::seconds(specimen, &self.options().mesh, Some(scan.voxel_mm), num_drives)?;
+        let detection = if *has_detectable { detection_seconds(specimen, scan, self.drives.count())? } else { 0.0 };
+        Some(evaluation + detection)
     }
 
     fn equal_work(&self) -> Option<(serde_json::Value, bool)> {
         let r = &self.request;
         let content = serde_json::json!({
             "specimen": r.specimen, "material": r.material, "scan": r.scan, "drives": self.drives,
-            "mesh": self.options().mesh, "protocol": r.protocol,
+            "mesh": self.options().mesh, "protocol": r.protocol, "has_detectable": r.has_detectable,
         });
         Some((content, !r.has_files))
     }
 
     fn run(&self, context: &Context) -> Result<Outcome, JobError> {
-        let EvaluationRequest { specimen, material, scan, .. } = &self.request;
+        let EvaluationRequest { specimen, material, scan, protocol, .. } = &self.request;
         context.step("solve", 0, 2);
         let options = self.options();
         let models = specimen
@@ -182,12 +192,16 @@ impl Run for CheckedEvaluation {
             let found = evaluate_fixture(&mut fixture, material, &self.drives, &[], &options, &cancelled)?;
             Ok((fixture, found))
         });
-        let (fixture, (evaluation, maps)) = evaluated.map_err(|e| match e {
+        let (fixture, (mut evaluation, maps)) = evaluated.map_err(|e| match e {
             EvaluationError::Solve(_) | EvaluationError::MedianStretchNotReached { .. } => context.failed(&e),
             other => FieldError::new("", "an evaluation that cannot be made", "one that can")
                 .remedy(other.to_string())
                 .into(),
         })?;
+        if self.request.has_detectable {
+            context.step("what would be found", 1, 2);
+            evaluation.detectable = detectable_sizes(specimen, material, protocol, &evaluation, context)?;
+        }
         let text = summary::evaluation(&specimen.name, &evaluation);
         let mut outcome = Outcome::new("evaluation.json", &evaluation, text)?;
         if !self.request.has_files {
@@ -195,6 +209,9 @@ impl Run for CheckedEvaluation {
         }
         context.step("pictures", 1, 2);
         outcome.add_pictures(bar_pictures(&evaluation));
+        if self.request.has_detectable {
+            outcome.add("detectable.svg", detectable_picture(&evaluation.detectable));
+        }
         self.add_samples(&mut outcome, &fixture, &maps, context)?;
         add_drawings(&mut outcome, specimen, "specimen")?;
         Ok(outcome)

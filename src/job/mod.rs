@@ -17,6 +17,7 @@ mod curves;
 pub mod defaults;
 mod design;
 mod design_pictures;
+mod detectable;
 mod diagnose;
 mod error;
 mod evaluate;

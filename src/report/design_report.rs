@@ -2,8 +2,8 @@
 
 use super::{
     BarGroup, CalloutKind, Column, GroupedBars, HistoryPlot, HistoryPoint, LimitBar, LimitsPlot, ParetoPlot,
-    ParetoPoint, PointKind, RankedItem, RankingPlot, Report, ReportHeader, Table, design_verification::verification,
-    significant, symbol_of_parameter,
+    ParetoPoint, PointKind, RankedItem, RankingPlot, Report, ReportHeader, Table, design_detection::detection,
+    design_verification::verification, significant, symbol_of_parameter,
 };
 use crate::design::{DesignEntry, DesignResult, block_in_brief, holes_in_brief};
 use crate::specimen::{LimitMargin, Specimen, to_svg};
@@ -125,6 +125,7 @@ pub fn design_report(result: &DesignResult, pictures: &DesignPictures) -> String
     page.section("Best against base");
     page.table(&gains_table(&result.best));
     page.figures(&gain_bars(result));
+    detection(&mut page, result);
     if !pictures.histogram.is_empty() {
         page.figure(
             &pictures.histogram,

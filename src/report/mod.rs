@@ -20,6 +20,7 @@
 //! | curves and histograms of residuals | [`LinePlot`] |
 //! | losses over two parameters | [`ContourPlot`] |
 //! | two rankings of the same designs | [`RankingPlot`] |
+//! | the smallest errors that would be named | [`detectable_picture`] |
 //! | measured curves with their fits and residuals | [`CurvesPlot`] |
 //!
 //! Files: [`Vtu`] for ParaView, [`Report`] for the browser.
@@ -35,8 +36,10 @@ mod correlation;
 mod curve_pictures;
 mod curves;
 mod density;
+mod design_detection;
 mod design_report;
 mod design_verification;
+mod detectable;
 mod detection;
 mod diagnosis_pictures;
 mod diagnosis_report;
@@ -84,7 +87,9 @@ pub use correlation::CorrelationPlot;
 pub use curve_pictures::{fit_picture, load_curve_pictures};
 pub use curves::{CurveSeries, CurvesPlot};
 pub use density::{DensityPanel, DensityPlot};
+pub use design_detection::{ComparedSize, compared_sizes};
 pub use design_report::{DesignPictures, design_report};
+pub use detectable::{detectable_picture, telling, which_of};
 pub use detection::detection_picture;
 pub use diagnosis_pictures::diagnosis_pictures;
 pub use diagnosis_report::diagnosis_report;

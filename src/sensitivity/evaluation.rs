@@ -123,6 +123,7 @@ pub fn evaluate_fixture(
         promised_sd: Vec::new(),
         correlation: Vec::new(),
         condition_number: None,
+        detectable: Vec::new(),
         largest_principal_stretch: steps.iter().map(|s| s.largest_principal_stretch).fold(f64::NAN, f64::max),
         steps,
         force_steps,

@@ -1,6 +1,7 @@
 //! The result of an evaluation (`evaluation/1`).
 
 use super::covariance::PromisedSd;
+use super::detectable_size::DetectableSize;
 use super::observation::EvaluationStep;
 use super::scan_settings::ScanSettings;
 use super::shares::BestShares;
@@ -34,6 +35,10 @@ pub struct Evaluation {
     pub correlation: Vec<Vec<Option<f64>>>,
     /// Largest over smallest eigenvalue of the relative covariance of all μᵢ, αᵢ; null where undetermined.
     pub condition_number: Option<f64>,
+    /// How small errors of the experiment may be and still be named by a diagnosis with 90 % probability, cause by
+    /// cause; empty unless it was asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub detectable: Vec<DetectableSize>,
     /// Largest principal stretch at any drive.
     pub largest_principal_stretch: f64,
     /// Material volume of the masks of all scanned blocks, mm³.

@@ -2,6 +2,7 @@
 
 mod continuum;
 mod covariance;
+mod detectable_size;
 mod drives;
 mod error;
 mod evaluation;
@@ -23,6 +24,7 @@ pub use continuum::{
     integrate_over_blocks, integrate_over_quadrature, largest_principal_stretch, median_stretch_over_quadrature,
 };
 pub use covariance::{Covariance, Criterion, IDENTIFIABILITY_LIMIT, PromisedSd};
+pub use detectable_size::{DetectableSize, DetectionLimit};
 pub use drives::DriveSelection;
 pub use error::EvaluationError;
 pub use evaluation::{EvaluationMaps, SampleMaps, evaluate, evaluate_fixture, unknowns_of};

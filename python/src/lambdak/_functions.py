@@ -115,6 +115,7 @@ def evaluate(
     median_stretch: Optional[float] = None,
     mesh: Optional[Mesh] = None,
     protocol: Optional[Fields] = None,
+    has_detectable: Optional[bool] = None,
     has_files: Optional[bool] = None,
     is_whole: Optional[bool] = None,
     folder: Optional[PathLike] = None,
@@ -123,7 +124,8 @@ def evaluate(
 ) -> Evaluation:
     """What a scan of a specimen would see, and what it would tell about the material.
 
-    `has_files=False` makes numbers alone, for loops over designs.
+    `has_files=False` makes numbers alone, for loops over designs. `has_detectable=True` says how small errors of the
+    experiment may be and still be named by a diagnosis (`detectable` of the result).
     """
     request = given(
         specimen=specimen,
@@ -133,6 +135,7 @@ def evaluate(
         median_stretch=median_stretch,
         mesh=mesh,
         protocol=protocol,
+        has_detectable=has_detectable,
         has_files=has_files,
         is_whole=is_whole,
     )

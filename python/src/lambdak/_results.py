@@ -178,18 +178,49 @@ def _evaluation_step(step: Mapping[str, Any]) -> EvaluationStep:
     )
 
 
+def _detectable(entry: Mapping[str, Any]) -> "DetectableSize":
+    size = entry["size"]
+    return DetectableSize(
+        cause=entry["cause"],
+        description=entry["description"],
+        parameter=entry["parameter"],
+        size=math.inf if size is None else size,
+        limited_by=entry["limited_by"],
+        rival=entry.get("rival"),
+    )
+
+
+@dataclass(frozen=True)
+class DetectableSize:
+    """The smallest size of one parameter of a cause that a diagnosis would name with 90 % probability."""
+
+    cause: str
+    description: str
+    parameter: str
+    size: float
+    """In the unit that the parameter's name ends with; infinite where it would never be named."""
+    limited_by: str
+    rival: Optional[str] = None
+
+
 @dataclass(frozen=True, eq=False)
 class Evaluation(Result):
-    """What a scan would see and tell (`evaluation/1`). `promised_sd` is of all drives together."""
+    """What a scan would see and tell (`evaluation/1`). `promised_sd` is of all drives together.
+
+    `detectable` is empty unless the evaluation was made with `has_detectable=True`.
+    """
 
     steps: Tuple[EvaluationStep, ...]
     promised_sd: Mapping[str, PromisedSd]
+    detectable: Tuple[DetectableSize, ...] = ()
 
     @classmethod
     def of(cls, raw: Mapping[str, Any], folder: Path) -> "Evaluation":
         """From the program's JSON."""
         steps = tuple(_evaluation_step(step) for step in raw["steps"])
-        return cls(raw, folder, (), steps=steps, promised_sd=_promised(raw["promised_sd"]))
+        detectable = tuple(_detectable(entry) for entry in raw.get("detectable", ()))
+        promised_sd = _promised(raw["promised_sd"])
+        return cls(raw, folder, (), steps=steps, promised_sd=promised_sd, detectable=detectable)
 
     @property
     def correlation(self) -> npt.NDArray[np.float64]:

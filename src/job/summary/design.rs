@@ -2,6 +2,7 @@
 
 use super::num;
 use crate::design::{DesignEntry, DesignResult};
+use crate::report::{ComparedSize, compared_sizes};
 use crate::specimen::LimitMargin;
 
 /// The result as text.
@@ -44,6 +45,15 @@ pub(in crate::job) fn design(result: &DesignResult) -> String {
             show(g.integrated_sensitivity),
             show(g.promised_sd)
         );
+    }
+    let sizes = compared_sizes(result);
+    if !sizes.is_empty() {
+        text += "\n  errors that a diagnosis would name with 90 % probability, from these sizes on\n";
+        text += "  material     cause          parameter                                   base   recommended\n";
+    }
+    for s in &sizes {
+        let [base, own] = [s.base, s.recommended].map(ComparedSize::shown);
+        text += &format!("  {:<12} {:<14} {:<36} {base:>11} {own:>13}\n", s.material, s.cause, s.parameter);
     }
     for v in &result.verification_by_material {
         text += &format!("\n  verification on synthetic noisy scans, material \"{}\"\n", v.material);

@@ -1,7 +1,8 @@
 //! An evaluation as text.
 
 use super::num;
-use crate::sensitivity::{Evaluation, PromisedSd};
+use crate::report::{telling, which_of};
+use crate::sensitivity::{DetectableSize, Evaluation, PromisedSd};
 
 /// The evaluation as text.
 pub(in crate::job) fn evaluation(name: &str, evaluation: &Evaluation) -> String {
@@ -45,6 +46,24 @@ pub(in crate::job) fn evaluation(name: &str, evaluation: &Evaluation) -> String 
         let shares: Vec<String> = best.scan_share.iter().map(|s| format!("{:.1} %", 100.0 * s)).collect();
         text += &format!("\nbest shares of the scan's time: {}; they promise\n", shares.join(", "));
         text += &promised(&best.promised_sd);
+    }
+    if !evaluation.detectable.is_empty() {
+        text += "\nerrors that a diagnosis would name with 90 % probability, from these sizes on\n";
+        text += &detectable(&evaluation.detectable);
+    }
+    text
+}
+
+/// Sizes of errors, a line each; of a cause with many parameters the hardest alone.
+fn detectable(sizes: &[DetectableSize]) -> String {
+    let mut text = String::new();
+    for (row, num_alike) in telling(sizes) {
+        let name = format!("{}{}", row.cause, which_of(row));
+        let size = row.size.map_or_else(|| "never".into(), |size| num(size, 3));
+        let rival = row.rival.as_ref().map_or_else(String::new, |rival| format!(", {rival}"));
+        let hardest = if num_alike > 1 { format!(" (hardest of {num_alike})") } else { String::new() };
+        let limit = row.limited_by.words();
+        text += &format!("  {name:<14} {size:>9}  {:<36} limited by {limit}{rival}{hardest}\n", row.parameter);
     }
     text
 }
