@@ -65,11 +65,11 @@ impl Mesh {
         self.check_jacobians()?;
         self.check_faces(&domain)?;
         let volume = self.volume();
-        let curved = if domain.discs.is_empty() && !domain.is_dumbbell {
+        let curved = if domain.holes.is_empty() && !domain.is_dumbbell {
             0.0
         } else {
-            let discs: f64 = domain.discs.iter().map(|d| std::f64::consts::PI * d.radius * d.radius).sum();
-            ARC_AREA_TOLERANCE * domain.depth() * (discs + if domain.is_dumbbell { 8.0 } else { 0.0 })
+            let holes: f64 = domain.holes.iter().map(|d| d.wall.area_mm2()).sum();
+            ARC_AREA_TOLERANCE * domain.depth() * (holes + if domain.is_dumbbell { 8.0 } else { 0.0 })
         };
         let (expected_mm3, tolerance_mm3) = (domain.area() * domain.depth(), curved + 1e-9 * volume.abs());
         let difference = (volume - expected_mm3).abs();
@@ -277,11 +277,10 @@ fn is_on_surface(domain: &Domain, positions: &[[f64; 3]]) -> bool {
     if on_profile(1.0) || (domain.bottom < 0.0 && on_profile(-1.0)) {
         return true;
     }
-    domain.discs.iter().any(|d| {
-        positions
-            .iter()
-            .all(|p| ((p[0] - d.center[0]).hypot(p[domain.b_axis] - d.center[1]) - d.radius).abs() < tolerance)
-    })
+    domain
+        .holes
+        .iter()
+        .any(|d| positions.iter().all(|p| d.wall.distance_mm([p[0], p[domain.b_axis]]).abs() < tolerance))
 }
 
 #[cfg(test)]
