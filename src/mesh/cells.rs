@@ -302,12 +302,13 @@ fn wall_parameters(wall: &HoleWall, points: &[[f64; 2]]) -> Vec<f64> {
     let weight = 0.5f64.min((LONGEST_STEP - 1.0) * equal / (longest - equal).max(1e-12));
     let mut corners: Vec<f64> =
         radial.iter().enumerate().map(|(i, r)| start + (1.0 - weight) * equal * i as f64 + weight * r).collect();
+    let mut is_moved = vec![false; n];
     for jump in wall.breaks() {
         let at = start + (jump - start).rem_euclid(TAU);
         let nearest = (1..n).min_by(|&i, &j| (corners[i] - at).abs().total_cmp(&(corners[j] - at).abs()));
         // The ends belong to the edges beside as well, and a corner that is far keeps its step.
-        if let Some(i) = nearest.filter(|&i| (corners[i] - at).abs() < LARGEST_MOVE * equal) {
-            corners[i] = at;
+        if let Some(i) = nearest.filter(|&i| !is_moved[i] && (corners[i] - at).abs() < LARGEST_MOVE * equal) {
+            (corners[i], is_moved[i]) = (at, true);
         }
     }
     with_middles(&corners)
