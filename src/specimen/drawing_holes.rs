@@ -78,13 +78,13 @@ impl Drawing {
     }
 }
 
-/// What a hole's label says of it.
+/// What a hole's label says of it; what kind it is the drawing shows and the table says.
 fn size_in_words(hole: &Hole) -> String {
     match hole.shape {
         None => format!("⌀{}", format_mm(hole.diameter_mm)),
-        Some(HoleShape { kind, length_mm, angle_deg }) => {
+        Some(HoleShape { length_mm, angle_deg, .. }) => {
             let [length, width] = [length_mm, hole.diameter_mm].map(format_mm);
-            format!("{} {length}×{width}, {}°", kind.name(), format_deg(angle_deg))
+            format!("{length}×{width}, {}°", format_deg(angle_deg))
         }
     }
 }

@@ -247,19 +247,18 @@ impl HoleWall {
         if self.form == Form::Ellipse {
             return self.section_point([a * t.cos(), b * t.sin()]);
         }
-        // Fold into the first quarter.
-        let turned = t.rem_euclid(TAU);
-        let half_turn = turned.rem_euclid(PI);
-        let is_second = half_turn > FRAC_PI_2;
-        let within = if is_second { PI - half_turn } else { half_turn } / self.round_share();
+        // Fold into the first quarter, by what is symmetric to the last bit.
+        let turned = t - TAU * (t / TAU).round();
+        let from_axis = turned.abs().min(PI);
+        let is_second = from_axis > FRAC_PI_2;
+        let within = if is_second { PI - from_axis } else { from_axis } / self.round_share();
         let s = self.half_straight();
         let [along, across] = if within <= FRAC_PI_2 {
             [s + b * within.cos(), b * within.sin()]
         } else {
             [s - (within - FRAC_PI_2) * b / STRAIGHT_RATE, b]
         };
-        let sign = if turned >= PI { -1.0 } else { 1.0 };
-        self.section_point([sign * if is_second { -along } else { along }, sign * across])
+        self.section_point([if is_second { -along } else { along }, if turned < 0.0 { -across } else { across }])
     }
 
     /// The parameter of the point of the wall that is nearest to `p`, in (−π, π] (plus the hole's angle).

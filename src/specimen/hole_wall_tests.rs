@@ -167,6 +167,26 @@ fn quarter_turns_are_exact() {
     assert_eq!(wall.half_extents_mm(), [3.0, 1.0]);
 }
 
+/// Parameters at and beside the ends of a hole's axes, where angles wrap.
+#[test]
+fn ends_of_axes_are_met_from_either_side() {
+    for kind in [HoleKind::Ellipse, HoleKind::Slot] {
+        for angle_deg in [0.0f64, 90.0, -90.0, 180.0, 30.0] {
+            let wall = hole(Some(kind), [0.0; 2], 2.0, 2.5, angle_deg).wall();
+            for quarter in -4..=8 {
+                let local = FRAC_PI_2 * f64::from(quarter);
+                let expected = wall.turned([2.5 * local.cos(), local.sin()]);
+                for beside in [0.0, 1e-16, -1e-16, 1e-12, -1e-12] {
+                    let p = wall.point_at(angle_deg.to_radians() + local + beside);
+                    // The step beside, as far as a straight line advances per radian, and rounding.
+                    let apart = (p[0] - expected[0]).hypot(p[1] - expected[1]);
+                    assert!(apart < 1e-11, "{kind:?} {angle_deg} {quarter} {beside}: {p:?} {expected:?}");
+                }
+            }
+        }
+    }
+}
+
 /// A half-turned hole is the same one, mirrors turn it the other way, and a slot is no ellipse.
 #[test]
 fn differences_of_holes() {
