@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{bar, model, never, norm, norm_of_sum, off_axis, solve, tight, two_holes, two_terms};
+use common::{bar, ellipse_and_slot, model, never, norm, norm_of_sum, off_axis, solve, tight, two_holes, two_terms};
 use lambdak::fem::{Equilibrium, ForwardModel, ParameterSensitivity};
 use lambdak::material::Ogden;
 use lambdak::mesh::{DesignVariable, morphed, shape_velocity};
@@ -136,10 +136,24 @@ fn drive_derivatives_are_of_second_order() {
 
 #[test]
 fn shape_derivatives_are_of_second_order() {
-    use DesignVariable::{BlockLength, BlockThickness, BlockWidth, HoleDiameter, HoleOther, HoleX};
+    use DesignVariable::{
+        BlockLength, BlockThickness, BlockWidth, HoleAngle, HoleDiameter, HoleLength, HoleOther, HoleX,
+    };
     let mut failures = Vec::new();
     for variable in [HoleX(0), HoleOther(1), HoleDiameter(0), BlockLength, BlockThickness, BlockWidth] {
         check_path(&format!("off-axis holes, {variable:?}"), &off_axis(), 5.0, Some(variable), 0.02, &mut failures);
+    }
+    let with_outlines = ellipse_and_slot();
+    // A degree moves the ends of these holes by 0.05 mm.
+    for (variable, step) in [
+        (HoleLength(0), 0.02),
+        (HoleLength(1), 0.02),
+        (HoleAngle(0), 0.5),
+        (HoleAngle(1), 0.5),
+        (HoleDiameter(1), 0.02),
+    ] {
+        let name = format!("ellipse and slot, {variable:?}");
+        check_path(&name, &with_outlines, 5.0, Some(variable), step, &mut failures);
     }
     for variable in [HoleDiameter(0), BlockThickness] {
         check_path(&format!("bar, {variable:?}"), &bar(), 20.0, Some(variable), 0.02, &mut failures);

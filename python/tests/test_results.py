@@ -23,7 +23,9 @@ class Parts(Scratch):
     def test_specimens_and_materials_come_back_from_json(self):
         thicker = lk.Sample(12, 5, 9, holes=[lk.Hole((0, 0), 2)])
         bent = bar(holes=[lk.Hole((1.5, 0.25), 2.0, axis="width")], outline="block")
-        for part in (bar(), block(), bent, block().replace(other_samples=[thicker])):
+        slot = lk.Hole((1.5, 0.25), 2.0, shape=lk.HoleShape("slot", 4.0, angle_deg=30))
+        slotted = bar(holes=[slot], outline="block")
+        for part in (bar(), block(), bent, slotted, block().replace(other_samples=[thicker])):
             self.assertEqual(type(part).from_json(part.to_json()), part)
             part.to_json(self.folder / "part.json")
             self.assertEqual(type(part).from_json(self.folder / "part.json"), part)

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::design::space::subspaces;
+use crate::design::study::{AngleRange, Range, VaryHoleShapes};
 use crate::mesh::{mesh_specimen, morphed};
 use crate::sensitivity::Protocol;
 use std::path::Path;
@@ -37,9 +38,42 @@ fn every_gradient_passes_the_taylor_test() {
         .iter()
         .find(|s| s.structure.num_holes() == 2 && s.structure.axis == crate::specimen::HoleAxis::Thickness)
         .expect("two holes are allowed");
-    let mut evaluator = Evaluator::new(&study).with_coarseness(1.5);
+    // The second hole's variables are of the same kinds as the first's.
+    let is_left_out = |variable| matches!(variable, Variable::X(1) | Variable::Other(1) | Variable::Diameter(1));
+    let variables = space.variables.iter().copied().filter(|v| !is_left_out(*v)).collect::<Vec<_>>();
+    check_gradients(&study, &specimen, space, &variables);
+}
+
+/// The same of an ellipse's and a slot's extents and angle.
+#[test]
+fn gradients_of_outlines_pass_the_taylor_test() {
+    use crate::specimen::{HoleKind, HoleShape};
+    let mut study = study();
+    study.vary.hole_shapes = Some(VaryHoleShapes {
+        kinds: vec![HoleKind::Ellipse, HoleKind::Slot],
+        elongation_mm: Range { min: 0.5, max: 6.0 },
+        angle_deg: AngleRange::default(),
+    });
+    for kind in [HoleKind::Ellipse, HoleKind::Slot] {
+        let mut specimen = study.base.clone();
+        specimen.drive_mm = vec![5.0];
+        specimen.holes[0].center_mm = [-4.6, 1.3];
+        for (hole, angle_deg) in specimen.holes.iter_mut().zip([30.0, -70.0]) {
+            hole.diameter_mm = 3.2;
+            hole.shape = Some(HoleShape { kind, length_mm: 5.6, angle_deg });
+        }
+        let all = subspaces(&study);
+        let space = all.iter().find(|s| s.vector_of(&specimen, 5.0).is_some()).expect("two such holes are allowed");
+        let variables = [Variable::Diameter(0), Variable::Elongation(0), Variable::Angle(0)];
+        check_gradients(&study, &specimen, space, &variables);
+    }
+}
+
+/// See the tests that call it.
+fn check_gradients(study: &Study, specimen: &Specimen, space: &Subspace, variables: &[Variable]) {
+    let mut evaluator = Evaluator::new(study).with_coarseness(1.5);
     evaluator.solve.tolerance = 1e-10;
-    let mesh = mesh_specimen(&specimen, &evaluator.mesh_options(&specimen)).expect("a mesh");
+    let mesh = mesh_specimen(specimen, &evaluator.mesh_options(specimen)).expect("a mesh");
     let at = |mesh: crate::mesh::Mesh, drive: f64, thicker_mm: f64, moves: &[Move]| {
         // The model takes the plates' distance from the specimen.
         let mut moved = specimen.clone();
@@ -50,19 +84,18 @@ fn every_gradient_passes_the_taylor_test() {
         let responses = evaluator.responses(&[Shown::as_solved(&block, &solved)]).expect("responses");
         (block, solved, responses.iter().map(Response::to_vector).collect::<Vec<_>>())
     };
-    for &variable in &space.variables {
-        // The second hole's variables are of the same kinds as the first's.
-        if matches!(variable, Variable::X(1) | Variable::Other(1) | Variable::Diameter(1)) {
-            continue;
-        }
-        let model = ForwardModel::new(mesh.clone(), &specimen).expect("a model");
-        let moves = vec![a_move(&model, (&specimen, 0), space, variable)];
+    for &variable in variables {
+        // Steps count in mm at the wall: ten degrees move the ends of a hole by half a millimetre.
+        let unit = if matches!(variable, Variable::Angle(_)) { 20.0 } else { 1.0 };
+        let model = ForwardModel::new(mesh.clone(), specimen).expect("a model");
+        let moves = vec![a_move(&model, (specimen, 0), space, variable)];
         let (block, solved, here) = at(mesh.clone(), 5.0, 0.0, &moves);
-        let gradients = evaluator.gradient(&[block], &[solved], 0, &[moves]).expect("a gradient");
+        let mut gradients = evaluator.gradient(&[block], &[solved], 0, &[moves]).expect("a gradient");
+        gradients.iter_mut().flatten().for_each(|slope| *slope *= unit);
         let value = |h: f64| -> Vec<Vec<f64>> {
             let mut moved = mesh.clone();
             for (design_variable, sign) in space.moves(variable, 0) {
-                moved = morphed(&moved, &shape_velocity(&mesh, &specimen, design_variable), sign * h);
+                moved = morphed(&moved, &shape_velocity(&mesh, specimen, design_variable), sign * unit * h);
             }
             let of = |which: Variable| if variable == which { h } else { 0.0 };
             at(moved, 5.0 + of(Variable::Drive), of(Variable::Thickness), &[]).2

@@ -82,7 +82,7 @@ fn shrink(
         }
         let mut is_shrunk = false;
         for (v, variable) in subspace.variables.iter().enumerate() {
-            if matches!(variable, Variable::Diameter(_)) && vector[v] > 1e-3 {
+            if matches!(variable, Variable::Diameter(_) | Variable::Elongation(_)) && vector[v] > 1e-3 {
                 vector[v] *= 0.6;
                 is_shrunk = true;
             }

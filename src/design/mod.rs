@@ -33,6 +33,7 @@ mod search_tests;
 mod shown;
 mod space;
 mod state;
+mod structure;
 mod structure_problem;
 mod study;
 mod study_check;
@@ -68,8 +69,11 @@ pub use result::{DesignResult, MaterialVerification, Verification};
 pub use search::{Found, base_at_drive, search};
 pub use search_error::SearchError;
 pub use search_run::{Progress, ProgressSink};
-pub use space::{Orbit, Structure, Subspace, Variable, subspaces};
-pub use study::{Budget, CountRange, MaterialPrior, Range, Study, Vary, VarySample, VerificationSettings};
+pub use space::{Subspace, Variable, subspaces};
+pub use structure::{Orbit, Structure};
+pub use study::{
+    AngleRange, Budget, CountRange, MaterialPrior, Range, Study, Vary, VaryHoleShapes, VarySample, VerificationSettings,
+};
 pub use study_error::StudyError;
 pub use study_hash::study_hash;
 pub use unfinished::Unfinished;

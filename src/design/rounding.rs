@@ -6,8 +6,8 @@ use crate::specimen::{Block, Hole, ManufacturingLimits, Specimen};
 /// The step where limits state none, mm.
 const USUAL_STEP_MM: f64 = 0.1;
 
-/// The design nearest to `specimen` whose dimensions, places and drive are multiples of the limits' step, and that can
-/// be made: holes are smaller by up to two steps where the nearest ones come too close to something. Punches keep their
+/// The design nearest to `specimen` whose dimensions, places and drive are multiples of the limits' step, whose angles are
+/// whole degrees, and that can be made: holes are smaller by up to two steps where the nearest ones come too close to something. Punches keep their
 /// diameters. `None` where no such design can be made.
 pub(super) fn in_steps(specimen: &Specimen, limits: &ManufacturingLimits, voxel_mm: [f64; 3]) -> Option<Specimen> {
     let step = limits.dimension_step_mm.unwrap_or(USUAL_STEP_MM);
@@ -18,15 +18,30 @@ pub(super) fn in_steps(specimen: &Specimen, limits: &ManufacturingLimits, voxel_
         for length in [&mut block.length_mm, &mut block.thickness_mm, &mut block.width_mm] {
             *length = nearest(*length);
         }
-        holes.iter_mut().for_each(|hole| hole.center_mm = hole.center_mm.map(nearest));
+        for hole in holes.iter_mut() {
+            hole.center_mm = hole.center_mm.map(nearest);
+            hole.shape.iter_mut().for_each(|shape| shape.angle_deg = shape.angle_deg.round());
+        }
     }
     if limits.punches_mm.is_some() {
+        for (_, holes) in shapes_of(&mut rounded) {
+            for hole in holes.iter_mut() {
+                let width = hole.diameter_mm;
+                hole.shape.iter_mut().for_each(|shape| shape.length_mm = nearest(shape.length_mm).max(width));
+            }
+        }
         return Some(rounded).filter(|s| is_makeable(s, limits, voxel_mm));
     }
     let with_diameters = |of: &dyn Fn(f64) -> f64| {
         let mut made = rounded.clone();
         for (_, holes) in shapes_of(&mut made) {
-            holes.iter_mut().for_each(|hole| hole.diameter_mm = multiple(step, of(hole.diameter_mm / step)));
+            for hole in holes.iter_mut() {
+                hole.diameter_mm = multiple(step, of(hole.diameter_mm / step));
+                // Rounded as well, a hole as long as wide stays as long as wide.
+                if let Some(shape) = &mut hole.shape {
+                    shape.length_mm = multiple(step, of(shape.length_mm / step)).max(hole.diameter_mm);
+                }
+            }
         }
         made
     };
@@ -72,13 +87,25 @@ mod tests {
         assert_eq!(made.holes[0].diameter_mm, 5.0);
     }
 
+    /// Lengths are multiples too, angles whole degrees, and no hole becomes wider than long.
+    #[test]
+    fn outlines_are_rounded() {
+        use crate::specimen::{HoleKind, HoleShape};
+        let (mut specimen, limits) = published();
+        let shape = HoleShape { kind: HoleKind::Slot, length_mm: 6.4449, angle_deg: 29.6 };
+        specimen.holes[0].shape = Some(shape);
+        specimen.holes[1].shape = Some(HoleShape { length_mm: 5.0 + 1e-6, angle_deg: -0.2, ..shape });
+        let made = in_steps(&specimen, &limits, [1.0; 3]).expect("it can be made");
+        let of = |i: usize| made.holes[i].shape.map(|s| (s.length_mm, s.angle_deg));
+        assert_eq!((of(0), of(1)), (Some((6.4, 30.0)), Some((5.0, -0.0))));
+    }
+
     /// A ligament at its limit is not rounded away: the holes give way.
     #[test]
     fn ligaments_are_kept() {
         let (mut specimen, limits) = published();
         // 1.5 mm between the holes as drawn; places rounded inwards would leave 1.42.
-        let [a, b] =
-            [-3.2449, 3.2449].map(|x| Hole { axis: HoleAxis::Thickness, center_mm: [x, 0.0], diameter_mm: 4.9898 });
+        let [a, b] = [-3.2449, 3.2449].map(|x| Hole::circle(HoleAxis::Thickness, [x, 0.0], 4.9898));
         specimen.holes = vec![a, b];
         let made = in_steps(&specimen, &limits, [1.0; 3]).expect("it can be made");
         assert!(made.holes.iter().all(|h| h.diameter_mm < 4.95), "{:?}", made.holes);

@@ -207,6 +207,58 @@ fn the_base_has_a_vector() {
     }
 }
 
+/// Holes of every outline have a vector that gives them back, also where symmetry ties them, and one design is of one
+/// structure.
+#[test]
+fn designs_with_outlines_have_a_vector() {
+    use crate::specimen::{Hole, HoleAxis, HoleKind, HoleShape, Symmetry};
+    let mut study = small_study();
+    study.limits.punches_mm = None;
+    study.limits.diameter_mm = Some(crate::specimen::DiameterRange { min: 1.0, max: 5.0 });
+    study.vary.hole_count = CountRange { min: 0, max: 2 };
+    study.vary.hole_shapes = Some(VaryHoleShapes {
+        kinds: vec![HoleKind::Ellipse, HoleKind::Slot],
+        elongation_mm: Range { min: 0.5, max: 6.0 },
+        angle_deg: AngleRange::default(),
+    });
+    let hole = |kind, center_mm, angle_deg| {
+        let shape = Some(HoleShape { kind, length_mm: 4.5, angle_deg });
+        Hole { axis: HoleAxis::Thickness, center_mm, diameter_mm: 2.5, shape }
+    };
+    for kind in [HoleKind::Ellipse, HoleKind::Slot] {
+        for (symmetry, holes) in [
+            (Symmetry::None, vec![hole(kind, [-5.0, 1.0], 30.0), hole(kind, [6.0, -2.0], 150.0)]),
+            (Symmetry::MirrorZ, vec![hole(kind, [3.0, 3.0], 30.0), hole(kind, [3.0, -3.0], -30.0)]),
+            (Symmetry::MirrorZ, vec![hole(kind, [3.0, 0.0], 90.0)]),
+            (Symmetry::MirrorX, vec![hole(kind, [6.0, 1.0], -45.0), hole(kind, [-6.0, 1.0], 45.0)]),
+            (Symmetry::Point, vec![hole(kind, [6.0, 1.0], 20.0), hole(kind, [-6.0, -1.0], 20.0)]),
+        ] {
+            study.limits.symmetry = symmetry;
+            let specimen = Specimen { holes, ..base_at_drive(&study) };
+            assert_eq!(specimen.validate(), Ok(()), "{symmetry:?}");
+            let back: Vec<Specimen> = subspaces(&study)
+                .iter()
+                .filter_map(|space| Some(space.specimen(&space.vector_of(&specimen, specimen.drive_mm[0])?)))
+                .collect();
+            assert_eq!(back.len(), 1, "{kind:?} {symmetry:?}");
+            for hole in &specimen.holes {
+                // Scaling to [0, 1] and back rounds, and so does a half turn.
+                let differences = back[0].holes.iter().map(|other| hole.difference_mm(other));
+                assert!(differences.fold(f64::INFINITY, f64::min) < 1e-9, "{symmetry:?}: {:?}", back[0].holes);
+            }
+        }
+        // An oblique hole on a mirror has no place in a study that asks for the mirror.
+        study.limits.symmetry = Symmetry::MirrorZ;
+        let oblique = Specimen { holes: vec![hole(kind, [3.0, 0.0], 30.0)], ..base_at_drive(&study) };
+        assert!(
+            study.limits.check_geometry(&oblique, [1.0; 3]).iter().any(|m| m.name == "symmetry" && !m.is_satisfied)
+        );
+    }
+    // Circles, ellipses and slots of every arrangement, and the solid block once.
+    let num_arrangements = |kind| subspaces(&study).iter().filter(|s| s.structure.hole_kind == kind).count();
+    assert_eq!(num_arrangements(None), num_arrangements(Some(HoleKind::Slot)) + 1);
+}
+
 /// A number in [low, high) from a fixed stream: a linear congruence with the constants of Knuth's MMIX.
 struct Draw(u64);
 
@@ -223,7 +275,7 @@ impl Draw {
 
 /// A study with random limits and freedoms.
 fn random_study(draw: &mut Draw) -> Study {
-    use crate::specimen::{DiameterRange, HoleAxis, Symmetry, TestKind};
+    use crate::specimen::{DiameterRange, HoleAxis, HoleKind, Symmetry, TestKind};
     let mut study = small_study();
     let limits = &mut study.limits;
     limits.min_ligament_hole_hole_mm = draw.between(0.5, 4.0);
@@ -248,6 +300,11 @@ fn random_study(draw: &mut Draw) -> Study {
     study.vary.width_mm = (draw.below(2) == 0).then_some(Range { min: 8.0, max: 14.0 });
     study.vary.length_mm = (draw.below(2) == 0).then_some(Range { min: 30.0, max: 45.0 });
     study.seed = draw.below(1000) as u64;
+    study.vary.hole_shapes = (draw.below(2) == 0).then(|| VaryHoleShapes {
+        kinds: [vec![HoleKind::Slot], vec![HoleKind::Ellipse, HoleKind::Slot]][draw.below(2)].clone(),
+        elongation_mm: Range { min: 0.5, max: draw.between(1.0, 6.0) },
+        angle_deg: AngleRange::default(),
+    });
     study
 }
 

@@ -1,35 +1,9 @@
-//! The search space: a few discrete structures (kind of test, direction and symmetry orbits of the holes), each with a
-//! continuous vector.
-//!
-//! Holes come in orbits under the study's mirrors: a hole on a mirror plane is its own image, others bring theirs
-//! along.
+//! The search space: a few discrete structures, each with a continuous vector.
 
+use super::structure::{Orbit, Structure, structures};
 use super::study::{Range, Study};
 use crate::mesh::DesignVariable;
-use crate::specimen::{Block, Hole, HoleAxis, MIRROR_TOLERANCE_MM, Specimen, Symmetry, TestKind};
-
-/// One orbit of holes: which of its two coordinates are held at zero by lying on a mirror.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Orbit {
-    /// x = 0.
-    pub on_x: bool,
-    /// Other coordinate = 0.
-    pub on_other: bool,
-}
-
-/// A discrete choice.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Structure {
-    /// Kind of test.
-    pub test: TestKind,
-    /// Direction of the holes.
-    pub axis: HoleAxis,
-    /// Orbits, sorted.
-    pub orbits: Vec<Orbit>,
-    mirrors: [bool; 2],
-    /// Whether holes come in pairs through the centre of the section; then no mirror acts.
-    is_point_symmetric: bool,
-}
+use crate::specimen::{Block, Hole, HoleAxis, HoleKind, HoleShape, MIRROR_TOLERANCE_MM, Specimen, TestKind};
 
 /// One component of the continuous vector.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,8 +12,12 @@ pub enum Variable {
     X(usize),
     /// Other coordinate of an orbit.
     Other(usize),
-    /// Diameter of an orbit.
+    /// Diameter of an orbit; of holes that are not circles the extent across.
     Diameter(usize),
+    /// How much longer than wide the holes of an orbit are.
+    Elongation(usize),
+    /// Angle of an orbit, degrees.
+    Angle(usize),
     /// Drive.
     Drive,
     /// Drive of a scan before it.
@@ -74,100 +52,9 @@ pub struct Subspace {
     is_like_first: Vec<bool>,
 }
 
-impl Structure {
-    /// Number of holes.
-    pub fn num_holes(&self) -> usize {
-        self.orbits.iter().map(|o| self.images(*o)).sum()
-    }
-
-    fn images(&self, orbit: Orbit) -> usize {
-        self.image_signs(orbit).len()
-    }
-
-    /// Signs of the images of an orbit, its own first.
-    fn image_signs(&self, orbit: Orbit) -> Vec<[f64; 2]> {
-        if self.is_point_symmetric {
-            return if orbit.on_x { vec![[1.0; 2]] } else { vec![[1.0; 2], [-1.0; 2]] };
-        }
-        let signs = |mirror: bool, on: bool| if mirror && !on { vec![1.0, -1.0] } else { vec![1.0] };
-        let mut all = Vec::new();
-        for sx in signs(self.mirrors[0], orbit.on_x) {
-            for so in signs(self.mirrors[1], orbit.on_other) {
-                all.push([sx, so]);
-            }
-        }
-        all
-    }
-}
-
 /// All structures of a study, fewest holes first.
 pub fn subspaces(study: &Study) -> Vec<Subspace> {
-    let axes = study.axes();
-    let max_holes = study.limits.max_holes.unwrap_or(usize::MAX).min(study.vary.hole_count.max);
-    let mut all = Vec::new();
-    for test in study.tests() {
-        let mut has_solid = false;
-        for &axis in &axes {
-            let mirrors = mirrors_of(study.limits.symmetry, axis);
-            let is_point_symmetric = study.limits.symmetry == Symmetry::Point;
-            let kinds = if is_point_symmetric {
-                [false, true].map(|is_central| Orbit { on_x: is_central, on_other: is_central }).to_vec()
-            } else {
-                orbit_kinds(mirrors)
-            };
-            let mut stack = vec![Vec::new()];
-            let mut lists: Vec<Vec<Orbit>> = Vec::new();
-            while let Some(list) = stack.pop() {
-                let structure = Structure { test, axis, orbits: list.clone(), mirrors, is_point_symmetric };
-                if structure.num_holes() > max_holes {
-                    continue;
-                }
-                if structure.num_holes() >= study.vary.hole_count.min {
-                    lists.push(list.clone());
-                }
-                for kind in &kinds {
-                    // Sorted lists only: the order of orbits does not matter. One centre holds one hole.
-                    let is_repeated_centre = kind.on_x && kind.on_other && list.last() == Some(kind);
-                    if list.last().is_none_or(|last| last <= kind) && !is_repeated_centre {
-                        let mut longer = list.clone();
-                        longer.push(*kind);
-                        stack.push(longer);
-                    }
-                }
-            }
-            for orbits in lists {
-                if orbits.is_empty() && std::mem::replace(&mut has_solid, true) {
-                    continue;
-                }
-                all.push(Subspace::new(study, Structure { test, axis, orbits, mirrors, is_point_symmetric }));
-            }
-        }
-    }
-    all.sort_by_key(|s| s.structure.num_holes());
-    all
-}
-
-/// Which mirrors act on (x, other).
-fn mirrors_of(symmetry: Symmetry, axis: HoleAxis) -> [bool; 2] {
-    let x = matches!(symmetry, Symmetry::MirrorX | Symmetry::MirrorXAndZ | Symmetry::MirrorXAndY);
-    // Holes along the width are symmetric in z anyway.
-    let other = match axis {
-        HoleAxis::Thickness => matches!(symmetry, Symmetry::MirrorZ | Symmetry::MirrorXAndZ),
-        HoleAxis::Width => matches!(symmetry, Symmetry::MirrorY | Symmetry::MirrorXAndY),
-    };
-    [x, other]
-}
-
-fn orbit_kinds(mirrors: [bool; 2]) -> Vec<Orbit> {
-    let choices = |mirror: bool| if mirror { vec![false, true] } else { vec![false] };
-    let mut kinds = Vec::new();
-    for on_x in choices(mirrors[0]) {
-        for on_other in choices(mirrors[1]) {
-            kinds.push(Orbit { on_x, on_other });
-        }
-    }
-    kinds.sort();
-    kinds
+    structures(study).into_iter().map(|structure| Subspace::new(study, structure)).collect()
 }
 
 impl Subspace {
@@ -216,6 +103,11 @@ impl Subspace {
             }
             variables.push(Variable::Diameter(index));
             ranges.push(diameter);
+            if let Some(shapes) = vary.hole_shapes.as_ref().filter(|_| structure.hole_kind.is_some()) {
+                let angle = shapes.angle_deg;
+                variables.extend([Variable::Elongation(index), Variable::Angle(index)]);
+                ranges.extend([shapes.elongation_mm, Range { min: angle.min, max: angle.max }]);
+            }
         }
         for (variable, interval) in [
             (Variable::Drive, Some(study.drive_range())),
@@ -251,7 +143,7 @@ impl Subspace {
     /// The specimen of a vector with components in [0, 1]. A punched diameter is the nearest punch.
     pub fn specimen(&self, vector: &[f64]) -> Specimen {
         let mut specimen = self.template.clone();
-        let mut orbits = vec![([0.0; 2], 0.0); self.structure.orbits.len()];
+        let mut orbits = vec![([0.0; 2], 0.0, [0.0; 2]); self.structure.orbits.len()];
         let mut earlier_mm = None;
         for ((variable, range), t) in self.variables.iter().zip(&self.ranges).zip(vector) {
             let value = range.min + t.clamp(0.0, 1.0) * (range.max - range.min);
@@ -259,6 +151,8 @@ impl Subspace {
                 Variable::X(o) => orbits[o].0[0] = value,
                 Variable::Other(o) => orbits[o].0[1] = value,
                 Variable::Diameter(o) => orbits[o].1 = self.nearest_punch(value),
+                Variable::Elongation(o) => orbits[o].2[0] = value,
+                Variable::Angle(o) => orbits[o].2[1] = self.allowed_angle(self.structure.orbits[o], value),
                 Variable::Drive => specimen.drive_mm = vec![value],
                 Variable::EarlierScan => earlier_mm = Some(value),
                 Variable::Length => specimen.block.length_mm = value,
@@ -272,14 +166,12 @@ impl Subspace {
         // One beyond the last drive is no earlier one: such a design is not valid.
         specimen.drive_mm.splice(0..0, earlier_mm);
         specimen.holes.clear();
-        for (orbit, (center, diameter_mm)) in self.structure.orbits.iter().zip(&orbits) {
-            for signs in self.structure.image_signs(*orbit) {
-                specimen.holes.push(Hole {
-                    axis: self.structure.axis,
-                    center_mm: [signs[0] * center[0], signs[1] * center[1]],
-                    diameter_mm: *diameter_mm,
-                });
-            }
+        for (orbit, (center_mm, diameter_mm, [elongation_mm, angle_deg])) in self.structure.orbits.iter().zip(orbits) {
+            let of_kind = |kind| HoleShape { kind, length_mm: diameter_mm + elongation_mm, angle_deg };
+            let shape = self.structure.hole_kind.map(of_kind);
+            let hole = Hole { axis: self.structure.axis, center_mm, diameter_mm, shape };
+            let images = self.structure.image_signs(*orbit).into_iter();
+            specimen.holes.extend(images.map(|signs| hole.mirrored(signs)));
         }
         for (sample, is_like_first) in specimen.other_samples.iter_mut().zip(&self.is_like_first) {
             if *is_like_first {
@@ -296,10 +188,14 @@ impl Subspace {
             HoleAxis::Thickness => "thickness",
             HoleAxis::Width => "width",
         };
+        let hole = self.structure.hole_kind.map_or("hole", |of_kind| match of_kind {
+            HoleKind::Ellipse => "elliptic hole",
+            HoleKind::Slot => "slot",
+        });
         specimen.name = match count {
             0 => format!("{kind}, solid"),
-            1 => format!("{kind}, 1 hole along the {direction}"),
-            n => format!("{kind}, {n} holes along the {direction}"),
+            1 => format!("{kind}, 1 {hole} along the {direction}"),
+            n => format!("{kind}, {n} {hole}s along the {direction}"),
         };
         specimen
     }
@@ -315,9 +211,24 @@ impl Subspace {
         }
     }
 
-    /// Whether a variable moves freely (a punched diameter does not).
+    /// The angle itself, or along or across the mirror that a hole lies on.
+    fn allowed_angle(&self, orbit: Orbit, angle_deg: f64) -> f64 {
+        if !self.structure.holds_upright(orbit) {
+            angle_deg
+        } else if angle_deg.to_radians().cos().powi(2) >= 0.5 {
+            0.0
+        } else {
+            90.0
+        }
+    }
+
+    /// Whether a variable moves freely (a punched diameter does not, nor the angle of a hole on a mirror).
     pub fn is_continuous(&self, index: usize) -> bool {
-        self.punches_mm.is_none() || !matches!(self.variables[index], Variable::Diameter(_))
+        match self.variables[index] {
+            Variable::Diameter(_) => self.punches_mm.is_none(),
+            Variable::Angle(orbit) => !self.structure.holds_upright(self.structure.orbits[orbit]),
+            _ => true,
+        }
     }
 
     /// What a variable moves in the specimen's sample with this number (0: the first), with signs; empty where it moves
@@ -336,20 +247,31 @@ impl Subspace {
     }
 
     fn moves_of_first(&self, variable: Variable) -> Vec<(DesignVariable, f64)> {
-        let first =
-            |orbit: usize| -> usize { self.structure.orbits[..orbit].iter().map(|o| self.structure.images(*o)).sum() };
-        let of_orbit = |orbit: usize, make: fn(usize) -> DesignVariable, component: Option<usize>| {
+        let first = |orbit: usize| -> usize {
+            self.structure.orbits[..orbit].iter().map(|o| self.structure.num_images(*o)).sum()
+        };
+        let of_orbit = |orbit: usize, make: fn(usize) -> DesignVariable, sign: fn(&[f64; 2]) -> f64| -> Vec<_> {
             self.structure
                 .image_signs(self.structure.orbits[orbit])
                 .iter()
                 .enumerate()
-                .map(|(i, signs)| (make(first(orbit) + i), component.map_or(1.0, |c| signs[c])))
+                .map(|(i, signs)| (make(first(orbit) + i), sign(signs)))
                 .collect()
         };
         match variable {
-            Variable::X(o) => of_orbit(o, DesignVariable::HoleX, Some(0)),
-            Variable::Other(o) => of_orbit(o, DesignVariable::HoleOther, Some(1)),
-            Variable::Diameter(o) => of_orbit(o, DesignVariable::HoleDiameter, None),
+            Variable::X(o) => of_orbit(o, DesignVariable::HoleX, |signs| signs[0]),
+            Variable::Other(o) => of_orbit(o, DesignVariable::HoleOther, |signs| signs[1]),
+            Variable::Diameter(o) => {
+                let mut moved = of_orbit(o, DesignVariable::HoleDiameter, |_| 1.0);
+                // The elongation is held, so that the length goes along.
+                if self.structure.hole_kind.is_some() {
+                    moved.extend(of_orbit(o, DesignVariable::HoleLength, |_| 1.0));
+                }
+                moved
+            }
+            Variable::Elongation(o) => of_orbit(o, DesignVariable::HoleLength, |_| 1.0),
+            Variable::Angle(o) if self.structure.holds_upright(self.structure.orbits[o]) => Vec::new(),
+            Variable::Angle(o) => of_orbit(o, DesignVariable::HoleAngle, |signs| signs[0] * signs[1]),
             Variable::Drive
             | Variable::EarlierScan
             | Variable::OtherLength(_)
@@ -367,7 +289,8 @@ impl Subspace {
         if specimen.test != self.structure.test || specimen.holes.len() != self.structure.num_holes() {
             return None;
         }
-        if specimen.holes.iter().any(|h| h.axis != self.structure.axis) {
+        let kind_of = |h: &Hole| h.shape.map(|shape| shape.kind);
+        if specimen.holes.iter().any(|h| h.axis != self.structure.axis || kind_of(h) != self.structure.hole_kind) {
             return None;
         }
         if specimen.other_samples.len() != self.is_like_first.len() {
@@ -386,6 +309,8 @@ impl Subspace {
                 Variable::X(o) => holes[o].center_mm[0],
                 Variable::Other(o) => holes[o].center_mm[1],
                 Variable::Diameter(o) => holes[o].diameter_mm,
+                Variable::Elongation(o) => holes[o].length_mm() - holes[o].diameter_mm,
+                Variable::Angle(o) => angle_within(holes[o].shape.map_or(0.0, |shape| shape.angle_deg), range),
                 Variable::Drive => drive_mm,
                 Variable::EarlierScan => *specimen.drive_mm.first().filter(|d| **d < drive_mm)?,
                 Variable::Length => specimen.block.length_mm,
@@ -425,16 +350,18 @@ impl Subspace {
             };
             let hole = *left.iter().find(|h| fits(h))?;
             for signs in self.structure.image_signs(*orbit) {
-                let image = [signs[0] * hole.center_mm[0], signs[1] * hole.center_mm[1]];
-                let index = left.iter().position(|h| {
-                    near(h.center_mm[0], image[0])
-                        && near(h.center_mm[1], image[1])
-                        && near(h.diameter_mm, hole.diameter_mm)
-                })?;
+                let image = hole.mirrored(signs);
+                let index = left.iter().position(|h| near(h.difference_mm(&image), 0.0))?;
                 left.remove(index);
             }
             found.push(hole);
         }
         left.is_empty().then_some(found)
     }
+}
+
+/// An angle of a hole with the half turns added that bring it into a range, where any do.
+fn angle_within(angle_deg: f64, range: &Range) -> f64 {
+    let turned = [-180.0, 0.0, 180.0].map(|turn| angle_deg + turn);
+    turned.into_iter().find(|a| (range.min..=range.max).contains(a)).unwrap_or(angle_deg)
 }

@@ -181,6 +181,7 @@ pub(super) fn is_same(a: &Specimen, b: &Specimen) -> bool {
                 a.axis == b.axis
                     && near(a.diameter_mm, b.diameter_mm)
                     && (0..2).all(|c| near(a.center_mm[c], b.center_mm[c]))
+                    && near(a.difference_mm(b), 0.0)
             })
     };
     let (of_a, of_b) = (a.samples(), b.samples());

@@ -2,10 +2,10 @@
 //! what is sought and how hard.
 
 use super::aim::Objective;
-use super::study_limits::{Count, CountOrNone, HoleCount, LengthMm};
+use super::study_limits::{AngleDeg, Count, CountOrNone, HoleCount, LengthMm};
 use crate::material::Ogden;
 use crate::sensitivity::{Protocol, ScanSettings};
-use crate::specimen::{HoleAxis, ManufacturingLimits, Specimen, TestKind};
+use crate::specimen::{HoleAxis, HoleKind, ManufacturingLimits, Specimen, TestKind};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -44,6 +44,40 @@ pub struct VarySample {
     pub width_mm: Option<Range>,
 }
 
+/// Outlines of holes that are tried beside circles. All holes of a design are of one kind; each orbit of holes has a
+/// length and an angle of its own. A hole that lies on a mirror of the limits' symmetry stands along or across it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct VaryHoleShapes {
+    /// Kinds of outlines.
+    #[schema(min_items = 1, max_items = 2)]
+    pub kinds: Vec<HoleKind>,
+    /// How much longer than wide, mm: length less `diameter_mm`.
+    pub elongation_mm: Range,
+    /// Angle, degrees; any where absent.
+    #[serde(default)]
+    pub angle_deg: AngleRange,
+}
+
+/// Two angles, degrees, both included.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AngleRange {
+    /// Smallest.
+    #[schema(value_type = AngleDeg)]
+    pub min: f64,
+    /// Largest.
+    #[schema(value_type = AngleDeg)]
+    pub max: f64,
+}
+
+/// Every angle: a hole looks alike after half a turn.
+impl Default for AngleRange {
+    fn default() -> Self {
+        AngleRange { min: -90.0, max: 90.0 }
+    }
+}
+
 /// What may vary; what is absent stays as in the base specimen.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
@@ -73,6 +107,10 @@ pub struct Vary {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub earlier_scan_mm: Option<Range>,
+    /// Outlines of holes that are tried beside circles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub hole_shapes: Option<VaryHoleShapes>,
     /// The base's further samples, in their order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 7)]

@@ -2,13 +2,13 @@
 
 use super::aim::ObjectiveKind;
 use super::detection::{countable, counted};
-use super::study::{MaterialPrior, Range, Study};
+use super::study::{MaterialPrior, Range, Study, VaryHoleShapes};
 use super::study_error::StudyError;
 use super::study_limits::{
     MAX_COUNT, MAX_HOLES_TO_TRY, MAX_LENGTH_MM, MAX_RELATIVE_SD, MAX_WEIGHT, MIN_LENGTH_MM, MIN_WEIGHT,
 };
 use crate::field::{FieldError, FieldPath};
-use crate::specimen::{MAX_NAME_LENGTH, Symmetry, TestKind};
+use crate::specimen::{MAX_HOLE_ANGLE_DEG, MAX_NAME_LENGTH, Symmetry, TestKind};
 
 impl Study {
     /// Checks a study and all of its parts. Call it on a study that was not read by this program's readers.
@@ -177,10 +177,31 @@ impl Study {
                 check_range(|| FieldPath::of("vary").name(name), range, problems);
             }
         }
+        if let Some(shapes) = &vary.hole_shapes {
+            let path = || FieldPath::of("vary").name("hole_shapes").name("elongation_mm");
+            check_range(path, shapes.elongation_mm, problems);
+            check_hole_shapes(shapes, problems);
+        }
         if let Some(limit_mm) = self.limits.max_drive_mm
             && vary.drive_mm.min > limit_mm
         {
             problems.push(StudyError::NoDrive { min_mm: vary.drive_mm.min, limit_mm });
+        }
+    }
+}
+
+/// Kinds and angles of holes.
+fn check_hole_shapes(shapes: &VaryHoleShapes, problems: &mut Vec<StudyError>) {
+    let is_repeated = shapes.kinds.len() > 1 && shapes.kinds[1..].contains(&shapes.kinds[0]);
+    if shapes.kinds.is_empty() || is_repeated {
+        problems.push(StudyError::HoleKinds { count: shapes.kinds.len() });
+    }
+    let angles = &shapes.angle_deg;
+    for (name, value, low) in [("min", angles.min, -MAX_HOLE_ANGLE_DEG), ("max", angles.max, angles.min)] {
+        if !(value >= low && value <= MAX_HOLE_ANGLE_DEG) {
+            let field = FieldPath::of("vary").name("hole_shapes").name("angle_deg").name(name);
+            let allowed = format!("from {low} to {MAX_HOLE_ANGLE_DEG} degrees");
+            problems.push(StudyError::OutOfRange { field, value, allowed });
         }
     }
 }

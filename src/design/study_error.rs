@@ -82,6 +82,12 @@ pub enum StudyError {
         /// Largest number of holes.
         max: usize,
     },
+    /// No outlines of holes are named, or one is named twice.
+    #[error("vary.hole_shapes.kinds has {count} entries; give ellipse, slot or both, each once")]
+    HoleKinds {
+        /// How many entries.
+        count: usize,
+    },
     /// Holes are asked for, but no direction of theirs is allowed.
     #[error(
         "vary.axes is empty and vary.hole_count.max {max_holes}; give directions of the holes, or leave out vary.axes to keep the base's"
@@ -212,6 +218,10 @@ impl StudyError {
             E::OutOfRange { field, value, allowed } => FieldError::new(field.pointer(), value, allowed.clone()),
             E::EmptyCountRange { min, max } => {
                 FieldError::new("/vary/hole_count/min", min, format!("at most the max, {max}"))
+            }
+            E::HoleKinds { count } => {
+                FieldError::new("/vary/hole_shapes/kinds", format!("a list of {count}"), "ellipse, slot or both, each once")
+                    .remedy("leave out hole_shapes to try circles alone")
             }
             E::NoAxes { max_holes } => {
                 FieldError::new("/vary/axes", "[]", format!("a list of directions, as up to {max_holes} holes are asked for"))

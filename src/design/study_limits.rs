@@ -1,6 +1,7 @@
 //! What a study may hold.
 
 use crate::field::schema::{integer_within, number_within, schema_type};
+use crate::specimen::MAX_HOLE_ANGLE_DEG;
 
 /// The schema that this version reads and writes.
 pub(super) const SCHEMA: &str = "study/1";
@@ -34,6 +35,8 @@ schema_type! {
     pub(super) HoleCount = integer_within(0..=MAX_HOLES_TO_TRY);
     /// A length or a drive, mm.
     pub(super) LengthMm = number_within(MIN_LENGTH_MM..=MAX_LENGTH_MM);
+    /// An angle of a hole, degrees.
+    pub(super) AngleDeg = number_within(-MAX_HOLE_ANGLE_DEG..=MAX_HOLE_ANGLE_DEG);
     /// A number of designs, steps or draws.
     pub(super) Count = integer_within(1..=MAX_COUNT);
     /// A number of designs that may be none.

@@ -2,7 +2,7 @@
 
 use super::confirm::{Confirmed, standard_error};
 use super::study::Study;
-use crate::specimen::Specimen;
+use crate::specimen::{Hole, Specimen};
 
 /// Two designs are equal where the mean of the difference of their ln objectives over the meshes is less than so many
 /// of its standard errors. With three meshes, chance alone exceeds four with a probability of one in twenty
@@ -26,21 +26,28 @@ pub(super) fn equal_to_best(study: &Study, base: &Confirmed, ranked: &[Confirmed
     within.filter(|(place, c)| *place == 0 || is_equal(c)).map(|(place, _)| place).collect()
 }
 
-/// Of the designs at `places`, the place of the one that is simplest to make: fewest holes, then fewest different
-/// diameters; of equals the better one.
+/// Of the designs at `places`, the place of the one that is simplest to make: fewest holes, then fewest that are not
+/// circles, then fewest different diameters and outlines; of equals the better one.
 pub(super) fn simplest(ranked: &[Confirmed], places: &[usize]) -> Option<usize> {
     let key = |place: &usize| {
         let specimen = &ranked[*place].specimen;
         let num_holes: usize = specimen.samples().iter().map(|s| s.holes.len()).sum();
-        (num_holes, num_diameters(specimen), *place)
+        (num_holes, num_not_round(specimen), num_outlines(specimen), *place)
     };
     places.iter().copied().min_by_key(key)
 }
 
-/// How many different diameters (to 1 µm) a specimen's holes have.
-fn num_diameters(specimen: &Specimen) -> usize {
+/// How many holes are not circles.
+fn num_not_round(specimen: &Specimen) -> usize {
+    specimen.samples().iter().flat_map(|s| &s.holes).filter(|hole| hole.shape.is_some()).count()
+}
+
+/// How many different diameters and lengths (to 1 µm) and kinds a specimen's holes have.
+fn num_outlines(specimen: &Specimen) -> usize {
     let holes = specimen.samples().into_iter().flat_map(|s| s.holes);
-    let mut all: Vec<i64> = holes.map(|h| (1e3 * h.diameter_mm).round() as i64).collect();
+    let micrometres = |length_mm: f64| (1e3 * length_mm).round() as i64;
+    let outline = |h: Hole| (micrometres(h.diameter_mm), micrometres(h.length_mm()), h.shape.map(|shape| shape.kind));
+    let mut all: Vec<_> = holes.map(outline).collect();
     all.sort_unstable();
     all.dedup();
     all.len()
@@ -54,10 +61,10 @@ mod tests {
     fn diameters_are_counted_once() {
         let text = include_str!("../../geometries/two-hole-shear.json");
         let mut specimen = Specimen::from_json(text).expect("the published specimen");
-        assert_eq!(num_diameters(&specimen), 1);
+        assert_eq!(num_outlines(&specimen), 1);
         specimen.holes[0].diameter_mm = 4.0;
-        assert_eq!(num_diameters(&specimen), 2);
+        assert_eq!(num_outlines(&specimen), 2);
         specimen.holes.clear();
-        assert_eq!(num_diameters(&specimen), 0);
+        assert_eq!(num_outlines(&specimen), 0);
     }
 }

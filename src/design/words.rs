@@ -26,14 +26,20 @@ pub fn short_number(value: f64) -> String {
     format!("{value:.digits$}")
 }
 
-/// The holes of one sample in brief, equal diameters together: `2 × ⌀5.0 + ⌀2.4`.
+/// The holes of one sample in brief, equal outlines together: `2 × ⌀5.0 + slot 8.0 × 4.0 at 30°`.
 pub fn holes_in_brief(specimen: &Specimen) -> String {
     let mut groups: Vec<(String, usize)> = Vec::new();
     for hole in &specimen.holes {
-        let diameter = format!("⌀{:.1}", hole.diameter_mm);
-        match groups.iter_mut().find(|(d, _)| *d == diameter) {
+        let outline = match hole.shape {
+            None => format!("⌀{:.1}", hole.diameter_mm),
+            Some(shape) => {
+                let (kind, angle) = (shape.kind.name(), shape.angle_deg);
+                format!("{kind} {:.1} × {:.1} at {angle:.0}°", shape.length_mm, hole.diameter_mm)
+            }
+        };
+        match groups.iter_mut().find(|(d, _)| *d == outline) {
             Some((_, count)) => *count += 1,
-            None => groups.push((diameter, 1)),
+            None => groups.push((outline, 1)),
         }
     }
     let list: Vec<String> = groups.into_iter().map(|(d, n)| if n > 1 { format!("{n} × {d}") } else { d }).collect();
@@ -65,6 +71,7 @@ pub fn sample_in_words(specimen: &Specimen) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::specimen::{HoleKind, HoleShape};
 
     #[test]
     fn lists_and_numbers() {
@@ -83,6 +90,9 @@ mod tests {
         let expected =
             "a block of 25.4 × 6.40 × 19.1 mm (length × thickness × width) with holes along the thickness, 2 × ⌀5.0 mm";
         assert_eq!(words, expected);
+        let shape = HoleShape { kind: HoleKind::Slot, length_mm: 8.0, angle_deg: 30.0 };
+        specimen.holes[0].shape = Some(shape);
+        assert_eq!(holes_in_brief(&specimen), "slot 8.0 × 5.0 at 30° + ⌀5.0");
         specimen.holes.clear();
         assert_eq!(holes_in_brief(&specimen), "solid");
         assert!(sample_in_words(&specimen).ends_with("without holes"));

@@ -9,7 +9,7 @@ use crate::specimen::Specimen;
 /// What differs from the nominal experiment. Causes change it; the laboratory predicts what would be recorded of it.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
-    /// Changes of each hole: diameter, then centre along x and across, mm.
+    /// Changes of each hole: diameter (of one that is no circle both extents), then centre along x and across, mm.
     pub holes: Vec<[f64; 3]>,
     /// Factors on the stiffness; they multiply.
     pub stiffness: Vec<Field>,
@@ -148,7 +148,7 @@ impl Scene {
     pub fn specimen(&self, nominal: &Specimen) -> Specimen {
         let mut made = nominal.clone();
         for (hole, change) in made.holes.iter_mut().zip(&self.holes) {
-            hole.diameter_mm += change[0];
+            *hole = hole.grown(change[0]);
             hole.center_mm[0] += change[1];
             hole.center_mm[1] += change[2];
         }

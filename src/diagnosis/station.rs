@@ -108,7 +108,8 @@ impl<'a> Stations<'a> {
         let base = self.base_of(scene)?;
         let mut mesh = Mesh::clone(&base);
         for (hole, change) in holes.iter().enumerate() {
-            for (variable, &by) in hole_variables(hole).into_iter().zip(change) {
+            for (variable, component) in hole_variables(drawn, hole) {
+                let by = change[component];
                 if by.abs() > 0.0 {
                     let velocity = shape_velocity(&base, drawn, variable);
                     mesh = morphed(&mesh, &velocity, by);
@@ -164,7 +165,8 @@ impl<'a> Stations<'a> {
         };
         for (hole, (a, b)) in ahead.holes.iter().zip(&behind.holes).enumerate() {
             let rate = [0, 1, 2].map(|i| (a[i] - b[i]) / (2.0 * step));
-            for (r, variable) in rate.into_iter().zip(hole_variables(hole)) {
+            for (variable, component) in hole_variables(&self.observed.specimen, hole) {
+                let r = rate[component];
                 if r.abs() > 0.0 {
                     let v = shape_velocity(&self.all[at].base, &self.observed.specimen, variable);
                     add(r, &|n| v[n]);
@@ -202,6 +204,12 @@ fn placing(pose: &Pose, shape: BlockShape) -> Placing {
     Placing { shift_mm: pose.shift_mm, rotation_rad: pose.rotation_rad, shape }
 }
 
-fn hole_variables(hole: usize) -> [DesignVariable; 3] {
-    [DesignVariable::HoleDiameter(hole), DesignVariable::HoleX(hole), DesignVariable::HoleOther(hole)]
+fn hole_variables(drawn: &Specimen, hole: usize) -> Vec<(DesignVariable, usize)> {
+    use DesignVariable as V;
+    let mut variables = vec![(V::HoleDiameter(hole), 0), (V::HoleX(hole), 1), (V::HoleOther(hole), 2)];
+    if drawn.holes.get(hole).is_some_and(|h| h.shape.is_some()) {
+        // Its wall moves out all around.
+        variables.push((V::HoleLength(hole), 0));
+    }
+    variables
 }

@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-use super::domain::{Disc, Domain};
+use super::domain::Domain;
 use super::error::MeshError;
 use super::grading::{divide, with_middles};
 use super::grid::{Builder, count, limit_cells, line};
 use super::options::MeshOptions;
 use super::power::{PowerDiagram, Rectangle};
 use super::section::{Section, dot, sub};
+use crate::specimen::HoleWall;
 
 /// Points of each edge by its vertices, the smaller index first.
 type EdgePoints = BTreeMap<(usize, usize), Vec<[f64; 2]>>;
@@ -21,6 +22,8 @@ pub(super) struct Style {
     pub shortest_mm: f64,
     /// How far the lines from a cell's corners to the hole bend towards the corner's bisector: 0 = straight, 1 = fully.
     pub bend: f64,
+    /// Which circle stands for a hole that is none ([`SectionHole::power_radius`]).
+    pub power_weight: f64,
 }
 
 /// O-grids around the holes in `inner`, structured strips outside it. `None` if the cells degenerate.
@@ -30,12 +33,14 @@ pub(super) fn holed_section(
     inner: Rectangle,
     style: Style,
 ) -> Result<Option<Section>, MeshError> {
-    let Some(diagram) = PowerDiagram::new(inner, &domain.discs, style.shortest_mm) else { return Ok(None) };
+    let Some(diagram) = PowerDiagram::new(inner, &domain.holes, style.shortest_mm, style.power_weight) else {
+        return Ok(None);
+    };
     let layout = Layout { domain, options, inner, diagram, bend: style.bend };
     let edges = layout.divide_edges()?;
     let mut builder = Builder::new(domain);
     let mut cells = 0;
-    for index in 0..domain.discs.len() {
+    for index in 0..domain.holes.len() {
         let layers = layout.radial_layers(index)?;
         let around: usize = layout.diagram.polygons[index].edges().map(|(u, v)| edges[&key(u, v)].len() / 2).sum();
         cells += layers * around;
@@ -91,15 +96,20 @@ impl Layout<'_> {
         let vertices = &self.diagram.vertices;
         // Per edge: parts asked for, feet of the centres, product of their distances, number of cells.
         let mut facts: BTreeMap<(usize, usize), (usize, f64, f64, u32)> = BTreeMap::new();
-        for (polygon, disc) in self.diagram.polygons.iter().zip(&self.domain.discs) {
-            for (u, v) in polygon.edges() {
-                let (u, v) = key(u, v);
+        for (polygon, hole) in self.diagram.polygons.iter().zip(&self.domain.holes) {
+            for (first, second) in polygon.edges() {
+                let (u, v) = key(first, second);
                 let along = sub(vertices[v], vertices[u]);
                 let length = dot(along, along).sqrt();
-                let to_center = sub(disc.center, vertices[u]);
+                let to_center = sub(hole.center(), vertices[u]);
                 let foot = dot(to_center, along) / length;
                 let distance = (dot(to_center, to_center) - foot * foot).max(0.0).sqrt();
-                let angle = ((length - foot) / distance).atan() + (foot / distance).atan();
+                let angle = if hole.wall.is_circle() {
+                    ((length - foot) / distance).atan() + (foot / distance).atan()
+                } else {
+                    let [from, to] = [first, second].map(|w| hole.wall.parameter_of(vertices[w]));
+                    (to - from).rem_euclid(TAU) * hole.wall.parts_factor()
+                };
                 // Rounded down only a little: with eight around, no arc exceeds 60°.
                 let around = (angle / TAU * self.options.hole_segments as f64 - 0.3).ceil() as usize;
                 let n = count(length, self.options)?.max(around);
@@ -134,15 +144,13 @@ impl Layout<'_> {
 
     /// Layers between a hole and its cell's edges: their root-mean-square gap over the element size.
     fn radial_layers(&self, index: usize) -> Result<usize, MeshError> {
-        let disc = &self.domain.discs[index];
+        let wall = &self.domain.holes[index].wall;
         let (mut sum, mut weight) = (0.0, 0.0);
         for (u, v) in self.diagram.polygons[index].edges() {
             for i in 0..8 {
                 let s = (f64::from(i) + 0.5) / 8.0;
-                let p = [0, 1].map(|c| {
-                    (1.0 - s) * self.diagram.vertices[u][c] + s * self.diagram.vertices[v][c] - disc.center[c]
-                });
-                let gap = dot(p, p).sqrt() - disc.radius;
+                let p = [0, 1].map(|c| (1.0 - s) * self.diagram.vertices[u][c] + s * self.diagram.vertices[v][c]);
+                let gap = wall.distance_mm(p);
                 sum += gap * gap;
                 weight += 1.0;
             }
@@ -150,18 +158,18 @@ impl Layout<'_> {
         Ok(count((sum / weight).sqrt(), self.options)?.max(self.options.radial_layers))
     }
 
-    /// Patches between the hole's arc and each edge of its cell.
+    /// Patches between the hole's wall and each edge of its cell.
     fn o_grid(&self, index: usize, layers: usize, edges: &EdgePoints, builder: &mut Builder) {
-        let disc = &self.domain.discs[index];
-        let wall = self.domain.grading.holes;
-        let inner_steps = with_middles(&divide(layers, wall, 1.0));
+        let wall = &self.domain.holes[index].wall;
+        let finest = self.domain.grading.holes;
+        let inner_steps = with_middles(&divide(layers, finest, 1.0));
         for (u, v) in self.diagram.polygons[index].edges() {
             let mut points = edges[&key(u, v)].clone();
             if u > v {
                 points.reverse();
             }
             let last = points.len() - 1;
-            let angles = arc_angles(disc, &points);
+            let parameters = wall_parameters(wall, &points);
             let bends = [self.corner_bend(index, u), self.corner_bend(index, v)];
             // How far the radial steps are graded towards the outer boundary: fully on an outer edge, and fading to
             // nothing at the middle of an inner edge from its ends on the outer boundary.
@@ -173,7 +181,7 @@ impl Layout<'_> {
                     let from_ends = ends_u.ln() * (1.0 - 2.0 * s).max(0.0) + ends_v.ln() * (2.0 * s - 1.0).max(0.0);
                     let fade = from_ends.min(outer.ln()).exp();
                     if fade < 1.0 - 1e-12 {
-                        let graded = with_middles(&divide(layers, wall, self.ratio(15)));
+                        let graded = with_middles(&divide(layers, finest, self.ratio(15)));
                         // Between "graded at the wall only" and "graded at both ends".
                         let w = fade.ln() / self.ratio(15).ln();
                         graded.iter().zip(&inner_steps).map(|(g, h)| w * g + (1.0 - w) * h).collect()
@@ -183,8 +191,7 @@ impl Layout<'_> {
                 })
                 .collect();
             builder.grid(2 * layers + 1, points.len(), |i, j| {
-                let on_arc =
-                    [disc.center[0] + disc.radius * angles[j].cos(), disc.center[1] + disc.radius * angles[j].sin()];
+                let on_wall = wall.point_at(parameters[j]);
                 let t = steps[j][i];
                 let s = j as f64 / last as f64;
                 let (near_u, near_v) = ((1.0 - 2.0 * s).max(0.0), (2.0 * s - 1.0).max(0.0));
@@ -193,7 +200,7 @@ impl Layout<'_> {
                 }
                 [0, 1].map(|c| {
                     let offset = near_u * bends[0][c] + near_v * bends[1][c];
-                    (1.0 - t) * on_arc[c] + t * points[j][c] + 2.0 * t * (1.0 - t) * offset
+                    (1.0 - t) * on_wall[c] + t * points[j][c] + 2.0 * t * (1.0 - t) * offset
                 })
             });
         }
@@ -203,7 +210,7 @@ impl Layout<'_> {
     /// line that meets the corner along its bisector makes equal angles with both edges, also where the hole is seen
     /// from the corner close to one of them.
     fn corner_bend(&self, index: usize, corner: usize) -> [f64; 2] {
-        let (disc, polygon) = (&self.domain.discs[index], &self.diagram.polygons[index]);
+        let (wall, polygon) = (&self.domain.holes[index].wall, &self.diagram.polygons[index]);
         let n = polygon.vertices.len();
         let position = polygon.vertices.iter().position(|&w| w == corner).unwrap_or(0);
         if polygon.is_open && (position == 0 || position + 1 == n) {
@@ -222,10 +229,10 @@ impl Layout<'_> {
         let across = sub(next, previous);
         let length = dot(across, across).sqrt();
         let bisector = [across[1] / length, -across[0] / length];
-        let inward = direction(disc.center);
+        let inward =
+            direction(if wall.is_circle() { wall.center_mm() } else { wall.point_at(wall.parameter_of(point)) });
         let sign = if dot(bisector, inward) < 0.0 { -1.0 } else { 1.0 };
-        let from_center = sub(point, disc.center);
-        let gap = dot(from_center, from_center).sqrt() - disc.radius;
+        let gap = wall.distance_mm(point);
         [0, 1].map(|c| 0.5 * self.bend * gap * (sign * bisector[c] - inward[c]))
     }
 
@@ -276,21 +283,33 @@ impl Layout<'_> {
     }
 }
 
-/// Angles of the arc's points that face `points`: between equal angles and straight radial lines, but no step much
-/// longer than the equal ones; the middles are exactly midway so that each element's arc is divided evenly.
-fn arc_angles(disc: &Disc, points: &[[f64; 2]]) -> Vec<f64> {
+/// Parameters of the wall's points that face `points` (of a circle angles): between equal steps and straight lines to the
+/// nearest point of the wall, but no step much longer than the equal ones; the middles are exactly midway so that each
+/// element's part of the wall is divided evenly. Where the curvature jumps the nearest element corner is put.
+fn wall_parameters(wall: &HoleWall, points: &[[f64; 2]]) -> Vec<f64> {
     const LONGEST_STEP: f64 = 1.15;
-    let angle = |p: [f64; 2]| (p[1] - disc.center[1]).atan2(p[0] - disc.center[0]);
+    const LARGEST_MOVE: f64 = 0.45;
     let last = points.len() - 1;
-    let start = angle(points[0]);
+    let start = wall.parameter_of(points[0]);
     // Counter-clockwise from the start; an edge spans less than half a turn.
-    let radial: Vec<f64> =
-        (0..=last).step_by(2).map(|i| if i == 0 { 0.0 } else { (angle(points[i]) - start).rem_euclid(TAU) }).collect();
+    let radial: Vec<f64> = (0..=last)
+        .step_by(2)
+        .map(|i| if i == 0 { 0.0 } else { (wall.parameter_of(points[i]) - start).rem_euclid(TAU) })
+        .collect();
     let n = radial.len() - 1;
     let equal = radial[n] / n as f64;
     let longest = radial.windows(2).map(|w| w[1] - w[0]).fold(equal, f64::max);
     let weight = 0.5f64.min((LONGEST_STEP - 1.0) * equal / (longest - equal).max(1e-12));
-    let corners: Vec<f64> =
+    let mut corners: Vec<f64> =
         radial.iter().enumerate().map(|(i, r)| start + (1.0 - weight) * equal * i as f64 + weight * r).collect();
+    let mut is_moved = vec![false; n];
+    for jump in wall.breaks() {
+        let at = start + (jump - start).rem_euclid(TAU);
+        let nearest = (1..n).min_by(|&i, &j| (corners[i] - at).abs().total_cmp(&(corners[j] - at).abs()));
+        // The ends belong to the edges beside as well, and a corner that is far keeps its step.
+        if let Some(i) = nearest.filter(|&i| !is_moved[i] && (corners[i] - at).abs() < LARGEST_MOVE * equal) {
+            (corners[i], is_moved[i]) = (at, true);
+        }
+    }
     with_middles(&corners)
 }

@@ -87,10 +87,7 @@ pub fn clearance_mm(specimen: &Specimen, p: [f64; 2]) -> f64 {
     let half = half_extents_mm(specimen);
     let axes = section_axes(specimen);
     let sides = [0, 1].map(|c| half[axes[c]] - p[c].abs());
-    let holes = specimen.holes.iter().map(|h| {
-        let [x, y] = h.center_mm;
-        (p[0] - x).hypot(p[1] - y) - 0.5 * h.diameter_mm
-    });
+    let holes = specimen.holes.iter().map(|h| h.wall().distance_mm(p));
     holes.chain(sides).fold(f64::INFINITY, f64::min).max(0.0)
 }
 

@@ -3,12 +3,14 @@
 use super::Mirror;
 use super::error::{LigamentEnd, MeshError};
 use super::options::{MeshOptions, in_range};
-use crate::specimen::{HoleAxis, Outline, Specimen, TestKind};
+use crate::specimen::{HoleAxis, HoleWall, Outline, Specimen, TestKind};
 
 /// Lengths outside this range, mm, are refused: they are certainly errors of unit.
 const LENGTH_RANGE_MM: [f64; 2] = [1e-3, 1e5];
 /// Ligaments below this fraction of the smaller hole's diameter are not meshed.
 const MIN_LIGAMENT_RATIO: f64 = 0.02;
+/// Points of an ellipse or a slot at which its distance from a dumb-bell's outline is looked at.
+const WALL_POINTS: usize = 96;
 /// Two positions closer than this fraction of the block's size are the same.
 pub(super) const COINCIDENT: f64 = 1e-9;
 
@@ -23,13 +25,37 @@ const TRANSITION_RADIUS_MM: f64 = 3.0;
 
 /// A hole in section coordinates.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Disc {
-    pub center: [f64; 2],
-    pub radius: f64,
+pub(super) struct SectionHole {
+    pub wall: HoleWall,
     /// Index in the specimen.
     pub index: usize,
     /// Centred on the section's mirror line, which cuts it in half.
     pub is_half: bool,
+}
+
+impl SectionHole {
+    pub fn center(&self) -> [f64; 2] {
+        self.wall.center_mm()
+    }
+
+    /// Extent across, the diameter of a circle.
+    fn width(&self) -> f64 {
+        2.0 * self.wall.half_mm()[1]
+    }
+
+    /// How far `k` radii reach from the centre along an axis; of a hole that is no circle its extent and `k` − 1 radii of
+    /// the circle of the same area.
+    pub fn reach_of_radii(&self, axis: usize, k: f64) -> f64 {
+        let radius = self.wall.mean_radius_mm();
+        if self.wall.is_circle() { k * radius } else { self.wall.half_extents_mm()[axis] + (k - 1.0) * radius }
+    }
+
+    /// The radius of the circle that stands for the hole in a power diagram: half of its extent across (`weight` 0), half
+    /// of that along it (1), or between them.
+    pub fn power_radius(&self, weight: f64) -> f64 {
+        let [a, b] = self.wall.half_mm();
+        if self.wall.is_circle() { b } else { a.powf(weight) * b.powf(1.0 - weight) }
+    }
 }
 
 /// The section [−half₀, half₀] × [bottom, half₁] (coordinates a = x and b = z or y) with its holes, and its extrusion.
@@ -39,7 +65,7 @@ pub(super) struct Domain {
     /// −half₁, or 0 if the section is mirrored at b = 0.
     pub bottom: f64,
     pub is_dumbbell: bool,
-    pub discs: Vec<Disc>,
+    pub holes: Vec<SectionHole>,
     /// Straight lines inside the section that element edges follow; each may end on the outline.
     pub lines: Vec<[[f64; 2]; 2]>,
     /// Coordinate index of b: 2 (z) or 1 (y).
@@ -77,7 +103,9 @@ impl Domain {
         options.validate()?;
         for (hole, h) in specimen.holes.iter().enumerate() {
             let finite = h.center_mm.iter().all(|c| c.is_finite() && c.abs() < high);
-            if !(finite && h.diameter_mm > 0.0 && h.diameter_mm < high) {
+            let is_long = h.length_mm() >= h.diameter_mm && h.length_mm() < high;
+            let is_turned = h.shape.is_none_or(|shape| shape.angle_deg.is_finite());
+            if !(finite && h.diameter_mm > 0.0 && h.diameter_mm < high && is_long && is_turned) {
                 return Err(MeshError::InvalidHole { hole, center_mm: h.center_mm, diameter_mm: h.diameter_mm });
             }
             if h.axis != specimen.holes[0].axis {
@@ -95,21 +123,17 @@ impl Domain {
         let (b_axis, extrusion_axis) = if along_width { (1, 2) } else { (2, 1) };
         let extents = [block.length_mm, block.thickness_mm, block.width_mm];
         let scale = extents.iter().fold(0.0f64, |a, &b| a.max(b));
-        let mut discs: Vec<Disc> = specimen
+        let mut holes: Vec<SectionHole> = specimen
             .holes
             .iter()
             .enumerate()
-            .map(|(index, h)| Disc { center: h.center_mm, radius: 0.5 * h.diameter_mm, index, is_half: false })
+            .map(|(index, h)| SectionHole { wall: h.wall(), index, is_half: false })
             .collect();
 
         let uniaxial = specimen.test == TestKind::Uniaxial;
-        let holes_symmetric = discs.iter().all(|d| {
-            discs.iter().any(|e| {
-                let tolerance = COINCIDENT * scale;
-                (d.center[0] - e.center[0]).abs() < tolerance
-                    && (d.center[1] + e.center[1]).abs() < tolerance
-                    && (d.radius - e.radius).abs() < tolerance
-            })
+        let holes_symmetric = specimen.holes.iter().all(|h| {
+            let image = h.mirrored([1.0, -1.0]);
+            specimen.holes.iter().any(|other| other.difference_mm(&image) < COINCIDENT * scale)
         });
         // Plates move along x, the section is mirrored in b and the extrusion in its own axis. y = 0 is no mirror
         // plane in shear: one plate moves, the other does not.
@@ -125,7 +149,7 @@ impl Domain {
             half: domain_half,
             bottom: if section_mirrored { 0.0 } else { -domain_half[1] },
             is_dumbbell,
-            discs: Vec::new(),
+            holes: Vec::new(),
             lines: Vec::new(),
             b_axis,
             extrusion_axis,
@@ -142,18 +166,18 @@ impl Domain {
                 extrusion: if shear { ratio } else { 1.0 },
             },
         };
-        domain.check_ligaments(&discs)?;
+        domain.check_ligaments(&holes)?;
         let mut domain = domain;
         if section_mirrored {
-            discs.retain(|d| d.center[1] > -COINCIDENT * scale);
-            for d in &mut discs {
-                if d.center[1] < COINCIDENT * scale {
-                    d.center[1] = 0.0;
+            holes.retain(|d| d.center()[1] > -COINCIDENT * scale);
+            for d in &mut holes {
+                if d.center()[1] < COINCIDENT * scale {
+                    d.wall = d.wall.moved_to([d.center()[0], 0.0]);
                     d.is_half = true;
                 }
             }
         }
-        domain.discs = discs;
+        domain.holes = holes;
         Ok(domain)
     }
 
@@ -191,20 +215,33 @@ impl Domain {
         ends.min(if inside < 0.0 { -nearest } else { nearest })
     }
 
-    fn check_ligaments(&self, discs: &[Disc]) -> Result<(), MeshError> {
-        for (i, d) in discs.iter().enumerate() {
-            let to_outline = self.outline_distance(d.center) - d.radius;
+    /// Material between a hole's wall and the outline: exact in a block, by points of the wall in a dumb-bell.
+    fn wall_to_outline(&self, wall: &HoleWall) -> f64 {
+        let center = wall.center_mm();
+        if wall.is_circle() {
+            return self.outline_distance(center) - wall.half_mm()[1];
+        }
+        if !self.is_dumbbell {
+            let reach = wall.half_extents_mm();
+            return (0..2).map(|c| self.half[c] - center[c].abs() - reach[c]).fold(f64::INFINITY, f64::min);
+        }
+        let at = |i: usize| wall.point_at(std::f64::consts::TAU * i as f64 / WALL_POINTS as f64);
+        (0..WALL_POINTS).map(|i| self.outline_distance(at(i))).fold(f64::INFINITY, f64::min)
+    }
+
+    fn check_ligaments(&self, holes: &[SectionHole]) -> Result<(), MeshError> {
+        for (i, d) in holes.iter().enumerate() {
+            let to_outline = self.wall_to_outline(&d.wall);
             let check = |to, length_mm: f64, limit_mm: f64| {
                 if length_mm >= limit_mm {
                     return Ok(());
                 }
                 Err(MeshError::LigamentTooThin { from: LigamentEnd::Hole(d.index), to, length_mm, limit_mm })
             };
-            check(LigamentEnd::Outline, to_outline, MIN_LIGAMENT_RATIO * 2.0 * d.radius)?;
-            for e in &discs[i + 1..] {
-                let distance = (d.center[0] - e.center[0]).hypot(d.center[1] - e.center[1]);
-                let limit = MIN_LIGAMENT_RATIO * 2.0 * d.radius.min(e.radius);
-                check(LigamentEnd::Hole(e.index), distance - d.radius - e.radius, limit)?;
+            check(LigamentEnd::Outline, to_outline, MIN_LIGAMENT_RATIO * d.width())?;
+            for e in &holes[i + 1..] {
+                let limit = MIN_LIGAMENT_RATIO * d.width().min(e.width());
+                check(LigamentEnd::Hole(e.index), d.wall.gap_mm(&e.wall).0, limit)?;
             }
         }
         Ok(())
@@ -218,11 +255,7 @@ impl Domain {
             whole -= 4.0 * dumbbell_missing_area();
         }
         let mirrored = self.bottom > -self.half[1];
-        let holes: f64 = self
-            .discs
-            .iter()
-            .map(|d| std::f64::consts::PI * d.radius * d.radius * if d.is_half { 0.5 } else { 1.0 })
-            .sum();
+        let holes: f64 = self.holes.iter().map(|d| d.wall.area_mm2() * if d.is_half { 0.5 } else { 1.0 }).sum();
         whole * if mirrored { 0.5 } else { 1.0 } - holes
     }
 

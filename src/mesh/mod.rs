@@ -10,7 +10,7 @@
 //! ```
 //!
 //! The section is (x, z) extruded along y, or (x, y) extruded along z where holes run along the width. Every mesh is
-//! conforming, its curved walls carry exact nodes at element corners and middles, and equal input gives equal bits.
+//! conforming, its curved walls (of circles, ellipses and slots) carry exact nodes at element corners and middles, and equal input gives equal bits.
 
 mod block_shape;
 mod build;
@@ -41,6 +41,8 @@ mod triangles;
 
 #[cfg(test)]
 mod layout_tests;
+#[cfg(test)]
+mod outline_tests;
 #[cfg(test)]
 mod test_specimens;
 

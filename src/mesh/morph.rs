@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::Mesh;
 use super::domain::{dumbbell_half_width, transition_end_mm};
 use super::locator::extrusion_axis;
-use crate::specimen::{HoleAxis, Outline, Specimen};
+use crate::specimen::{HoleAxis, HoleWall, Outline, Specimen};
 
 /// One geometric quantity of a specimen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -15,8 +15,12 @@ pub enum DesignVariable {
     HoleX(usize),
     /// The other coordinate of a hole's centre (z or y), mm.
     HoleOther(usize),
-    /// Diameter of a hole, mm.
+    /// Diameter of a hole, mm; of an ellipse or a slot the extent across it, its length held.
     HoleDiameter(usize),
+    /// Length of an ellipse or a slot, mm, its extent across held. A circle has none.
+    HoleLength(usize),
+    /// Angle of an ellipse or a slot, degrees. A circle has none.
+    HoleAngle(usize),
     /// Extent of the block along x, mm.
     BlockLength,
     /// Extent of the block along y, mm.
@@ -27,7 +31,8 @@ pub enum DesignVariable {
 
 /// d(node position)/d(variable), dimensionless, per node of `mesh` (of `specimen`).
 ///
-/// A hole's wall moves rigidly or dilates, so it stays a circle; the motion fades as d/(d + d_h) towards the other
+/// A hole's wall moves rigidly, or as its extents or its angle ask: an extent moves it linearly, so that a circle stays a
+/// circle, an ellipse an ellipse and a slot a slot at any step; an angle does so to first order. The motion fades as d/(d + d_h) towards the other
 /// walls and the outline, with d_h the distance to the hole and d a smooth minimum of the distances to the others. A
 /// block dimension scales the outline affinely about the origin and leaves the holes' centres and shapes alone; along
 /// the extrusion everything is scaled.
@@ -35,7 +40,7 @@ pub enum DesignVariable {
 /// In a mirrored mesh the velocity is that of the meshed half. A hole and its image are moved together by summing their
 /// two variables (with opposite signs for [`DesignVariable::HoleOther`]); the one outside the meshed half contributes
 /// zero. [`DesignVariable::HoleOther`] of a hole centred on the mirror plane gives zero: by symmetry it changes
-/// symmetric results (forces, integrals) in second order only.
+/// symmetric results (forces, integrals) in second order only. The same holds for [`DesignVariable::HoleAngle`].
 ///
 /// A dumb-bell keeps its standard outline: length moves its ends, width gives zero. An index of a hole that does not
 /// exist gives zero.
@@ -58,6 +63,7 @@ pub fn morphed(mesh: &Mesh, velocity: &[[f64; 3]], step: f64) -> Mesh {
 
 struct Field<'a> {
     specimen: &'a Specimen,
+    walls: Vec<HoleWall>,
     half: [f64; 3],
     /// Coordinate index of the section's second direction and of the extrusion.
     b_axis: usize,
@@ -79,6 +85,7 @@ impl<'a> Field<'a> {
         let half = [0.5 * b.length_mm, 0.5 * b.thickness_mm, 0.5 * b.width_mm];
         Field {
             specimen,
+            walls: specimen.holes.iter().map(|hole| hole.wall()).collect(),
             half,
             b_axis,
             extrusion_axis,
@@ -89,8 +96,7 @@ impl<'a> Field<'a> {
 
     /// Distance from the wall of a hole; at least 0.
     fn hole_distance(&self, hole: usize, p: [f64; 2]) -> f64 {
-        let h = &self.specimen.holes[hole];
-        let distance = (p[0] - h.center_mm[0]).hypot(p[1] - h.center_mm[1]) - 0.5 * h.diameter_mm;
+        let distance = self.walls[hole].distance_mm(p);
         if distance < self.tolerance { 0.0 } else { distance }
     }
 
@@ -117,14 +123,11 @@ impl<'a> Field<'a> {
                     v[self.b_axis] = self.hole_weight(hole, p);
                 }
             }
-            DesignVariable::HoleDiameter(hole) => {
-                let weight = self.hole_weight(hole, p);
-                if weight > 0.0 {
-                    let center = self.specimen.holes[hole].center_mm;
-                    let radial = [p[0] - center[0], p[1] - center[1]];
-                    let distance = radial[0].hypot(radial[1]);
-                    v[0] = 0.5 * weight * radial[0] / distance;
-                    v[self.b_axis] = 0.5 * weight * radial[1] / distance;
+            DesignVariable::HoleDiameter(hole) => self.add_wall_motion(&mut v, hole, p, HoleWall::motion_with_width),
+            DesignVariable::HoleLength(hole) => self.add_wall_motion(&mut v, hole, p, HoleWall::motion_with_length),
+            DesignVariable::HoleAngle(hole) => {
+                if !self.is_on_mirror(hole) {
+                    self.add_wall_motion(&mut v, hole, p, HoleWall::motion_with_angle);
                 }
             }
             DesignVariable::BlockLength => v[0] = self.outline_weight(p) * self.length_rate(p[0]),
@@ -132,6 +135,16 @@ impl<'a> Field<'a> {
             DesignVariable::BlockWidth => v[2] = self.block_rate(node, p, 2),
         }
         v
+    }
+
+    /// The motion of a hole's wall, fading.
+    fn add_wall_motion(&self, v: &mut [f64; 3], hole: usize, p: [f64; 2], motion: fn(&HoleWall, [f64; 2]) -> [f64; 2]) {
+        let weight = self.hole_weight(hole, p);
+        if weight > 0.0 {
+            let [along, across] = motion(&self.walls[hole], p);
+            v[0] = weight * along;
+            v[self.b_axis] = weight * across;
+        }
     }
 
     /// 1 at the hole's wall, 0 at the outline, the other walls and (for holes off it) the mirror line.
@@ -218,6 +231,8 @@ mod tests {
             DesignVariable::HoleX(i) => s.holes[i].center_mm[0] += step,
             DesignVariable::HoleOther(i) => s.holes[i].center_mm[1] += step,
             DesignVariable::HoleDiameter(i) => s.holes[i].diameter_mm += step,
+            DesignVariable::HoleLength(i) => s.holes[i].shape.iter_mut().for_each(|shape| shape.length_mm += step),
+            DesignVariable::HoleAngle(i) => s.holes[i].shape.iter_mut().for_each(|shape| shape.angle_deg += step),
             DesignVariable::BlockLength => s.block.length_mm += step,
             DesignVariable::BlockThickness => s.block.thickness_mm += step,
             DesignVariable::BlockWidth => s.block.width_mm += step,

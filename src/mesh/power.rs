@@ -1,7 +1,7 @@
 //! The power diagram of the holes in a rectangle: one polygon around each hole, sharing whole edges with its
 //! neighbours.
 
-use super::domain::Disc;
+use super::domain::SectionHole;
 use super::section::{cross, dot, sub};
 
 /// Polygons by vertex index. A polygon of a half hole is an open chain from one end of the mirror line to the other.
@@ -43,20 +43,22 @@ impl Rectangle {
 }
 
 impl PowerDiagram {
-    /// Divides `rectangle` among `discs` by radical lines: a point belongs to the disc with the smallest |p − c|² − r².
-    /// Disjoint discs lie inside their polygons. Edges shorter than `shortest` are collapsed.
+    /// Divides `rectangle` among `holes` by radical lines: a point belongs to the hole with the smallest |p − c|² − r²,
+    /// where r is its radius, or that of the circle that stands for it ([`SectionHole::power_radius`] with `weight`).
+    /// Disjoint circles lie inside their polygons; of other holes it is checked. Edges shorter than `shortest` are
+    /// collapsed.
     ///
-    /// `None` if a polygon degenerates or does not see its disc's centre.
-    pub fn new(rectangle: Rectangle, discs: &[Disc], shortest: f64) -> Option<Self> {
+    /// `None` if a polygon degenerates or does not hold its hole.
+    pub fn new(rectangle: Rectangle, holes: &[SectionHole], shortest: f64, weight: f64) -> Option<Self> {
         let scale = (rectangle.high[0] - rectangle.low[0]).max(rectangle.high[1] - rectangle.low[1]);
         let tolerance = 1e-7 * scale;
         let mut diagram = PowerDiagram { vertices: Vec::new(), polygons: Vec::new() };
-        for (i, disc) in discs.iter().enumerate() {
+        for (i, hole) in holes.iter().enumerate() {
             let ([l0, l1], [h0, h1]) = (rectangle.low, rectangle.high);
             let mut polygon = vec![[l0, l1], [h0, l1], [h0, h1], [l0, h1]];
-            for (j, other) in discs.iter().enumerate() {
+            for (j, other) in holes.iter().enumerate() {
                 if j != i {
-                    polygon = clip(&polygon, disc, other);
+                    polygon = clip(&polygon, hole, other, weight);
                 }
             }
             let vertices: Vec<usize> = polygon.iter().map(|&p| diagram.vertex(p, tolerance)).collect();
@@ -64,8 +66,8 @@ impl PowerDiagram {
         }
         diagram.insert_hanging_vertices(tolerance);
         diagram.collapse_short_edges(rectangle, tolerance, shortest);
-        diagram.open_half_cells(discs, rectangle.low[1], tolerance)?;
-        diagram.sees_discs(discs).then_some(diagram)
+        diagram.open_half_cells(holes, rectangle.low[1], tolerance)?;
+        diagram.sees_holes(holes).then_some(diagram)
     }
 
     fn vertex(&mut self, p: [f64; 2], tolerance: f64) -> usize {
@@ -145,9 +147,9 @@ impl PowerDiagram {
     }
 
     /// Takes the edge below a half hole away.
-    fn open_half_cells(&mut self, discs: &[Disc], bottom: f64, tolerance: f64) -> Option<()> {
-        for (polygon, disc) in self.polygons.iter_mut().zip(discs) {
-            if disc.is_half {
+    fn open_half_cells(&mut self, holes: &[SectionHole], bottom: f64, tolerance: f64) -> Option<()> {
+        for (polygon, hole) in self.polygons.iter_mut().zip(holes) {
+            if hole.is_half {
                 let n = polygon.vertices.len();
                 let on_bottom = |w: usize| (self.vertices[w][1] - bottom).abs() < tolerance;
                 let start =
@@ -159,26 +161,28 @@ impl PowerDiagram {
         Some(())
     }
 
-    /// Every polygon is star-shaped about its disc's centre and holds the disc.
-    fn sees_discs(&self, discs: &[Disc]) -> bool {
-        self.polygons.iter().zip(discs).all(|(polygon, disc)| {
+    /// Every polygon is star-shaped about its hole's centre and holds the hole.
+    fn sees_holes(&self, holes: &[SectionHole]) -> bool {
+        self.polygons.iter().zip(holes).all(|(polygon, hole)| {
             polygon.vertices.len() >= 3
                 && polygon.edges().all(|(u, v)| {
-                    let (p, q) = (sub(self.vertices[u], disc.center), sub(self.vertices[v], disc.center));
+                    let (p, q) = (sub(self.vertices[u], hole.center()), sub(self.vertices[v], hole.center()));
                     let along = sub(q, p);
-                    cross(p, q) / dot(along, along).sqrt() > disc.radius * (1.0 + 1e-3)
+                    let length = dot(along, along).sqrt();
+                    let outward = [along[1] / length, -along[0] / length];
+                    cross(p, q) / length > hole.wall.reach_mm(outward) * (1.0 + 1e-3)
                 })
         })
     }
 }
 
-/// The part of a convex polygon with a smaller power to `disc` than to `other`.
-fn clip(polygon: &[[f64; 2]], disc: &Disc, other: &Disc) -> Vec<[f64; 2]> {
+/// The part of a convex polygon with a smaller power to `hole` than to `other`.
+fn clip(polygon: &[[f64; 2]], hole: &SectionHole, other: &SectionHole, weight: f64) -> Vec<[f64; 2]> {
     // |p − c|² − r² ≤ |p − c'|² − r'² is 2 p·(c' − c) ≤ |c'|² − |c|² + r² − r'².
-    let normal = sub(other.center, disc.center);
-    let offset = 0.5
-        * (dot(other.center, other.center) - dot(disc.center, disc.center) + disc.radius * disc.radius
-            - other.radius * other.radius);
+    let (own, others) = (hole.center(), other.center());
+    let [radius, other_radius] = [hole, other].map(|h| h.power_radius(weight));
+    let normal = sub(others, own);
+    let offset = 0.5 * (dot(others, others) - dot(own, own) + radius * radius - other_radius * other_radius);
     let excess = |p: [f64; 2]| dot(p, normal) - offset;
     let mut clipped = Vec::with_capacity(polygon.len() + 1);
     for (i, &p) in polygon.iter().enumerate() {

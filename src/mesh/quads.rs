@@ -17,7 +17,7 @@ use super::section::Section;
 /// # Errors
 /// [`MeshError::TooManyElements`].
 pub(super) fn quad_section(domain: &Domain, options: &MeshOptions) -> Result<Option<Section>, MeshError> {
-    if domain.discs.is_empty() {
+    if domain.holes.is_empty() {
         return structured_section(domain, options).map(Some);
     }
     if domain.is_dumbbell {
@@ -34,8 +34,7 @@ pub(super) fn quad_section(domain: &Domain, options: &MeshOptions) -> Result<Opt
     };
     let mut ranking: Vec<(f64, Rectangle, Style)> = Vec::new();
     for rectangle in inner_rectangles(domain, size) {
-        for (shortest, bend) in STYLES {
-            let style = Style { shortest_mm: shortest * size, bend };
+        for style in styles(domain, size) {
             let Some(section) = holed_section(domain, &coarse, rectangle, style)? else { continue };
             let (worst, _) = section.min_scaled_jacobian();
             let excess = (section.num_cells() as f64 * size * size / area).max(1.0).ln();
@@ -65,6 +64,19 @@ const MAX_ATTEMPTS: usize = 8;
 /// Ways to make cells: edges shorter than this many element sizes are collapsed, and the lines to the cells' corners
 /// bend by this fraction.
 const STYLES: [(f64, f64); 4] = [(0.45, 0.0), (0.15, 0.0), (0.45, 0.7), (0.15, 0.7)];
+
+/// Radii that stand for holes that are not circles: of their extent across, along, and the mean of both.
+const WEIGHTS: [f64; 3] = [0.5, 0.0, 1.0];
+
+/// The ways to make cells that are tried, on elements of a size.
+fn styles(domain: &Domain, size: f64) -> Vec<Style> {
+    let has_circles_only = domain.holes.iter().all(|hole| hole.wall.is_circle());
+    let weights = if has_circles_only { &WEIGHTS[..1] } else { &WEIGHTS[..] };
+    let of_weight = |&weight: &f64| {
+        STYLES.map(|(shortest, bend)| Style { shortest_mm: shortest * size, bend, power_weight: weight })
+    };
+    weights.iter().flat_map(of_weight).collect()
+}
 
 /// Block or dumb-bell without holes.
 fn structured_section(domain: &Domain, options: &MeshOptions) -> Result<Section, MeshError> {
@@ -98,14 +110,15 @@ fn structured_section(domain: &Domain, options: &MeshOptions) -> Result<Section,
     Ok(builder.finish())
 }
 
-/// Rectangles around all holes, the whole section first. The distance kept from a hole is a multiple of its radius.
+/// Rectangles around all holes, the whole section first. The distance kept from a hole is a multiple of its radius
+/// (of one that is no circle, of the radius of the circle of its area).
 fn inner_rectangles(domain: &Domain, size: f64) -> Vec<Rectangle> {
     const RADII: [f64; 4] = [f64::INFINITY, 3.4, 2.5, 1.8];
     let outer = Rectangle { low: [-domain.half[0], domain.bottom], high: domain.half };
     let reach = |c: usize, sign: f64, k: f64| {
-        domain.discs.iter().map(|d| sign * d.center[c] + k * d.radius).fold(f64::NEG_INFINITY, f64::max)
+        domain.holes.iter().map(|d| sign * d.center()[c] + d.reach_of_radii(c, k)).fold(f64::NEG_INFINITY, f64::max)
     };
-    let has_half = domain.discs.iter().any(|d| d.is_half);
+    let has_half = domain.holes.iter().any(|d| d.is_half);
     let side = |c: usize, upper: bool, k: f64| {
         let sign = if upper { 1.0 } else { -1.0 };
         let limit = if upper { outer.high[c] } else { -outer.low[c] };

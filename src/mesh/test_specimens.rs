@@ -10,7 +10,7 @@ pub(super) fn specimen(test: TestKind, extents: [f64; 3], axis: HoleAxis, holes:
         test,
         block: Block { length_mm, thickness_mm, width_mm },
         outline: Outline::Block,
-        holes: holes.iter().map(|h| Hole { axis, center_mm: [h[0], h[1]], diameter_mm: h[2] }).collect(),
+        holes: holes.iter().map(|h| Hole::circle(axis, [h[0], h[1]], h[2])).collect(),
         drive_mm: vec![1.0],
         samples_in_parallel: 1,
         other_samples: Vec::new(),

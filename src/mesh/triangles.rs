@@ -1,7 +1,7 @@
 //! Sections of triangles by constrained Delaunay refinement: for every shape that quadrilaterals do not suit.
 
 use std::collections::{HashMap, HashSet};
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 use spade::{AngleLimit, ConstrainedDelaunayTriangulation, Point2, RefinementParameters, Triangulation};
 
@@ -9,11 +9,14 @@ use super::domain::Domain;
 use super::error::MeshError;
 use super::options::MeshOptions;
 use super::section::{Section, sub};
+use crate::specimen::HoleWall;
 
 /// Smallest angle asked of the refinement, degrees.
 const ANGLE_LIMIT_DEG: f64 = 30.0;
 /// Boundary parts are at most this fraction of the distance to the next wall.
 const GAP_FRACTION: f64 = 0.9;
+/// Parameters closer than this are the same.
+const SAME_PARAMETER: f64 = 1e-9;
 /// Arcs of triangles span at most this part of a circle.
 const MIN_SEGMENTS: f64 = 12.0;
 /// Factors on the sizes of arcs and of parts beside gaps that are tried in turn.
@@ -23,9 +26,9 @@ const BOUNDARY_FINENESS: [f64; 5] = [1.0, 0.8, 0.65, 0.5, 0.35];
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Curve {
     Line([f64; 2], [f64; 2]),
-    /// Circle of a disc from one angle to another.
-    Arc {
-        disc: usize,
+    /// Wall of a hole from one parameter to another (angles of a circle).
+    Wall {
+        hole: usize,
         from: f64,
         to: f64,
     },
@@ -41,7 +44,7 @@ impl Curve {
     fn is_straight(self, domain: &Domain) -> bool {
         match self {
             Curve::Line(..) => true,
-            Curve::Arc { .. } => false,
+            Curve::Wall { .. } => false,
             Curve::Profile { from, to, .. } => {
                 let [start, _, end] = domain.arc_ends();
                 let middle = 0.5 * (from + to).abs();
@@ -53,11 +56,7 @@ impl Curve {
     fn at(self, domain: &Domain, t: f64) -> [f64; 2] {
         match self {
             Curve::Line(p, q) => [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])],
-            Curve::Arc { disc, from, to } => {
-                let d = &domain.discs[disc];
-                let angle = from + t * (to - from);
-                [d.center[0] + d.radius * angle.cos(), d.center[1] + d.radius * angle.sin()]
-            }
+            Curve::Wall { hole, from, to } => domain.holes[hole].wall.point_at(from + t * (to - from)),
             Curve::Profile { upper, from, to } => {
                 let a = from + t * (to - from);
                 [a, if upper { domain.half_width(a) } else { -domain.half_width(a) }]
@@ -192,8 +191,8 @@ fn push(points: &mut Vec<[f64; 2]>, p: [f64; 2]) -> u32 {
 fn boundary_loops(domain: &Domain) -> Vec<Vec<Curve>> {
     let ([a, b], bottom) = (domain.half, domain.bottom);
     let mut outline = Vec::new();
-    let mut halves: Vec<usize> = (0..domain.discs.len()).filter(|&i| domain.discs[i].is_half).collect();
-    halves.sort_by(|&i, &j| domain.discs[i].center[0].total_cmp(&domain.discs[j].center[0]));
+    let mut halves: Vec<usize> = (0..domain.holes.len()).filter(|&i| domain.holes[i].is_half).collect();
+    halves.sort_by(|&i, &j| domain.holes[i].center()[0].total_cmp(&domain.holes[j].center()[0]));
     // Where lines end on a side parallel to axis `c`, on the given side of the section.
     let ends_on = |c: usize, value: f64| -> Vec<f64> {
         let tolerance = 1e-9 * domain.scale();
@@ -219,11 +218,12 @@ fn boundary_loops(domain: &Domain) -> Vec<Vec<Curve>> {
         outline.extend(with_ends(ends_on(0, -b)).windows(2).map(|w| side(domain, false, w[0], w[1])));
     } else {
         let mut from = -a;
-        for disc in halves {
-            let (center, radius) = (domain.discs[disc].center[0], domain.discs[disc].radius);
-            outline.push(Curve::Line([from, 0.0], [center - radius, 0.0]));
-            outline.push(Curve::Arc { disc, from: PI, to: 0.0 });
-            from = center + radius;
+        for hole in halves {
+            let wall = &domain.holes[hole].wall;
+            let (center, reach) = (wall.center_mm()[0], wall.half_extents_mm()[0]);
+            outline.push(Curve::Line([from, 0.0], [center - reach, 0.0]));
+            outline.extend(wall_curves(domain, hole, &[PI, 0.0]));
+            from = center + reach;
         }
         outline.push(Curve::Line([from, 0.0], [a, 0.0]));
     }
@@ -234,13 +234,23 @@ fn boundary_loops(domain: &Domain) -> Vec<Vec<Curve>> {
     outline.extend(with_ends(ends_on(0, b)).windows(2).rev().map(|w| side(domain, true, w[1], w[0])));
     outline.extend(upright(-a).windows(2).rev().map(|w| Curve::Line([-a, w[1]], [-a, w[0]])));
     let mut loops = vec![outline];
-    for (disc, d) in domain.discs.iter().enumerate() {
+    for (hole, d) in domain.holes.iter().enumerate() {
         if !d.is_half {
-            // Two halves: no part may span the whole circle.
-            loops.push(vec![Curve::Arc { disc, from: 2.0 * PI, to: PI }, Curve::Arc { disc, from: PI, to: 0.0 }]);
+            // Two halves: no part may span the whole wall.
+            loops.push(wall_curves(domain, hole, &[TAU, PI, 0.0]));
         }
     }
     loops
+}
+
+/// The wall of a hole between falling parameters, parted where its curvature jumps.
+fn wall_curves(domain: &Domain, hole: usize, knots: &[f64]) -> Vec<Curve> {
+    let (first, last) = (knots[0], knots[knots.len() - 1]);
+    let jumps = domain.holes[hole].wall.breaks().into_iter().map(|jump| jump.rem_euclid(TAU));
+    let mut all: Vec<f64> = knots.iter().copied().chain(jumps.filter(|t| *t < first && *t > last)).collect();
+    all.sort_by(|s, t| t.total_cmp(s));
+    all.dedup_by(|s, t| (*s - *t).abs() < SAME_PARAMETER);
+    all.windows(2).map(|w| Curve::Wall { hole, from: w[0], to: w[1] }).collect()
 }
 
 fn side(domain: &Domain, upper: bool, from: f64, to: f64) -> Curve {
@@ -349,15 +359,16 @@ fn parameters(domain: &Domain, options: &MeshOptions, fineness: f64, curve: Curv
 /// Length wanted for a part of `curve` at `p`: the element size (finer on graded sides), the holes' own resolution, and
 /// no more than the gap to the next wall.
 fn local_size(domain: &Domain, options: &MeshOptions, fineness: f64, curve: Curve, p: [f64; 2]) -> f64 {
-    let arc = |radius: f64| fineness * 2.0 * PI * radius / (options.hole_segments as f64).max(MIN_SEGMENTS);
+    let segments = (options.hole_segments as f64).max(MIN_SEGMENTS);
+    let arc = |wall: &HoleWall| fineness * TAU * wall.speed_at(wall.parameter_of(p)) / (segments * wall.parts_factor());
     let mut size = options.section_size_mm;
     let mut own = None;
     let mut gap = f64::INFINITY;
     match curve {
-        Curve::Arc { disc, .. } => {
-            own = Some(disc);
-            let d = &domain.discs[disc];
-            size = size.min(arc(d.radius));
+        Curve::Wall { hole, .. } => {
+            own = Some(hole);
+            let d = &domain.holes[hole];
+            size = size.min(arc(&d.wall));
             gap = domain.outline_distance(p);
             if domain.bottom == 0.0 && !d.is_half {
                 gap = gap.min(p[1]);
@@ -366,13 +377,13 @@ fn local_size(domain: &Domain, options: &MeshOptions, fineness: f64, curve: Curv
         Curve::Profile { .. } => size = size.min(domain.half_width(p[0])),
         Curve::Line(..) => {}
     }
-    for (i, d) in domain.discs.iter().enumerate() {
+    for (i, d) in domain.holes.iter().enumerate() {
         if own != Some(i) {
-            let distance = (p[0] - d.center[0]).hypot(p[1] - d.center[1]) - d.radius;
+            let distance = d.wall.distance_mm(p);
             // On the mirror line the wall of a half hole starts: no gap there.
             let touches = d.is_half && domain.bottom == 0.0 && p[1].abs() < 1e-12;
             if touches {
-                size = size.min(arc(d.radius) + 0.5 * distance.max(0.0));
+                size = size.min(arc(&d.wall) + 0.5 * distance.max(0.0));
             } else {
                 gap = gap.min(distance);
             }

@@ -200,7 +200,7 @@ fn made_specimen(specimen: &Specimen, experiment: &Experiment) -> Specimen {
         match hidden.cause {
             HiddenCause::Hole => {
                 if let Some(hole) = made.holes.get_mut(hidden.which) {
-                    hole.diameter_mm += hidden.strength * hidden.direction[0];
+                    *hole = hole.grown(hidden.strength * hidden.direction[0]);
                     hole.center_mm[0] += hidden.strength * hidden.direction[1];
                     hole.center_mm[1] += hidden.strength * hidden.direction[2];
                 }
@@ -262,7 +262,7 @@ fn patch_lines(made: &Specimen, hidden: &Hidden) -> Vec<[[f64; 2]; 2]> {
         made.holes.iter().any(|h| {
             let nearest = [0, 1].map(|c| h.center_mm[c].clamp(l[0][c].min(l[1][c]), l[0][c].max(l[1][c])));
             let distance = (nearest[0] - h.center_mm[0]).hypot(nearest[1] - h.center_mm[1]);
-            distance < 0.5 * h.diameter_mm + LEAST_STRIP_MM
+            distance < h.wall().half_mm()[0] + LEAST_STRIP_MM
         })
     };
     if lines.iter().any(is_near_hole) { Vec::new() } else { lines }

@@ -174,7 +174,8 @@ fn scored(
         HiddenCause::Wrap => Some((hidden.center_mm, hidden.extent_mm)),
         HiddenCause::Hole => specimen.holes.get(hidden.which).map(|h| {
             let made = [0, 1].map(|a| h.center_mm[a] + hidden.strength * hidden.direction[1 + a]);
-            ([made[0], 0.0, made[1]], [h.diameter_mm, specimen.block.thickness_mm, h.diameter_mm])
+            let [x, z] = h.wall().half_extents_mm().map(|e| 2.0 * e);
+            ([made[0], 0.0, made[1]], [x, specimen.block.thickness_mm, z])
         }),
         _ => None,
     };

@@ -10,13 +10,14 @@ impl Specimen {
     /// a slab of material-free space beyond the side. mm; 0 where they overlap. It checks
     /// [`Specimen::ligaments`] by another way of computing; agreement to about 1e-6 of the block's length.
     ///
-    /// `None` for the curved sides of a dumb-bell, for an index without a hole, and where a size is not positive.
+    /// `None` for holes that are not circles, for the curved sides of a dumb-bell, for an index without a hole, and where
+    /// a size is not positive.
     pub fn solid_clearance_mm(&self, kind: LigamentKind) -> Option<f64> {
         let half_extrusion = 0.5 * self.extrusion_mm();
         // parry's cylinders run along y: the frame here is (x, extrusion, lateral).
         let cylinder_of = |index: usize| {
             let hole = self.holes.get(index)?;
-            let is_positive = hole.diameter_mm > 0.0 && half_extrusion > 0.0;
+            let is_positive = hole.shape.is_none() && hole.diameter_mm > 0.0 && half_extrusion > 0.0;
             let place = Pose::translation(hole.center_mm[0], 0.0, hole.center_mm[1]);
             is_positive.then(|| (place, Cylinder::new(half_extrusion, 0.5 * hole.diameter_mm)))
         };

@@ -1,17 +1,17 @@
 //! The layout of a specimen's dimensioned drawing; `drawing_svg` and `drawing_dxf` write it.
 //!
-//! Front view (x, z) above, side view (x, y) below, x to the right in both. Holes appear as circles in the view
+//! Front view (x, z) above, side view (x, y) below, x to the right in both. Holes appear with their outlines in the view
 //! along their axis and as hidden lines in the other. Positions are ordinates from the block's centre lines; the
 //! table repeats them and adds distances from the end at −x and from the negative side.
 
-use super::drawing_labels::{place_labels, spread};
-use super::drawing_sheet::{Anchor, CHARACTER_WIDTH, Drawing, Entity, Layer, Shape, TEXT_HEIGHT, format_mm};
+use super::drawing_labels::spread;
+use super::drawing_sheet::{Anchor, CHARACTER_WIDTH, Drawing, Layer, Shape, TEXT_HEIGHT, format_mm};
+use super::drawing_table::{ROW_HEIGHT, table_width};
 use super::{HoleAxis, Outline, Specimen, TestKind, dumbbell};
 
 const MARGIN: f64 = 10.0;
-const COLUMN_WIDTHS: [f64; 6] = [9.0, 15.0, 15.0, 15.0, 15.0, 15.0];
-const TABLE_WIDTH: f64 = 84.0;
-const ROW_HEIGHT: f64 = 4.0;
+/// Width of the title, mm.
+const TITLE_WIDTH: f64 = 84.0;
 const TITLE_HEIGHT: f64 = 40.0;
 const LEFT_OF_VIEW: f64 = 17.0;
 const RIGHT_OF_VIEW: f64 = 26.0;
@@ -32,7 +32,7 @@ impl Drawing {
         let size = if num_holes <= rows_of(210.0) { [297.0, 210.0] } else { [420.0, 297.0] };
         let rows = rows_of(size[1]);
         let num_tables = num_holes.div_ceil(rows).max(1);
-        let panel = num_tables as f64 * TABLE_WIDTH;
+        let panel = num_tables as f64 * table_width(specimen);
 
         let block = specimen.block;
         let is_front_section = specimen.extrusion_axis() == HoleAxis::Thickness;
@@ -57,6 +57,7 @@ impl Drawing {
         drawing.outline(specimen, front_center, side_center);
         let (section, other) = if is_front_section { (front_center, side_center) } else { (side_center, front_center) };
         drawing.section_view(specimen, section);
+        drawing.ordinates(specimen, section);
         drawing.hidden_holes(specimen, other);
         drawing.overall_dimensions(specimen, front_center, side_center);
         drawing.table(specimen, rows, [size[0] - MARGIN - panel, size[1] - MARGIN]);
@@ -101,44 +102,12 @@ impl Drawing {
         self.dimension_x([ends[0], ends[1]], above, format_mm(dumbbell::NARROW_LENGTH_MM));
     }
 
-    /// Circles, centre marks, labels and ordinates of the holes.
-    fn section_view(&mut self, specimen: &Specimen, center: [f64; 2]) {
-        let s = self.scale;
-        let [length, lateral] = specimen.section_size();
-        let (hx, hb) = (0.5 * s * length, 0.5 * s * lateral);
-        self.line(Layer::Centre, [center[0] - hx - 3.0, center[1]], [center[0] + hx + 3.0, center[1]]);
-        self.line(Layer::Centre, [center[0], center[1] - hb - 3.0], [center[0], center[1] + hb + 3.0]);
+    /// Ordinates from the centre lines: x below the view, the lateral coordinate at its right.
+    fn ordinates(&mut self, specimen: &Specimen, center: [f64; 2]) {
         if specimen.holes.is_empty() {
             return;
         }
-        let circles: Vec<([f64; 2], f64)> = specimen
-            .holes
-            .iter()
-            .map(|hole| {
-                let [x, b] = hole.center_mm;
-                ([center[0] + s * x, center[1] + s * b], 0.5 * s * hole.diameter_mm)
-            })
-            .collect();
-        for ([x, y], radius) in circles.iter().copied() {
-            self.push(Layer::Holes, Shape::Circle([x, y], radius));
-            let mark = radius + radius.min(1.2);
-            self.line(Layer::Centre, [x - mark, y], [x + mark, y]);
-            self.line(Layer::Centre, [x, y - mark], [x, y + mark]);
-        }
-        let details: Vec<String> =
-            specimen.holes.iter().map(|hole| format!("⌀{}", format_mm(hole.diameter_mm))).collect();
-        let bounds = [[center[0] - hx, center[1] - hb], [center[0] + hx, center[1] + hb]];
-        for label in place_labels(&circles, &details, bounds, center) {
-            if let Some((from, to)) = label.leader {
-                self.line(Layer::Dimensions, from, to);
-            }
-            self.push(Layer::Dimensions, Shape::Text(label.text));
-        }
-        self.ordinates(specimen, center, [hx, hb]);
-    }
-
-    /// Ordinates from the centre lines: x below the view, the lateral coordinate at its right.
-    fn ordinates(&mut self, specimen: &Specimen, center: [f64; 2], half: [f64; 2]) {
+        let half = specimen.section_size().map(|extent| 0.5 * self.scale * extent);
         let spacing = TEXT_HEIGHT + 1.0;
         for k in 0..2 {
             let mut values: Vec<f64> = specimen.holes.iter().map(|hole| hole.center_mm[k]).chain([0.0]).collect();
@@ -170,20 +139,6 @@ impl Drawing {
         }
     }
 
-    /// The holes as hidden lines in the view across their axis.
-    fn hidden_holes(&mut self, specimen: &Specimen, center: [f64; 2]) {
-        let half = 0.5 * self.scale * specimen.extrusion_mm();
-        for hole in &specimen.holes {
-            let x = center[0] + self.scale * hole.center_mm[0];
-            let radius = 0.5 * self.scale * hole.diameter_mm;
-            for wall in [x - radius, x + radius] {
-                let shape = Shape::Line([wall, center[1] - half], [wall, center[1] + half]);
-                self.entities.push(Entity { layer: Layer::Holes, is_hidden: true, shape });
-            }
-            self.line(Layer::Centre, [x, center[1] - half - 1.5], [x, center[1] + half + 1.5]);
-        }
-    }
-
     fn overall_dimensions(&mut self, specimen: &Specimen, front: [f64; 2], side: [f64; 2]) {
         let [hx, hy, hz] = [specimen.block.length_mm, specimen.block.thickness_mm, specimen.block.width_mm]
             .map(|c| 0.5 * self.scale * c);
@@ -208,46 +163,15 @@ impl Drawing {
         self.text(Layer::Dimensions, at, TEXT_HEIGHT, Anchor::Start, false, side_title);
     }
 
-    /// The table of holes; `rows` per table, tables side by side from `top_left`.
-    fn table(&mut self, specimen: &Specimen, rows: usize, top_left: [f64; 2]) {
-        if specimen.holes.is_empty() {
-            return;
-        }
-        let b = if specimen.extrusion_axis() == HoleAxis::Thickness { "z" } else { "y" };
-        let header = ["hole", "x", b, "from -x", &format!("from -{b}"), "⌀"].map(String::from);
-        let [length, lateral] = specimen.section_size();
-        for (table, holes) in specimen.holes.chunks(rows).enumerate() {
-            let left = top_left[0] + table as f64 * TABLE_WIDTH;
-            let mut y = top_left[1] - 6.0;
-            self.table_row(left, y, &header);
-            self.line(Layer::Sheet, [left, y - 1.2], [left + TABLE_WIDTH - 2.0, y - 1.2]);
-            for (i, hole) in holes.iter().enumerate() {
-                y -= ROW_HEIGHT + if i == 0 { 1.0 } else { 0.0 };
-                let [x, b] = hole.center_mm;
-                let mut row = vec![(table * rows + i + 1).to_string()];
-                row.extend([x, b, 0.5 * length + x, 0.5 * lateral + b, hole.diameter_mm].map(format_mm));
-                self.table_row(left, y, &row);
-            }
-        }
-    }
-
-    fn table_row(&mut self, left: f64, y: f64, cells: &[String]) {
-        let mut right = left;
-        for (cell, width) in cells.iter().zip(COLUMN_WIDTHS) {
-            right += width;
-            self.text(Layer::Sheet, [right - 2.0, y], TEXT_HEIGHT, Anchor::End, false, cell.clone());
-        }
-    }
-
     fn title(&mut self, specimen: &Specimen) {
         let [width, _] = self.size;
-        let left = width - MARGIN - TABLE_WIDTH;
+        let left = width - MARGIN - TITLE_WIDTH;
         self.rectangle(Layer::Sheet, [5.0, 5.0], [width - 5.0, self.size[1] - 5.0]);
         self.line(Layer::Sheet, [left - 2.0, 5.0], [left - 2.0, 5.0 + TITLE_HEIGHT]);
         self.line(Layer::Sheet, [left - 2.0, 5.0 + TITLE_HEIGHT], [width - 5.0, 5.0 + TITLE_HEIGHT]);
         let mut y = 5.0 + TITLE_HEIGHT - 6.5;
         // Names have wide letters: a little more room than for numbers.
-        let per_line = (TABLE_WIDTH / (3.6 * CHARACTER_WIDTH)) as usize;
+        let per_line = (TITLE_WIDTH / (3.6 * CHARACTER_WIDTH)) as usize;
         for line in wrap(&specimen.name, per_line, 2) {
             self.text(Layer::Sheet, [left + 1.0, y], 3.5, Anchor::Start, false, line);
             y -= 5.0;
@@ -271,11 +195,21 @@ impl Drawing {
             faces,
             format!("Samples of this kind in one test: {}", specimen.samples_in_parallel),
             format!("Dimensions in mm. Scale {ratio} on {sheet}."),
-        ] {
+        ]
+        .into_iter()
+        .chain(angles_line(specimen))
+        {
             self.text(Layer::Sheet, [left + 1.0, y], TEXT_HEIGHT, Anchor::Start, false, line);
             y -= 4.6;
         }
     }
+}
+
+/// How angles of holes count, where there are any.
+fn angles_line(specimen: &Specimen) -> Option<String> {
+    let axis = if specimen.extrusion_axis() == HoleAxis::Thickness { "z" } else { "y" };
+    let has_angles = specimen.holes.iter().any(|hole| hole.shape.is_some());
+    has_angles.then(|| format!("Angles of holes in degrees, from +x towards +{axis}."))
 }
 
 /// Breaks a text into at most `max_lines` lines of `per_line` characters; what is left over becomes an ellipsis.

@@ -2,10 +2,15 @@
 
 use super::Specimen;
 use super::drawing_sheet::{Anchor, Drawing, Layer, Shape};
+use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 
+/// Largest distance between an ellipse and its chords, mm at full size.
+const CHORD_ERROR_MM: f64 = 0.002;
+
 /// The specimen's two views and their dimensions as plain entities (LINE, CIRCLE, ARC, TEXT) in mm, full size,
-/// the front view's centre at the origin. Layers: OUTLINE, HOLES, CENTRE, DIMENSIONS. The specimen should be valid.
+/// the front view's centre at the origin. Layers: OUTLINE, HOLES, CENTRE, DIMENSIONS. R12 knows no ellipse: one is a
+/// closed POLYLINE of chords within 0.002 mm. The specimen should be valid.
 pub fn to_dxf(specimen: &Specimen) -> String {
     let drawing = Drawing::new(specimen);
     let scale = drawing.scale;
@@ -36,6 +41,7 @@ pub fn to_dxf(specimen: &Specimen) -> String {
         let kind = match &entity.shape {
             Shape::Line(..) => "LINE",
             Shape::Circle(..) => "CIRCLE",
+            Shape::Ellipse(..) => "POLYLINE",
             Shape::Arc(..) => "ARC",
             Shape::Text(..) => "TEXT",
         };
@@ -52,6 +58,19 @@ pub fn to_dxf(specimen: &Specimen) -> String {
             Shape::Circle(c, radius) => {
                 dxf.point(0, place(*c));
                 dxf.number(40, radius / scale);
+            }
+            Shape::Ellipse(c, half, angle) => {
+                // Vertices follow, and are there in this plane.
+                dxf.group(66, "1");
+                dxf.point(0, [0.0; 2]);
+                dxf.group(70, "1");
+                for p in ellipse_points(*c, *half, *angle, scale) {
+                    dxf.group(0, "VERTEX");
+                    dxf.group(8, layer);
+                    dxf.point(0, place(p));
+                }
+                dxf.group(0, "SEQEND");
+                dxf.group(8, layer);
             }
             Shape::Arc(c, radius, from, to) => {
                 dxf.point(0, place(*c));
@@ -79,6 +98,20 @@ pub fn to_dxf(specimen: &Specimen) -> String {
     dxf.group(0, "ENDSEC");
     dxf.group(0, "EOF");
     dxf.0
+}
+
+/// Points of an ellipse of the sheet, so close that chords between them stay within the chord error at full size.
+fn ellipse_points(center: [f64; 2], half: [f64; 2], angle_deg: f64, scale: f64) -> Vec<[f64; 2]> {
+    // The ellipse is a circle of radius a, shortened: chords stray by at most a (1 − cos(step/2)).
+    let half_step = (1.0 - CHORD_ERROR_MM * scale / half[0]).clamp(0.0, 1.0).acos();
+    let count = ((PI / half_step).ceil() as usize).clamp(24, 4000);
+    let (sin, cos) = angle_deg.to_radians().sin_cos();
+    let at = |i: usize| {
+        let (t_sin, t_cos) = (TAU * i as f64 / count as f64).sin_cos();
+        let (along, across) = (half[0] * t_cos, half[1] * t_sin);
+        [center[0] + along * cos - across * sin, center[1] + along * sin + across * cos]
+    };
+    (0..count).map(at).collect()
 }
 
 /// Line types and layers.
@@ -156,6 +189,7 @@ fn ascii(text: &str) -> String {
             '⌀' => out.push_str("%%c"),
             '±' => out.push_str("%%p"),
             '×' => out.push('x'),
+            '°' => out.push_str("%%d"),
             c if c.is_ascii() && !c.is_ascii_control() => out.push(c),
             _ => out.push('?'),
         }
@@ -202,13 +236,32 @@ mod tests {
             prop_assert!(dxf.is_ascii());
             let found = entities(&dxf);
             let circles: Vec<_> = found.iter().filter(|e| is(e, "CIRCLE", "HOLES")).collect();
-            prop_assert_eq!(circles.len(), specimen.holes.len());
-            for (circle, hole) in circles.iter().zip(&specimen.holes) {
+            let round: Vec<_> = specimen.holes.iter().filter(|hole| hole.shape.is_none()).collect();
+            prop_assert_eq!(circles.len(), round.len());
+            for (circle, hole) in circles.iter().zip(round) {
                 // Nine decimals are written.
                 prop_assert!((number(circle, 40) - 0.5 * hole.diameter_mm).abs() < 1e-8);
                 prop_assert!((number(circle, 10) - hole.center_mm[0]).abs() < 1e-8);
                 if hole.axis == HoleAxis::Thickness {
                     prop_assert!((number(circle, 20) - hole.center_mm[1]).abs() < 1e-8);
+                }
+            }
+        }
+
+        /// Every vertex of an ellipse and every end of a slot's arcs and lines lies on the wall.
+        #[test]
+        fn other_holes_are_full_size(specimen in valid_specimen()) {
+            let on_wall = |p: [f64; 2]| specimen.holes.iter().any(|hole| hole.wall().distance_mm(p).abs() < 1e-7);
+            let is_seen_in_front = specimen.extrusion_axis() == HoleAxis::Thickness;
+            for entity in entities(&to_dxf(&specimen)).iter().filter(|_| is_seen_in_front) {
+                if is(entity, "VERTEX", "HOLES") {
+                    prop_assert!(on_wall([number(entity, 10), number(entity, 20)]));
+                } else if is(entity, "ARC", "HOLES") {
+                    for angle in [number(entity, 50), number(entity, 51)].map(f64::to_radians) {
+                        let radius = number(entity, 40);
+                        let p = [number(entity, 10) + radius * angle.cos(), number(entity, 20) + radius * angle.sin()];
+                        prop_assert!(on_wall(p), "{p:?}");
+                    }
                 }
             }
         }

@@ -1,5 +1,6 @@
 //! Places labels at holes so that none covers a hole, a centre line or another label.
 
+use super::HoleWall;
 use super::drawing_sheet::{Anchor, CHARACTER_WIDTH, TEXT_HEIGHT, Text};
 
 /// A label and, where it stands beside its hole, the line to it.
@@ -35,16 +36,11 @@ impl Taken {
     }
 }
 
-/// Places one label for each circle (centre, radius; paper mm), all within `bounds` and off the two centre lines
+/// Places one label for each hole (its wall in paper mm), all within `bounds` and off the two centre lines
 /// through `center`. Each label is its hole's number and `details`, in the hole where that fits, else beside it with
 /// a leader that crosses nothing. Where neither is possible the number stands alone; as a last resort it shrinks
-/// into its own circle, as circles never overlap.
-pub(super) fn place_labels(
-    circles: &[([f64; 2], f64)],
-    details: &[String],
-    bounds: Box2,
-    center: [f64; 2],
-) -> Vec<Label> {
+/// into its own hole, as holes never overlap.
+pub(super) fn place_labels(walls: &[HoleWall], details: &[String], bounds: Box2, center: [f64; 2]) -> Vec<Label> {
     let mut taken = Taken::default();
     let mut placed = Vec::with_capacity(details.len());
     for (index, detail) in details.iter().enumerate() {
@@ -52,11 +48,11 @@ pub(super) fn place_labels(
         let full = format!("{number} {detail}");
         let label = [(&full, TEXT_HEIGHT), (&number, TEXT_HEIGHT), (&number, SMALL_HEIGHT)]
             .into_iter()
-            .find_map(|(content, height)| place_one(circles, index, content, height, bounds, center, &taken))
+            .find_map(|(content, height)| place_one(walls, index, content, height, bounds, center, &taken))
             .unwrap_or_else(|| {
                 // In the quadrant between the centre marks: the far corner of two digits is at 1.8 heights.
-                let (middle, radius) = circles[index];
-                let height = (radius / 2.0).min(SMALL_HEIGHT);
+                let (middle, [_, inner]) = (walls[index].center_mm(), walls[index].half_mm());
+                let height = (inner / 2.0).min(SMALL_HEIGHT);
                 let at = middle.map(|c| c + 0.1 * height);
                 Label { text: text_at(at, height, &number), leader: None }
             });
@@ -69,9 +65,9 @@ fn text_at(at: [f64; 2], height: f64, content: &str) -> Text {
     Text { at, height, anchor: Anchor::Start, is_vertical: false, content: content.into() }
 }
 
-/// A free place for a label in or beside its circle.
+/// A free place for a label in or beside its hole.
 fn place_one(
-    circles: &[([f64; 2], f64)],
+    walls: &[HoleWall],
     index: usize,
     content: &str,
     height: f64,
@@ -79,9 +75,10 @@ fn place_one(
     center: [f64; 2],
     taken: &Taken,
 ) -> Option<Label> {
-    let (middle, radius) = circles[index];
+    let own = &walls[index];
+    let (middle, [radius, _]) = (own.center_mm(), own.half_mm());
     let inside = text_at(middle.map(|c| c + 1.5 * CLEARANCE), height, content);
-    if fits_in_circle(inside.bounds(), middle, radius - CLEARANCE) && taken.is_free(inside.bounds()) {
+    if fits_in(own, inside.bounds()) && taken.is_free(inside.bounds()) {
         return Some(Label { text: inside, leader: None });
     }
     let width = CHARACTER_WIDTH * height * content.chars().count() as f64;
@@ -90,18 +87,19 @@ fn place_one(
         let outer = grow(text.bounds(), CLEARANCE);
         let is_in_bounds = (0..2).all(|k| outer[0][k] >= bounds[0][k] && outer[1][k] <= bounds[1][k]);
         let is_off_centre_lines = (0..2).all(|k| outer[1][k] <= center[k] || outer[0][k] >= center[k]);
-        // A centre mark reaches past its circle by as much as 1.2 mm.
-        let is_off_circles = circles.iter().all(|(c, r)| distance_to_box(*c, outer) >= r + r.min(1.2));
-        if !(is_in_bounds && is_off_centre_lines && is_off_circles && taken.is_free(outer)) {
+        // A centre mark reaches past its hole by as much as 1.2 mm.
+        let is_off_holes = walls.iter().all(|wall| gap_to_box(wall, outer) >= wall.half_mm()[0].min(1.2));
+        if !(is_in_bounds && is_off_centre_lines && is_off_holes && taken.is_free(outer)) {
             return None;
         }
         let [low, high] = text.bounds();
         let end = [0, 1].map(|k| middle[k].clamp(low[k] - 0.3, high[k] + 0.3));
         let offset = [end[0] - middle[0], end[1] - middle[1]];
         let length = offset[0].hypot(offset[1]).max(f64::MIN_POSITIVE);
-        let start = [0, 1].map(|k| middle[k] + radius * offset[k] / length);
-        let others = circles.iter().enumerate().filter(|(other, _)| *other != index);
-        let is_clear = others.into_iter().all(|(_, (c, r))| distance_to_segment(*c, (start, end)) > r + 0.3)
+        let reach = own.ray_mm(offset.map(|c| c / length));
+        let start = [0, 1].map(|k| middle[k] + reach * offset[k] / length);
+        let others = walls.iter().enumerate().filter(|(other, _)| *other != index);
+        let is_clear = others.into_iter().all(|(_, wall)| gap_to_segment(wall, (start, end)) > 0.3)
             && taken.boxes.iter().all(|b| !crosses((start, end), *b));
         is_clear.then_some(Label { text, leader: Some((start, end)) })
     })
@@ -157,9 +155,34 @@ fn distance_to_box(p: [f64; 2], [low, high]: Box2) -> f64 {
     d[0].hypot(d[1])
 }
 
-fn fits_in_circle([low, high]: Box2, middle: [f64; 2], radius: f64) -> bool {
-    let far = [0, 1].map(|k| (low[k] - middle[k]).abs().max((high[k] - middle[k]).abs()));
-    far[0].hypot(far[1]) <= radius
+/// Distance of a box from a hole, no more than the true one: exact for a circle, else by points of the box's sides.
+fn gap_to_box(wall: &HoleWall, [low, high]: Box2) -> f64 {
+    if wall.is_circle() {
+        return distance_to_box(wall.center_mm(), [low, high]) - wall.half_mm()[1];
+    }
+    if distance_to_box(wall.center_mm(), [low, high]) <= 0.0 {
+        return -wall.half_mm()[1];
+    }
+    let corners = [low, [high[0], low[1]], high, [low[0], high[1]]];
+    (0..4).map(|i| gap_to_segment(wall, (corners[i], corners[(i + 1) % 4]))).fold(f64::INFINITY, f64::min)
+}
+
+/// The same of a segment.
+fn gap_to_segment(wall: &HoleWall, (from, to): ([f64; 2], [f64; 2])) -> f64 {
+    if wall.is_circle() {
+        return distance_to_segment(wall.center_mm(), (from, to)) - wall.half_mm()[1];
+    }
+    const PARTS: usize = 32;
+    let at = |i: usize| [0, 1].map(|k| from[k] + (to[k] - from[k]) * i as f64 / PARTS as f64);
+    let nearest = (0..=PARTS).map(|i| wall.distance_mm(at(i))).fold(f64::INFINITY, f64::min);
+    // Between two points the segment comes nearer by no more than half of their distance.
+    nearest - 0.5 * (to[0] - from[0]).hypot(to[1] - from[1]) / PARTS as f64
+}
+
+/// Whether a box lies in a hole with clearance all around: its corners do, as holes are convex.
+fn fits_in(wall: &HoleWall, [low, high]: Box2) -> bool {
+    let corners = [low, [high[0], low[1]], high, [low[0], high[1]]];
+    corners.iter().all(|p| wall.distance_mm(*p) <= -CLEARANCE)
 }
 
 /// Moves increasing positions apart to at least `spacing`, each group of crowded ones keeping its mean.

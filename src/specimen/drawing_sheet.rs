@@ -24,6 +24,8 @@ pub(super) enum Anchor {
 pub(super) enum Shape {
     Line([f64; 2], [f64; 2]),
     Circle([f64; 2], f64),
+    /// Centre, half of the extents along its length and across it, angle of its length in degrees, counter-clockwise.
+    Ellipse([f64; 2], [f64; 2], f64),
     /// Centre, radius, start and end in degrees, counter-clockwise.
     Arc([f64; 2], f64, f64, f64),
     Text(Text),
@@ -136,6 +138,13 @@ impl Drawing {
         self.line(Layer::Dimensions, [x, center[1] - half[1]], [x, center[1] + half[1]]);
         self.text(Layer::Dimensions, [x - 1.5, center[1]], TEXT_HEIGHT, Anchor::Middle, true, content);
     }
+}
+
+/// An angle with up to one decimal, without trailing zeros.
+pub(super) fn format_deg(value: f64) -> String {
+    let text = format!("{value:.1}");
+    let text = text.strip_suffix(".0").unwrap_or(&text);
+    if text == "-0" { "0".into() } else { text.into() }
 }
 
 /// A length with up to three decimals, without trailing zeros.

@@ -1,7 +1,7 @@
 //! The specimen as a closed surface (binary STL) for printing moulds and cores.
 //!
 //! The section is triangulated (constrained Delaunay, spade) without adding points, capped at both ends and
-//! walled along its boundary. Arcs and circles are chords within [`CHORD_ERROR_MM`] of the curve.
+//! walled along its boundary. Curves are chords within [`CHORD_ERROR_MM`] of the curve.
 
 use super::{HoleAxis, Outline, Specimen, dumbbell};
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
@@ -115,17 +115,12 @@ type Section = (Vec<[f64; 2]>, Vec<[usize; 3]>);
 fn triangulate_section(specimen: &Specimen) -> Result<Section, DrawingError> {
     let mut loops = vec![outline_points(specimen)];
     for hole in &specimen.holes {
-        let radius = 0.5 * hole.diameter_mm;
-        let n = num_chords(radius, TAU);
-        let [cx, cb] = hole.center_mm;
-        loops.push(
-            (0..n)
-                .map(|i| {
-                    let angle = TAU * i as f64 / n as f64;
-                    [cx + radius * angle.cos(), cb + radius * angle.sin()]
-                })
-                .collect(),
-        );
+        let wall = hole.wall();
+        // Of an ellipse, a circle of half its length that is shortened, and of a slot the half circles take the most.
+        let [a, b] = wall.half_mm();
+        let around = if wall.breaks().is_empty() { num_chords(a, TAU) as f64 } else { num_chords(b, TAU) as f64 };
+        let n = if wall.is_circle() { around } else { (around * wall.parts_factor()).ceil() } as usize;
+        loops.push((0..n).map(|i| wall.point_at(TAU * i as f64 / n as f64)).collect());
     }
     let num_points = loops.iter().map(Vec::len).sum();
     let failed = |reason: String| DrawingError::Triangulation { num_points, reason };

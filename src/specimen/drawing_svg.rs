@@ -15,7 +15,7 @@ pub fn to_svg(specimen: &Specimen) -> String {
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}mm\" height=\"{h}mm\" viewBox=\"0 0 {w} {h}\">\n",
             "<title>{name}</title>\n",
             "<style>\n",
-            "line,circle,path{{fill:none;stroke:#111;stroke-linecap:round}}\n",
+            "line,circle,ellipse,path{{fill:none;stroke:#111;stroke-linecap:round}}\n",
             ".outline{{stroke-width:.5}} .holes{{stroke-width:.5}} .hidden{{stroke-width:.3;stroke-dasharray:1.6 1}}\n",
             ".centre{{stroke:#777;stroke-width:.15;stroke-dasharray:4 1 1 1}}\n",
             ".dimensions{{stroke:#335;stroke-width:.18}} .sheet{{stroke-width:.25}}\n",
@@ -52,13 +52,23 @@ pub fn to_svg(specimen: &Specimen) -> String {
                 c[0],
                 height - c[1]
             ),
+            // Angles are counter-clockwise on paper, and clockwise in SVG, whose second axis points down.
+            Shape::Ellipse(c, half, angle) => {
+                let [x, y] = [c[0], height - c[1]];
+                writeln!(
+                    svg,
+                    "<ellipse class=\"{class}\" cx=\"{x:.3}\" cy=\"{y:.3}\" rx=\"{:.3}\" ry=\"{:.3}\" \
+                     transform=\"rotate({:.3} {x:.3} {y:.3})\"/>",
+                    half[0], half[1], -angle
+                )
+            }
             Shape::Arc(c, radius, from, to) => {
                 let point = |degrees: f64| {
                     let angle = degrees.to_radians();
                     [c[0] + radius * angle.cos(), height - c[1] - radius * angle.sin()]
                 };
                 let (a, b) = (point(*from), point(*to));
-                // Counter-clockwise on paper is sweep 0, as SVG's second axis points down. Arcs here are short.
+                // Counter-clockwise on paper is sweep 0, as SVG's second axis points down. Arcs here span at most half a turn.
                 writeln!(
                     svg,
                     "<path class=\"{class}\" d=\"M{:.3} {:.3}A{radius:.3} {radius:.3} 0 0 0 {:.3} {:.3}\"/>",
@@ -108,6 +118,7 @@ fn escape(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::specimen::HoleKind;
     use crate::specimen::sampling::valid_specimen;
     use proptest::prelude::*;
 
@@ -118,7 +129,13 @@ mod tests {
         fn shows_every_hole_and_escapes_the_name(specimen in valid_specimen()) {
             let specimen = Specimen { name: "a<b> & \"c\"".into(), ..specimen };
             let svg = to_svg(&specimen);
-            prop_assert_eq!(svg.matches("<circle").count(), specimen.holes.len());
+            let count = |kind: Option<HoleKind>| {
+                specimen.holes.iter().filter(|h| h.shape.map(|shape| shape.kind) == kind).count()
+            };
+            prop_assert_eq!(svg.matches("<circle").count(), count(None));
+            prop_assert_eq!(svg.matches("<ellipse").count(), count(Some(HoleKind::Ellipse)));
+            // Two half circles of each slot.
+            prop_assert_eq!(svg.matches("<path").count(), 2 * count(Some(HoleKind::Slot)));
             prop_assert!(svg.contains("<title>a&lt;b&gt; &amp; &quot;c&quot;</title>"));
             prop_assert!(!svg.contains("NaN") && !svg.contains("inf"));
         }

@@ -1,12 +1,15 @@
 //! Closed forms of a specimen's geometry: section, outline, containment, ligaments, mirrors, volume.
 
+use super::hole_gap::largest_between;
 use super::ligament::{Ligament, LigamentKind, SectionEdge};
-use super::{HoleAxis, Outline, Specimen, TestKind, dumbbell};
-use std::f64::consts::PI;
+use super::{HoleAxis, HoleWall, Outline, Specimen, TestKind, dumbbell};
+use std::f64::consts::TAU;
 
 /// How far a hole may lie from its partner's mirror image, in place and in diameter, for the specimen to count
 /// as symmetric, mm. Far below any mould's accuracy, far above rounding.
 pub const MIRROR_TOLERANCE_MM: f64 = 1e-6;
+/// Points of an ellipse or a slot at which its distance from a dumb-bell's curved side is looked at first.
+const WALL_POINTS: usize = 128;
 
 impl Specimen {
     /// Half the extent along z at `x_mm`, mm: width/2 of a block, the standard's profile of a dumb-bell.
@@ -29,7 +32,7 @@ impl Specimen {
                     HoleAxis::Thickness => z,
                     HoleAxis::Width => y,
                 };
-                (x - hole.center_mm[0]).hypot(lateral - hole.center_mm[1]) >= 0.5 * hole.diameter_mm
+                hole.wall().distance_mm([x, lateral]) >= 0.0
             })
     }
 
@@ -76,25 +79,19 @@ impl Specimen {
     }
 
     /// How far the holes are from being symmetric under (x, y, z) → (s₀x, s₁y, s₂z) with signs s, mm: the
-    /// largest of the least differences (distance of centres plus difference of diameters) between the mirror
-    /// image of a hole and a hole. Zero without holes.
+    /// largest of the least differences (distance of centres plus difference of diameters and outlines) between the
+    /// mirror image of a hole and a hole. Zero without holes.
     pub fn mirror_defect_mm(&self, signs: [f64; 3]) -> f64 {
         let defect_of = |hole: &super::Hole| {
             let lateral_sign = if hole.axis == HoleAxis::Thickness { signs[2] } else { signs[1] };
-            let image = [signs[0] * hole.center_mm[0], lateral_sign * hole.center_mm[1]];
-            self.holes
-                .iter()
-                .filter(|other| other.axis == hole.axis)
-                .map(|other| {
-                    (other.center_mm[0] - image[0]).hypot(other.center_mm[1] - image[1])
-                        + (other.diameter_mm - hole.diameter_mm).abs()
-                })
-                .fold(f64::INFINITY, f64::min)
+            let image = hole.mirrored([signs[0], lateral_sign]);
+            let others = self.holes.iter().filter(|other| other.axis == hole.axis);
+            others.map(|other| other.difference_mm(&image)).fold(f64::INFINITY, f64::min)
         };
         self.holes.iter().map(defect_of).fold(0.0, f64::max)
     }
 
-    /// Volume of one sample (of the first kind), mm³: area of the outline less the holes' circles, times the extrusion.
+    /// Volume of one sample (of the first kind), mm³: area of the outline less the holes', times the extrusion.
     pub fn volume_mm3(&self) -> f64 {
         let outline_area = match self.outline {
             Outline::Block => {
@@ -103,7 +100,7 @@ impl Specimen {
             }
             Outline::Iso37Type4 => dumbbell::area_mm2(),
         };
-        let hole_area: f64 = self.holes.iter().map(|hole| 0.25 * PI * hole.diameter_mm * hole.diameter_mm).sum();
+        let hole_area: f64 = self.holes.iter().map(|hole| hole.wall().area_mm2()).sum();
         (outline_area - hole_area) * self.extrusion_mm()
     }
 
@@ -111,20 +108,34 @@ impl Specimen {
     pub fn ligaments(&self) -> Vec<Ligament> {
         let mut ligaments = Vec::with_capacity(self.holes.len() * (self.holes.len() + 7) / 2);
         for (i, hole) in self.holes.iter().enumerate() {
+            let wall = hole.wall();
             for edge in SectionEdge::ALL {
-                let (distance, direction) = self.distance_to_edge(hole.center_mm, edge);
-                let length_mm = distance - 0.5 * hole.diameter_mm;
+                let (length_mm, direction) = self.wall_to_edge(&wall, edge);
                 ligaments.push(Ligament { kind: LigamentKind::HoleEdge(i, edge), length_mm, direction });
             }
             for (j, other) in self.holes.iter().enumerate().skip(i + 1) {
-                let offset = [other.center_mm[0] - hole.center_mm[0], other.center_mm[1] - hole.center_mm[1]];
-                let distance = offset[0].hypot(offset[1]);
-                let direction = if distance > 0.0 { offset.map(|c| c / distance) } else { [1.0, 0.0] };
-                let length_mm = distance - 0.5 * (hole.diameter_mm + other.diameter_mm);
+                let (length_mm, direction) = wall.gap_mm(&other.wall());
                 ligaments.push(Ligament { kind: LigamentKind::HoleHole(i, j), length_mm, direction });
             }
         }
         ligaments
+    }
+
+    /// Material between a hole's wall and a side, mm (negative where the hole reaches beyond it), and the unit vector
+    /// along which it is measured. Exact but for ellipses and slots beside the curved side of a dumb-bell, where the
+    /// nearest of many points of the wall is sought.
+    fn wall_to_edge(&self, wall: &HoleWall, edge: SectionEdge) -> (f64, [f64; 2]) {
+        let (distance, direction) = self.distance_to_edge(wall.center_mm(), edge);
+        let is_straight = self.outline == Outline::Block || matches!(edge, SectionEdge::MinusX | SectionEdge::PlusX);
+        if wall.is_circle() || is_straight {
+            return (distance - wall.reach_mm(direction), direction);
+        }
+        let at = |parameter: f64| self.distance_to_edge(wall.point_at(parameter), edge);
+        let step = TAU / WALL_POINTS as f64;
+        let depth = |parameter: f64| -at(parameter).0;
+        let nearest = (0..WALL_POINTS).map(|i| step * i as f64).max_by(|p, q| depth(*p).total_cmp(&depth(*q)));
+        let middle = nearest.unwrap_or(0.0);
+        at(largest_between(&depth, middle - step, middle + step))
     }
 
     /// Elongation or slip at which the test reaches a nominal deformation, as a fraction of `drive_mm`: shear strain

@@ -3,8 +3,8 @@
 //! Frame (reference): origin at the centre of the undeformed block; x along its length (the pull direction),
 //! y along its thickness, z along its width. Lengths in mm.
 //!
-//! What is supported: a plain block or one standard dumb-bell, with circular holes that all share one axis; in a
-//! double-lap test further blocks beside it ([`Specimen::samples`]).
+//! What is supported: a plain block or one standard dumb-bell, with holes that all share one axis: circles, ellipses and
+//! slots ([`HoleShape`]); in a double-lap test further blocks beside it ([`Specimen::samples`]).
 //! The mesh is a section extruded along that axis, so holes of two directions in one specimen are refused.
 //! Parsing and validation: [`Specimen::from_json`]. Limits of what can be made: [`ManufacturingLimits`].
 //! Drawings for the mould maker: [`to_svg`], [`to_dxf`], [`to_stl`].
@@ -13,14 +13,21 @@
 mod clearance;
 mod drawing;
 mod drawing_dxf;
+mod drawing_holes;
 mod drawing_labels;
 mod drawing_sheet;
 #[cfg(feature = "triangles")]
 mod drawing_stl;
 mod drawing_svg;
+mod drawing_table;
 pub mod dumbbell;
+mod ellipse;
 mod file;
 mod geometry;
+mod hole_gap;
+mod hole_motion;
+mod hole_shape;
+mod hole_wall;
 pub(crate) mod json;
 mod ligament;
 mod limits;
@@ -41,6 +48,8 @@ pub use drawing_dxf::to_dxf;
 pub use drawing_stl::{DrawingError, to_stl};
 pub use drawing_svg::to_svg;
 pub use geometry::MIRROR_TOLERANCE_MM;
+pub use hole_shape::{HoleKind, HoleShape, MAX_HOLE_ANGLE_DEG, MAX_HOLE_ASPECT};
+pub use hole_wall::HoleWall;
 pub use json::JsonProblem;
 pub use ligament::{Ligament, LigamentKind, SectionEdge};
 pub use limits::{DiameterRange, LimitMargin, ManufacturingLimits, Symmetry};
@@ -102,7 +111,7 @@ impl HoleAxis {
     }
 }
 
-/// A circular hole through the whole block.
+/// A hole through the whole block: a circle, or an ellipse or a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = HoleSchema))]
 #[serde(deny_unknown_fields)]
@@ -112,9 +121,31 @@ pub struct Hole {
     /// Centre, mm: (x, z) for `thickness`, (x, y) for `width`.
     #[cfg_attr(feature = "schema", schema(min_items = 2, max_items = 2))]
     pub center_mm: [f64; 2],
-    /// Diameter, mm.
+    /// Diameter, mm; of an ellipse or a slot the extent across it.
     #[cfg_attr(feature = "schema", schema(value_type = file::DiameterMm))]
     pub diameter_mm: f64,
+    /// Its outline where that is not a circle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schema(value_type = Option<HoleShape>, nullable = false))]
+    pub shape: Option<HoleShape>,
+}
+
+impl Hole {
+    /// A circular hole.
+    pub fn circle(axis: HoleAxis, center_mm: [f64; 2], diameter_mm: f64) -> Hole {
+        Hole { axis, center_mm, diameter_mm, shape: None }
+    }
+
+    /// Extent along the hole, mm; the diameter of a circle.
+    pub fn length_mm(&self) -> f64 {
+        self.shape.map_or(self.diameter_mm, |shape| shape.length_mm)
+    }
+
+    /// The hole with its wall about `by_mm`/2 further out all around: both extents grow by `by_mm`.
+    pub fn grown(self, by_mm: f64) -> Hole {
+        let shape = self.shape.map(|shape| HoleShape { length_mm: shape.length_mm + by_mm, ..shape });
+        Hole { diameter_mm: self.diameter_mm + by_mm, shape, ..self }
+    }
 }
 
 /// The outline in the (x, z) section, extruded along the thickness.

@@ -1,7 +1,10 @@
 //! Reading, writing and validating a specimen (`specimen/1`).
 
 use super::json::{JsonProblem, schema_of};
-use super::{Block, Hole, HoleAxis, Ligament, LigamentKind, Outline, Specimen, SpecimenError, TestKind, dumbbell};
+use super::{
+    Block, Hole, HoleAxis, HoleShape, Ligament, LigamentKind, MAX_HOLE_ANGLE_DEG, MAX_HOLE_ASPECT, Outline, Specimen,
+    SpecimenError, TestKind, dumbbell,
+};
 use crate::field::{FieldError, FieldPath};
 
 /// The schema that this version reads and writes.
@@ -33,7 +36,8 @@ const LIMIT_SLACK: f64 = 1e-9;
 /// How far a dumb-bell's block may be off the standard, mm: rounding only.
 const STANDARD_TOLERANCE_MM: f64 = 1e-6;
 
-/// Thinnest ligament that can be meshed beside a hole (the larger one of two), mm: 0.05 mm and 2 % of the diameter.
+/// Thinnest ligament that can be meshed beside a hole (the larger one of two), mm: 0.05 mm and 2 % of the diameter (of an
+/// ellipse or a slot the extent across it).
 pub fn min_meshable_ligament_mm(diameter_mm: f64) -> f64 {
     (0.02 * diameter_mm).max(0.05)
 }
@@ -166,6 +170,7 @@ impl Specimen {
             let of_hole = || FieldPath::of("holes").index(i);
             let diameter = || of_hole().name("diameter_mm");
             problems.extend(check_size(diameter, hole.diameter_mm, MIN_DIAMETER_MM, MAX_DIAMETER_MM));
+            problems.extend(hole.shape.into_iter().flat_map(|shape| check_hole_shape(of_hole, hole, shape)));
             for (k, value) in hole.center_mm.into_iter().enumerate() {
                 if !value.is_finite() {
                     let field = of_hole().name("center_mm").index(k);
@@ -248,6 +253,21 @@ impl Specimen {
         }
         None
     }
+}
+
+/// An outline that is not a circle is at least as long as wide, and not too long.
+fn check_hole_shape(field: impl Fn() -> FieldPath, hole: &Hole, shape: HoleShape) -> Vec<SpecimenError> {
+    let length = || field().name("shape").name("length_mm");
+    let (min_mm, max_mm) = (hole.diameter_mm, MAX_HOLE_ASPECT * hole.diameter_mm);
+    let mut problems: Vec<SpecimenError> = check_size(length, shape.length_mm, min_mm, max_mm).into_iter().collect();
+    let (value, limit) = (shape.angle_deg, MAX_HOLE_ANGLE_DEG);
+    if !value.is_finite() {
+        problems.push(SpecimenError::NotFinite { field: field().name("shape").name("angle_deg"), value });
+    } else if value.abs() > limit {
+        let field = field().name("shape").name("angle_deg");
+        problems.push(SpecimenError::AngleOutOfRange { field, value_deg: value, limit_deg: limit });
+    }
+    problems
 }
 
 fn check_size(field: impl Fn() -> FieldPath, value_mm: f64, min_mm: f64, max_mm: f64) -> Option<SpecimenError> {

@@ -48,6 +48,16 @@ pub enum SpecimenError {
         /// Largest, mm.
         max_mm: f64,
     },
+    /// The angle of a hole is outside the supported range.
+    #[error("{field} is {value_deg}°; choose an angle from -{limit_deg}° to {limit_deg}°")]
+    AngleOutOfRange {
+        /// Path of the field.
+        field: FieldPath,
+        /// Its value, degrees.
+        value_deg: f64,
+        /// Largest either way, degrees.
+        limit_deg: f64,
+    },
     /// More holes than supported.
     #[error("there are {count} holes; use at most {limit}")]
     TooManyHoles {
@@ -234,6 +244,9 @@ impl SpecimenError {
             E::NotFinite { field, value } => FieldError::new(field.pointer(), value, "a finite number"),
             E::SizeOutOfRange { field, value_mm, min_mm, max_mm } => {
                 FieldError::new(field.pointer(), value_mm, format!("from {min_mm} to {max_mm} mm"))
+            }
+            E::AngleOutOfRange { field, value_deg, limit_deg } => {
+                FieldError::new(field.pointer(), value_deg, format!("from -{limit_deg} to {limit_deg} degrees"))
             }
             E::TooManyHoles { count, limit } => {
                 FieldError::new("/holes", format!("a list of {count}"), format!("at most {limit} holes"))

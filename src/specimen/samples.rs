@@ -88,7 +88,7 @@ mod tests {
     fn unlike() -> Specimen {
         let mut specimen = Specimen::from_json(include_str!("../../geometries/two-hole-shear.json")).expect("shipped");
         let block = Block { thickness_mm: 8.0, ..specimen.block };
-        let hole = Hole { axis: HoleAxis::Width, center_mm: [0.0, 0.0], diameter_mm: 3.0 };
+        let hole = Hole::circle(HoleAxis::Width, [0.0, 0.0], 3.0);
         specimen.other_samples = vec![Sample { block, holes: vec![hole] }];
         specimen
     }

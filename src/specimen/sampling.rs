@@ -1,20 +1,21 @@
 //! Random specimens for tests.
 
-use super::{Block, Hole, HoleAxis, Outline, Specimen, TestKind, dumbbell};
+use super::{Block, Hole, HoleAxis, HoleKind, HoleShape, Outline, Specimen, TestKind, dumbbell};
 use proptest::prelude::*;
 
 /// Any arrangement of up to seven holes in a block, valid or not.
 pub(crate) fn any_layout() -> impl Strategy<Value = Specimen> {
-    let hole = (-0.6..0.6, -0.6..0.6, 0.02..0.4);
+    let kind = prop_oneof![2 => Just(None), 1 => Just(Some(HoleKind::Ellipse)), 1 => Just(Some(HoleKind::Slot))];
+    let hole = (-0.6..0.6, -0.6..0.6, 0.02..0.4, kind, 1.0..4.0, -180.0..180.0);
     let sizes = (5.0..60.0, 2.0..12.0, 4.0..30.0);
     (sizes, prop::collection::vec(hole, 0..8), any::<bool>(), any::<bool>()).prop_map(
         |((length_mm, thickness_mm, width_mm), holes, is_along_width, is_shear)| {
             let axis = if is_along_width { HoleAxis::Width } else { HoleAxis::Thickness };
             let lateral = if is_along_width { thickness_mm } else { width_mm };
-            let place = |(x, b, d): (f64, f64, f64)| Hole {
-                axis,
-                center_mm: [x * length_mm, b * lateral],
-                diameter_mm: 0.1 + d * lateral,
+            let place = |(x, b, d, kind, aspect, angle_deg): (f64, f64, f64, Option<HoleKind>, f64, f64)| {
+                let diameter_mm = 0.1 + d * lateral / kind.map_or(1.0, |_| aspect);
+                let shape = kind.map(|kind| HoleShape { kind, length_mm: aspect * diameter_mm, angle_deg });
+                Hole { axis, center_mm: [x * length_mm, b * lateral], diameter_mm, shape }
             };
             Specimen {
                 name: "random layout".into(),
@@ -57,7 +58,7 @@ pub(crate) fn dumbbell_with_hole() -> impl Strategy<Value = Specimen> {
             width_mm: dumbbell::END_WIDTH_MM,
         },
         outline: Outline::Iso37Type4,
-        holes: vec![Hole { axis: HoleAxis::Thickness, center_mm: [x, z], diameter_mm }],
+        holes: vec![Hole::circle(HoleAxis::Thickness, [x, z], diameter_mm)],
         drive_mm: vec![5.0],
         samples_in_parallel: 1,
         other_samples: Vec::new(),

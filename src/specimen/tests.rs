@@ -99,7 +99,7 @@ fn refuses_bad_dumbbells() {
     assert!(matches!(wide, E::NotTheStandardsBlock { .. }));
     assert_eq!(wide.field_error().pointer, "/block/width_mm");
     assert!(matches!(refused(&|s| s.test = TestKind::DoubleLapShear), E::DumbbellInShear));
-    let hole = |axis, x, z, d| Hole { axis, center_mm: [x, z], diameter_mm: d };
+    let hole = |axis, x, z, d| Hole::circle(axis, [x, z], d);
     assert!(matches!(
         refused(&|s| s.holes = vec![hole(HoleAxis::Width, 0.0, 0.0, 1.0)]),
         E::DumbbellHoleAlongWidth { hole: 0 }
@@ -202,9 +202,7 @@ fn refuses_bad_limits() {
 fn brute_force(specimen: &Specimen, kind: LigamentKind) -> f64 {
     const POINTS: usize = 600;
     let wall = |hole: &Hole| -> Vec<[f64; 2]> {
-        let angle = |i: usize| std::f64::consts::TAU * i as f64 / POINTS as f64;
-        let r = 0.5 * hole.diameter_mm;
-        (0..POINTS).map(|i| [hole.center_mm[0] + r * angle(i).cos(), hole.center_mm[1] + r * angle(i).sin()]).collect()
+        (0..POINTS).map(|i| hole.wall().point_at(std::f64::consts::TAU * i as f64 / POINTS as f64)).collect()
     };
     let [length, lateral] = specimen.section_size();
     let along = |i: usize| i as f64 / (4 * POINTS) as f64 - 0.5;
@@ -271,10 +269,10 @@ proptest! {
         for specimen in specimens {
             for ligament in specimen.ligaments() {
                 let found = brute_force(&specimen, ligament.kind);
-                // Samples are at most 1/2400 of a side or 1/600 of a circle apart: the search is above the distance,
-                // by no more than half the sum of both spacings.
+                // Samples are at most 1/2400 of a side or 1/600 of a circle apart (of other walls at most twice as much):
+                // the search is above the distance, by no more than half the sum of both spacings.
                 let size = specimen.block.length_mm.max(specimen.block.width_mm);
-                let circle = std::f64::consts::PI * specimen.holes.iter().map(|h| h.diameter_mm).fold(0.0, f64::max);
+                let circle = std::f64::consts::PI * specimen.holes.iter().map(|h| h.length_mm()).fold(0.0, f64::max);
                 let spacing = size / 2400.0 + 2.0 * circle / 600.0;
                 prop_assert!(found >= ligament.length_mm - 1e-9, "{}", ligament.kind);
                 prop_assert!(found <= ligament.length_mm + spacing, "{}: {} {}", ligament.kind, found, ligament.length_mm);
@@ -296,7 +294,7 @@ proptest! {
             }
         }
         let volume = inside as f64 / (N * N) as f64 * length * lateral * specimen.extrusion_mm();
-        let perimeter: f64 = specimen.holes.iter().map(|h| std::f64::consts::PI * h.diameter_mm).sum();
+        let perimeter: f64 = specimen.holes.iter().map(|h| h.wall().perimeter_mm()).sum();
         // Cells that a wall cuts may count wrongly by half their area, on average far less.
         let tolerance = perimeter * (length + lateral) / N as f64 * specimen.extrusion_mm();
         prop_assert!((volume - specimen.volume_mm3()).abs() <= tolerance + 1e-9 * volume);

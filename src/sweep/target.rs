@@ -3,7 +3,7 @@
 use super::study_error::SweepStudyError;
 use crate::material::Ogden;
 use crate::sensitivity::ScanSettings;
-use crate::specimen::Specimen;
+use crate::specimen::{HoleShape, Specimen};
 
 /// A place that a variable's value goes to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,6 +23,8 @@ enum Place {
     HoleX(usize),
     HoleOther(usize),
     HoleDiameter(usize),
+    HoleLength(usize),
+    HoleAngle(usize),
     Bulk,
     Mu(usize),
     Alpha(usize),
@@ -34,7 +36,7 @@ enum Place {
 impl Target {
     /// Reads `drive_mm`, `block.length_mm`, `block.thickness_mm`, `block.width_mm`, `holes[i].x_mm`,
     /// `holes[i].other_mm` (z of a hole along the thickness, y of one along the width), `holes[i].diameter_mm`,
-    /// `material.bulk_kpa`, `material.mu_1_kpa`, `material.alpha_1`, `scan.voxel_mm[c]`, `scan.noise_sd_mm[c]` or
+    /// `holes[i].length_mm` and `holes[i].angle_deg` (of a hole with an outline of its own), `material.bulk_kpa`, `material.mu_1_kpa`, `material.alpha_1`, `scan.voxel_mm[c]`, `scan.noise_sd_mm[c]` or
     /// `scan.force_sd_n`; indices of holes and components from 0, of Ogden terms from 1. A leading `-` sets the negated
     /// value.
     ///
@@ -63,6 +65,8 @@ impl Target {
                 "x_mm" => Some(Place::HoleX(index)),
                 "other_mm" => Some(Place::HoleOther(index)),
                 "diameter_mm" => Some(Place::HoleDiameter(index)),
+                "length_mm" => Some(Place::HoleLength(index)),
+                "angle_deg" => Some(Place::HoleAngle(index)),
                 _ => None,
             };
         }
@@ -89,6 +93,7 @@ impl Target {
             Place::Bulk | Place::Mu(_) => "_kpa",
             Place::Alpha(_) => "",
             Place::ForceSd => "_n",
+            Place::HoleAngle(_) => "_deg",
             _ => "_mm",
         }
     }
@@ -108,7 +113,7 @@ impl Target {
         if self.is_negated { -value } else { value }
     }
 
-    /// Sets `value`; false where there is no such hole or term.
+    /// Sets `value`; false where there is no such hole, outline or term.
     pub fn set(&self, value: f64, specimen: &mut Specimen, material: &mut Ogden, scan: &mut ScanSettings) -> bool {
         let value = self.signed(value);
         let slot = match self.place {
@@ -122,6 +127,8 @@ impl Target {
             Place::HoleX(i) => specimen.holes.get_mut(i).map(|h| &mut h.center_mm[0]),
             Place::HoleOther(i) => specimen.holes.get_mut(i).map(|h| &mut h.center_mm[1]),
             Place::HoleDiameter(i) => specimen.holes.get_mut(i).map(|h| &mut h.diameter_mm),
+            Place::HoleLength(i) => shape_of(specimen, i).map(|shape| &mut shape.length_mm),
+            Place::HoleAngle(i) => shape_of(specimen, i).map(|shape| &mut shape.angle_deg),
             Place::Bulk => Some(&mut material.bulk_kpa),
             Place::Mu(i) => material.terms.get_mut(i).map(|t| &mut t.mu_kpa),
             Place::Alpha(i) => material.terms.get_mut(i).map(|t| &mut t.alpha),
@@ -134,4 +141,9 @@ impl Target {
             true
         })
     }
+}
+
+/// The outline of a hole that is not a circle.
+fn shape_of(specimen: &mut Specimen, hole: usize) -> Option<&mut HoleShape> {
+    specimen.holes.get_mut(hole)?.shape.as_mut()
 }

@@ -138,7 +138,7 @@ pub(crate) mod tests {
     }
 
     pub(crate) fn two_hole() -> Specimen {
-        let hole = |x| Hole { axis: HoleAxis::Thickness, center_mm: [x, 0.0], diameter_mm: 5.0 };
+        let hole = |x| Hole::circle(HoleAxis::Thickness, [x, 0.0], 5.0);
         Specimen { holes: vec![hole(-4.2333), hole(4.2333)], ..solid() }
     }
 
@@ -153,14 +153,9 @@ pub(crate) mod tests {
     /// On a grid that covers everything, the filled parts add up to the specimen's volume, wherever the grid lies.
     #[test]
     fn filled_parts_add_up_to_the_volume() {
-        for specimen in [
-            solid(),
-            two_hole(),
-            Specimen {
-                holes: vec![Hole { axis: HoleAxis::Width, center_mm: [2.0, 0.4], diameter_mm: 3.0 }],
-                ..solid()
-            },
-        ] {
+        for specimen in
+            [solid(), two_hole(), Specimen { holes: vec![Hole::circle(HoleAxis::Width, [2.0, 0.4], 3.0)], ..solid() }]
+        {
             let offset = [-14.906, -3.613, -10.999];
             let grid = VoxelGrid::new(offset, PUBLISHED_VOXEL, [30, 39, 30]).unwrap();
             let all = VoxelMask::from_flags(&specimen, grid.clone(), &vec![true; grid.num_voxels()], 0.0).unwrap();

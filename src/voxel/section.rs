@@ -4,7 +4,7 @@
 //! constant x the material along the other section axis is the outline's interval less the chords of the holes, all in
 //! closed form. Areas and averages over cut voxels need only a rule along x.
 
-use crate::specimen::{HoleAxis, Specimen};
+use crate::specimen::{HoleAxis, HoleWall, Specimen};
 
 /// How a rectangle of the section lies to the material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,12 +51,7 @@ impl<'a> Section<'a> {
         }
         intervals.push([low, high]);
         for hole in &self.specimen.holes {
-            let (radius, dx) = (0.5 * hole.diameter_mm, x - hole.center_mm[0]);
-            if dx.abs() >= radius {
-                continue;
-            }
-            let chord = (radius * radius - dx * dx).sqrt();
-            let (from, to) = (hole.center_mm[1] - chord, hole.center_mm[1] + chord);
+            let Some([from, to]) = hole.wall().chord_mm(x) else { continue };
             let mut n = 0;
             while n < intervals.len() {
                 let [a, b] = intervals[n];
@@ -92,14 +87,10 @@ impl<'a> Section<'a> {
             Overlap::Cut
         };
         for hole in &self.specimen.holes {
-            let (c, radius) = (hole.center_mm, 0.5 * hole.diameter_mm);
-            let near = [c[0].clamp(x[0], x[1]) - c[0], c[1].clamp(b[0], b[1]) - c[1]];
-            let far = [(x[0] - c[0]).abs().max((x[1] - c[0]).abs()), (b[0] - c[1]).abs().max((b[1] - c[1]).abs())];
-            if far[0].hypot(far[1]) <= radius {
-                return Overlap::None;
-            }
-            if near[0].hypot(near[1]) < radius {
-                overlap = Overlap::Cut;
+            match of_hole(&hole.wall(), x, b) {
+                Overlap::None => return Overlap::None,
+                Overlap::Cut => overlap = Overlap::Cut,
+                Overlap::Full => {}
             }
         }
         overlap
@@ -116,6 +107,31 @@ impl<'a> Section<'a> {
         }
         area
     }
+}
+
+/// How a rectangle lies to a hole: exact for a circle; for other walls `Full` only where it is certain.
+fn of_hole(wall: &HoleWall, x: [f64; 2], b: [f64; 2]) -> Overlap {
+    let [c, d] = wall.center_mm();
+    if wall.is_circle() {
+        let radius = wall.half_mm()[1];
+        let near = [c.clamp(x[0], x[1]) - c, d.clamp(b[0], b[1]) - d];
+        let far = [(x[0] - c).abs().max((x[1] - c).abs()), (b[0] - d).abs().max((b[1] - d).abs())];
+        return if far[0].hypot(far[1]) <= radius {
+            Overlap::None
+        } else if near[0].hypot(near[1]) < radius {
+            Overlap::Cut
+        } else {
+            Overlap::Full
+        };
+    }
+    // A hole is convex: what has its corners in it lies in it.
+    let corners = [[x[0], b[0]], [x[1], b[0]], [x[0], b[1]], [x[1], b[1]]];
+    if corners.iter().all(|p| wall.distance_mm(*p) <= 0.0) {
+        return Overlap::None;
+    }
+    let middle = [0.5 * (x[0] + x[1]), 0.5 * (b[0] + b[1])];
+    let half_diagonal = 0.5 * (x[1] - x[0]).hypot(b[1] - b[0]);
+    if wall.distance_mm(middle) >= half_diagonal { Overlap::Full } else { Overlap::Cut }
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@
 use lambdak::fem::{Equilibrium, ForwardModel, SolveError, SolveOptions};
 use lambdak::material::{Ogden, OgdenTerm};
 use lambdak::mesh::{ElementKind, Mesh, MeshOptions, Mirror, mesh_specimen};
-use lambdak::specimen::{Block, Hole, HoleAxis, Outline, Specimen, TestKind};
+use lambdak::specimen::{Block, Hole, HoleAxis, HoleKind, HoleShape, Outline, Specimen, TestKind};
 use std::collections::HashMap;
 
 pub type Vector = [f64; 3];
@@ -34,7 +34,7 @@ pub fn specimen(test: TestKind, extents: Vector, axis: HoleAxis, holes: &[Vector
         test,
         block: Block { length_mm, thickness_mm, width_mm },
         outline: Outline::Block,
-        holes: holes.iter().map(|h| Hole { axis, center_mm: [h[0], h[1]], diameter_mm: h[2] }).collect(),
+        holes: holes.iter().map(|h| Hole::circle(axis, [h[0], h[1]], h[2])).collect(),
         drive_mm: vec![1.0],
         samples_in_parallel: 1,
         other_samples: Vec::new(),
@@ -56,6 +56,18 @@ pub fn two_holes() -> Specimen {
 pub fn off_axis() -> Specimen {
     let holes = [[-5.0, 3.0, 4.0], [4.0, -2.0, 5.0]];
     specimen(TestKind::DoubleLapShear, SHEAR_BLOCK, HoleAxis::Thickness, &holes)
+}
+
+/// An ellipse and a slot without any symmetry.
+pub fn ellipse_and_slot() -> Specimen {
+    let mut specimen = specimen(TestKind::DoubleLapShear, SHEAR_BLOCK, HoleAxis::Thickness, &[]);
+    let hole = |kind, center_mm, diameter_mm, length_mm, angle_deg| {
+        let shape = Some(HoleShape { kind, length_mm, angle_deg });
+        Hole { axis: HoleAxis::Thickness, center_mm, diameter_mm, shape }
+    };
+    specimen.holes =
+        vec![hole(HoleKind::Ellipse, [-5.0, 2.0], 3.0, 6.0, 35.0), hole(HoleKind::Slot, [5.0, -1.5], 3.0, 5.5, -60.0)];
+    specimen
 }
 
 pub fn bar() -> Specimen {

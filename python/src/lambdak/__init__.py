@@ -62,7 +62,7 @@ from ._results import (
     Solution,
     SolveStep,
 )
-from ._specimen import Hole, Material, Sample, ScanSettings, Specimen, Term
+from ._specimen import Hole, HoleShape, Material, Sample, ScanSettings, Specimen, Term
 
 try:
     __version__ = version("lambdak")
@@ -84,6 +84,7 @@ __all__ = [
     "Evaluation",
     "EvaluationStep",
     "Hole",
+    "HoleShape",
     "InputError",
     "IntegratedSensitivity",
     "LambdakError",

@@ -56,8 +56,29 @@ def _tuple(numbers: Any) -> Tuple[float, ...]:
 
 
 @dataclass(frozen=True)
+class HoleShape:
+    """The outline of a hole that is not a circle: `kind` is `ellipse` or `slot`.
+
+    `length_mm` is its extent along it, and the hole's `diameter_mm` then that across it; `angle_deg` runs from x
+    towards the section's other axis (z for holes along the thickness, y for holes along the width).
+    """
+
+    kind: str
+    length_mm: float
+    angle_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "length_mm", plain(self.length_mm))
+        object.__setattr__(self, "angle_deg", plain(self.angle_deg))
+
+    def to_dict(self) -> Dict[str, Any]:
+        """As `specimen/1` holds it."""
+        return {"kind": self.kind, "length_mm": self.length_mm, "angle_deg": self.angle_deg}
+
+
+@dataclass(frozen=True)
 class Hole:
-    """A circular hole through the whole block.
+    """A hole through the whole block: a circle, or with a `shape` an ellipse or a slot.
 
     Along the thickness it is centred at (x, z), along the width at (x, y), in mm from the block's centre.
     """
@@ -65,6 +86,7 @@ class Hole:
     center_mm: Tuple[float, float]
     diameter_mm: float
     axis: str = "thickness"
+    shape: Optional[HoleShape] = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "center_mm", _tuple(self.center_mm))
@@ -72,7 +94,16 @@ class Hole:
 
     def to_dict(self) -> Dict[str, Any]:
         """As `specimen/1` holds it."""
-        return {"axis": self.axis, "center_mm": list(self.center_mm), "diameter_mm": self.diameter_mm}
+        shape = {} if self.shape is None else {"shape": self.shape.to_dict()}
+        return {"axis": self.axis, "center_mm": list(self.center_mm), "diameter_mm": self.diameter_mm, **shape}
+
+    @classmethod
+    def _of_program(cls, found: Dict[str, Any]) -> "Hole":
+        only_known(found, ("axis", "center_mm", "diameter_mm", "shape"), "a hole")
+        shape = found.get("shape")
+        if shape is not None:
+            only_known(shape, ("kind", "length_mm", "angle_deg"), "a hole's shape")
+        return cls(**{**found, "shape": None if shape is None else HoleShape(**shape)})
 
 
 @dataclass(frozen=True)
@@ -106,10 +137,7 @@ def _block(found: Dict[str, Any]) -> Dict[str, float]:
 
 
 def _holes(found: Dict[str, Any]) -> Tuple[Hole, ...]:
-    holes = found.get("holes") or []
-    for hole in holes:
-        only_known(hole, ("axis", "center_mm", "diameter_mm"), "a hole")
-    return tuple(Hole(**hole) for hole in holes)
+    return tuple(Hole._of_program(hole) for hole in found.get("holes") or [])
 
 
 @dataclass(frozen=True)

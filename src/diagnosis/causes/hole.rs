@@ -13,7 +13,7 @@ const REMEDY: &str = "Measure the holes as cast and give the specimen their plac
 /// Its line in the registry.
 pub(super) const ENTRY: Entry = Entry { name: NAME, remedy: REMEDY, origin: Origin::Tested(all_of) };
 
-/// Diameter and centre of one hole.
+/// Diameter and centre of one hole; of an ellipse or a slot both of its extents, which grow by the same.
 pub struct HoleError {
     hole: usize,
     axis: HoleAxis,
@@ -79,10 +79,11 @@ impl Cause for HoleError {
 
     fn location(&self, values: &[f64], specimen: &Specimen) -> Option<Location> {
         let h = specimen.holes.get(self.hole)?;
-        let (d, a, b) = (h.diameter_mm + values[0], h.center_mm[0] + values[1], h.center_mm[1] + values[2]);
+        let [a, b] = [h.center_mm[0] + values[1], h.center_mm[1] + values[2]];
+        let [along, across] = h.wall().half_extents_mm().map(|half| 2.0 * half + values[0]);
         let (center_mm, extent_mm) = match self.axis {
-            HoleAxis::Thickness => ([a, 0.0, b], [d, specimen.block.thickness_mm, d]),
-            HoleAxis::Width => ([a, b, 0.0], [d, d, specimen.block.width_mm]),
+            HoleAxis::Thickness => ([a, 0.0, b], [along, specimen.block.thickness_mm, across]),
+            HoleAxis::Width => ([a, b, 0.0], [along, across, specimen.block.width_mm]),
         };
         Some(Location { region: format!("hole {}", self.hole), center_mm, extent_mm })
     }

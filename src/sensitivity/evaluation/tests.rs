@@ -70,8 +70,7 @@ fn beside(specimen: Specimen, others: &[&Specimen]) -> Specimen {
 }
 
 fn with_hole() -> Specimen {
-    let hole =
-        crate::specimen::Hole { axis: crate::specimen::HoleAxis::Thickness, center_mm: [0.5, 0.0], diameter_mm: 3.0 };
+    let hole = crate::specimen::Hole::circle(crate::specimen::HoleAxis::Thickness, [0.5, 0.0], 3.0);
     Specimen { holes: vec![hole], ..block("hole") }
 }
 

@@ -1,6 +1,7 @@
 // The section of a specimen to edit: holes are dragged, or moved by the arrow keys (Shift: ten times as far).
 
 import { h, s } from "./dom.js";
+import { KINDS_OF_HOLES, holeShape, reshape, sizeOf, widen } from "./hole.js";
 import { wrongDiameters } from "./ligaments.js";
 import { plain } from "./numbers.js";
 import { sectionOf } from "./outline.js";
@@ -67,8 +68,8 @@ export function editor(model, change) {
   const resize = (index, by) => {
     const hole = model.specimen.holes[index];
     const tied = images(model, index);
-    hole.diameter_mm = Math.max(0.5, round(hole.diameter_mm + by));
-    for (const image of tied) image.hole.diameter_mm = hole.diameter_mm;
+    const width = Math.max(0.5, round(hole.diameter_mm + by));
+    for (const one of [hole, ...tied.map((image) => image.hole)]) widen(one, width);
     edited();
   };
   const remove = (index) => {
@@ -105,18 +106,15 @@ export function editor(model, change) {
       dragging = null;
     });
 
-  function circle(hole, index, wrong) {
+  function outline(hole, index, wrong) {
     const classes = ["hole", index === model.chosen ? "chosen" : "", wrong ? "wrong" : ""].join(" ");
     const [x, y] = hole.center_mm;
-    return s("circle", {
+    return holeShape(hole, {
       class: classes,
-      cx: x,
-      cy: -y,
-      r: hole.diameter_mm / 2,
       tabindex: 0,
       role: "button",
       "aria-label":
-        `Hole ${index + 1}, ${plain(hole.diameter_mm)} mm at ${plain(x)}, ${plain(y)} mm` +
+        `Hole ${index + 1}, ${hole.shape ? `${hole.shape.kind} ${sizeOf(hole)}, in` : plain(hole.diameter_mm)} mm at ${plain(x)}, ${plain(y)} mm` +
         `${wrong ? ", breaks a limit" : ""}`,
       onpointerdown: (event) => {
         const at = toMm(event);
@@ -134,7 +132,7 @@ export function editor(model, change) {
   function draw() {
     const { under, over, text } = drawSection(svg, model);
     const sizes = wrongDiameters(model);
-    const holes = model.specimen.holes.map((hole, i) => circle(hole, i, sizes.has(i) || model.wrong?.has(i)));
+    const holes = model.specimen.holes.map((hole, i) => outline(hole, i, sizes.has(i) || model.wrong?.has(i)));
     const labels = model.specimen.holes.map((hole, i) =>
       s(
         "text",
@@ -145,7 +143,7 @@ export function editor(model, change) {
           "font-size": Math.min(text, hole.diameter_mm / 3.2),
           "text-anchor": "middle",
         },
-        `${i + 1}: ⌀ ${plain(hole.diameter_mm, 4)}`,
+        `${i + 1}: ${sizeOf(hole)}`,
       ),
     );
     svg.replaceChildren(...[under, holes, labels, over].flat(Infinity));
@@ -169,6 +167,43 @@ export function editor(model, change) {
         },
       });
     const other = sectionOf(model.specimen).up;
+    const outlineCells = (hole, index) => [
+      h(
+        "td",
+        {},
+        h(
+          "select",
+          {
+            "aria-label": `outline of hole ${index + 1}`,
+            onchange: (event) => {
+              reshape(hole, event.target.value);
+              edited();
+            },
+          },
+          KINDS_OF_HOLES.map(([kind, words]) =>
+            h("option", { value: kind, selected: kind === (hole.shape?.kind ?? "circle") }, words),
+          ),
+        ),
+      ),
+      ...[
+        ["length_mm", `length of hole ${index + 1}, mm`],
+        ["angle_deg", `angle of hole ${index + 1}, degrees`],
+      ].map(([key, name]) =>
+        h(
+          "td",
+          {},
+          hole.shape &&
+            number(
+              hole,
+              name,
+              (o) => o.shape[key] ?? 0,
+              (o, v) => {
+                o.shape[key] = v;
+              },
+            ),
+        ),
+      ),
+    ];
     list.replaceChildren(
       holes.length === 0
         ? h("p", { class: "quiet" }, "No holes.")
@@ -181,7 +216,7 @@ export function editor(model, change) {
               h(
                 "tr",
                 {},
-                ["Hole", "x, mm", `${other}, mm`, "Diameter, mm", h("span", { class: "hidden" }, "Remove")].map((t) =>
+                ["Hole", "x, mm", `${other}, mm`, "Diameter, mm", "Outline", "Length, mm", "Angle, °", h("span", { class: "hidden" }, "Remove")].map((t) =>
                   h("th", { scope: "col" }, t),
                 ),
               ),
@@ -230,6 +265,7 @@ export function editor(model, change) {
                       },
                     ),
                   ),
+                  outlineCells(hole, index),
                   h(
                     "td",
                     {},

@@ -1,5 +1,6 @@
 // Where a section is thinner than its limits: between holes, to the edges, and holes of a wrong size.
 
+import { gapOf, reachOf } from "./hole.js";
 import { outlineAt } from "./outline.js";
 
 /** A place that breaks a limit: from, to (mm), value and limit (mm), and where there is room for words. */
@@ -9,14 +10,11 @@ function betweenHoles(holes, limit) {
   const found = [];
   holes.forEach((a, i) =>
     holes.slice(i + 1).forEach((b) => {
-      const [dx, dy] = [b.center_mm[0] - a.center_mm[0], b.center_mm[1] - a.center_mm[1]];
-      const apart = Math.hypot(dx, dy) || 1e-9;
-      const value = apart - (a.diameter_mm + b.diameter_mm) / 2;
+      const { value, n } = gapOf(a, b);
       if (value >= limit - 1e-9) return;
-      const along = (hole, sign) =>
-        [0, 1].map((k) => hole.center_mm[k] + (((sign * [dx, dy][k]) / apart) * hole.diameter_mm) / 2);
+      const along = (hole, sign) => [0, 1].map((k) => hole.center_mm[k] + sign * n[k] * reachOf(hole, n));
       const room = [0, 1].map((k) => (a.center_mm[k] + b.center_mm[k]) / 2);
-      room[1] += Math.max(a.diameter_mm, b.diameter_mm) / 2;
+      room[1] += Math.max(reachOf(a, [0, 1]), reachOf(b, [0, 1]));
       found.push(broken(along(a, 1), along(b, -1), value, limit, room));
     }),
   );
@@ -26,16 +24,16 @@ function betweenHoles(holes, limit) {
 function toEdges(holes, specimen, section, limit) {
   return holes.flatMap((hole) => {
     const [x, y] = hole.center_mm;
-    const r = hole.diameter_mm / 2;
+    const [r, t] = [reachOf(hole, [1, 0]), reachOf(hole, [0, 1])];
     const half = outlineAt(specimen, section, x);
     return [
-      [[x, y + r], [x, half], half - y - r],
-      [[x, y - r], [x, -half], half + y - r],
+      [[x, y + t], [x, half], half - y - t],
+      [[x, y - t], [x, -half], half + y - t],
       [[x + r, y], [section.length / 2, y], section.length / 2 - x - r],
       [[x - r, y], [-section.length / 2, y], section.length / 2 + x - r],
     ]
       .filter(([, , value]) => value < limit - 1e-9)
-      .map(([from, to, value]) => broken(from, to, value, limit, [x, y + r]));
+      .map(([from, to, value]) => broken(from, to, value, limit, [x, y + t]));
   });
 }
 

@@ -1,6 +1,7 @@
 // The drawing of a specimen: its section with holes, plates or grips, the drive, dimensions, and a view from the side.
 
 import { s } from "./dom.js";
+import { holeShape, reachOf } from "./hole.js";
 import { brokenLigaments } from "./ligaments.js";
 import { digits, plain } from "./numbers.js";
 import { outlinePath, sectionOf } from "./outline.js";
@@ -121,8 +122,11 @@ function sideView(model, section, { text, side }) {
   const top = side - depth / 2;
   return [
     s("rect", { class: "outline", x: -length / 2, y: top, width: length, height: depth }),
-    model.specimen.holes.flatMap(({ center_mm: [x], diameter_mm: d }) =>
-      [-1, 1].map((e) => line("concealed", [x + (e * d) / 2, top], [x + (e * d) / 2, top + depth])),
+    model.specimen.holes.flatMap((hole) =>
+      [-1, 1].map((e) => {
+        const x = hole.center_mm[0] + e * reachOf(hole, [1, 0]);
+        return line("concealed", [x, top], [x, top + depth]);
+      }),
     ),
     dimension(
       text,
@@ -155,9 +159,7 @@ export function sectionPicture(exact, label) {
   const specimen = rounded(exact);
   const svg = s("svg", { class: "section still", role: "img", "aria-label": label });
   const { under, over } = drawSection(svg, { specimen, limits: {} });
-  const holes = specimen.holes.map(({ center_mm: [x, y], diameter_mm: d }) =>
-    s("circle", { class: "hole", cx: x, cy: -y, r: d / 2 }),
-  );
+  const holes = specimen.holes.map((hole) => holeShape(hole, { class: "hole" }));
   svg.append(...[under, holes, over].flat(Infinity));
   return svg;
 }

@@ -11,6 +11,10 @@ function variables(model) {
   specimen.holes.forEach((hole, i) => {
     const axes = hole.axis === "thickness" ? ["x", "z"] : ["x", "y"];
     add(`/specimen/holes/${i}/diameter_mm`, `diameter of hole ${i + 1}, mm`, hole.diameter_mm);
+    if (hole.shape) {
+      add(`/specimen/holes/${i}/shape/length_mm`, `length of hole ${i + 1}, mm`, hole.shape.length_mm);
+      add(`/specimen/holes/${i}/shape/angle_deg`, `angle of hole ${i + 1}, degrees`, hole.shape.angle_deg ?? 0);
+    }
     axes.forEach((a, c) =>
       add(`/specimen/holes/${i}/center_mm/${c}`, `centre of hole ${i + 1} along ${a}, mm`, hole.center_mm[c]),
     );

@@ -35,6 +35,7 @@ const ASSETS: &[(&str, &str, &str)] = &[
     asset!("live.js", "text/javascript; charset=utf-8"),
     asset!("editor.js", "text/javascript; charset=utf-8"),
     asset!("outline.js", "text/javascript; charset=utf-8"),
+    asset!("hole.js", "text/javascript; charset=utf-8"),
     asset!("ligaments.js", "text/javascript; charset=utf-8"),
     asset!("section_drawing.js", "text/javascript; charset=utf-8"),
     asset!("sweep.js", "text/javascript; charset=utf-8"),

@@ -100,7 +100,7 @@ fn homogeneous_deformation_on_real_meshes() {
     // Without z shear and, where y mirrors, without y shear.
     let sheared = [[1.2, 0.5, 0.0], [0.02, 0.9, 0.0], [0.0, 0.0, 1.1]];
     let stretched = [[1.2, 0.0, 0.0], [0.0, 0.9, 0.0], [0.0, 0.0, 1.1]];
-    let across = Hole { axis: HoleAxis::Width, center_mm: [3.0, 0.2], diameter_mm: 3.0 };
+    let across = Hole::circle(HoleAxis::Width, [3.0, 0.2], 3.0);
     let dumbbell = Specimen {
         test: TestKind::Uniaxial,
         block: Block { length_mm: 35.0, thickness_mm: 2.0, width_mm: 6.0 },
