@@ -21,9 +21,12 @@ ROOT = DOCS.parent
 FILES = [
     ("specimen/1", "SpecimenSchema", "geometries/two-hole-shear.json",
      "A specimen: the block or dumb-bell as drawn, its holes, how it is held and moved, and how far."),
-    ("ogden/1", "MaterialSchema", "geometries/materials/ecoflex-0020-two-term.json",
+    ("ogden/1", "OgdenSchema", "geometries/materials/ecoflex-0020-two-term.json",
      "A material, Ψ = Σ μᵢ/αᵢ (λ̄₁^αᵢ + λ̄₂^αᵢ + λ̄₃^αᵢ − 3) + κ/2 (ln J)² ([theory](theory.md#the-material)). Every fit leaves one as "
      "`material.json`."),
+    ("yeoh/1", "YeohSchema", None, "A material with Yeoh's law in the place of Ogden's terms ([theory](theory.md#the-material))."),
+    ("gent/1", "GentSchema", None, "A material with Gent's law."),
+    ("arruda_boyce/1", "ArrudaBoyceSchema", None, "A material with Arruda and Boyce's law."),
     ("study/1", "StudySchema", None,
      "A design study. In a file, `base` and each `material` may be the path of a file, from the study's own folder, in place of the "
      "object itself. `geometries/studies/` holds examples; [what a design search maximises](design-search.md) explains the objectives."),

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 fn ogden(bulk_kpa: f64, terms: &[(f64, f64)]) -> Ogden {
-    Ogden { bulk_kpa, terms: terms.iter().map(|&(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha }).collect() }
+    Ogden { bulk_kpa, terms: terms.iter().map(|&(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha }).collect(), law: None }
 }
 
 /// Runs the input file `name.inp` of `folder`, and gives time and total force (N) of each increment.

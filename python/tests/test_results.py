@@ -20,6 +20,16 @@ needs_tables = unittest.skipUnless(HAS_TABLES, "pandas and xarray are not instal
 
 
 class Parts(Scratch):
+    def test_laws_in_the_first_invariant(self):
+        for material in (
+            lk.Material.yeoh((8.0, -0.2, 0.04), bulk_kpa=2000),
+            lk.Material.gent(16.0, 30.0, bulk_kpa=2000),
+            lk.Material.arruda_boyce(15.0, 2.5, bulk_kpa=2000),
+        ):
+            self.assertEqual(lk.Material.from_json(material.to_json()), material)
+        with self.assertRaises(lk.InputError):
+            lk.Material.gent(16.0, 0.0, bulk_kpa=2000)
+
     def test_specimens_and_materials_come_back_from_json(self):
         thicker = lk.Sample(12, 5, 9, holes=[lk.Hole((0, 0), 2)])
         bent = bar(holes=[lk.Hole((1.5, 0.25), 2.0, axis="width")], outline="block")

@@ -48,6 +48,7 @@ pub fn calibrate(
         by_f_test: rule(Rule::FTest),
         by_decrement: rule(Rule::Decrement),
         decided_by: match options.terms {
+            _ if options.law.is_some() => "fixed".into(),
             TermCount::Fixed(_) => "fixed".into(),
             TermCount::Auto { .. } => match options.rule {
                 Rule::Bic => "bic".into(),
@@ -56,6 +57,7 @@ pub fn calibrate(
             },
         },
         chosen: match options.terms {
+            _ if options.law.is_some() => rows.len(),
             TermCount::Fixed(n) => n.min(rows.len()),
             TermCount::Auto { .. } => rule(options.rule),
         },

@@ -4,6 +4,7 @@ use super::contours::ContourOptions;
 use super::options::FitOptions;
 use super::target::Objective;
 use super::terms::{DECREMENT_THRESHOLD, Rule};
+use crate::material::LawKind;
 
 /// Discretisation errors of data are taken to be this multiple of our own, to one standard deviation. Ours at the
 /// standard size is about that of the usual synthetic recordings (0.004 to 0.012 mm rms at 70 % shear).
@@ -26,6 +27,8 @@ pub enum TermCount {
 pub struct CalibrateOptions {
     /// Number of terms.
     pub terms: TermCount,
+    /// A law in the first invariant in the place of Ogden's terms, whose number is then not chosen.
+    pub law: Option<LawKind>,
     /// Which rule decides.
     pub rule: Rule,
     /// Threshold of the paper's decrement.
@@ -55,6 +58,7 @@ impl Default for CalibrateOptions {
     fn default() -> Self {
         CalibrateOptions {
             terms: TermCount::Auto { max: 3 },
+            law: None,
             rule: Rule::Bic,
             decrement_threshold: DECREMENT_THRESHOLD,
             objective: Objective::Weighted,

@@ -45,7 +45,7 @@ pub struct Contour {
     pub total: Vec<Option<f64>>,
 }
 
-/// Computes the three pairs (κ, μ₁), (κ, α₁), (μ₁, α₁), other parameters staying at the estimate.
+/// Computes the three pairs (κ, μ₁), (κ, α₁), (μ₁, α₁) (of a law its first two parameters), other parameters staying at the estimate.
 ///
 /// # Errors
 /// [`CalibrationError`].
@@ -63,16 +63,15 @@ pub fn contours(
         (0..n)
             .map(|i| match parameter {
                 Parameter::Kappa => at * options.bulk_factor.powf(part(i)),
-                Parameter::Mu(_) => at * (1.0 + options.mu_range * part(i)),
-                Parameter::Alpha(_) => at * (1.0 + options.alpha_range * part(i)),
+                _ if parameter.is_modulus() => at * (1.0 + options.mu_range * part(i)),
+                _ => at * (1.0 + options.alpha_range * part(i)),
             })
             .collect()
     };
-    let pairs = [
-        [Parameter::Kappa, Parameter::Mu(0)],
-        [Parameter::Kappa, Parameter::Alpha(0)],
-        [Parameter::Mu(0), Parameter::Alpha(0)],
-    ];
+    // κ, and the first two of the others.
+    let parameters = fit.material.parameters();
+    let (first, second) = (parameters[1], parameters[2]);
+    let pairs = [[Parameter::Kappa, first], [Parameter::Kappa, second], [first, second]];
     let mut all = Vec::new();
     for pair in pairs {
         let axes = pair.map(values);

@@ -67,14 +67,10 @@ impl RecordingFit {
         Some(plain * self.structured_misfit)
     }
 
-    /// ½ Σ μᵢαᵢ, kPa, and its standard deviation by the delta method.
+    /// The initial shear modulus, kPa, and its standard deviation by the delta method.
     pub fn initial_shear_modulus(&self) -> (f64, Option<f64>) {
-        let terms = &self.material.terms;
         let value = self.material.initial_shear_modulus_kpa();
-        let mut gradient = vec![0.0];
-        for term in terms {
-            gradient.extend([0.5 * term.alpha, 0.5 * term.mu_kpa]);
-        }
+        let gradient = self.material.initial_shear_modulus_derivatives();
         let is_known = !self.held.contains(1);
         let sd = self.covariance.sd_along(&gradient).filter(|_| is_known);
         (value, sd.map(|sd| sd * self.misfit_factor.sqrt()))

@@ -249,16 +249,18 @@ impl CalibrationResult {
     }
 }
 
-/// Without a force: every modulus over μ₁, which was held.
+/// Without a force: every modulus over the first but κ (μ₁), which was held.
 fn ratios(calibration: &Calibration) -> Vec<RatioResult> {
     let fit = &calibration.fit;
-    let first = fit.material.terms.first().map_or(1.0, |t| t.mu_kpa);
+    // κ stands before the first of the others, which was held.
+    let reference = fit.material.parameters()[1];
+    let first = fit.material.value(reference);
     calibration
         .estimates
         .iter()
-        .filter(|e| e.parameter.name() != "mu_1" && !e.parameter.name().starts_with("alpha"))
+        .filter(|e| e.parameter != reference && e.parameter.is_modulus())
         .map(|e| RatioResult {
-            name: format!("{}/mu_1", e.parameter.name()),
+            name: format!("{}/{}", e.parameter.name(), reference.name()),
             value: e.value / first,
             sd: e.sd.map(|sd| sd / first.abs()),
         })

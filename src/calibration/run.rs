@@ -8,7 +8,7 @@ use super::outcome::MeshComparison;
 use super::prediction::SolverWork;
 use super::problem::CalibrationProblem;
 use super::recording_fit::RecordingFit;
-use super::starts::{first_starts, further_starts};
+use super::starts::{first_starts, further_starts, law_starts};
 use super::target::{Objective, PAPER_BETA};
 use super::terms::{TermRow, compare, degeneracies, is_kept};
 use crate::material::{MAX_TERMS, Ogden, least_relative_stiffness};
@@ -18,6 +18,18 @@ pub(super) fn with_falling_exponents(material: &Ogden) -> Ogden {
     let mut sorted = material.clone();
     sorted.terms.sort_by(|a, b| b.alpha.total_cmp(&a.alpha));
     sorted
+}
+
+/// Where a fit starts: the exponents of its terms, or the parameters of its law.
+fn start_in_words(start: &Ogden) -> String {
+    let rounded = |v: f64| (100.0 * v).round() / 100.0;
+    if let Some(law) = &start.law {
+        let values = law.parameters().iter().map(|p| format!("{} {}", p.name(), rounded(law.value(*p))));
+        return format!("law from {}", values.collect::<Vec<_>>().join(", "));
+    }
+    let count = start.terms.len();
+    let exponents: Vec<f64> = start.terms.iter().map(|t| rounded(t.alpha)).collect();
+    format!("{count} term{} from α {exponents:?}", if count == 1 { "" } else { "s" })
 }
 
 /// What the stages of a calibration share.
@@ -53,6 +65,11 @@ impl<'a> Run<'a> {
         problem: &mut CalibrationProblem,
     ) -> Result<(Vec<TermRow>, Vec<RecordingFit>), CalibrationError> {
         let (mut rows, mut fits): (Vec<TermRow>, Vec<RecordingFit>) = (Vec::new(), Vec::new());
+        if let Some(kind) = self.options.law {
+            (self.on_stage)("a law in the first invariant");
+            let starts = law_starts(problem.observed(), kind);
+            return Ok(self.best_of(problem, &starts)?.map_or((rows, fits), |(row, fit)| (vec![row], vec![fit])));
+        }
         let (most, is_auto) = match self.options.terms {
             TermCount::Auto { max } => (max, true),
             TermCount::Fixed(n) => (n, false),
@@ -90,14 +107,7 @@ impl<'a> Run<'a> {
     ) -> Result<RecordingFit, CalibrationError> {
         let fit = problem.fit(start, near, &self.fit_options, self.is_cancelled)?;
         self.work.add(fit.work);
-        (self.on_stage)(&format!(
-            "  {} term{} from α {:?}: χ² {:.1} in {} iterations",
-            start.terms.len(),
-            if start.terms.len() == 1 { "" } else { "s" },
-            start.terms.iter().map(|t| (100.0 * t.alpha).round() / 100.0).collect::<Vec<_>>(),
-            fit.chi2,
-            fit.iterations
-        ));
+        (self.on_stage)(&format!("  {}: χ² {:.1} in {} iterations", start_in_words(start), fit.chi2, fit.iterations));
         Ok(fit)
     }
 
@@ -118,7 +128,7 @@ impl<'a> Run<'a> {
                     }
                 }
                 Err(e) if e.is_of_the_data() => {
-                    (self.on_stage)(&format!("  {} terms: {e}", start.terms.len()));
+                    (self.on_stage)(&format!("  {}: {e}", start_in_words(start)));
                     failure = Some(e);
                 }
                 Err(e) => return Err(e),
@@ -130,7 +140,7 @@ impl<'a> Run<'a> {
         let best = found.iter().position(|f| f.is_converged && last(f) < last(&found[0]) + 1.0).unwrap_or(0);
         if found.is_empty() {
             return match failure {
-                Some(e) if starts.first().is_some_and(|s| s.terms.len() == 1) => Err(e),
+                Some(e) if starts.first().is_some_and(|s| s.terms.len() < 2) => Err(e),
                 _ => Ok(None),
             };
         }

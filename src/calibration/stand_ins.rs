@@ -106,7 +106,7 @@ pub fn stand_ins(
         let values = trained.calibration.selection.rows.first().map(|r| r.values.clone()).unwrap_or_default();
         if let [bulk_kpa, mu_kpa, alpha] = values[..] {
             let terms = vec![crate::material::OgdenTerm { mu_kpa, alpha }];
-            let material = Ogden { bulk_kpa, terms };
+            let material = Ogden { bulk_kpa, terms, law: None };
             let mesh = |s: &Specimen| MeshOptions::scaled(s, options.fit_factor);
             let mut problem = CalibrationProblem::new(observed, &mesh, options.objective)?;
             let fit = problem.at(&material, is_cancelled)?;

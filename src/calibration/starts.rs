@@ -8,7 +8,7 @@ use super::problem::CalibrationProblem;
 use super::recording_fit::RecordingFit;
 use super::system::raw_sums;
 use super::target::Target;
-use crate::material::{MAX_TERMS, Ogden, OgdenTerm};
+use crate::material::{LawKind, MAX_TERMS, Ogden, OgdenTerm};
 use crate::specimen::{Specimen, TestKind};
 use nalgebra::DVector;
 
@@ -51,7 +51,7 @@ fn shear_modulus_kpa(observed: &[Observed]) -> f64 {
 }
 
 fn ogden(bulk_kpa: f64, terms: Vec<OgdenTerm>) -> Ogden {
-    Ogden { bulk_kpa, terms }
+    Ogden { bulk_kpa, terms, law: None }
 }
 
 /// Blind one-term starts, the likeliest first.
@@ -61,6 +61,13 @@ pub(super) fn first_starts(observed: &[Observed]) -> Vec<Ogden> {
         .iter()
         .map(|&alpha| ogden(START_BULK_RATIO * shear, vec![OgdenTerm { mu_kpa: 2.0 * shear / alpha, alpha }]))
         .collect()
+}
+
+/// Blind starts of a law in the first invariant.
+pub(super) fn law_starts(observed: &[Observed], kind: LawKind) -> Vec<Ogden> {
+    let shear = shear_modulus_kpa(observed);
+    let start = |law| Ogden { bulk_kpa: START_BULK_RATIO * shear, terms: Vec::new(), law: Some(law) };
+    kind.starts(shear).into_iter().map(start).collect()
 }
 
 /// What a further term would change, for every exponent that it is tried with. Does not depend on the data.

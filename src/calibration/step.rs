@@ -3,7 +3,10 @@
 use super::error::CalibrationError;
 use super::options::{Bulk, FitOptions, Held};
 use super::system::NormalSystem;
-use crate::material::{MAX_ALPHA, MIN_ALPHA, Ogden, Parameter};
+use crate::material::{
+    LawParameter, MAX_ALPHA, MAX_CHAIN_LIMIT, MAX_LOCKING_STRETCH, MIN_ALPHA, MIN_CHAIN_LIMIT, MIN_LOCKING_STRETCH,
+    Ogden, Parameter,
+};
 use crate::optimise::{LinearLimit, NoStep, limited_step};
 use nalgebra::{DMatrix, DVector};
 
@@ -82,6 +85,8 @@ impl Constraints {
                     let value = start.value(*p).abs();
                     match p {
                         Parameter::Alpha(_) => (SMALLEST_EXPONENT * value).max(1.01 * MIN_ALPHA),
+                        Parameter::Law(LawParameter::Limit) => MIN_CHAIN_LIMIT,
+                        Parameter::Law(LawParameter::LockingStretch) => MIN_LOCKING_STRETCH,
                         _ => SMALLEST_MODULUS * value,
                     }
                 })
@@ -105,10 +110,18 @@ impl Constraints {
                 limit(format!("{name}: largest"), vec![(i, 1.0)], high.max(0.0));
                 limit(format!("{name}: smallest"), vec![(i, -1.0)], (-low).max(0.0));
             }
-            if *parameter != Parameter::Kappa {
+            if *parameter != Parameter::Kappa && !parameter.has_any_sign() {
                 let part = self.smallest[i] / system.values[i].abs();
-                let room = if let Parameter::Mu(_) = parameter { -part.ln() } else { 1.0 - part }.max(0.0);
+                let room = if let Parameter::Alpha(_) = parameter { 1.0 - part } else { -part.ln() }.max(0.0);
                 limit(format!("{name}: smallest size"), vec![(i, -1.0)], room);
+            }
+            let largest = match parameter {
+                Parameter::Law(LawParameter::Limit) => Some(MAX_CHAIN_LIMIT),
+                Parameter::Law(LawParameter::LockingStretch) => Some(MAX_LOCKING_STRETCH),
+                _ => None,
+            };
+            if let Some(largest) = largest {
+                limit(format!("{name}: largest size"), vec![(i, 1.0)], (largest / system.values[i]).ln().max(0.0));
             }
             if let Parameter::Alpha(_) = parameter {
                 let room = (LARGEST_EXPONENT / system.values[i].abs() - 1.0).max(0.0);

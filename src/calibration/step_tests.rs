@@ -6,6 +6,7 @@ fn system(material: &Ogden, matrix: DMatrix<f64>, gradient: &[f64]) -> NormalSys
     let parameters = material.parameters();
     NormalSystem {
         values: parameters.iter().map(|p| material.value(*p)).collect(),
+        scales: crate::calibration::system::scales_of(material),
         parameters,
         information: FisherInformation::none(material),
         matrix,

@@ -9,7 +9,7 @@
 
 use super::error::CalibrationError;
 use super::step::Constraints;
-use super::system::NormalSystem;
+use super::system::{NormalSystem, scales_of};
 use crate::fem::{Equilibrium, ForwardModel};
 use crate::kinematics::principal_stretches;
 use crate::material::Ogden;
@@ -115,6 +115,7 @@ impl StressPath {
         matrix[(0, 0)] = 1.0;
         NormalSystem {
             values: outer.parameters.iter().map(|p| material.value(*p)).collect(),
+            scales: scales_of(material),
             gradient: slopes.tr_mul(&misfit),
             matrix,
             chi2: misfit.norm_squared(),
@@ -205,6 +206,7 @@ mod tests {
         let n = parameters.len();
         NormalSystem {
             values: parameters.iter().map(|p| material.value(*p)).collect(),
+            scales: scales_of(material),
             parameters,
             information: FisherInformation::none(material),
             matrix: DMatrix::identity(n, n),

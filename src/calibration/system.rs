@@ -1,7 +1,8 @@
 //! The misfit of a model's prediction and its Gauss–Newton system in scaled parameters.
 //!
 //! The objective is that of [`super::target`], plus (ln κ − ln κ₀)²/σ_κ² where a prior is set.
-//! Scaled parameters: ln κ and ln |μ|, κ eˢ and μ eˢ; α relative to its present value, α (1 + s). What a term's stress
+//! Scaled parameters: ln κ and ln |μ|, κ eˢ and μ eˢ, as of all others that keep their sign; α relative to its present
+//! value, α (1 + s); those that may have either sign in units of half the initial shear modulus. What a term's stress
 //! at the largest stretches fixes, ln |μ| + α ln λ, is then a straight valley: with μ (1 + s) steps along it have to be
 //! short. With the residuals r and their derivatives the gradient is g = −½ ∂χ²/∂s and the matrix is H = ½ ∂²χ²/∂s²
 //! without the second derivatives of the model.
@@ -19,6 +20,8 @@ use nalgebra::{DMatrix, DVector};
 pub(super) struct NormalSystem {
     pub(super) parameters: Vec<Parameter>,
     pub(super) values: Vec<f64>,
+    /// ∂ξ/∂s.
+    pub(super) scales: Vec<f64>,
     pub(super) information: FisherInformation,
     /// H; for all parameters, held ones included.
     pub(super) matrix: DMatrix<f64>,
@@ -63,10 +66,10 @@ impl NormalSystem {
                 information.add_log_prior(parameter, HELD_LOG_SD)?;
             }
         }
-        // dξ = ξ ds, with its sign.
-        let matrix = DMatrix::from_fn(n, n, |i, j| information.matrix()[(i, j)] * values[i] * values[j]);
+        let scales = scales_of(material);
+        let matrix = DMatrix::from_fn(n, n, |i, j| information.matrix()[(i, j)] * scales[i] * scales[j]);
         let mut gradient = sums.gradient;
-        gradient.component_mul_assign(&DVector::from_column_slice(&values));
+        gradient.component_mul_assign(&DVector::from_column_slice(&scales));
         let mut chi2 = sums.chi2;
         if let Bulk::LogPrior { center_kpa, log_sd } = bulk {
             let misfit = (center_kpa / values[0]).ln();
@@ -79,6 +82,7 @@ impl NormalSystem {
         Ok(NormalSystem {
             parameters,
             values,
+            scales,
             information,
             matrix,
             gradient,
@@ -94,13 +98,21 @@ impl NormalSystem {
         for (i, &parameter) in self.parameters.iter().enumerate() {
             let value = self.values[i];
             let moved = match parameter {
-                Parameter::Kappa | Parameter::Mu(_) => value * step[i].exp(),
                 Parameter::Alpha(_) => value * (1.0 + step[i]),
+                _ if parameter.has_any_sign() => value + self.scales[i] * step[i],
+                _ => value * step[i].exp(),
             };
             next.set(parameter, moved);
         }
         next
     }
+}
+
+/// ∂ξ/∂s of every parameter: ξ itself, with its sign, and half the initial shear modulus where ξ may be zero.
+pub(super) fn scales_of(material: &Ogden) -> Vec<f64> {
+    let half_shear = 0.5 * material.initial_shear_modulus_kpa();
+    let scale = |p: Parameter| if p.has_any_sign() { half_shear } else { material.value(p) };
+    material.parameters().into_iter().map(scale).collect()
 }
 
 /// Gauss–Newton matrix and half the negative gradient in the parameters' own units, for parameters that may be zero.

@@ -24,7 +24,7 @@ pub(super) fn block() -> Specimen {
 }
 
 pub(super) fn ogden(bulk_kpa: f64, terms: &[[f64; 2]]) -> Ogden {
-    Ogden { bulk_kpa, terms: terms.iter().map(|&[mu_kpa, alpha]| OgdenTerm { mu_kpa, alpha }).collect() }
+    Ogden { bulk_kpa, terms: terms.iter().map(|&[mu_kpa, alpha]| OgdenTerm { mu_kpa, alpha }).collect(), law: None }
 }
 
 /// Compressible enough for κ to be seen.

@@ -141,6 +141,10 @@ fn blind_start(truth: &Ogden, bulk: Bulk) -> Ogden {
         term.mu_kpa *= 1.0 + 0.3 * sign;
         term.alpha *= 1.0 - 0.3 * sign;
     }
+    for (index, parameter) in truth.parameters().into_iter().filter(|p| matches!(p, Parameter::Law(_))).enumerate() {
+        let sign = if index % 2 == 0 { 1.0 } else { -1.0 };
+        start.set(parameter, truth.value(parameter) * (1.0 + 0.3 * sign));
+    }
     start
 }
 

@@ -110,6 +110,7 @@ const IMPORT: &[Flag] = &[
 ];
 const CALIBRATE: &[Flag] = &[
     Flag::read("terms", "num_terms", OrAuto),
+    Flag::of("law", "law"),
     Flag::of("rule", "rule"),
     Flag::of("decrement", "decrement"),
     Flag::of("objective", "objective"),

@@ -1,7 +1,7 @@
 //! The materials at which designs are judged: the priors' central values and variants.
 
 use super::study::MaterialPrior;
-use crate::material::Ogden;
+use crate::material::{Ogden, Parameter};
 
 /// A material at which designs are judged, and its weight.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,6 +34,12 @@ pub fn sample_materials(priors: &[MaterialPrior]) -> Vec<MaterialSample> {
                 for term in &mut material.terms {
                     term.alpha *= 1.0 + sign * prior.relative_sd;
                     term.mu_kpa *= 1.0 - sign * prior.relative_sd;
+                }
+                for parameter in prior.material.parameters() {
+                    if let Parameter::Law(own) = parameter {
+                        let sign = if own.is_modulus() { -sign } else { sign };
+                        material.set(parameter, prior.material.value(parameter) * (1.0 + sign * prior.relative_sd));
+                    }
                 }
                 samples.push(MaterialSample { prior: index, material, weight: 0.25 * share });
             }

@@ -127,7 +127,8 @@ fn fit_with_term(
 /// The further terms that explain more than `least` to first order, best first and few.
 fn promising_terms(inference: &mut Inference, current: &CauseFit, least: f64) -> Vec<OgdenTerm> {
     let num_terms = current.material.terms.len();
-    if num_terms >= MOST_TERMS {
+    // A law in the first invariant has no terms to which one could be added.
+    if num_terms >= MOST_TERMS || current.material.law.is_some() {
         return Vec::new();
     }
     let probes = EXPONENTS.chunks(MAX_TERMS - num_terms);

@@ -137,7 +137,7 @@ mod tests {
         specimen.block.length_mm = 60.0;
         specimen.block.width_mm = 60.0;
         specimen.block.thickness_mm = 3.0;
-        let material = Ogden { bulk_kpa: 3000.0, terms: vec![OgdenTerm { mu_kpa: 15.0, alpha: 2.4 }] };
+        let material = Ogden { bulk_kpa: 3000.0, terms: vec![OgdenTerm { mu_kpa: 15.0, alpha: 2.4 }], law: None };
         let mesh = mesh_specimen(&specimen, &MeshOptions::scaled(&specimen, 6.0)).unwrap();
         let mut model = ForwardModel::new(mesh, &specimen).unwrap();
         let mut last = None;

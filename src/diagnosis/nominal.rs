@@ -24,7 +24,7 @@ pub(super) fn first_guess(
     if let Some(believed) = believed {
         return Ok(believed.clone());
     }
-    let mut material = Ogden { bulk_kpa: 2000.0, terms: vec![OgdenTerm { mu_kpa: 16.0, alpha: 2.0 }] };
+    let mut material = Ogden { bulk_kpa: 2000.0, terms: vec![OgdenTerm { mu_kpa: 16.0, alpha: 2.0 }], law: None };
     let predicted = laboratory.predict(&material, &Scene::default(), is_cancelled)?;
     let forces = laboratory.measured().force;
     let ratio = |n: &usize| forces[*n] / predicted.trace.force[*n];

@@ -29,12 +29,9 @@ impl ShearPrior {
         let modulus = shear_modulus(material);
         let away = (self.center_kpa / modulus).ln();
         let weight = self.log_sd.powi(-2);
-        let mut slope = vec![0.0];
-        for t in &material.terms {
-            // Modulus and exponent of a term act alike on ½ μ α.
-            let share = 0.5 * t.mu_kpa * t.alpha / modulus;
-            slope.extend([share, share]);
-        }
+        let derivatives = material.initial_shear_modulus_derivatives();
+        let scaled = material.parameters().into_iter().zip(derivatives);
+        let slope = scaled.map(|(p, derivative)| derivative * material.value(p) / modulus).collect();
         (weight * away * away, slope, weight * away)
     }
 }

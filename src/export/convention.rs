@@ -204,8 +204,11 @@ impl Convention {
     /// The program's constants of `material`: factor and exponent of each term, then the volumetric one.
     ///
     /// # Errors
-    /// [`ExportError::TooManyTerms`].
+    /// [`ExportError::TooManyTerms`], [`ExportError::NotOgden`].
     pub fn constants(&self, material: &Ogden, unit: StressUnit) -> Result<Vec<Constant>, ExportError> {
+        if material.law.is_some() {
+            return Err(ExportError::NotOgden { program: self.program });
+        }
         let count = material.terms.len();
         if count > self.most_terms {
             return Err(ExportError::TooManyTerms { program: self.program, count, limit: self.most_terms });

@@ -9,6 +9,7 @@ fn materials() -> Vec<Ogden> {
     let make = |bulk_kpa, terms: &[(f64, f64)]| Ogden {
         bulk_kpa,
         terms: terms.iter().map(|&(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha }).collect(),
+        law: None,
     };
     vec![
         make(2173.0, &[(17.0, 1.91)]),
@@ -199,7 +200,7 @@ fn energies_agree_where_they_are_said_to() {
 #[test]
 fn what_a_program_cannot_read_is_refused() {
     let terms = (1..=4).map(|i| OgdenTerm { mu_kpa: 1.0, alpha: f64::from(i) }).collect();
-    let material = Ogden { bulk_kpa: 1e3, terms };
+    let material = Ogden { bulk_kpa: 1e3, terms, law: None };
     let found = MaterialFormat::Calculix.convention().constants(&material, StressUnit::MPa);
     assert_eq!(found, Err(ExportError::TooManyTerms { program: "CalculiX", count: 4, limit: 3 }));
     // Eight numbers a line: four pairs, then D_1 to D_4.

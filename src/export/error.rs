@@ -4,6 +4,14 @@
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExportError {
+    /// The material is a law in the first invariant.
+    #[error(
+        "cards for {program} are written of Ogden's terms only; fit Ogden terms, or set its constants down by hand"
+    )]
+    NotOgden {
+        /// The program.
+        program: &'static str,
+    },
     /// The material has more terms than the program reads.
     #[error("the material has {count} Ogden terms and {program} reads at most {limit}; fit fewer terms")]
     TooManyTerms {

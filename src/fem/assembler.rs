@@ -52,7 +52,7 @@ pub(super) struct Configuration<'a> {
 
 /// A material of which only the geometry of elements at rest is asked.
 fn any_material() -> Ogden {
-    Ogden { bulk_kpa: 1.0, terms: Vec::new() }
+    Ogden { bulk_kpa: 1.0, terms: Vec::new(), law: None }
 }
 
 impl Assembler {

@@ -6,7 +6,7 @@
 //! stretch.
 
 use super::deformation::Deformation;
-use crate::material::{Ogden, Parameter};
+use crate::material::{Lanes, Ogden, Parameter};
 
 /// Newton stops when the free face's traction is below this part of the shear stiffness.
 const TOLERANCE: f64 = 1e-13;
@@ -67,6 +67,19 @@ fn kirchhoff(material: &Ogden, e: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
             }
         }
     }
+    if let Some(law) = &material.law {
+        let squared = e.map(|v| (2.0 * (v - volume / 3.0)).exp());
+        let mean = squared.iter().sum::<f64>() / 3.0;
+        let [slope, second] = law.slopes_at(3.0 * mean - 3.0);
+        for j in 0..3 {
+            stress[j] += 2.0 * slope * (squared[j] - mean);
+            for k in 0..3 {
+                let own = if j == k { squared[j] } else { 0.0 };
+                tangent[j][k] += 4.0 * slope * (own - (squared[j] + squared[k] - mean) / 3.0)
+                    + 4.0 * second * (squared[j] - mean) * (squared[k] - mean);
+            }
+        }
+    }
     (stress, tangent)
 }
 
@@ -84,6 +97,12 @@ fn parameter_derivative(material: &Ogden, parameter: Parameter, e: [f64; 3]) -> 
         Parameter::Alpha(i) => {
             let t = material.terms[i];
             deviator(bar.map(|v| t.mu_kpa * v * (t.alpha * v).exp()))
+        }
+        Parameter::Law(own) => {
+            let squared = bar.map(|v| (2.0 * v).exp());
+            let x = squared.iter().sum::<f64>() - 3.0;
+            let rate = material.law.map_or(0.0, |law| law.slope_derivative(own, Lanes::splat(x)).0[0]);
+            deviator(squared).map(|d| 2.0 * rate * d)
         }
     }
 }
@@ -126,7 +145,8 @@ pub fn respond(material: &Ogden, deformation: &Deformation) -> Result<Response, 
     }
     let is_uniaxial = matches!(deformation, Deformation::Uniaxial { .. });
     let free: &[usize] = if is_uniaxial { &[1, 2] } else { &[2] };
-    let scale = material.terms.iter().map(|t| (t.mu_kpa * t.alpha).abs()).sum::<f64>().max(1e-300);
+    let of_law = material.law.map_or(0.0, |law| 2.0 * law.initial_shear_modulus_kpa());
+    let scale = (material.terms.iter().map(|t| (t.mu_kpa * t.alpha).abs()).sum::<f64>() + of_law).max(1e-300);
     let mut iteration = 0;
     let (stress, tangent, slope) = loop {
         let (stress, tangent) = kirchhoff(material, e);
@@ -175,6 +195,7 @@ pub fn respond(material: &Ogden, deformation: &Deformation) -> Result<Response, 
 mod tests {
     use super::super::deformation::{HomogeneousTest, incompressible_stress};
     use super::*;
+    use crate::material::laws;
     use crate::material::{OgdenTerm, first_piola_kirchhoff_stress};
 
     fn material(bulk_kpa: f64) -> Ogden {
@@ -183,7 +204,13 @@ mod tests {
             OgdenTerm { mu_kpa: -3.0, alpha: -2.0 },
             OgdenTerm { mu_kpa: 0.01, alpha: 9.0 },
         ];
-        Ogden { bulk_kpa, terms }
+        Ogden { bulk_kpa, terms, law: None }
+    }
+
+    /// The same bulk modulus with Ogden's terms and with every law in the first invariant.
+    fn materials(bulk_kpa: f64) -> Vec<Ogden> {
+        let of_law = |law| Ogden { bulk_kpa, terms: vec![], law: Some(law) };
+        [material(bulk_kpa)].into_iter().chain(laws().map(of_law)).collect()
     }
 
     fn states() -> Vec<Deformation> {
@@ -202,8 +229,8 @@ mod tests {
     /// κ ln J (1e-13 of κ) over stretches of order one.
     #[test]
     fn agrees_with_the_tensor_form() {
-        for bulk in [60.0, 2000.0, 1e5] {
-            let m = material(bulk);
+        for m in [60.0, 2000.0, 1e5].into_iter().flat_map(materials) {
+            let bulk = m.bulk_kpa;
             for deformation in states() {
                 let r = respond(&m, &deformation).unwrap();
                 let l = r.principal_stretches;
@@ -233,8 +260,7 @@ mod tests {
     /// Taylor test through the Newton solve: remainder falls with the square of the step.
     #[test]
     fn derivatives_pass_the_taylor_test() {
-        for bulk in [60.0, 2000.0] {
-            let m = material(bulk);
+        for m in [60.0, 2000.0].into_iter().flat_map(materials) {
             for deformation in states() {
                 let base = respond(&m, &deformation).unwrap();
                 for (i, parameter) in m.parameters().into_iter().enumerate() {
@@ -253,7 +279,7 @@ mod tests {
                     let remainder = |h: f64| one_side(h) + one_side(-h);
                     let (coarse, fine) = (remainder(2e-2), remainder(2e-3));
                     // Newton's tolerance is 1e-13 of κ.
-                    assert!(fine < 0.02 * coarse + 1e-11 * bulk, "{deformation:?} {parameter:?} {coarse} {fine}");
+                    assert!(fine < 0.02 * coarse + 1e-11 * m.bulk_kpa, "{deformation:?} {parameter:?} {coarse} {fine}");
                 }
             }
         }

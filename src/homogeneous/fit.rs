@@ -44,7 +44,7 @@ impl TermFit {
 /// The material with these terms and κ.
 pub fn material_of(terms: &[ShearTerm], bulk_kpa: f64) -> Ogden {
     let terms = terms.iter().map(|t| OgdenTerm { mu_kpa: t.mu_kpa(), alpha: t.alpha }).collect();
-    Ogden { bulk_kpa, terms }
+    Ogden { bulk_kpa, terms, law: None }
 }
 
 /// Bulk modulus over initial shear modulus of the material that stands for a fit of the incompressible limit: a

@@ -9,6 +9,7 @@ use crate::calibration::{
     Observed, PAPER_BETA, Rule, TermCount, calibrate,
 };
 use crate::field::FieldError;
+use crate::material::LawKind;
 use crate::mesh::{MeshOptions, MeshSize};
 use crate::recording::write_vectors;
 use crate::report::calibration_report;
@@ -39,6 +40,9 @@ pub struct CalibrationRequest {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1, maximum = 5)]
     pub num_terms: Option<usize>,
+    /// A law in the first invariant in the place of Ogden's terms.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub law: Option<LawKind>,
     /// Rule that decides the number of terms.
     #[serde(default)]
     #[schema(default = Rule::default)]
@@ -109,6 +113,7 @@ impl CalibrationRequest {
         let default = CalibrateOptions::default();
         CalibrateOptions {
             terms: self.num_terms.map_or(default.terms, TermCount::Fixed),
+            law: self.law,
             objective: match self.objective {
                 ObjectiveName::Weighted => Objective::Weighted,
                 ObjectiveName::Paper => Objective::Paper { beta: self.beta },
@@ -180,6 +185,10 @@ impl Request for CalibrationRequest {
         if !self.protocol.scan_share.is_empty() {
             let error = FieldError::new("/protocol/scan_share", "given", "left out");
             errors.push(error.remedy("a recording states the noise that its scans had"));
+        }
+        if let (Some(_), Some(count)) = (self.law, self.num_terms) {
+            let error = FieldError::new("/num_terms", count, "left out where a law is given");
+            errors.push(error.remedy("a law in the first invariant has no Ogden terms; leave out one of the two"));
         }
         if self.boundary == Boundary::Measured
             && let Some(drive_mm) = self.protocol.force_drive_mm.first()

@@ -11,12 +11,12 @@ pub enum MaterialError {
     #[error("material JSON, {0}")]
     Json(JsonProblem),
     /// The schema is another one.
-    #[error("schema is {found:?}; set it to {expected:?}")]
+    #[error("schema is {found:?}; set it to one of {expected:?}")]
     WrongSchema {
         /// What the text says.
         found: String,
         /// What this version reads.
-        expected: &'static str,
+        expected: &'static [&'static str],
     },
     /// No or too many terms.
     #[error("there are {count} terms; give 1 to {limit}")]
@@ -25,6 +25,12 @@ pub enum MaterialError {
         count: usize,
         /// Most.
         limit: usize,
+    },
+    /// A law in the first invariant has no terms.
+    #[error("there are {count} Ogden terms beside a law in the first invariant; leave out one of the two")]
+    TermsBesideLaw {
+        /// How many.
+        count: usize,
     },
     /// A number is NaN or infinite.
     #[error("{field} is {value}; give a finite number")]
@@ -64,6 +70,18 @@ pub enum MaterialError {
         /// Largest |α|.
         max: f64,
     },
+    /// A parameter of a law in the first invariant is out of range.
+    #[error("{field} is {value}; it must be from {min} to {max}, a modulus above 0")]
+    LawOutOfRange {
+        /// The field.
+        field: FieldPath,
+        /// Its value.
+        value: f64,
+        /// Smallest.
+        min: f64,
+        /// Largest.
+        max: f64,
+    },
     /// Hill's condition for up to two terms: each μα is positive.
     #[error(
         "terms[{term}]: mu_kpa {mu} times alpha {alpha} is not above 0; with one or two terms each product must be (Hill's stability): give both the same sign"
@@ -92,10 +110,13 @@ impl MaterialError {
         match self {
             E::Json(problem) => FieldError::new("", "", "JSON of a material").remedy(problem.to_string()),
             E::WrongSchema { found, expected } => {
-                FieldError::new("/schema", format!("{found:?}"), format!("{expected:?}"))
+                FieldError::new("/schema", format!("{found:?}"), format!("one of {expected:?}"))
             }
             E::NumTerms { count, limit } => {
                 FieldError::new("/terms", format!("a list of {count}"), format!("a list of 1 to {limit} terms"))
+            }
+            E::TermsBesideLaw { count } => {
+                FieldError::new("/terms", format!("a list of {count} beside a law"), "left out")
             }
             E::NotFinite { field, value } => FieldError::new(field.pointer(), value, "a finite number"),
             E::BulkOutOfRange { value, limit } => {
@@ -108,6 +129,9 @@ impl MaterialError {
             E::AlphaOutOfRange { term, value, min, max } => {
                 let pointer = of_term(*term).name("alpha").pointer();
                 FieldError::new(pointer, value, format!("of a magnitude from {min} to {max}"))
+            }
+            E::LawOutOfRange { field, value, min, max } => {
+                FieldError::new(field.pointer(), value, format!("from {min} to {max}, a modulus above 0"))
             }
             E::HillViolated { term, mu, alpha } => {
                 let value = format!("mu_kpa {mu} and alpha {alpha}");

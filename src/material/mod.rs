@@ -2,6 +2,7 @@
 
 mod error;
 mod file;
+mod invariant_law;
 mod lanes;
 mod limits;
 mod ogden_lanes;
@@ -12,8 +13,14 @@ mod shear_term;
 mod stability;
 
 pub use error::MaterialError;
+#[cfg(test)]
+pub(crate) use invariant_law::laws;
+pub use invariant_law::{ArrudaBoyce, FirstInvariantEnergy, Gent, InvariantLaw, LawKind, LawParameter, Yeoh};
 pub use lanes::{LANES, Lanes};
-pub use limits::{MAX_ALPHA, MAX_MODULUS_KPA, MIN_ALPHA, SCHEMA};
+pub use limits::{
+    ARRUDA_BOYCE_SCHEMA, GENT_SCHEMA, MAX_ALPHA, MAX_CHAIN_LIMIT, MAX_LOCKING_STRETCH, MAX_MODULUS_KPA, MIN_ALPHA,
+    MIN_CHAIN_LIMIT, MIN_LOCKING_STRETCH, SCHEMA, YEOH_SCHEMA,
+};
 pub use ogden_lanes::{MAX_TERMS, SpectralState, Tensor};
 pub use point::{energy_density, first_piola_kirchhoff_stress, material_tangent, stress_parameter_derivative};
 pub use shear_modulus::initial_shear_modulus_kpa;
@@ -35,19 +42,22 @@ pub struct OgdenTerm {
     pub alpha: f64,
 }
 
-/// N-term compressible Ogden material, Ψ = Σ μᵢ/αᵢ (λ̄₁^αᵢ + λ̄₂^αᵢ + λ̄₃^αᵢ − 3) + κ/2 (ln J)².
+/// A compressible hyperelastic material, Ψ = Σ μᵢ/αᵢ (λ̄₁^αᵢ + λ̄₂^αᵢ + λ̄₃^αᵢ − 3) + W(Ī₁ − 3) + κ/2 (ln J)²: Ogden's
+/// with its terms, or one whose energy is a law W in the first isochoric invariant alone.
 ///
-/// In JSON it is `ogden/1`, with the tag `schema` before its fields.
+/// In JSON it is `ogden/1`, `yeoh/1`, `gent/1` or `arruda_boyce/1`, with the tag `schema` before its fields.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(from = "file::OgdenFile", into = "file::OgdenFile")]
+#[serde(try_from = "file::MaterialFields", into = "file::MaterialFile")]
 pub struct Ogden {
     /// κ, kPa.
     pub bulk_kpa: f64,
-    /// Terms.
+    /// Ogden's terms.
     pub terms: Vec<OgdenTerm>,
+    /// A law in the first invariant in their place.
+    pub law: Option<InvariantLaw>,
 }
 
-/// A material parameter. Order everywhere: κ, μ₁, α₁, μ₂, α₂, …
+/// A material parameter. Order everywhere: κ, μ₁, α₁, μ₂, α₂, …, or κ and those of the law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Parameter {
     /// κ, kPa.
@@ -56,16 +66,40 @@ pub enum Parameter {
     Mu(usize),
     /// α of the term with this index (from 0).
     Alpha(usize),
+    /// A parameter of the law in the first invariant.
+    Law(LawParameter),
 }
 
 impl Parameter {
-    /// `kappa`, `mu_1`, `alpha_1`, …
+    /// `kappa`, `mu_1`, `alpha_1`, …; of a law as [`LawParameter::name`] says.
     pub fn name(self) -> String {
         match self {
             Parameter::Kappa => "kappa".into(),
             Parameter::Mu(i) => format!("mu_{}", i + 1),
             Parameter::Alpha(i) => format!("alpha_{}", i + 1),
+            Parameter::Law(parameter) => parameter.name(),
         }
+    }
+
+    /// Whether a parameter of this name is a modulus, in kPa: [`Parameter::is_modulus`] for results, which hold names.
+    pub fn is_modulus_of_name(name: &str) -> bool {
+        let kind = name.split('_').next().unwrap_or(name);
+        let moduli = [Parameter::Kappa, Parameter::Mu(0), Parameter::Law(LawParameter::Coefficient(0))];
+        moduli.iter().any(|modulus| modulus.name().split('_').next() == Some(kind))
+    }
+
+    /// Whether it is a modulus, in kPa; the others have no unit.
+    pub fn is_modulus(self) -> bool {
+        match self {
+            Parameter::Kappa | Parameter::Mu(_) => true,
+            Parameter::Alpha(_) => false,
+            Parameter::Law(parameter) => parameter.is_modulus(),
+        }
+    }
+
+    /// Whether it may have either sign and be zero; the others keep the sign that they have.
+    pub fn has_any_sign(self) -> bool {
+        matches!(self, Parameter::Law(parameter) if parameter.has_any_sign())
     }
 }
 
@@ -84,16 +118,33 @@ impl Ogden {
     /// As [`Ogden::validate`].
     pub fn new(bulk_kpa: f64, terms: impl IntoIterator<Item = (f64, f64)>) -> Result<Ogden, MaterialError> {
         let terms = terms.into_iter().map(|(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha }).collect();
-        let material = Ogden { bulk_kpa, terms };
+        let material = Ogden { bulk_kpa, terms, law: None };
         material.validate().map(|()| material)
     }
 
-    /// κ, μ₁, α₁, μ₂, α₂, …
+    /// A valid material of a bulk modulus (kPa) and a law in the first invariant.
+    ///
+    /// ```
+    /// use lambdak::material::{Gent, InvariantLaw, Ogden};
+    /// let material = Ogden::of_law(2173.0, InvariantLaw::Gent(Gent { mu_kpa: 16.0, limit: 30.0 }))?;
+    /// assert_eq!(material.initial_shear_modulus_kpa(), 16.0);
+    /// # Ok::<(), lambdak::material::MaterialError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Ogden::validate`].
+    pub fn of_law(bulk_kpa: f64, law: InvariantLaw) -> Result<Ogden, MaterialError> {
+        let material = Ogden { bulk_kpa, terms: Vec::new(), law: Some(law) };
+        material.validate().map(|()| material)
+    }
+
+    /// κ, μ₁, α₁, μ₂, α₂, …, then those of the law.
     pub fn parameters(&self) -> Vec<Parameter> {
         let mut all = vec![Parameter::Kappa];
         for i in 0..self.terms.len() {
             all.extend([Parameter::Mu(i), Parameter::Alpha(i)]);
         }
+        all.extend(self.law.iter().flat_map(|law| law.parameters()).map(|p| Parameter::Law(*p)));
         all
     }
 
@@ -103,6 +154,7 @@ impl Ogden {
             Parameter::Kappa => self.bulk_kpa,
             Parameter::Mu(i) => self.terms[i].mu_kpa,
             Parameter::Alpha(i) => self.terms[i].alpha,
+            Parameter::Law(parameter) => self.law.map_or(f64::NAN, |law| law.value(parameter)),
         }
     }
 
@@ -112,6 +164,11 @@ impl Ogden {
             Parameter::Kappa => self.bulk_kpa = value,
             Parameter::Mu(i) => self.terms[i].mu_kpa = value,
             Parameter::Alpha(i) => self.terms[i].alpha = value,
+            Parameter::Law(parameter) => {
+                if let Some(law) = &mut self.law {
+                    law.set(parameter, value);
+                }
+            }
         }
     }
 }

@@ -8,6 +8,9 @@
 //! * normal: ∂P_a/∂λ_b = (∂τ_a/∂ln λ_b − τ_a δ_ab)/(λ_a λ_b),
 //! * shear: Â_abab = s_b + λ_a² g, Â_abba = λ_a λ_b g, with s_a = τ_a/λ_a², g = (s_a − s_b)/(λ_a² − λ_b²).
 //!
+//! A law W(Ī₁ − 3) adds what a term of exponent 2 and modulus 2 W′ would, and 4 W″ d_a d_b to ∂τ_a/∂ln λ_b with
+//! d_a = λ̄_a² − mean λ̄².
+//!
 //! For nearly equal stretches g is written as λ_b⁻⁴ [Σ_p e_bp R(α_p/2 − 1, d) − m R(−1, d)] with d = x_a − x_b and
 //! R(c, d) = expm1(c d)/expm1(d) → c, expanded about d = 0: exact in the limit, no perturbation of eigenvalues.
 
@@ -36,7 +39,25 @@ pub struct SpectralState {
     mean_power: [Lanes; MAX_TERMS],
     /// Isochoric τ_a, without the pressure.
     tau: [Lanes; 3],
+    /// Of a law in the first invariant.
+    law: Option<LawState>,
 }
+
+/// What a law in the first invariant adds to a state.
+struct LawState {
+    /// x = Ī₁ − 3.
+    x: Lanes,
+    /// d_a = λ̄_a² − mean λ̄².
+    deviator: [Lanes; 3],
+    /// e_a = 2 W′ λ̄_a² and their mean.
+    power: [Lanes; 3],
+    mean_power: Lanes,
+    /// 4 W″.
+    stiffening: Lanes,
+}
+
+/// The exponent of the term that a law in the first invariant acts like.
+const LAW_EXPONENT: f64 = 2.0;
 
 impl SpectralState {
     /// Decomposes F (det F > 0).
@@ -60,6 +81,7 @@ impl SpectralState {
             power: [[Lanes::ZERO; 3]; MAX_TERMS],
             mean_power: [Lanes::ZERO; MAX_TERMS],
             tau: [Lanes::ZERO; 3],
+            law: None,
         };
         let mean = (state.centred_log[0] + state.centred_log[1] + state.centred_log[2]) * (1.0 / 3.0);
         for a in 0..3 {
@@ -79,7 +101,28 @@ impl SpectralState {
                 state.tau[a] += e[a] - state.mean_power[p];
             }
         }
+        if let Some(law) = &material.law {
+            let squared = state.centred_log.map(|x| x.exp());
+            let sum = squared[0] + squared[1] + squared[2];
+            let (x, mean) = (sum - 3.0, sum * (1.0 / 3.0));
+            let [slope, second] = law.slopes(x);
+            let deviator = squared.map(|s| s - mean);
+            let power = squared.map(|s| s * slope * 2.0);
+            for (tau, d) in state.tau.iter_mut().zip(deviator) {
+                *tau += d * slope * 2.0;
+            }
+            state.law = Some(LawState { x, deviator, power, mean_power: mean * slope * 2.0, stiffening: second * 4.0 });
+        }
         state
+    }
+
+    /// α_p, e_ap and m_p of all terms, and of the term that a law acts like.
+    #[inline(always)]
+    fn powers<'a>(&'a self, material: &'a Ogden) -> impl Iterator<Item = (f64, &'a [Lanes; 3], Lanes)> {
+        let of_terms = material.terms.iter().take(MAX_TERMS).enumerate();
+        of_terms
+            .map(|(p, term)| (term.alpha, &self.power[p], self.mean_power[p]))
+            .chain(self.law.iter().map(|law| (LAW_EXPONENT, &law.power, law.mean_power)))
     }
 
     /// P (kPa) with the pressure-like stress `pressure` (kPa).
@@ -106,6 +149,12 @@ impl SpectralState {
                 let mean = (d[0] + d[1] + d[2]) * (1.0 / 3.0);
                 for x in &mut d {
                     *x = *x - mean;
+                }
+            }
+            Parameter::Law(parameter) => {
+                if let (Some(law), Some(state)) = (&material.law, &self.law) {
+                    let rate = law.slope_derivative(parameter, state.x) * 2.0;
+                    d = state.deviator.map(|x| x * rate);
                 }
             }
         }
@@ -145,16 +194,22 @@ impl SpectralState {
         // ∂τ_a/∂ln λ_b = Σ_p α_p [e_a δ_ab − (e_a + e_b)/3 + m/3].
         let mut normal = [[Lanes::ZERO; 3]; 3];
         let mut mean = Lanes::ZERO;
-        for (p, term) in material.terms.iter().take(MAX_TERMS).enumerate() {
-            let e = self.power[p];
-            mean += self.mean_power[p];
+        for (exponent, e, mean_power) in self.powers(material) {
+            mean += mean_power;
             for a in 0..3 {
                 for b in a..3 {
-                    let mut d = (self.mean_power[p] - e[a] - e[b]) * (1.0 / 3.0);
+                    let mut d = (mean_power - e[a] - e[b]) * (1.0 / 3.0);
                     if a == b {
                         d += e[a];
                     }
-                    normal[a][b] += d * term.alpha;
+                    normal[a][b] += d * exponent;
+                }
+            }
+        }
+        if let Some(law) = &self.law {
+            for a in 0..3 {
+                for b in a..3 {
+                    normal[a][b] += law.deviator[a] * law.deviator[b] * law.stiffening;
                 }
             }
         }
@@ -197,8 +252,8 @@ impl SpectralState {
             let quotient = (s[0] - s[1]) / guarded;
             let mut series = mean * divided_expm1(-1.0, d);
             series = -series;
-            for (p, term) in material.terms.iter().take(MAX_TERMS).enumerate() {
-                series += self.power[p][b] * divided_expm1(0.5 * term.alpha - 1.0, d);
+            for (exponent, e, _) in self.powers(material) {
+                series += e[b] * divided_expm1(0.5 * exponent - 1.0, d);
             }
             let inverse_fourth = inverse[b] * inverse[b] * inverse[b] * inverse[b];
             let g = Lanes::select_below(d.abs(), NEAR, series * inverse_fourth, quotient);

@@ -1,6 +1,10 @@
-//! Reading, writing and validating a material (`ogden/1`).
+//! Reading, writing and validating a material (`ogden/1`, `yeoh/1`, `gent/1`, `arruda_boyce/1`).
 
-use super::limits::{MAX_ALPHA, MAX_MODULUS_KPA, MIN_ALPHA, SCHEMA};
+use super::invariant_law::{InvariantLaw, LawParameter};
+use super::limits::{
+    MAX_ALPHA, MAX_CHAIN_LIMIT, MAX_LOCKING_STRETCH, MAX_MODULUS_KPA, MIN_ALPHA, MIN_CHAIN_LIMIT, MIN_LOCKING_STRETCH,
+    SCHEMAS,
+};
 use super::stability::has_stable_product;
 use super::{MAX_TERMS, MaterialError, Ogden};
 use crate::field::{FieldError, FieldPath};
@@ -8,7 +12,7 @@ use crate::specimen::JsonProblem;
 use crate::specimen::json::schema_of;
 
 impl Ogden {
-    /// Reads and validates `ogden/1`.
+    /// Reads and validates a material of any of its schemas.
     ///
     /// ```
     /// use lambdak::material::Ogden;
@@ -21,14 +25,16 @@ impl Ogden {
     /// [`MaterialError`]: the text does not fit the schema, or the material is not valid.
     pub fn from_json(text: &str) -> Result<Ogden, MaterialError> {
         let material: Ogden = serde_json::from_str(text).map_err(|error| match schema_of(text) {
-            Some(found) if found != SCHEMA => MaterialError::WrongSchema { found, expected: SCHEMA },
+            Some(found) if !SCHEMAS.contains(&found.as_str()) => {
+                MaterialError::WrongSchema { found, expected: &SCHEMAS }
+            }
             _ => MaterialError::Json(JsonProblem::new(text, &error)),
         })?;
         material.validate()?;
         Ok(material)
     }
 
-    /// The material as `ogden/1`, indented, with a line break at the end. Reading it back gives the same numbers.
+    /// The material in the schema of its law, indented, with a line break at the end. Reading it back gives the same numbers.
     pub fn to_json(&self) -> String {
         // Serialising fails only for maps with keys that are not strings and for failing writers: neither is here.
         let mut text = serde_json::to_string_pretty(self).expect("a struct of strings and numbers serialises");
@@ -53,8 +59,11 @@ impl Ogden {
 
     fn problems(&self) -> Vec<MaterialError> {
         let mut problems = Vec::new();
-        if self.terms.is_empty() || self.terms.len() > MAX_TERMS {
+        if self.law.is_none() && self.terms.is_empty() || self.terms.len() > MAX_TERMS {
             problems.push(MaterialError::NumTerms { count: self.terms.len(), limit: MAX_TERMS });
+        }
+        if self.law.is_some() && !self.terms.is_empty() {
+            problems.push(MaterialError::TermsBesideLaw { count: self.terms.len() });
         }
         if !self.bulk_kpa.is_finite() {
             problems.push(MaterialError::NotFinite { field: FieldPath::of("bulk_kpa"), value: self.bulk_kpa });
@@ -64,6 +73,9 @@ impl Ogden {
         // Beyond the limit one error stands for all terms.
         for term in 0..self.terms.len().min(MAX_TERMS) {
             self.check_term(term, &mut problems);
+        }
+        if let Some(law) = &self.law {
+            check_law(law, &mut problems);
         }
         if problems.is_empty() {
             let value = self.initial_shear_modulus_kpa();
@@ -93,6 +105,26 @@ impl Ogden {
     }
 }
 
+fn check_law(law: &InvariantLaw, problems: &mut Vec<MaterialError>) {
+    for parameter in law.parameters() {
+        let value = law.value(*parameter);
+        let [min, max] = match parameter {
+            LawParameter::Coefficient(0) | LawParameter::Modulus => [0.0, MAX_MODULUS_KPA],
+            LawParameter::Coefficient(_) => [-MAX_MODULUS_KPA, MAX_MODULUS_KPA],
+            LawParameter::Limit => [MIN_CHAIN_LIMIT, MAX_CHAIN_LIMIT],
+            LawParameter::LockingStretch => [MIN_LOCKING_STRETCH, MAX_LOCKING_STRETCH],
+        };
+        let unit = if parameter.is_modulus() { "_kpa" } else { "" };
+        let name = format!("{}{unit}", parameter.name());
+        if !value.is_finite() {
+            problems.push(MaterialError::NotFinite { field: FieldPath::of(&name), value });
+        } else if !(min..=max).contains(&value) || (parameter.is_modulus() && !parameter.has_any_sign() && value <= 0.0)
+        {
+            problems.push(MaterialError::LawOutOfRange { field: FieldPath::of(&name), value, min, max });
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -101,7 +133,7 @@ mod tests {
 
     fn ogden(bulk_kpa: f64, terms: &[(f64, f64)]) -> Ogden {
         let terms = terms.iter().map(|&(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha }).collect();
-        Ogden { bulk_kpa, terms }
+        Ogden { bulk_kpa, terms, law: None }
     }
 
     #[test]
@@ -140,6 +172,29 @@ mod tests {
         let unstable = ogden(1.0, &[(9.0, 1.0), (1.0, -1.0)]);
         assert_eq!(unstable.field_errors()[0].pointer, "/terms/1");
         assert_eq!(ogden(2173.0, &[(17.0, 1.91)]).field_errors(), []);
+    }
+
+    /// Each law has its own schema; what it writes it reads, and fields of another law are errors.
+    #[test]
+    fn laws_have_their_own_schemas() {
+        let texts = [
+            r#"{"schema":"yeoh/1","bulk_kpa":2000.0,"c_1_kpa":8.0,"c_2_kpa":-0.2,"c_3_kpa":0.04}"#,
+            r#"{"schema":"gent/1","bulk_kpa":2000.0,"mu_kpa":16.0,"j_m":30.0}"#,
+            r#"{"schema":"arruda_boyce/1","bulk_kpa":2000.0,"mu_kpa":15.0,"lambda_m":2.5}"#,
+        ];
+        for text in texts {
+            let material = Ogden::from_json(text).unwrap();
+            assert_eq!(serde_json::to_string(&material).unwrap(), text);
+            assert!(Ogden::from_json(&text.replace("bulk_kpa", "terms\":[],\"bulk_kpa")).is_err(), "{text}");
+        }
+        let refused = |text: &str| Ogden::from_json(text).unwrap_err().to_string();
+        assert!(refused(&texts[1].replace("\"mu_kpa\":16.0,", "")).contains("missing field `mu_kpa`"));
+        assert!(refused(&texts[1].replace("j_m", "lambda_m\":2.0,\"j_m")).contains("unknown field `lambda_m`"));
+        assert!(refused(&texts[1].replace("30.0", "0.0")).contains("j_m is 0"));
+        assert!(refused(&texts[0].replace("8.0", "-8.0")).contains("c_1_kpa is -8"));
+        let mut mixed = Ogden::from_json(texts[1]).unwrap();
+        mixed.terms.push(OgdenTerm { mu_kpa: 1.0, alpha: 2.0 });
+        assert!(matches!(mixed.validate(), Err(MaterialError::TermsBesideLaw { count: 1 })));
     }
 
     /// The tag stands first in JSON, and reading needs it.

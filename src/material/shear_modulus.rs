@@ -1,6 +1,6 @@
 //! The initial shear modulus ½ Σ μᵢαᵢ: the shear stiffness at rest, by which fits are compared.
 
-use super::{Ogden, ShearTerm};
+use super::{Lanes, Ogden, Parameter, ShearTerm};
 
 /// ½ Σ cᵢ of terms with products cᵢ = μᵢαᵢ, kPa.
 ///
@@ -10,7 +10,7 @@ pub fn initial_shear_modulus_kpa(terms: &[ShearTerm]) -> f64 {
 }
 
 impl Ogden {
-    /// The initial shear modulus ½ Σ μᵢαᵢ, kPa.
+    /// The initial shear modulus ½ Σ μᵢαᵢ + 2 W′(0), kPa.
     ///
     /// ```
     /// use lambdak::material::Ogden;
@@ -19,7 +19,19 @@ impl Ogden {
     /// # Ok::<(), lambdak::material::MaterialError>(())
     /// ```
     pub fn initial_shear_modulus_kpa(&self) -> f64 {
-        0.5 * self.terms.iter().map(|t| t.mu_kpa * t.alpha).sum::<f64>()
+        let of_terms = 0.5 * self.terms.iter().map(|t| t.mu_kpa * t.alpha).sum::<f64>();
+        self.law.map_or(of_terms, |law| of_terms + law.initial_shear_modulus_kpa())
+    }
+
+    /// Its derivatives in the order of [`Ogden::parameters`].
+    pub fn initial_shear_modulus_derivatives(&self) -> Vec<f64> {
+        let derivative = |parameter: &Parameter| match *parameter {
+            Parameter::Kappa => 0.0,
+            Parameter::Mu(i) => 0.5 * self.terms[i].alpha,
+            Parameter::Alpha(i) => 0.5 * self.terms[i].mu_kpa,
+            Parameter::Law(p) => self.law.map_or(0.0, |law| 2.0 * law.slope_derivative(p, Lanes::ZERO).0[0]),
+        };
+        self.parameters().iter().map(derivative).collect()
     }
 }
 
@@ -34,7 +46,7 @@ mod tests {
         let terms = [[17.3, 1.91], [0.351, 7.77], [-2.1e-5, 11.3], [3.3e-9, -9.1]];
         let terms: Vec<OgdenTerm> = terms.iter().map(|&[mu_kpa, alpha]| OgdenTerm { mu_kpa, alpha }).collect();
         let halves: f64 = terms.iter().map(|t| 0.5 * t.mu_kpa * t.alpha).sum();
-        let material = Ogden { bulk_kpa: 2000.0, terms };
+        let material = Ogden { bulk_kpa: 2000.0, terms, law: None };
         assert_eq!(material.initial_shear_modulus_kpa().to_bits(), halves.to_bits());
         assert_eq!(initial_shear_modulus_kpa(&material.shear_terms()).to_bits(), halves.to_bits());
     }

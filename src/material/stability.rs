@@ -20,6 +20,8 @@
 //! Fits to curves look at both parts ([`smallest_relative_stiffness`]), calibrations at the first alone
 //! ([`least_relative_stiffness`]). The first check is the stricter one; each keeps what it has accepted so far.
 
+use super::invariant_law::InvariantLaw;
+use super::point::first_invariant_less_3;
 use super::{Ogden, OgdenTerm, ShearTerm, initial_shear_modulus_kpa, power_difference};
 
 /// Up to this many terms every product μα must be positive; with more the visited states decide.
@@ -76,12 +78,38 @@ pub fn smallest_relative_stiffness(terms: &[ShearTerm], log_stretches: [f64; 3])
 /// its value at rest, Σμα: positive is stable. Only increments that keep the principal axes are looked at.
 pub fn least_relative_stiffness(material: &Ogden, visited: &[[f64; 3]]) -> f64 {
     let terms = material.shear_terms();
-    let at_rest = terms.iter().map(|t| t.modulus_kpa).sum::<f64>();
+    let at_rest = 2.0 * material.initial_shear_modulus_kpa();
     visited
         .iter()
         .flat_map(|stretches| PARTS_OF_THE_WAY.map(|part| stretches.map(|s| s.powf(part))))
-        .map(|stretches| smallest_principal_stiffness_kpa(&terms, stretches.map(f64::ln)) / at_rest)
+        .map(|stretches| {
+            let log_stretches = stretches.map(f64::ln);
+            match &material.law {
+                None => smallest_principal_stiffness_kpa(&terms, log_stretches) / at_rest,
+                Some(law) => smallest_stiffness_of_law_kpa(law, log_stretches) / at_rest,
+            }
+        })
         .fold(1.0, f64::min)
+}
+
+/// The same as [`smallest_principal_stiffness_kpa`] of a law in the first invariant: with y = λ̄² the stress power is
+/// Σⱼ 4 W′ yⱼ (dēⱼ)² + 4 W″ (Σⱼ yⱼ dēⱼ)². Minus infinity beyond the states that the law allows.
+fn smallest_stiffness_of_law_kpa(law: &InvariantLaw, log_stretches: [f64; 3]) -> f64 {
+    let x = first_invariant_less_3(log_stretches);
+    if x >= law.largest_x() {
+        return f64::NEG_INFINITY;
+    }
+    let [slope, second] = law.slopes_at(x);
+    let y = log_stretches.map(|e| (2.0 * e).exp());
+    // In the orthonormal basis (1,−1,0)/√2, (1,1,−2)/√6 of the plane Σ dē = 0.
+    let basis = [[1.0, -1.0, 0.0].map(|b| b / 2f64.sqrt()), [1.0, 1.0, -2.0].map(|b| b / 6f64.sqrt())];
+    let along = basis.map(|b| (0..3).map(|j| b[j] * y[j]).sum::<f64>());
+    let form = |m: usize, n: usize| {
+        let own: f64 = (0..3).map(|j| basis[m][j] * basis[n][j] * y[j]).sum();
+        4.0 * (slope * own + second * along[m] * along[n])
+    };
+    let (a, b, c) = (form(0, 0), form(0, 1), form(1, 1));
+    0.5 * (a + c) - (0.25 * (a - c).powi(2) + b * b).sqrt()
 }
 
 #[cfg(test)]
@@ -90,7 +118,7 @@ mod tests {
 
     fn ogden(terms: &[[f64; 2]]) -> Ogden {
         let terms = terms.iter().map(|&[mu_kpa, alpha]| OgdenTerm { mu_kpa, alpha }).collect();
-        Ogden { bulk_kpa: 1.0, terms }
+        Ogden { bulk_kpa: 1.0, terms, law: None }
     }
 
     /// The closed form is the curvature of the energy along traceless logarithmic strains.

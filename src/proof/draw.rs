@@ -206,7 +206,7 @@ pub fn draw_cause(cause: HiddenCause, seed: u64) -> Hidden {
     let mut hidden = Hidden {
         cause,
         seed,
-        material: Ogden { bulk_kpa, terms: vec![OgdenTerm { mu_kpa, alpha }] },
+        material: Ogden { bulk_kpa, terms: vec![OgdenTerm { mu_kpa, alpha }], law: None },
         noise_sd_mm: d.within(0.015, 0.035),
         strength: 0.0,
         which: 0,

@@ -116,7 +116,7 @@ fn draw_plain(d: &mut Draw, seed: u64) -> Experiment {
         let alpha = d.within(low, high);
         terms.push(OgdenTerm { mu_kpa: 2.0 * shear_kpa * d.within(0.05, 0.25) / alpha, alpha });
     }
-    let mut material = Ogden { bulk_kpa: 1.0, terms };
+    let mut material = Ogden { bulk_kpa: 1.0, terms, law: None };
     material.bulk_kpa = material.initial_shear_modulus_kpa() * d.log_within(90.0, 180.0);
     Experiment {
         seed,

@@ -5,6 +5,7 @@ use super::{
     Table, VoxelField, VoxelMaps, residual_histogram, significant, symbol_of_parameter,
 };
 use crate::calibration::{Calibration, CalibrationResult, Contour, Observed};
+use crate::material::Parameter;
 
 /// The pictures by name (SVG), and the page that holds them.
 pub fn calibration_report(
@@ -288,7 +289,7 @@ fn contour_plot(found: &Calibration, contours: &[Contour]) -> ContourPlot {
 /// ℓ_u, ℓ_F and ℓ of every pair of parameters; `estimate_of` names the values to mark.
 pub fn contour_panels(contours: &[Contour], estimate_of: &dyn Fn(&str) -> Option<f64>) -> Vec<ContourPanel> {
     let label = |name: &str| {
-        let unit = if name.starts_with("alpha") { "" } else { ", kPa" };
+        let unit = if Parameter::is_modulus_of_name(name) { ", kPa" } else { "" };
         format!("{}{unit}", symbol_of_parameter(name))
     };
     contours

@@ -4,6 +4,7 @@ use super::html::Report;
 use super::{CalloutKind, Column, SpreadPlot, SpreadRow, Table, significant, symbol_of_parameter};
 use crate::calibration::ParameterSpread;
 use crate::design::DesignResult;
+use crate::material::Parameter;
 
 /// Half width of a 95 % interval of a normal distribution, in standard deviations.
 const HALF_WIDTH_95: f64 = 1.96;
@@ -64,7 +65,7 @@ pub(super) fn verification(page: &mut Report, result: &DesignResult) {
                 rows.push(SpreadRow {
                     specimen: label.into(),
                     parameter: symbol_of_parameter(&p.parameter),
-                    unit: if p.parameter.starts_with("alpha") { String::new() } else { "kPa".into() },
+                    unit: if Parameter::is_modulus_of_name(&p.parameter) { "kPa".into() } else { String::new() },
                     truth: p.truth,
                     found: p.estimates.clone(),
                     promised_sd: p.promised_sd.unwrap_or(f64::NAN),

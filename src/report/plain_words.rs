@@ -4,7 +4,6 @@ use super::html::Report;
 use super::html_parts::{Column, Table};
 use super::number::significant;
 use crate::diagnosis::{Diagnosis, DiagnosisResult, ParameterResult, Verdict};
-use crate::material::Parameter;
 
 /// A parameter is hardly known where its interval is wider than this part of its value.
 const HARDLY_KNOWN: f64 = 1.0;
@@ -71,7 +70,7 @@ fn what_the_material_is(d: &Diagnosis, r: &DiagnosisResult) -> String {
     let (mut known, mut unknown) = (Vec::new(), Vec::new());
     for (kind, p) in r.material.parameters().into_iter().zip(&r.material_parameters) {
         // Without a force no modulus is known, whatever its interval among the others.
-        let is_modulus = !matches!(kind, Parameter::Alpha(_));
+        let is_modulus = kind.is_modulus();
         match p.interval_95.filter(|i| is_known(p, *i) && (has_force || !is_modulus)) {
             Some([a, b]) => known.push(format!(
                 "{} is {}{} (95 % interval {} to {})",

@@ -126,7 +126,7 @@ pub fn map_pictures(sample: &SampleMaps) -> Vec<(String, String)> {
     )];
     for (parameter, values) in &drive.sensitivities {
         let name = parameter.name();
-        let unit = if name.starts_with("mu") { "" } else { "kPa" };
+        let unit = if parameter.is_modulus() { "" } else { "kPa" };
         let title = format!("sensitivity to {}", symbol_of_parameter(&name));
         pictures.push((format!("map-sensitivity-{name}"), picture(vec![field(title, unit, values, ColorMap::Magma)])));
     }

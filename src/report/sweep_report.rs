@@ -4,6 +4,7 @@ use super::{
     CalloutKind, Column, MainEffect, MainEffectsPlot, ParallelAxis, ParallelPlot, ParetoPlot, ParetoPoint, PointKind,
     Report, ReportHeader, Table, significant,
 };
+use crate::material::Parameter;
 use crate::sweep::{Cells, SweepResult, SweepTable};
 use std::collections::BTreeMap;
 
@@ -98,7 +99,7 @@ fn section(page: &mut Report, result: &SweepResult, material: &str, names: &[Str
     );
     let mut responses = vec![(worst_label.to_string(), worst.clone()), ("force / N".into(), force.clone())];
     for name in names {
-        let unit = if name.starts_with("alpha") { "_kpa" } else { "" };
+        let unit = if Parameter::is_modulus_of_name(name) { "" } else { "_kpa" };
         let column = format!("sensitivity_sum_{name}{unit}");
         responses.push((label(&column), selection.numbers(&column)));
     }

@@ -1,8 +1,8 @@
 //! Integrated sensitivities 𝒮_ξ of one deformation field, per material parameter.
 
-use super::pointwise::{PointwiseSensitivity, alpha_sensitivity, mu_sensitivity};
+use super::pointwise::{PointwiseSensitivity, alpha_sensitivity, law_sensitivity, mu_sensitivity};
 use crate::kinematics::Decomposition;
-use crate::material::{Ogden, Parameter};
+use crate::material::{Lanes, Ogden, Parameter};
 use crate::voxel::VoxelMask;
 use serde::{Deserialize, Serialize};
 
@@ -38,6 +38,9 @@ pub fn parameter_sensitivity(
         Parameter::Alpha(i) => {
             alpha_sensitivity(stretch_amplitude, k, material.terms[i].mu_kpa, material.terms[i].alpha)
         }
+        Parameter::Law(own) => law_sensitivity(stretch_amplitude, k, &|x| {
+            material.law.map_or(0.0, |law| law.slope_derivative(own, Lanes::splat(x)).0[0])
+        }),
     }
 }
 
@@ -89,6 +92,7 @@ mod tests {
         Ogden {
             bulk_kpa: 2200.0,
             terms: vec![OgdenTerm { mu_kpa: 16.0, alpha: 1.9 }, OgdenTerm { mu_kpa: 0.35, alpha: 8.0 }],
+            law: None,
         }
     }
 

@@ -61,6 +61,20 @@ pub fn alpha_sensitivity(
     s
 }
 
+/// S_ξ(λ, k) of a parameter of a law W(x), x = Ī₁ − 3, whose ∂W′/∂ξ at x is `slope_derivative`, with the value alone:
+/// with ∂Ī₁/∂λ = 2 Σⱼ gⱼ λ^(2 gⱼ − 1) it is ∂W′/∂ξ ∂Ī₁/∂λ.
+pub fn law_sensitivity(
+    stretch_amplitude: f64,
+    deformation_mode: f64,
+    slope_derivative: &dyn Fn(f64) -> f64,
+) -> PointwiseSensitivity {
+    let g = mode_exponents(deformation_mode);
+    // expm1 keeps the digits of small strains.
+    let x = g.iter().map(|g| (2.0 * g * stretch_amplitude.ln()).exp_m1()).sum();
+    let rate = 2.0 * mu_sensitivity(stretch_amplitude, deformation_mode, 2.0).value;
+    PointwiseSensitivity { value: slope_derivative(x) * rate, ..PointwiseSensitivity::default() }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

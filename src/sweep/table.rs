@@ -54,18 +54,12 @@ impl Row<'_> {
 
 /// Unit suffix of a parameter: `_kpa` for κ and μ.
 fn unit(parameter: Parameter) -> &'static str {
-    match parameter {
-        Parameter::Alpha(_) => "",
-        _ => "_kpa",
-    }
+    if parameter.is_modulus() { "_kpa" } else { "" }
 }
 
-/// Unit suffix of S_ξ: 1 for μ, kPa for α.
+/// Unit suffix of S_ξ: 1 for moduli, kPa for α and others without a unit.
 fn sensitivity_unit(parameter: Parameter) -> &'static str {
-    match parameter {
-        Parameter::Alpha(_) => "_kpa",
-        _ => "",
-    }
+    if parameter.is_modulus() { "" } else { "_kpa" }
 }
 
 impl SweepTable {

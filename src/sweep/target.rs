@@ -1,7 +1,7 @@
 //! What a variable sets: one number of the specimen, the material or the scan, by name.
 
 use super::study_error::SweepStudyError;
-use crate::material::Ogden;
+use crate::material::{LawParameter, Ogden, Parameter};
 use crate::sensitivity::ScanSettings;
 use crate::specimen::{HoleShape, Specimen};
 
@@ -28,6 +28,7 @@ enum Place {
     Bulk,
     Mu(usize),
     Alpha(usize),
+    Law(LawParameter),
     Voxel(usize),
     Noise(usize),
     ForceSd,
@@ -37,7 +38,8 @@ impl Target {
     /// Reads `drive_mm`, `block.length_mm`, `block.thickness_mm`, `block.width_mm`, `holes[i].x_mm`,
     /// `holes[i].other_mm` (z of a hole along the thickness, y of one along the width), `holes[i].diameter_mm`,
     /// `holes[i].length_mm` and `holes[i].angle_deg` (of a hole with an outline of its own), `material.bulk_kpa`,
-    /// `material.mu_1_kpa`, `material.alpha_1`, `scan.voxel_mm[c]`, `scan.noise_sd_mm[c]` or `scan.force_sd_n`; indices
+    /// `material.mu_1_kpa`, `material.alpha_1` (of a law `material.c_1_kpa`, `material.mu_kpa`, `material.j_m`,
+    /// `material.lambda_m`), `scan.voxel_mm[c]`, `scan.noise_sd_mm[c]` or `scan.force_sd_n`; indices
     /// of holes and components from 0, of Ogden terms from 1. A leading `-` sets the negated value.
     ///
     /// # Errors
@@ -52,6 +54,9 @@ impl Target {
             "block.width_mm" => Place::Width,
             "material.bulk_kpa" => Place::Bulk,
             "scan.force_sd_n" => Place::ForceSd,
+            "material.mu_kpa" => Place::Law(LawParameter::Modulus),
+            "material.j_m" => Place::Law(LawParameter::Limit),
+            "material.lambda_m" => Place::Law(LawParameter::LockingStretch),
             other => Self::indexed(other).ok_or_else(unknown)?,
         };
         Ok(Target { place, is_negated })
@@ -84,6 +89,9 @@ impl Target {
         if let Some(number) = name.strip_prefix("material.mu_") {
             return Some(Place::Mu(term(number.strip_suffix("_kpa")?)?));
         }
+        if let Some(number) = name.strip_prefix("material.c_") {
+            return Some(Place::Law(LawParameter::Coefficient(term(number.strip_suffix("_kpa")?)?)));
+        }
         Some(Place::Alpha(term(name.strip_prefix("material.alpha_")?)?))
     }
 
@@ -92,6 +100,8 @@ impl Target {
         match self.place {
             Place::Bulk | Place::Mu(_) => "_kpa",
             Place::Alpha(_) => "",
+            Place::Law(parameter) if parameter.is_modulus() => "_kpa",
+            Place::Law(_) => "",
             Place::ForceSd => "_n",
             Place::HoleAngle(_) => "_deg",
             _ => "_mm",
@@ -120,6 +130,11 @@ impl Target {
             Place::Drive => {
                 specimen.drive_mm = vec![value];
                 return true;
+            }
+            Place::Law(parameter) => {
+                let has_it = material.parameters().contains(&Parameter::Law(parameter));
+                material.set(Parameter::Law(parameter), value);
+                return has_it;
             }
             Place::Length => Some(&mut specimen.block.length_mm),
             Place::Thickness => Some(&mut specimen.block.thickness_mm),

@@ -13,7 +13,7 @@ pub type Matrix = [[f64; 3]; 3];
 
 /// κ and terms (μ, α).
 pub fn ogden(bulk_kpa: f64, terms: &[(f64, f64)]) -> Ogden {
-    Ogden { bulk_kpa, terms: terms.iter().map(|&(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha }).collect() }
+    Ogden { bulk_kpa, terms: terms.iter().map(|&(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha }).collect(), law: None }
 }
 
 /// Ecoflex 00-20, one term.

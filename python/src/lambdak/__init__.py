@@ -62,7 +62,7 @@ from ._results import (
     Solution,
     SolveStep,
 )
-from ._specimen import Hole, HoleShape, Material, Sample, ScanSettings, Specimen, Term
+from ._specimen import Hole, HoleShape, Law, Material, Sample, ScanSettings, Specimen, Term
 
 try:
     __version__ = version("lambdak")
@@ -88,6 +88,7 @@ __all__ = [
     "InputError",
     "IntegratedSensitivity",
     "LambdakError",
+    "Law",
     "Material",
     "MaterialCard",
     "MaterialExport",

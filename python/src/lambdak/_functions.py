@@ -264,6 +264,7 @@ def calibrate(
     recordings: Union[Recorded, Sequence[Recorded]],
     *,
     num_terms: Optional[int] = None,
+    law: Optional[str] = None,
     rule: Optional[str] = None,
     decrement: Optional[float] = None,
     objective: Optional[str] = None,
@@ -285,6 +286,7 @@ def calibrate(
     request = given(
         recordings=[_named(one) for one in sources],
         num_terms=num_terms,
+        law=law,
         rule=rule,
         decrement=decrement,
         objective=objective,

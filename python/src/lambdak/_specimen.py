@@ -242,44 +242,89 @@ class Term:
         return {"mu_kpa": self.mu_kpa, "alpha": self.alpha}
 
 
+_LAWS = {
+    "yeoh/1": ("c_1_kpa", "c_2_kpa", "c_3_kpa"),
+    "gent/1": ("mu_kpa", "j_m"),
+    "arruda_boyce/1": ("mu_kpa", "lambda_m"),
+}
+
+
+@dataclass(frozen=True)
+class Law:
+    """An energy in the first invariant alone: the schema of its file and its numbers by their names there."""
+
+    schema: str
+    values: Dict[str, float]
+
+
 @dataclass(frozen=True)
 class Material:
-    """An Ogden material (`ogden/1`): Ψ = Σ μᵢ/αᵢ (Σλ̄^αᵢ − 3) + κ/2 (ln J)², with μᵢ and κ (`bulk_kpa`) in kPa.
+    """A hyperelastic material, Ψ = Σ μᵢ/αᵢ (Σλ̄^αᵢ − 3) + W(Ī₁ − 3) + κ/2 (ln J)², with κ (`bulk_kpa`) in kPa.
 
-    `Material([(17.0, 1.91)], bulk_kpa=2173)`: terms are :class:`Term` or pairs of μ and α.
+    `Material([(17.0, 1.91)], bulk_kpa=2173)` is Ogden's (`ogden/1`): terms are :class:`Term` or pairs of μ (kPa) and α.
+    `Material.yeoh`, `Material.gent` and `Material.arruda_boyce` have a :class:`Law` W in the place of terms.
     """
 
     terms: Tuple[Term, ...]
     bulk_kpa: float
+    law: Optional["Law"] = None
 
-    def __init__(self, terms: Sequence[Union[Term, Tuple[float, float]]], *, bulk_kpa: float) -> None:
+    def __init__(
+        self,
+        terms: Sequence[Union[Term, Tuple[float, float]]] = (),
+        *,
+        bulk_kpa: float,
+        law: Optional["Law"] = None,
+    ) -> None:
         object.__setattr__(self, "terms", tuple(t if isinstance(t, Term) else Term(*t) for t in terms))
         object.__setattr__(self, "bulk_kpa", plain(bulk_kpa))
+        object.__setattr__(self, "law", law)
         _check("material", self.to_dict())
 
     @classmethod
+    def yeoh(cls, c_kpa: Tuple[float, float, float], *, bulk_kpa: float) -> "Material":
+        """W = c₁ x + c₂ x² + c₃ x³, x = Ī₁ − 3 (`yeoh/1`)."""
+        values = {f"c_{n}_kpa": plain(c) for n, c in enumerate(c_kpa, 1)}
+        return cls(bulk_kpa=bulk_kpa, law=Law("yeoh/1", values))
+
+    @classmethod
+    def gent(cls, mu_kpa: float, j_m: float, *, bulk_kpa: float) -> "Material":
+        """W = −½ μ J_m ln(1 − x/J_m), x = Ī₁ − 3 (`gent/1`)."""
+        return cls(bulk_kpa=bulk_kpa, law=Law("gent/1", {"mu_kpa": plain(mu_kpa), "j_m": plain(j_m)}))
+
+    @classmethod
+    def arruda_boyce(cls, mu_kpa: float, lambda_m: float, *, bulk_kpa: float) -> "Material":
+        """Eight chains that lock at the stretch λ_m (`arruda_boyce/1`)."""
+        return cls(bulk_kpa=bulk_kpa, law=Law("arruda_boyce/1", {"mu_kpa": plain(mu_kpa), "lambda_m": plain(lambda_m)}))
+
+    @classmethod
     def from_json(cls, source: JsonSource) -> "Material":
-        """From an `ogden/1`, such as the `material.json` of a fit: a file, its text, or the object itself."""
+        """From a material's file, such as the `material.json` of a fit: a file, its text, or the object itself."""
         found = read_json(source)
         _check("material", found)
         return cls._of_program(found)
 
     @classmethod
     def _of_program(cls, found: Dict[str, Any]) -> "Material":
-        only_known(found, ("schema", "terms", "bulk_kpa"), "the material")
-        for term in found["terms"]:
+        names = _LAWS.get(found["schema"])
+        only_known(found, ("schema", "bulk_kpa", *(("terms",) if names is None else names)), "the material")
+        for term in found.get("terms", ()):
             only_known(term, ("mu_kpa", "alpha"), "a term")
         material = object.__new__(cls)
-        object.__setattr__(material, "terms", tuple(Term(**term) for term in found["terms"]))
+        object.__setattr__(material, "terms", tuple(Term(**term) for term in found.get("terms", ())))
         object.__setattr__(material, "bulk_kpa", found["bulk_kpa"])
+        law = None if names is None else Law(found["schema"], {name: found[name] for name in names})
+        object.__setattr__(material, "law", law)
         return material
 
     def to_dict(self) -> Dict[str, Any]:
-        """The object of an `ogden/1`."""
+        """The object of the material's file."""
+        if self.law is not None and not self.terms:
+            return {"schema": self.law.schema, "bulk_kpa": self.bulk_kpa, **self.law.values}
         return {"schema": "ogden/1", "bulk_kpa": self.bulk_kpa, "terms": [term.to_dict() for term in self.terms]}
 
     def to_json(self, file: Optional[PathLike] = None) -> str:
-        """The text of an `ogden/1`, also written to `file`."""
+        """The text of the material's file, also written to `file`."""
         return _to_json(self.to_dict(), file)
 
 

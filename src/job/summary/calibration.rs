@@ -5,12 +5,22 @@ use crate::calibration::CalibrationResult;
 
 /// The result as text.
 pub(in crate::job) fn calibration(result: &CalibrationResult) -> String {
-    let mut text = format!("{}\n\nnumber of terms\n", result.recordings.join(", "));
-    text +=
+    let mut text = format!("{}\n", result.recordings.join(", "));
+    if result.material.law.is_none() {
+        add_terms(&mut text, result);
+    }
+    add_estimates(&mut text, result);
+    text
+}
+
+/// The fits with one term, two, …
+fn add_terms(text: &mut String, result: &CalibrationResult) {
+    *text += "\nnumber of terms\n";
+    *text +=
         "  terms        chi2  chi2/datum   loss x 1000   mu (kPa)   F        p(F)      BIC change  decrement x 1000\n";
     for r in &result.term_selection.rows {
         let number = |v: Option<f64>, decimals: usize| v.map_or("-".to_string(), |v| num(v, decimals + 2));
-        text += &format!(
+        *text += &format!(
             "  {:<5} {:>11} {:>11} {:>13} {:>10}   {:<8} {:<9} {:<11} {}\n",
             r.num_terms,
             num(r.chi2, 7),
@@ -23,19 +33,23 @@ pub(in crate::job) fn calibration(result: &CalibrationResult) -> String {
             number(r.decrement.map(|d| 1e3 * d), 4)
         );
         for d in &r.degeneracies {
-            text += &format!("        {d}\n");
+            *text += &format!("        {d}\n");
         }
     }
     let s = &result.term_selection;
-    text += &format!(
+    *text += &format!(
         "  BIC takes {}, the F-test {}, the decrement {}; taken: {} ({})\n",
         s.by_bic, s.by_f_test, s.by_decrement, s.chosen, s.decided_by
     );
-    text += "\nparameter            value           sd      95 % interval              mesh    misfit\n";
+}
+
+/// The parameters and what goes with them.
+fn add_estimates(text: &mut String, result: &CalibrationResult) {
+    *text += "\nparameter            value           sd      95 % interval              mesh    misfit\n";
     let end = |v: Option<f64>| v.map_or("open".to_string(), |v| num(v, 6));
     for p in &result.parameters {
         let interval = format!("{} to {}", end(p.interval_95[0]), end(p.interval_95[1]));
-        text += &match (p.value, p.sd) {
+        *text += &match (p.value, p.sd) {
             (Some(value), Some(sd)) => {
                 format!(
                     "  {:<10} {:>13} {:>12}      {interval:<25} {:>8} {:>8}\n",
@@ -50,13 +64,13 @@ pub(in crate::job) fn calibration(result: &CalibrationResult) -> String {
         };
     }
     for r in &result.ratios {
-        text += &format!("  {:<12} {:>11} ± {}\n", r.name, num(r.value, 5), r.sd.map_or("?".into(), |s| num(s, 5)));
+        *text += &format!("  {:<12} {:>11} ± {}\n", r.name, num(r.value, 5), r.sd.map_or("?".into(), |s| num(s, 5)));
     }
     if let Some(shear) = &result.initial_shear_modulus_kpa {
         let interval = shear.interval_95.map_or("open".into(), |[a, b]| format!("{} to {}", num(a, 5), num(b, 5)));
-        text += &format!("  initial shear modulus {} kPa, 95 % interval {interval}\n", num(shear.value, 5));
+        *text += &format!("  initial shear modulus {} kPa, 95 % interval {interval}\n", num(shear.value, 5));
     }
-    text += &format!(
+    *text += &format!(
         "\nchi2 per datum {}; paper's loss {} = loss_u {} + {:e} loss_F {}\n",
         num(result.chi2_per_datum, 5),
         num(result.objective.paper_loss, 5),
@@ -65,7 +79,7 @@ pub(in crate::job) fn calibration(result: &CalibrationResult) -> String {
         result.loss_f.map_or("(no force)".into(), |l| num(l, 5))
     );
     for s in &result.steps {
-        text += &format!(
+        *text += &format!(
             "  {} {} mm: {} voxels, misfit x, y, z {} {} {} mm{}\n",
             s.recording,
             s.drive_mm,
@@ -80,7 +94,6 @@ pub(in crate::job) fn calibration(result: &CalibrationResult) -> String {
         );
     }
     for note in &result.notes {
-        text += &format!("note: {note}\n");
+        *text += &format!("note: {note}\n");
     }
-    text
 }

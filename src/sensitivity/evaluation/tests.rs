@@ -275,6 +275,7 @@ fn forces_on_the_way_and_unknowns_of_the_set_up() {
     let material = Ogden {
         bulk_kpa: 2000.0,
         terms: vec![OgdenTerm { mu_kpa: 12.0, alpha: 1.5 }, OgdenTerm { mu_kpa: 2.0, alpha: 5.0 }],
+        law: None,
     };
     let drives = DriveSelection::DriveMm(vec![2.5]);
     let promised = |protocol: Protocol| -> (Vec<f64>, Evaluation) {

@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 pub(crate) fn one_term() -> Ogden {
-    Ogden { bulk_kpa: 2173.0, terms: vec![OgdenTerm { mu_kpa: 17.0, alpha: 1.91 }] }
+    Ogden { bulk_kpa: 2173.0, terms: vec![OgdenTerm { mu_kpa: 17.0, alpha: 1.91 }], law: None }
 }
 
 fn noise() -> MeasurementNoise {

@@ -87,6 +87,9 @@ export async function planOfLink(text) {
 const FORMATS = {
   "specimen/1": (specimen) => ({ specimen }),
   "ogden/1": (material) => ({ material }),
+  "yeoh/1": (material) => ({ material }),
+  "gent/1": (material) => ({ material }),
+  "arruda_boyce/1": (material) => ({ material }),
   "study/1": (study) => ({
     specimen: study.base,
     base: study.base,

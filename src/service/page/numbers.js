@@ -77,12 +77,12 @@ export function duration(ms) {
 /** The symbol of a parameter. */
 export function symbol(name) {
   const [kind, number] = name.split("_");
-  const letter = { mu: "μ", alpha: "α", kappa: "κ" }[kind] ?? name;
-  return number ? letter + "₀₁₂₃₄₅₆₇₈₉"[Number(number)] : letter;
+  const letter = { mu: "μ", alpha: "α", kappa: "κ", c: "c", j: "J", lambda: "λ" }[kind] ?? name;
+  return number ? letter + ("₀₁₂₃₄₅₆₇₈₉"[Number(number)] ?? "ₘ") : letter;
 }
 
 /** The unit of a displacement's sensitivity summed over voxels: none for a modulus, kPa for an exponent. */
-export const sensitivityUnit = (name) => ({ alpha: "kPa" })[name.split("_")[0]] ?? "";
+export const sensitivityUnit = (name) => ({ alpha: "kPa", j: "kPa", lambda: "kPa" })[name.split("_")[0]] ?? "";
 
 /** The unit of a material's parameter. */
-export const unitOf = (name) => ({ mu: "kPa", kappa: "kPa" })[name.split("_")[0]] ?? "";
+export const unitOf = (name) => ({ mu: "kPa", kappa: "kPa", c: "kPa" })[name.split("_")[0]] ?? "";

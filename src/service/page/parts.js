@@ -2,6 +2,7 @@
 
 import { getBlob } from "./api.js";
 import { h, term } from "./dom.js";
+import { lawNumbers } from "./law.js";
 import { digits, known, percent, sensitivityUnit, symbol, unitOf, withUnit } from "./numbers.js";
 import { GLOSSARY } from "./words.js";
 import { view3d } from "./view3d.js";
@@ -92,15 +93,18 @@ export const materialRow = (name, value, ends) => withUnit(known(value, ends), u
 /** The parameters of a material by name. */
 export function parametersOf(material) {
   const found = { kappa: material.bulk_kpa };
-  material.terms.forEach((t, i) => {
+  (material.terms ?? []).forEach((t, i) => {
     found[`mu_${i + 1}`] = t.mu_kpa;
     found[`alpha_${i + 1}`] = t.alpha;
   });
+  // A law in the first invariant has numbers of its own.
+  for (const [name, value] of lawNumbers(material)) found[name.replace(/_kpa$/, "")] = value;
   return found;
 }
 
 /** ½ Σ μα, kPa. */
-export const shearModulus = (material) => material.terms.reduce((sum, t) => sum + 0.5 * t.mu_kpa * t.alpha, 0);
+export const shearModulus = (material) =>
+  (material.terms ?? []).reduce((sum, t) => sum + 0.5 * t.mu_kpa * t.alpha, 0);
 
 /** Deformed surfaces side by side: [[file, label]]. */
 export async function shapes(files, wanted) {

@@ -2,6 +2,7 @@
 
 import { h } from "./dom.js";
 import { choice, field, fields } from "./field.js";
+import { lawNumbers } from "./law.js";
 import { sectionOf } from "./outline.js";
 import { GLOSSARY } from "./words.js";
 
@@ -103,7 +104,8 @@ export function specimenForm(model, library, edited) {
 
 /** The material's fields. */
 export function materialForm(model, library, edited) {
-  const terms = model.material.terms;
+  const terms = model.material.terms ?? [];
+  const numbers = lawNumbers(model.material);
   const term = (index) => [
     field({
       label: `μ of term ${index + 1}, kPa`,
@@ -152,8 +154,21 @@ export function materialForm(model, library, edited) {
         changed: edited,
       }),
       terms.map((_, index) => term(index)),
+      numbers.map(([name, value]) =>
+        field({
+          label: name.endsWith("_kpa") ? `${name.slice(0, -4).replace("_", "")}, kPa` : name.replace("_", ""),
+          value,
+          pointer: `/material/${name}`,
+          example: String(value),
+          put: (v) => {
+            model.material[name] = v;
+          },
+          changed: edited,
+        }),
+      ),
     ),
-    h(
+    numbers.length === 0 &&
+      h(
       "div",
       { class: "row" },
       h(

@@ -1,6 +1,7 @@
 // The form of a sweep: what varies, from where to where, how many, which seed.
 
 import { fill, h } from "./dom.js";
+import { lawNumbers } from "./law.js";
 import { digits, symbol } from "./numbers.js";
 
 /** What of an evaluation can vary: pointer, words, value now. */
@@ -22,10 +23,11 @@ function variables(model) {
   specimen.drive_mm.forEach((v, i) => add(`/specimen/drive_mm/${i}`, `drive ${i + 1}, mm`, v));
   for (const side of ["length", "thickness", "width"])
     add(`/specimen/block/${side}_mm`, `${side}, mm`, specimen.block[`${side}_mm`]);
-  material.terms.forEach((t, i) => {
+  (material.terms ?? []).forEach((t, i) => {
     add(`/material/terms/${i}/mu_kpa`, `${symbol(`mu_${i + 1}`)}, kPa`, t.mu_kpa);
     add(`/material/terms/${i}/alpha`, symbol(`alpha_${i + 1}`), t.alpha);
   });
+  for (const [name, value] of lawNumbers(material)) add(`/material/${name}`, name.replace(/_kpa$/, ", kPa"), value);
   add("/material/bulk_kpa", "κ, kPa", material.bulk_kpa);
   scan.voxel_mm.forEach((v, i) => add(`/scan/voxel_mm/${i}`, `voxel along ${"xyz"[i]}, mm`, v));
   return found;
