@@ -148,8 +148,8 @@ fn instruction_sets_agree() {
     }
 }
 
-/// Holes that are not circles: an ellipse as long as wide is the circle; half a turn changes nothing; a specimen mirrored
-/// in z has the same force; mirrored in x, where the other plate then moves the other way, too.
+/// Holes that are not circles: an ellipse as long as wide is the circle; half a turn changes nothing; a specimen
+/// mirrored in z has the same force; mirrored in x, where the other plate then moves the other way, too.
 #[test]
 fn turned_and_mirrored_outlines_have_the_same_force() {
     let material = two_terms();

@@ -6,9 +6,9 @@ use crate::specimen::{Block, Hole, ManufacturingLimits, Specimen};
 /// The step where limits state none, mm.
 const USUAL_STEP_MM: f64 = 0.1;
 
-/// The design nearest to `specimen` whose dimensions, places and drive are multiples of the limits' step, whose angles are
-/// whole degrees, and that can be made: holes are smaller by up to two steps where the nearest ones come too close to something. Punches keep their
-/// diameters. `None` where no such design can be made.
+/// The design nearest to `specimen` whose dimensions, places and drive are multiples of the limits' step, whose angles
+/// are whole degrees, and that can be made: holes are smaller by up to two steps where the nearest ones come too close
+/// to something. Punches keep their diameters. `None` where no such design can be made.
 pub(super) fn in_steps(specimen: &Specimen, limits: &ManufacturingLimits, voxel_mm: [f64; 3]) -> Option<Specimen> {
     let step = limits.dimension_step_mm.unwrap_or(USUAL_STEP_MM);
     let nearest = |value: f64| multiple(step, (value / step).round());

@@ -67,8 +67,8 @@ pub(super) fn explain_too_little(verdict: Verdict, [before, after]: [f64; 2]) ->
 }
 
 /// Fits each of the two models to the two colours of a chequerboard of blocks in turn and predicts the other colour.
-/// `seen` is what each of the two models is compared with. Gives the rms misfit (mm) on the blocks that the fits did not
-/// see, without and with the causes.
+/// `seen` is what each of the two models is compared with. Gives the rms misfit (mm) on the blocks that the fits did
+/// not see, without and with the causes.
 ///
 /// # Errors
 /// [`DiagnosisError`]: no equilibrium, or the work was cancelled.

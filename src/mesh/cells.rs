@@ -283,9 +283,9 @@ impl Layout<'_> {
     }
 }
 
-/// Parameters of the wall's points that face `points` (of a circle angles): between equal steps and straight lines to the
-/// nearest point of the wall, but no step much longer than the equal ones; the middles are exactly midway so that each
-/// element's part of the wall is divided evenly. Where the curvature jumps the nearest element corner is put.
+/// Parameters of the wall's points that face `points` (of a circle angles): between equal steps and straight lines to
+/// the nearest point of the wall, but no step much longer than the equal ones; the middles are exactly midway so that
+/// each element's part of the wall is divided evenly. Where the curvature jumps the nearest element corner is put.
 fn wall_parameters(wall: &HoleWall, points: &[[f64; 2]]) -> Vec<f64> {
     const LONGEST_STEP: f64 = 1.15;
     const LARGEST_MOVE: f64 = 0.45;

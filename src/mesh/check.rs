@@ -14,8 +14,8 @@ use crate::specimen::{HoleWall, Specimen};
 
 /// Relative error allowed in a hole's or an arc's area: a parabola through three points of a 60° arc has 0.14 %.
 const ARC_AREA_TOLERANCE: f64 = 2e-3;
-/// The same of a slot: four parabolas may each pass an end of a straight line in between their points, where the curvature
-/// jumps; of 45° arcs of radius r each then misses up to 0.003 r².
+/// The same of a slot: four parabolas may each pass an end of a straight line in between their points, where the
+/// curvature jumps; of 45° arcs of radius r each then misses up to 0.003 r².
 const JUMP_AREA_TOLERANCE: f64 = 5e-3;
 
 /// What a mesh is like.

@@ -43,15 +43,15 @@ impl SectionHole {
         2.0 * self.wall.half_mm()[1]
     }
 
-    /// How far `k` radii reach from the centre along an axis; of a hole that is no circle its extent and `k` − 1 radii of
-    /// the circle of the same area.
+    /// How far `k` radii reach from the centre along an axis; of a hole that is no circle its extent and `k` − 1 radii
+    /// of the circle of the same area.
     pub fn reach_of_radii(&self, axis: usize, k: f64) -> f64 {
         let radius = self.wall.mean_radius_mm();
         if self.wall.is_circle() { k * radius } else { self.wall.half_extents_mm()[axis] + (k - 1.0) * radius }
     }
 
-    /// The radius of the circle that stands for the hole in a power diagram: half of its extent across (`weight` 0), half
-    /// of that along it (1), or between them.
+    /// The radius of the circle that stands for the hole in a power diagram: half of its extent across (`weight` 0),
+    /// half of that along it (1), or between them.
     pub fn power_radius(&self, weight: f64) -> f64 {
         let [a, b] = self.wall.half_mm();
         if self.wall.is_circle() { b } else { a.powf(weight) * b.powf(1.0 - weight) }

@@ -10,7 +10,8 @@
 //! ```
 //!
 //! The section is (x, z) extruded along y, or (x, y) extruded along z where holes run along the width. Every mesh is
-//! conforming, its curved walls (of circles, ellipses and slots) carry exact nodes at element corners and middles, and equal input gives equal bits.
+//! conforming, its curved walls (of circles, ellipses and slots) carry exact nodes at element corners and middles, and
+//! equal input gives equal bits.
 
 mod block_shape;
 mod build;

@@ -31,11 +31,11 @@ pub enum DesignVariable {
 
 /// d(node position)/d(variable), dimensionless, per node of `mesh` (of `specimen`).
 ///
-/// A hole's wall moves rigidly, or as its extents or its angle ask: an extent moves it linearly, so that a circle stays a
-/// circle, an ellipse an ellipse and a slot a slot at any step; an angle does so to first order. The motion fades as d/(d + d_h) towards the other
-/// walls and the outline, with d_h the distance to the hole and d a smooth minimum of the distances to the others. A
-/// block dimension scales the outline affinely about the origin and leaves the holes' centres and shapes alone; along
-/// the extrusion everything is scaled.
+/// A hole's wall moves rigidly, or as its extents or its angle ask: an extent moves it linearly, so that a circle stays
+/// a circle, an ellipse an ellipse and a slot a slot at any step; an angle does so to first order. The motion fades as
+/// d/(d + d_h) towards the other walls and the outline, with d_h the distance to the hole and d a smooth minimum of the
+/// distances to the others. A block dimension scales the outline affinely about the origin and leaves the holes'
+/// centres and shapes alone; along the extrusion everything is scaled.
 ///
 /// In a mirrored mesh the velocity is that of the meshed half. A hole and its image are moved together by summing their
 /// two variables (with opposite signs for [`DesignVariable::HoleOther`]); the one outside the meshed half contributes

@@ -111,8 +111,8 @@ fn volumes_converge_to_the_closed_form() {
             };
             let (coarse, fine) = (error(10, 2.0), error(40, 0.5));
             println!("{kind:?}, prisms {force_prisms}: {coarse:e} {fine:e}");
-            // Fourth order would give 256 and second order 16 for four times as many equal parts; where no corner stands
-            // at the end of a slot's straight line, third.
+            // Fourth order would give 256 and second order 16 for four times as many equal parts; where no corner
+            // stands at the end of a slot's straight line, third.
             assert!(fine < 2e-6 && coarse / fine > 24.0, "{}: {coarse:e} {fine:e}", s.name);
         }
     }
@@ -133,8 +133,8 @@ fn set(specimen: &Specimen, variable: DesignVariable, step: f64) -> Specimen {
     s
 }
 
-/// The morphed mesh passes the whole check of the changed specimen, at steps of any size but for the angle: a turn moves
-/// the wall off itself by the square of the step (1e-7 mm at a hundredth of a degree), which the check allows.
+/// The morphed mesh passes the whole check of the changed specimen, at steps of any size but for the angle: a turn
+/// moves the wall off itself by the square of the step (1e-7 mm at a hundredth of a degree), which the check allows.
 #[test]
 fn the_morphed_mesh_is_a_mesh_of_the_changed_specimen() {
     use DesignVariable::*;

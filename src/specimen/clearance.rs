@@ -10,8 +10,8 @@ impl Specimen {
     /// a slab of material-free space beyond the side. mm; 0 where they overlap. It checks
     /// [`Specimen::ligaments`] by another way of computing; agreement to about 1e-6 of the block's length.
     ///
-    /// `None` for holes that are not circles, for the curved sides of a dumb-bell, for an index without a hole, and where
-    /// a size is not positive.
+    /// `None` for holes that are not circles, for the curved sides of a dumb-bell, for an index without a hole, and
+    /// where a size is not positive.
     pub fn solid_clearance_mm(&self, kind: LigamentKind) -> Option<f64> {
         let half_extrusion = 0.5 * self.extrusion_mm();
         // parry's cylinders run along y: the frame here is (x, extrusion, lateral).

@@ -1,7 +1,7 @@
 //! The layout of a specimen's dimensioned drawing; `drawing_svg` and `drawing_dxf` write it.
 //!
-//! Front view (x, z) above, side view (x, y) below, x to the right in both. Holes appear with their outlines in the view
-//! along their axis and as hidden lines in the other. Positions are ordinates from the block's centre lines; the
+//! Front view (x, z) above, side view (x, y) below, x to the right in both. Holes appear with their outlines in the
+//! view along their axis and as hidden lines in the other. Positions are ordinates from the block's centre lines; the
 //! table repeats them and adds distances from the end at −x and from the negative side.
 
 use super::drawing_labels::spread;

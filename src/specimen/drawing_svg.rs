@@ -68,7 +68,8 @@ pub fn to_svg(specimen: &Specimen) -> String {
                     [c[0] + radius * angle.cos(), height - c[1] - radius * angle.sin()]
                 };
                 let (a, b) = (point(*from), point(*to));
-                // Counter-clockwise on paper is sweep 0, as SVG's second axis points down. Arcs here span at most half a turn.
+                // Counter-clockwise on paper is sweep 0, as SVG's second axis points down. Arcs here span at most half
+                // a turn.
                 writeln!(
                     svg,
                     "<path class=\"{class}\" d=\"M{:.3} {:.3}A{radius:.3} {radius:.3} 0 0 0 {:.3} {:.3}\"/>",

@@ -1,7 +1,7 @@
 //! Closed forms of an ellipse in its own frame, semi-axes a (along the first coordinate) ≥ b > 0.
 
-/// Steps after which Newton's method for the nearest point has long converged: it is monotone, and gains at least half a
-/// digit per step far from the root.
+/// Steps after which Newton's method for the nearest point has long converged: it is monotone, and gains at least half
+/// a digit per step far from the root.
 const MAX_STEPS: usize = 200;
 /// Steps of the arithmetic–geometric mean, which doubles its digits in each.
 const MEAN_STEPS: i32 = 12;

@@ -1,9 +1,9 @@
 //! The material between two holes at its thinnest.
 //!
-//! The signed distance of two convex sets is the largest gap between parallel lines that part them, max over unit vectors
-//! n of (c₂ − c₁)·n − h₁(n) − h₂(n) with h the reach of each: positive where they are apart, and less the depth of the
-//! overlap where they are not. Every n gives a lower bound, so that a search over n never tells more material than there
-//! is.
+//! The signed distance of two convex sets is the largest gap between parallel lines that part them, max over unit
+//! vectors n of (c₂ − c₁)·n − h₁(n) − h₂(n) with h the reach of each: positive where they are apart, and less the depth
+//! of the overlap where they are not. Every n gives a lower bound, so that a search over n never tells more material
+//! than there is.
 
 use super::HoleWall;
 use std::f64::consts::TAU;

@@ -24,8 +24,8 @@ impl HoleWall {
         [0, 1].map(|c| inward[c] + 0.5 * if out > 0.0 { outward[c] } else { 0.0 })
     }
 
-    /// As the length grows and the extent across stays: of an ellipse the derivative at fixed t; of a slot the ends move
-    /// apart and the straight lines stretch. A circle has no length: zero.
+    /// As the length grows and the extent across stays: of an ellipse the derivative at fixed t; of a slot the ends
+    /// move apart and the straight lines stretch. A circle has no length: zero.
     pub fn motion_with_length(&self, p: [f64; 2]) -> [f64; 2] {
         if self.is_circle() {
             return [0.0; 2];
@@ -56,8 +56,8 @@ impl HoleWall {
         self.outward([0.0; 2], [along / a, across / b])
     }
 
-    /// The nearest point of a slot's middle line, as a part of its half (−1 to 1) and from the centre, mm; and the distance
-    /// of `p` from it.
+    /// The nearest point of a slot's middle line, as a part of its half (−1 to 1) and from the centre, mm; and the
+    /// distance of `p` from it.
     fn on_middle_line(&self, p: [f64; 2]) -> ([f64; 2], f64) {
         let ([along, across], [a, b]) = (self.local(p), self.half_mm());
         let half = a - b;

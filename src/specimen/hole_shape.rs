@@ -1,8 +1,5 @@
 //! The outline of a hole that is not a circle: an ellipse or a slot with an angle.
 
-use super::Hole;
-#[cfg(feature = "schema")]
-use super::file;
 use serde::{Deserialize, Serialize};
 
 /// The longest a hole may be, in multiples of its extent across. Longer ones are cuts rather than holes: their tips are
@@ -35,47 +32,24 @@ impl HoleKind {
 
 /// The outline of a hole that is not a circle, in its own frame: ξ along the hole, η across it, both from its centre.
 ///
-/// With a = `length_mm`/2 and b = `diameter_mm`/2 of the hole, ξ = (x − x₀) cos φ + (y − y₀) sin φ and
-/// η = (y − y₀) cos φ − (x − x₀) sin φ, where (x, y) are the coordinates of the section (z in place of y for holes along
-/// the thickness), (x₀, y₀) is the hole's centre and φ is `angle_deg`. Where a = b the outline is the circle.
+/// With a = `length_mm`/2 and b = `diameter_mm`/2 of the hole, ξ = (x − x₀) cos φ + (y − y₀) sin φ and η = (y − y₀) cos
+/// φ − (x − x₀) sin φ, where (x, y) are the coordinates of the section (z in place of y for holes along the thickness),
+/// (x₀, y₀) is the hole's centre and φ is `angle_deg`. Where a = b the outline is the circle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = HoleShapeSchema))]
 #[serde(deny_unknown_fields)]
 pub struct HoleShape {
     /// What it looks like.
     pub kind: HoleKind,
-    /// Extent along the hole, mm: at least its `diameter_mm`, which is then the extent across it, and at most five times
-    /// as much.
-    #[cfg_attr(feature = "schema", schema(value_type = file::DiameterMm))]
+    /// Extent along the hole, mm: at least its `diameter_mm`, which is then the extent across it, and at most five
+    /// times as much.
+    #[cfg_attr(feature = "schema", schema(value_type = super::file::DiameterMm))]
     pub length_mm: f64,
-    /// Angle from x to the hole's length, towards the section's other axis (z for holes along the thickness, y for holes
-    /// along the width), degrees; 0 by default.
+    /// Angle from x to the hole's length, towards the section's other axis (z for holes along the thickness, y for
+    /// holes along the width), degrees; 0 by default.
     #[serde(default)]
-    #[cfg_attr(feature = "schema", schema(value_type = file::AngleDeg))]
+    #[cfg_attr(feature = "schema", schema(value_type = super::file::AngleDeg))]
     pub angle_deg: f64,
-}
-
-impl Hole {
-    /// The hole in a section that is mirrored where a sign is negative (x, then the other axis).
-    pub fn mirrored(self, signs: [f64; 2]) -> Hole {
-        let center_mm = [signs[0] * self.center_mm[0], signs[1] * self.center_mm[1]];
-        Hole { center_mm, shape: self.shape.map(|shape| shape.mirrored(signs)), ..self }
-    }
-
-    /// How far another hole is from being this one, mm: the distance of the centres and the differences of the extents,
-    /// and where both are longer than wide how far apart that puts their ends or outlines. Zero for the same hole at
-    /// half a turn, and for a circle and an ellipse as long as wide.
-    pub fn difference_mm(&self, other: &Hole) -> f64 {
-        let apart = (self.center_mm[0] - other.center_mm[0]).hypot(self.center_mm[1] - other.center_mm[1]);
-        let across = (self.diameter_mm - other.diameter_mm).abs();
-        let (Some(own), Some(others)) = (self.shape, other.shape) else {
-            return apart + across + (self.length_mm() - other.length_mm()).abs();
-        };
-        let elongation = 0.5 * (own.length_mm - self.diameter_mm).min(others.length_mm - other.diameter_mm);
-        let turn = (own.angle_deg - others.angle_deg).to_radians().sin().abs();
-        let kind = if own.kind == others.kind { 0.0 } else { 1.0 };
-        apart + across + (own.length_mm - others.length_mm).abs() + elongation * (turn + kind)
-    }
 }
 
 impl HoleShape {

@@ -1,13 +1,13 @@
 //! The wall of a hole in its section: the one place that knows what holes of every kind look like.
 //!
-//! A wall is convex and symmetric about its centre and both of its axes. It is met by its signed distance, its reach in a
-//! direction (the support function), its chords, and its points by a parameter that advances as finely as it curves.
+//! A wall is convex and symmetric about its centre and both of its axes. It is met by its signed distance, its reach in
+//! a direction (the support function), its chords, and its points by a parameter that advances as finely as it curves.
 
 use super::{Hole, HoleKind, ellipse};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// How finely the parameter of a slot advances on its straight lines, against its half circles: parts of equal steps are
-/// twice as long where the wall is straight.
+/// How finely the parameter of a slot advances on its straight lines, against its half circles: parts of equal steps
+/// are twice as long where the wall is straight.
 const STRAIGHT_RATE: f64 = 0.5;
 
 /// What a wall is, with a ≥ b half of its extents along and across.
@@ -18,8 +18,8 @@ enum Form {
     Slot,
 }
 
-/// The wall of a hole in section coordinates (x and z for holes along the thickness, x and y for holes along the width),
-/// mm.
+/// The wall of a hole in section coordinates (x and z for holes along the thickness, x and y for holes along the
+/// width), mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HoleWall {
     center: [f64; 2],

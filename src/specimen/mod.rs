@@ -3,11 +3,11 @@
 //! Frame (reference): origin at the centre of the undeformed block; x along its length (the pull direction),
 //! y along its thickness, z along its width. Lengths in mm.
 //!
-//! What is supported: a plain block or one standard dumb-bell, with holes that all share one axis: circles, ellipses and
-//! slots ([`HoleShape`]); in a double-lap test further blocks beside it ([`Specimen::samples`]).
-//! The mesh is a section extruded along that axis, so holes of two directions in one specimen are refused.
-//! Parsing and validation: [`Specimen::from_json`]. Limits of what can be made: [`ManufacturingLimits`].
-//! Drawings for the mould maker: [`to_svg`], [`to_dxf`], [`to_stl`].
+//! What is supported: a plain block or one standard dumb-bell, with holes that all share one axis: circles, ellipses
+//! and slots ([`HoleShape`]); in a double-lap test further blocks beside it ([`Specimen::samples`]). The mesh is a
+//! section extruded along that axis, so holes of two directions in one specimen are refused. Parsing and validation:
+//! [`Specimen::from_json`]. Limits of what can be made: [`ManufacturingLimits`]. Drawings for the mould maker:
+//! [`to_svg`], [`to_dxf`], [`to_stl`].
 
 #[cfg(feature = "solids")]
 mod clearance;
@@ -25,6 +25,7 @@ mod ellipse;
 mod file;
 mod geometry;
 mod hole_gap;
+mod hole_likeness;
 mod hole_motion;
 mod hole_shape;
 mod hole_wall;

@@ -36,8 +36,8 @@ const LIMIT_SLACK: f64 = 1e-9;
 /// How far a dumb-bell's block may be off the standard, mm: rounding only.
 const STANDARD_TOLERANCE_MM: f64 = 1e-6;
 
-/// Thinnest ligament that can be meshed beside a hole (the larger one of two), mm: 0.05 mm and 2 % of the diameter (of an
-/// ellipse or a slot the extent across it).
+/// Thinnest ligament that can be meshed beside a hole (the larger one of two), mm: 0.05 mm and 2 % of the diameter (of
+/// an ellipse or a slot the extent across it).
 pub fn min_meshable_ligament_mm(diameter_mm: f64) -> f64 {
     (0.02 * diameter_mm).max(0.05)
 }

@@ -269,8 +269,8 @@ proptest! {
         for specimen in specimens {
             for ligament in specimen.ligaments() {
                 let found = brute_force(&specimen, ligament.kind);
-                // Samples are at most 1/2400 of a side or 1/600 of a circle apart (of other walls at most twice as much):
-                // the search is above the distance, by no more than half the sum of both spacings.
+                // Samples are at most 1/2400 of a side or 1/600 of a circle apart (of other walls at most twice as
+                // much): the search is above the distance, by no more than half the sum of both spacings.
                 let size = specimen.block.length_mm.max(specimen.block.width_mm);
                 let circle = std::f64::consts::PI * specimen.holes.iter().map(|h| h.length_mm()).fold(0.0, f64::max);
                 let spacing = size / 2400.0 + 2.0 * circle / 600.0;

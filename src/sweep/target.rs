@@ -36,9 +36,9 @@ enum Place {
 impl Target {
     /// Reads `drive_mm`, `block.length_mm`, `block.thickness_mm`, `block.width_mm`, `holes[i].x_mm`,
     /// `holes[i].other_mm` (z of a hole along the thickness, y of one along the width), `holes[i].diameter_mm`,
-    /// `holes[i].length_mm` and `holes[i].angle_deg` (of a hole with an outline of its own), `material.bulk_kpa`, `material.mu_1_kpa`, `material.alpha_1`, `scan.voxel_mm[c]`, `scan.noise_sd_mm[c]` or
-    /// `scan.force_sd_n`; indices of holes and components from 0, of Ogden terms from 1. A leading `-` sets the negated
-    /// value.
+    /// `holes[i].length_mm` and `holes[i].angle_deg` (of a hole with an outline of its own), `material.bulk_kpa`,
+    /// `material.mu_1_kpa`, `material.alpha_1`, `scan.voxel_mm[c]`, `scan.noise_sd_mm[c]` or `scan.force_sd_n`; indices
+    /// of holes and components from 0, of Ogden terms from 1. A leading `-` sets the negated value.
     ///
     /// # Errors
     /// [`SweepStudyError::UnknownTarget`].
