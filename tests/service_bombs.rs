@@ -47,6 +47,8 @@ fn header(shape: [i16; 3], components: i16, [code, bits]: [i16; 2], offset: f32)
     put(254, &1i16.to_le_bytes());
     for axis in 0..3 {
         put(280 + 20 * axis, &1f32.to_le_bytes());
+        // The specimen's centre is the image's: it is not refused for lying elsewhere.
+        put(292 + 16 * axis, &(0.5 - 0.5 * f32::from(shape[axis])).to_le_bytes());
     }
     put(344, b"n+1\0");
     bytes

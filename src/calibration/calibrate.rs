@@ -196,3 +196,42 @@ fn estimate(fit: &RecordingFit, parameter: Parameter, value: f64, mesh_error: f6
     };
     Estimate { parameter, value, sd, mesh_error, discretisation_sd, possible_shift, interval_95, is_identifiable }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibration::test_problem::{block, same_mesh, truth};
+    use crate::recording::Filter;
+
+    /// A mask that marks a hole which is not drawn: what the scan holds there is noise.
+    #[test]
+    fn voxels_of_noise_are_left_out_and_told() {
+        let (_, scan) = same_mesh(&truth());
+        let mut recording = scan.recording("hole", &block(), scan.noiseless(), Filter::None).expect("a recording");
+        let in_hole = |v: &usize| {
+            let [i, _, k] = recording.grid.indices(*v);
+            (5..8).contains(&i) && (3..6).contains(&k)
+        };
+        let hole: Vec<usize> = (0..recording.grid.num_voxels()).filter(in_hole).collect();
+        for (n, &v) in hole.iter().enumerate() {
+            // Far from smooth, and within what a wrapped phase can be.
+            recording.steps[0].displacement[v] = [1, 2, 3].map(|c| 2.0 * ((n * c) as f64 * 2.399).sin());
+        }
+        let observed = [Observed::new(&recording, 0.01).expect("a recording to compare")];
+        let options = CalibrateOptions {
+            terms: TermCount::Fixed(1),
+            mesh_factor: 2.5,
+            has_mesh_allowance: false,
+            num_starts: 1,
+            ..CalibrateOptions::default()
+        };
+        let found = calibrate(&observed, &MeshOptions::scaled, &options, &|_| (), &|| false).expect("a calibration");
+        for e in found.estimates.iter().filter(|e| e.parameter != Parameter::Kappa) {
+            // Without noise elsewhere and on the data's own mesh; what little noise is taken for displacement shows.
+            assert!((e.value / truth().value(e.parameter) - 1.0).abs() < 0.02, "{}: {}", e.parameter.name(), e.value);
+        }
+        let told = observed[0].num_outliers;
+        assert!(told >= hole.len() && told < 3 * hole.len(), "{told} of {}", hole.len());
+        assert!(found.notes.iter().any(|note| note.starts_with(&format!("{told} voxels hold no displacement"))));
+    }
+}

@@ -219,6 +219,14 @@ impl<'a> Run<'a> {
         for recording in observed.iter().filter(|o| o.is_noise_estimated) {
             self.notes.push(format!("the noise was estimated from the recording: {:.4?} mm", recording.noise_sd_mm));
         }
+        for (n, recording) in observed.iter().enumerate().filter(|(_, o)| o.num_outliers > 0) {
+            let of = if observed.len() > 1 { format!(" of recording {}", n + 1) } else { String::new() };
+            self.notes.push(format!(
+                "{} voxels{of} hold no displacement and are left out: they agree with hardly any neighbour, as where a mask \
+                 marks more than the sample",
+                recording.num_outliers
+            ));
+        }
         for limit in &fit.reached_limits {
             self.notes.push(format!("the estimate stands at a limit: {limit}"));
         }

@@ -140,6 +140,15 @@ impl Request for EvaluationRequest {
 }
 
 impl CheckedEvaluation {
+    /// All that its numbers depend on.
+    pub(super) fn content(&self) -> serde_json::Value {
+        let r = &self.request;
+        serde_json::json!({
+            "specimen": r.specimen, "material": r.material, "scan": r.scan, "drives": self.drives,
+            "mesh": self.options().mesh, "protocol": r.protocol, "has_detectable": r.has_detectable,
+        })
+    }
+
     fn options(&self) -> EvaluationOptions {
         let specimen = &self.request.specimen;
         let mut mesh = self.request.mesh.options(specimen);
@@ -170,12 +179,7 @@ impl Run for CheckedEvaluation {
     }
 
     fn equal_work(&self) -> Option<(serde_json::Value, bool)> {
-        let r = &self.request;
-        let content = serde_json::json!({
-            "specimen": r.specimen, "material": r.material, "scan": r.scan, "drives": self.drives,
-            "mesh": self.options().mesh, "protocol": r.protocol, "has_detectable": r.has_detectable,
-        });
-        Some((content, !r.has_files))
+        Some((self.content(), !self.request.has_files))
     }
 
     fn run(&self, context: &Context) -> Result<Outcome, JobError> {

@@ -5,6 +5,7 @@
 
 use super::evaluate::EvaluationRequest;
 use super::evaluation_table::{Entry, evaluation_table};
+use super::kind::work_key;
 use super::{Context, Failure, JobError, Outcome, Part, PartKind, RecordingOutline, Request, ResultSchema, Run, cost};
 use crate::field::FieldError;
 use crate::field::schema::Seed;
@@ -228,11 +229,14 @@ impl Request for EvaluationListRequest {
 
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let mut errors = Vec::new();
-        let mut evaluations = Vec::new();
+        let (mut evaluations, mut work_keys) = (Vec::new(), Vec::new());
         for (origin, value) in self.expanded().map_err(|e| vec![e])? {
             let checked = crate::field::read::<EvaluationRequest>(&value).map_err(|e| vec![e]);
             match checked.and_then(EvaluationRequest::checked) {
-                Ok(_) => evaluations.push(value),
+                Ok(checked) => {
+                    evaluations.push(value);
+                    work_keys.push(work_key(EvaluationRequest::COMMAND, checked.content()));
+                }
                 Err(found) => {
                     errors.extend(found.into_iter().map(|e| FieldError { pointer: origin.locate(&e.pointer), ..e }));
                 }
@@ -241,7 +245,11 @@ impl Request for EvaluationListRequest {
                 break;
             }
         }
-        if errors.is_empty() { Ok(Box::new(CheckedList { request: self, evaluations })) } else { Err(errors) }
+        if errors.is_empty() {
+            Ok(Box::new(CheckedList { request: self, evaluations, work_keys }))
+        } else {
+            Err(errors)
+        }
     }
 }
 
@@ -259,6 +267,8 @@ struct EvaluationListResult<'a> {
 struct CheckedList {
     request: EvaluationListRequest,
     evaluations: Vec<Value>,
+    /// The key of equal work of each.
+    work_keys: Vec<String>,
 }
 
 impl Run for CheckedList {
@@ -276,13 +286,13 @@ impl Run for CheckedList {
     }
 
     fn parts(&self) -> Vec<Part> {
-        let part = |value: &Value| {
+        let part = |(value, key): (&Value, &String)| {
             let mut request = value.clone();
             // Only numbers are kept.
             request["has_files"] = false.into();
-            Part { kind: PartKind::Evaluation, request }
+            Part { kind: PartKind::Evaluation, request, work_key: Some(key.clone()) }
         };
-        self.evaluations.iter().map(part).collect()
+        self.evaluations.iter().zip(&self.work_keys).map(part).collect()
     }
 
     fn run(&self, _: &Context) -> Result<Outcome, JobError> {
@@ -318,5 +328,26 @@ impl Run for CheckedList {
         outcome.add("table.csv", table.to_csv());
         outcome.add("table.parquet", parquet);
         Ok(outcome)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::{job_of_part, kind_of_collection};
+
+    /// What a part says of itself is what is found when it is read again, so that equal work is known as such whoever
+    /// asks for it.
+    #[test]
+    fn parts_are_known_as_the_evaluations_that_they_are() {
+        let list =
+            kind_of_collection("sweeps").expect("a kind").job(&EvaluationListRequest::example()).expect("a sweep");
+        let parts = list.parts();
+        assert_eq!(parts.len(), 2);
+        for part in &parts {
+            let (key, is_numbers_only) = job_of_part(part).expect("an evaluation").work_key();
+            assert_eq!((part.work_key.as_ref(), is_numbers_only), (Some(&key), true));
+        }
+        assert_ne!(parts[0].work_key, parts[1].work_key);
     }
 }

@@ -42,6 +42,11 @@ fn checked<R: Request>(value: &Value) -> Result<Checked, Vec<FieldError>> {
     Ok((canonical, request.check()?))
 }
 
+/// A key that equal work of this version of the program shares: the kind's command and what its work depends on.
+pub(super) fn work_key(command: &str, content: Value) -> String {
+    input_hash(&json!({ "kind": command, "version": VERSION, "content": content }))
+}
+
 /// The schemas of a request and of everything that it refers to, by name.
 fn components<R: Request>() -> Vec<(String, RefOr<Schema>)> {
     let mut parts = vec![(R::name().into_owned(), R::schema())];
@@ -165,8 +170,7 @@ impl Job {
     /// files of an equal job with files answer too.
     pub fn work_key(&self) -> (String, bool) {
         let (content, is_numbers_only) = self.run.equal_work().unwrap_or_else(|| (self.canonical.clone(), false));
-        let key = input_hash(&json!({ "kind": self.kind.command, "version": VERSION, "content": content }));
-        (key, is_numbers_only)
+        (work_key(self.kind.command, content), is_numbers_only)
     }
 
     /// Whether its meshes have at most `max_elements` elements, given what is known of its recordings.

@@ -18,4 +18,7 @@ pub struct Part {
     pub kind: PartKind,
     /// Its request.
     pub request: Value,
+    /// The key of equal work, where whoever divided the work has checked the request: nobody needs to read it again
+    /// before it runs. What it makes are numbers alone.
+    pub work_key: Option<String>,
 }

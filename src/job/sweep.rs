@@ -48,7 +48,7 @@ impl Run for CheckedSweep {
         let part = |task: crate::sweep::Task| {
             let TaskInputs { specimen, material, scan, mesh } = task.inputs(study);
             let inputs = json!({ "specimen": specimen, "material": material, "scan": scan, "mesh": mesh });
-            Part { kind: PartKind::SweepTask, request: inputs }
+            Part { kind: PartKind::SweepTask, request: inputs, work_key: None }
         };
         tasks(study).into_iter().map(part).collect()
     }

@@ -126,6 +126,22 @@ pub enum RecordingError {
         /// In the mask's affine, mm.
         found_mm: [f64; 3],
     },
+    /// The mask lies elsewhere than the specimen.
+    #[error(
+        "only {num_inside} of the mask's {num_voxels} voxels lie on the specimen: they reach from {:.1?} to {:.1?} mm, the block to {half_extent_mm:.1?} mm (x, y, z) on either side of the origin; correct the images' affine, whose origin is the block's centre",
+        box_mm[0],
+        box_mm[1]
+    )]
+    Position {
+        /// Voxels of the mask on the block.
+        num_inside: usize,
+        /// Voxels of the mask.
+        num_voxels: usize,
+        /// Least and greatest corner of the mask's box, mm.
+        box_mm: [[f64; 3]; 2],
+        /// Half of the block along x, y, z, mm.
+        half_extent_mm: [f64; 3],
+    },
     /// A drive is no drive of the specimen.
     #[error(
         "steps[{step}].drive_mm is {drive_mm}; it must be above 0 and at most {limit_mm:.4} mm, the largest that is supported for this specimen"

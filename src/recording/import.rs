@@ -1,6 +1,7 @@
 //! Displacements from other files: what the readers of MATLAB files and point clouds share.
 
 use super::mat::MatError;
+use super::position::check_position;
 use super::scanner::ScannerError;
 use super::{Filter, RecordedStep, Recording, RecordingError};
 use crate::file::MemoryError;
@@ -216,6 +217,7 @@ pub(super) fn finish(
     if num_voxels == 0 {
         return Err(ImportError::EmptyMask);
     }
+    check_position(specimen, &grid, &mask)?;
     for (n, step) in steps.iter().enumerate() {
         if !step.displacement.iter().any(|u| u.iter().all(|x| x.is_finite())) {
             return Err(RecordingError::NoDisplacement { step: n + 1, num_voxels }.into());

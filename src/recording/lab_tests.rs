@@ -1,5 +1,6 @@
 use super::super::mat::read_mat;
 use super::*;
+use crate::recording::RecordingError;
 use std::path::PathBuf;
 
 fn memory() -> crate::file::ReadingMemory {
@@ -129,9 +130,21 @@ fn components_and_positions_may_be_stated() {
     let (a, b) = (by_index.steps[1].displacement[7], stated.steps[1].displacement[7]);
     // Along the indices they are y, z, x.
     assert_eq!([b[2], b[0], b[1]], [a[1], -a[2], a[0]]);
-    let placed = read("positions.mat", &options(None, GridOrigin::Positions)).unwrap();
-    // X begins at zero along every index.
-    assert!(placed.grid.origin_mm.iter().all(|x| x.abs() < 1e-12), "{:?}", placed.grid.origin_mm);
+    // X begins at zero along every index: its frame is not the specimen's, whose origin is the block's centre.
+    let elsewhere = read("positions.mat", &options(None, GridOrigin::Positions)).unwrap_err();
+    assert!(matches!(elsewhere, ImportError::Recording(RecordingError::Position { .. })), "{elsewhere}");
+    let mut shifted = variables("positions.mat");
+    let positions = shifted.iter_mut().find(|v| v.0 == "X").map(|v| &mut v.1);
+    let Some(MatValue::Cell { members, .. }) = positions else { panic!("X is a cell") };
+    for member in members {
+        let MatValue::Numeric { values, .. } = member else { panic!("X holds numbers") };
+        let last = values.last().copied().unwrap();
+        values.iter_mut().for_each(|x| *x += 0.25 - 0.5 * last);
+    }
+    let placed = recording_from_mat(&shifted, &specimen(), &options(None, GridOrigin::Positions), &memory()).unwrap();
+    for (found, centred) in placed.grid.origin_mm.iter().zip(by_index.grid.origin_mm) {
+        assert!((found - centred - 0.25).abs() < 1e-12, "{found} {centred}");
+    }
     assert!((by_index.grid.origin_mm[0] + 2.0 * 5.08).abs() < 1e-12);
     let without = read("v5.mat", &options(None, GridOrigin::Positions)).unwrap_err();
     assert!(matches!(without, ImportError::Missing { .. }), "{without}");

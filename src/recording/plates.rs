@@ -1,16 +1,18 @@
 //! Whether the displacements next to the plates are those of the drive: a wrong unit, sign or order of components shows
 //! there at once, and nowhere later.
 
-use super::{PlateFault, Recording, RecordingError};
+use super::{MistakenUnit, PlateFault, Recording, RecordingError};
 use crate::specimen::TestKind;
 
 /// Ratios of plate motion and drive within these bounds are taken as one: mounts give way, and lines to the plates err.
 const NEAR_ONE: std::ops::RangeInclusive<f64> = 0.5..=1.6;
 /// Voxels this part of the way between the plates from a plate, or nearer, tell of it.
 const REACH: f64 = 0.15;
-/// Displacements in metres are nowhere above this part of the drive.
-const SMALL: f64 = 0.02;
-/// A component below this part of the drive does not follow it.
+/// Displacements in metres are nowhere above this part of the drive: where a plate slips, what it slips on still moves.
+const SMALL_IN_M: f64 = 0.02;
+/// The same of centimetres, in which nothing moves further than twice the drive.
+const SMALL_IN_CM: f64 = 0.2;
+/// A component below this part of what follows the drive does not follow it.
 const STILL: f64 = 0.2;
 
 impl Recording {
@@ -63,22 +65,41 @@ impl Recording {
 }
 
 fn fault(found_mm: [f64; 3], drive_mm: f64, displacement: &[[f64; 3]]) -> Option<PlateFault> {
-    let [x, y, z] = found_mm.map(|motion| motion / drive_mm);
+    let ratios = found_mm.map(|motion| motion / drive_mm);
     let is_near = |ratio: f64| NEAR_ONE.contains(&ratio);
-    if is_near(x) {
-        return None;
+    let is_below = |part: f64| displacement.iter().flatten().all(|u| !(u.abs() > part * drive_mm));
+    let unit_of = |ratio: f64| {
+        MistakenUnit::ALL.into_iter().find(|unit| {
+            let is_small = match unit {
+                MistakenUnit::Metres => is_below(SMALL_IN_M),
+                MistakenUnit::Centimetres => is_below(SMALL_IN_CM),
+                MistakenUnit::Micrometres => true,
+            };
+            is_near(ratio * unit.in_mm()) && is_small
+        })
+    };
+    let component = |axis: usize| ['x', 'y', 'z'][axis];
+    let [x, y, z] = ratios.map(f64::abs);
+    let most = if x >= y.max(z) {
+        0
+    } else if y >= z {
+        1
+    } else {
+        2
+    };
+    let follows = ratios[most].abs();
+    let is_permuted = most > 0 && x < STILL * follows;
+    match unit_of(follows) {
+        unit if is_permuted && (unit.is_some() || is_near(follows)) => {
+            return Some(PlateFault::Permuted { component: component(most), unit });
+        }
+        Some(unit) if most == 0 => return Some(PlateFault::Unit(unit)),
+        _ => {}
     }
-    let is_small = || displacement.iter().flatten().all(|u| !(u.abs() > SMALL * drive_mm));
-    if is_near(-x) {
+    if is_near(-ratios[0]) {
         Some(PlateFault::Sign)
-    } else if is_near(x.abs() / 1e3) {
-        Some(PlateFault::Micrometres)
-    } else if is_near(x.abs() * 1e3) && is_small() {
-        Some(PlateFault::Metres)
-    } else if x.abs() < STILL && is_near(y.abs()) {
-        Some(PlateFault::Permuted { component: 'y' })
-    } else if x.abs() < STILL && is_near(z.abs()) {
-        Some(PlateFault::Permuted { component: 'z' })
+    } else if follows > *NEAR_ONE.end() {
+        Some(PlateFault::TooFar { component: component(most), times: follows })
     } else {
         None
     }
@@ -119,14 +140,28 @@ mod tests {
         sheared(|u| u.map(|u| 0.7 * u)).expect("a mount that gives way");
         sheared(|u| [u[0] + 40.0, u[1], u[2]]).expect("a phase without a zero");
         sheared(|_| [0.0; 3]).expect("nothing moved: that is for the diagnosis");
+        sheared(|u| [0.1 * (u[0] - 2.5) + 2.5, u[1], u[2]]).expect("both plates slip on what moves between them");
         let fault = |change: fn([f64; 3]) -> [f64; 3]| match sheared(change) {
             Err(RecordingError::PlateMotion { step: 1, fault, .. }) => fault,
             other => panic!("{other:?}"),
         };
-        assert_eq!(fault(|u| u.map(|u| u / 1e3)), PlateFault::Metres);
-        assert_eq!(fault(|u| u.map(|u| u * 1e3)), PlateFault::Micrometres);
+        assert_eq!(fault(|u| u.map(|u| u / 1e3)), PlateFault::Unit(MistakenUnit::Metres));
+        assert_eq!(fault(|u| u.map(|u| u / 10.0)), PlateFault::Unit(MistakenUnit::Centimetres));
+        assert_eq!(fault(|u| u.map(|u| u * 1e3)), PlateFault::Unit(MistakenUnit::Micrometres));
         assert_eq!(fault(|[x, y, z]| [-x, y, z]), PlateFault::Sign);
-        assert_eq!(fault(|[x, y, z]| [y, x, z]), PlateFault::Permuted { component: 'y' });
-        assert_eq!(fault(|[x, y, z]| [y, z, -x]), PlateFault::Permuted { component: 'z' });
+        let permuted = |component, unit| PlateFault::Permuted { component, unit };
+        assert_eq!(fault(|[x, y, z]| [y, x, z]), permuted('y', None));
+        assert_eq!(fault(|[x, y, z]| [y, z, -x]), permuted('z', None));
+        for (unit, change) in [
+            (MistakenUnit::Metres, (|[x, y, z]| [y / 1e3, x / 1e3, z / 1e3]) as fn([f64; 3]) -> [f64; 3]),
+            (MistakenUnit::Centimetres, |[x, y, z]| [y / 10.0, x / 10.0, z / 10.0]),
+            (MistakenUnit::Micrometres, |[x, y, z]| [y * 1e3, x * 1e3, z * 1e3]),
+        ] {
+            assert_eq!(fault(change), permuted('y', Some(unit)));
+        }
+        let too_far = fault(|u| u.map(|u| 2.0 * u));
+        assert!(matches!(too_far, PlateFault::TooFar { component: 'x', times } if (times - 2.0).abs() < 1e-9));
+        let too_far = fault(|[x, y, z]| [x, y, 4.0 * x + z]);
+        assert!(matches!(too_far, PlateFault::TooFar { component: 'z', times } if (times - 4.0).abs() < 1e-9));
     }
 }

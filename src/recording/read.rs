@@ -2,6 +2,7 @@
 
 use super::folder::FolderReader;
 use super::nifti::{INTENT_DISPLACEMENT, Image, NiftiError};
+use super::position::check_position;
 use super::{Filter, LoadCurve, ReadLimits, RecordedStep, Recording, RecordingError};
 use crate::file::ReadingMemory;
 use crate::specimen::Specimen;
@@ -178,6 +179,7 @@ impl<'a> Head<'a> {
         if !mask.contains(&true) {
             return Err(RecordingError::EmptyMask);
         }
+        check_position(&specimen, &grid, &mask)?;
         if let Some(sd) = json.acquisition.noise_sd_mm {
             for value in sd {
                 positive("acquisition.noise_sd_mm", value)?;

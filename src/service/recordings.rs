@@ -9,6 +9,7 @@ use crate::field::{printable, with_short_numbers};
 use crate::file::digest_of_file;
 use crate::job::{RecordingOutline, ScratchFolder, identifier_of_contents};
 use crate::recording::{RawRecording, ReadLimits, ReadRecording, Recording, RecordingError};
+use crate::report::plain_number;
 use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -151,10 +152,10 @@ pub fn check_space(store: &Store, owner: &str, length: u64, space: Space) -> Res
     let full = [of_owner, of_all].into_iter().find(|(kept, most, _)| kept.saturating_add(length) > *most);
     let Some((kept, most, whose)) = full else { return Ok(()) };
     let own = store.largest_uploads(owner, 5)?;
-    let megabytes = |bytes: u64| bytes as f64 / 1e6;
+    let megabytes = |bytes: u64| plain_number(bytes as f64 / 1e6, 3);
     let list: Vec<String> = own
         .iter()
-        .map(|row| format!("{} ({:?}, {:.1} MB)", row.id, row.title, megabytes(row.num_bytes.unsigned_abs())))
+        .map(|row| format!("{} ({:?}, {} MB)", row.id, row.title, megabytes(row.num_bytes.unsigned_abs())))
         .collect();
     let which = if list.is_empty() {
         "none of them is yours: ask their owners, or whoever runs the service".to_string()
@@ -164,7 +165,7 @@ pub fn check_space(store: &Store, owner: &str, length: u64, space: Space) -> Res
     Err(Problem::new(
         "no-space",
         format!(
-            "{:.1} MB more do not fit: {whose} {:.1} of {:.1} MB. Delete what is no longer needed (DELETE \
+            "{} MB more do not fit: {whose} {} of {} MB. Delete what is no longer needed (DELETE \
              /v1/recordings/ID); {which}",
             megabytes(length),
             megabytes(kept),

@@ -22,6 +22,16 @@ pub struct TaskInput {
     pub space: Space,
 }
 
+/// As [`TaskInput`], written from a request that stays where it is.
+#[derive(Serialize)]
+struct StoredTask<'a> {
+    kind: &'a str,
+    request: &'a serde_json::Value,
+    max_elements: usize,
+    max_seconds: f64,
+    space: Space,
+}
+
 /// The limits that a job was accepted with.
 #[derive(Clone, Copy, Debug)]
 pub struct TaskLimits {
@@ -49,8 +59,7 @@ impl TaskInput {
 pub fn tasks_of(job: &Job, limits: TaskLimits) -> Result<(Vec<NewTask>, bool), serde_json::Error> {
     let input = |kind: &Kind, request: &serde_json::Value| {
         let TaskLimits { max_elements, max_seconds, space } = limits;
-        let (kind, request) = (kind.command.into(), request.clone());
-        serde_json::to_string(&TaskInput { kind, request, max_elements, max_seconds, space })
+        serde_json::to_string(&StoredTask { kind: kind.command, request, max_elements, max_seconds, space })
     };
     let task = |job: &Job| {
         let (key, is_numbers_only) = job.work_key();
@@ -61,10 +70,17 @@ pub fn tasks_of(job: &Job, limits: TaskLimits) -> Result<(Vec<NewTask>, bool), s
     if parts.is_empty() {
         return Ok((vec![task(job)?], false));
     }
-    let tasks = parts.iter().map(|part| match job_of_part(part) {
-        Ok(job) => task(&job),
-        // A part that cannot be run is a result: it fails when its turn comes.
-        Err(_) => Ok(NewTask { input: input(kind_of_part(part.kind), &part.request)?, cache_key: String::new() }),
+    let tasks = parts.iter().map(|part| {
+        let unread =
+            |cache_key: String| Ok(NewTask { input: input(kind_of_part(part.kind), &part.request)?, cache_key });
+        match &part.work_key {
+            Some(key) => unread(format!("{key}{NUMBERS_ONLY}")),
+            None => match job_of_part(part) {
+                Ok(job) => task(&job),
+                // A part that cannot be run is a result: it fails when its turn comes.
+                Err(_) => unread(String::new()),
+            },
+        }
     });
     Ok((tasks.collect::<Result<_, _>>()?, true))
 }

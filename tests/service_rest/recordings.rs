@@ -126,6 +126,7 @@ fn a_full_space_names_what_to_delete() {
     assert!(reply.header("retry-after").is_none());
     let detail = reply.json()["detail"].as_str().unwrap().to_string();
     assert!(detail.contains("DELETE /v1/recordings/ID") && detail.contains(&kept), "{detail}");
+    assert!(!detail.contains(" 0.0 "), "a few kilobytes are no more nothing than a gigabyte: {detail}");
     // Another recording does not fit, neither from a job; the same one takes no more.
     let view = service.wait(&service.submit("scans", &small_scan(1.1)), LONG);
     assert_eq!((view["state"].as_str(), view["problem"]["status"].as_u64()), (Some("failed"), Some(507)), "{view}");
