@@ -29,7 +29,7 @@ pub struct DiagnosisRequest {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 20)]
     pub recordings: Vec<String>,
-    /// The material as believed (`ogden/1`); its number of terms is the nominal one.
+    /// The material as believed; its number of terms is the nominal one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<Ogden>,
     /// Element size as a factor on the standard one.

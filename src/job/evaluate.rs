@@ -28,7 +28,7 @@ const MEDIAN_STRETCH_SOLVES: usize = 6;
 pub struct EvaluationRequest {
     /// The specimen (`specimen/1`).
     pub specimen: Specimen,
-    /// The material (`ogden/1`); Ecoflex 00-20 where it is left out.
+    /// The material, Ogden's or another law; Ecoflex 00-20 where it is left out.
     #[serde(default = "defaults::ecoflex")]
     pub material: Ogden,
     /// The scan; 1 × 0.1875 × 0.75 mm voxels, 0.05 mm and 0.02 N noise where it is left out.

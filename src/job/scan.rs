@@ -49,7 +49,7 @@ fn all_of_kspace() -> [f64; 3] {
 pub struct ScanRequest {
     /// The specimen (`specimen/1`).
     pub specimen: Specimen,
-    /// The material (`ogden/1`); Ecoflex 00-20 where it is left out.
+    /// The material, Ogden's or another law; Ecoflex 00-20 where it is left out.
     #[serde(default = "defaults::ecoflex")]
     pub material: Ogden,
     /// Drives in mm instead of the specimen's.

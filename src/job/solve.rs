@@ -32,7 +32,7 @@ pub enum FieldDrives {
 pub struct SolveRequest {
     /// The specimen (`specimen/1`).
     pub specimen: Specimen,
-    /// The material (`ogden/1`); Ecoflex 00-20 where it is left out.
+    /// The material, Ogden's or another law; Ecoflex 00-20 where it is left out.
     #[serde(default = "defaults::ecoflex")]
     pub material: Ogden,
     /// Drives in mm instead of the specimen's.
