@@ -84,10 +84,6 @@ fn raw_step() -> Value {
     json!({ "drive_mm": 1.0, "raw": raw })
 }
 
-fn tar(files: &[(&str, &[u8])]) -> Vec<u8> {
-    files.iter().flat_map(|(name, bytes)| tar_entry(name, b'0', bytes)).collect()
-}
-
 /// A recording whose `recording.json` is `text`.
 fn with_text(text: &[u8], mask: &[u8], u: &[u8]) -> Vec<u8> {
     tar(&[("recording.json", text), ("mask.nii.gz", mask), ("u.nii.gz", u)])
@@ -212,6 +208,17 @@ fn bombs_do_not_end_the_service() {
         let cause = reply.cause();
         assert!(matches!(reply.status, 413 | 422), "{name}: {} {cause}", reply.status);
         assert!(matches!(cause.as_str(), "too-large" | "unsafe-upload"), "{name}: {cause}");
+        count += 1;
+    }
+    // Files of other programs with the request of their import.
+    for (name, ending, bytes) in files() {
+        let file = format!("bomb.{ending}");
+        let form = if ending == "mat" { "matlab" } else { "points" };
+        let request =
+            json!({ "files": [file], "form": form, "specimen": shipped("two-hole-shear.json"), "drive_mm": [1.0] });
+        let body = tar(&[("import.json", request.to_string().as_bytes()), (&file, &bytes)]);
+        let reply = service.call("POST", "/v1/recordings", &[("content-type", "application/x-tar")], &body);
+        assert!(matches!(reply.status, 400 | 413 | 422), "{name}: {} {}", reply.status, reply.cause());
         count += 1;
     }
     // Many at a time, as nobody sends them by mistake.

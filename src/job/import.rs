@@ -11,7 +11,7 @@ use crate::field::FieldError;
 use crate::file::ReadingMemory;
 use crate::provenance::VERSION;
 use crate::recording::{
-    Filter, GridOrigin, Image, ImportOptions, LoadCurve, NamedImage, RawRecording, ReadLimits, Recording, SeriesMap,
+    Filter, GridOrigin, Image, ImportOptions, LoadCurve, NamedImage, RawRecording, Recording, SeriesMap,
     VectorFrame, axes_of_affine, mat, raw_recording_from_series, read_points, recording_from_images,
     recording_from_mat, recording_from_points, write_vectors,
 };
@@ -319,7 +319,7 @@ impl CheckedImport {
         let specimen = self.request.specimen.as_ref().ok_or_else(missing)?;
         let options = self.request.import_options().ok_or_else(missing)?;
         let first = context.files.first().ok_or_else(missing)?;
-        let limits = ReadLimits::default();
+        let limits = context.surroundings.read_limits();
         let memory = limits.memory.begin();
         let map = self.request.series.as_ref();
         let opened = open_scanner(form, &context.files, map.is_some(), &limits, &memory);
@@ -344,11 +344,12 @@ impl CheckedImport {
         files.iter().enumerate().map(read).collect()
     }
 
-    fn read_files(&self, files: &[PathBuf]) -> Result<Recording, JobError> {
+    fn read_files(&self, context: &Context) -> Result<Recording, JobError> {
+        let files = &context.files;
         let missing = || JobError::Internal("a checked import has a specimen and a form".into());
         let specimen = self.request.specimen.as_ref().ok_or_else(missing)?;
         let options = self.request.import_options().ok_or_else(missing)?;
-        let limits = ReadLimits::default();
+        let limits = context.surroundings.read_limits();
         let memory = limits.memory.begin();
         let first = files.first().ok_or_else(missing)?;
         match self.request.form.ok_or_else(missing)? {
@@ -453,7 +454,7 @@ impl Run for CheckedImport {
                 let pointer = if self.request.recording.is_some() { "/recording" } else { "/files" };
                 self.unwrapped(&raw, pointer, context)?
             }
-            None => (self.read_files(&context.files)?, Vec::new(), Vec::new()),
+            None => (self.read_files(context)?, Vec::new(), Vec::new()),
         };
         if let Some(load) = &self.load {
             recording.load = Some(load.clone());

@@ -2,7 +2,7 @@
 
 use super::JobError;
 use super::input_use::{InputForm, InputUse};
-use crate::recording::{RawRecording, ReadRecording};
+use crate::recording::{RawRecording, ReadLimits, ReadRecording};
 use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -88,6 +88,11 @@ pub trait Surroundings: Sync {
     /// # Errors
     /// [`JobError`] where there is none or it cannot be read.
     fn raw_recording(&self, name: &str) -> Result<ReadRecording<RawRecording>, JobError>;
+
+    /// How much a job may read a file of a laboratory's own format into.
+    fn read_limits(&self) -> ReadLimits {
+        ReadLimits::default()
+    }
 
     /// The file of a laboratory's own format that a request names.
     ///

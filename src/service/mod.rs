@@ -23,6 +23,7 @@ mod open_files;
 mod paced;
 pub mod problem;
 mod quota;
+mod foreign;
 mod recordings;
 mod router;
 mod routes;

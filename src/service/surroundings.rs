@@ -133,7 +133,7 @@ impl Surroundings for StoredSurroundings<'_> {
     }
 
     fn file(&self, name: &str) -> Result<InputFile, JobError> {
-        let message = "the service reads uploaded recordings alone; import other files with the command".into();
+        let message = "jobs read uploaded recordings alone; upload other files with the import's request as import.json beside them".into();
         Err(JobError::Unreadable { name: name.into(), message })
     }
 

@@ -200,6 +200,13 @@ def recordings(page):
     diagnosis that it leads to."""
     page.go("recordings")
     page.until("document.getElementById('recording-zip')")
+    # Files of another program: what they are is asked, and they are kept as a recording.
+    matlab = pathlib.Path(__file__).resolve().parents[1] / "data" / "import" / "v73.mat"
+    page.files("#recording-files", {"v73.mat": matlab.read_bytes()})
+    page.until("document.body.innerText.includes('What are v73.mat?')")
+    page.screen("files-of-another-program")
+    page.click("Upload")
+    page.until("[...document.querySelectorAll('section.sheet h3')].some((h) => h.textContent === 'v73')")
     page.files("#recording-zip", {"recording.zip": zipped_recording()})
     page.until(f"{MAPS} === 1 && document.body.innerText.includes('The load cell')")
     page.screen("recording-looked-at")

@@ -1,6 +1,7 @@
 //! Recordings: made, kept, calibrated on.
 
 use super::LONG;
+use super::service_common::tar::tar;
 use super::service_common::{MISFIT, Service, UNFIT, add_token, set_quota, shipped, small_scan};
 use serde_json::json;
 
@@ -133,4 +134,41 @@ fn a_full_space_names_what_to_delete() {
     assert!(view["problem"]["detail"].as_str().unwrap().contains(&kept), "{view}");
     let again = service.wait(&service.submit("scans", &small_scan(1.0)), LONG);
     assert_eq!(again["state"], "succeeded", "{again}");
+}
+
+/// Files of another program become a recording where the request of an import lies beside them; what does not fit is
+/// said, without a path of the service.
+#[test]
+fn files_of_another_program_become_a_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &[]);
+    let matlab = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/import/v73.mat")).unwrap();
+    let request = json!({
+        "files": ["scan.mat"], "form": "matlab", "name": "from matlab", "specimen": shipped("two-hole-shear.json"),
+    });
+    let upload = |request: &serde_json::Value| {
+        let body = tar(&[("import.json", request.to_string().as_bytes()), ("scan.mat", &matlab)]);
+        service.call("POST", "/v1/recordings", &[("content-type", "application/x-tar")], &body)
+    };
+    let reply = upload(&request);
+    assert_eq!(reply.status, 201, "{}", String::from_utf8_lossy(&reply.body));
+    let kept = reply.json();
+    assert_eq!((kept["title"].as_str(), kept["summary"]["num_voxels"].as_u64()), (Some("from matlab"), Some(119)));
+    let names = service.get(&format!("{}/files", reply.header("location").unwrap())).json();
+    assert!(names["artefacts"].as_array().unwrap().iter().any(|file| file["name"] == "recording.json"), "{names}");
+    for (status, change) in [
+        (404, json!({ "files": ["other.mat"] })),
+        (404, json!({ "files": ["../scan.mat"] })),
+        (422, json!({ "unit": "m" })),
+        (422, json!({ "form": "points" })),
+        (422, json!({ "recording": "some", "files": [] })),
+        (422, json!({ "unknown": 1 })),
+    ] {
+        let mut wrong = request.clone();
+        wrong.as_object_mut().unwrap().extend(change.as_object().unwrap().clone());
+        let reply = upload(&wrong);
+        let text = String::from_utf8_lossy(&reply.body).into_owned();
+        assert_eq!(reply.status, status, "{change}: {text}");
+        assert!(!text.contains("/tmp") && !text.contains("lambdak-"), "{text}");
+    }
 }

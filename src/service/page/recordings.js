@@ -3,6 +3,7 @@
 import { Failure, getJson, remove, upload } from "./api.js";
 import { fill, h, say, sheet } from "./dom.js";
 import { dropPlace, unpacked } from "./drop.js";
+import { foreignForm, isForeign } from "./foreign.js";
 import { keptFiles, look } from "./look.js";
 import { digits, many, plain } from "./numbers.js";
 import { table } from "./parts.js";
@@ -12,7 +13,7 @@ import { askName, recordingName } from "./titles.js";
 
 export async function recordingsView(content, signal) {
   const library = await getJson("/v1/library");
-  const state = { recordings: [], text: "", chosen: new Set(), files: [] };
+  const state = { recordings: [], text: "", chosen: new Set(), content: () => [] };
   const list = h("div", {});
   const together = h("div", {});
   const view = h("div", {});
@@ -69,9 +70,14 @@ export async function recordingsView(content, signal) {
   async function take(files) {
     fill(problem);
     try {
-      state.files = await unpacked(files);
-      keepButton.disabled = state.files.length === 0;
-      if (state.files.length > 0) await show(() => state.files);
+      const found = await unpacked(files);
+      keepButton.disabled = found.length === 0;
+      state.content = () => found;
+      if (isForeign(found)) {
+        const form = foreignForm(found, library);
+        state.content = form.content;
+        fill(view, form.element);
+      } else if (found.length > 0) await show(() => found);
     } catch (error) {
       fail(error);
     }
@@ -89,6 +95,13 @@ export async function recordingsView(content, signal) {
     id: "recording-zip",
     onchange: () => take([...zipInput.files]),
   });
+  const filesInput = h("input", {
+    type: "file",
+    accept: ".mat,.nii,.gz,.csv,.txt",
+    multiple: true,
+    id: "recording-files",
+    onchange: () => take([...filesInput.files]),
+  });
   const keepButton = h(
     "button",
     {
@@ -99,7 +112,7 @@ export async function recordingsView(content, signal) {
         fill(problem);
         keepButton.disabled = true;
         try {
-          await upload("/v1/recordings", await tar(state.files));
+          await upload("/v1/recordings", await tar(state.content()));
           say("Kept.");
           fill(view);
           await load();
@@ -114,12 +127,13 @@ export async function recordingsView(content, signal) {
   const place = h(
     "div",
     { class: "drop" },
-    h("p", {}, "Drop a recording's folder or zip file here, or choose it."),
+    h("p", {}, "Drop a recording's folder or zip file here, or files of another program, or choose them."),
     h(
       "div",
       { class: "row" },
       h("label", { for: "recording" }, "Folder", input),
       h("label", { for: "recording-zip" }, "Zip file", zipInput),
+      h("label", { for: "recording-files" }, "MATLAB, NIfTI or tables", filesInput),
       keepButton,
     ),
   );
@@ -211,8 +225,8 @@ export async function recordingsView(content, signal) {
         "p",
         { class: "quiet" },
         "A folder, or a zip file of one, with recording.json and its images: displacements, or raw phases. It is " +
-          "shown first; the service reads and checks it before it keeps it. MATLAB files and images of other " +
-          "programs become such a folder by lambdak import.",
+          "shown first; the service reads and checks it before it keeps it. MATLAB files, images of other programs and " +
+          "tables of points become such a recording here, too; the files of scanners by lambdak import.",
       ),
       place,
       problem,

@@ -43,6 +43,7 @@ const ASSETS: &[(&str, &str, &str)] = &[
     asset!("job.js", "text/javascript; charset=utf-8"),
     asset!("progress.js", "text/javascript; charset=utf-8"),
     asset!("result.js", "text/javascript; charset=utf-8"),
+    asset!("foreign.js", "text/javascript; charset=utf-8"),
     asset!("law.js", "text/javascript; charset=utf-8"),
     asset!("parts.js", "text/javascript; charset=utf-8"),
     asset!("figures.js", "text/javascript; charset=utf-8"),

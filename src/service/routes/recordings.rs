@@ -7,6 +7,7 @@ use crate::service::access::{Caller, Role};
 use crate::service::answer::{Stored, stored};
 use crate::service::app::App;
 use crate::service::body::{let_run_out, receive_file};
+use crate::service::foreign;
 use crate::service::problem::Problem;
 use crate::service::recordings::{self, Space};
 use crate::service::store::{KeptFile, Removed, Store, UploadRow};
@@ -190,9 +191,10 @@ pub(super) async fn delete(
     }
 }
 
-/// Upload a recording: a tar file of its folder. Its content is read and checked before it is kept. The media type
-/// `application/x-tar` is taken, too.
-#[utoipa::path(post, path = "/v1/recordings", operation_id = "upload_recording", request_body(content = Binary, content_type = "application/octet-stream", description = "A tar file of the recording's folder"), responses(
+/// Upload a recording: a tar file of its folder, or of files of another program (MATLAB, NIfTI, point clouds, a
+/// scanner) beside `import.json`, the request of an import whose `files` are names among them. Its content is read and
+/// checked before it is kept. The media type `application/x-tar` is taken, too.
+#[utoipa::path(post, path = "/v1/recordings", operation_id = "upload_recording", request_body(content = Binary, content_type = "application/octet-stream", description = "A tar file of the recording's folder, or of foreign files and import.json"), responses(
     (status = 201, description = "Kept", body = RecordingView, headers(("Location" = String, description = "The recording"))),
     (status = "default", description = "A problem", body = Problem, content_type = "application/problem+json"),
 ), tag = "recordings")]
@@ -236,7 +238,7 @@ async fn keep(app: &App, caller: &Caller, file: File) -> Result<Response, Proble
     Ok((StatusCode::CREATED, [(header::LOCATION, location)], Json(RecordingView::from(row))).into_response())
 }
 
-/// Takes the tar file apart, reads the recording, and keeps it.
+/// Takes the tar file apart, makes a recording of files of another program, reads the recording, and keeps it.
 fn keep_upload(
     store: &Store,
     file: std::fs::File,
@@ -247,7 +249,12 @@ fn keep_upload(
     let names = unpack(std::io::BufReader::new(file), scratch.path(), max)?;
     let mut limits = ReadLimits::upload();
     limits.memory.stop = stop;
-    let upload = recordings::upload_of(scratch.path(), names, owner, &limits)?;
+    let made = foreign::recording_of(scratch.path(), &names, &limits)?;
+    let (folder, names) = match &made {
+        Some((folder, names)) => (folder.path(), names.clone()),
+        None => (scratch.path(), names),
+    };
+    let upload = recordings::upload_of(folder, names, owner, &limits)?;
     recordings::put(store, &upload, space)?;
     Ok(store.upload(&upload.id)?)
 }
