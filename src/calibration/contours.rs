@@ -45,7 +45,8 @@ pub struct Contour {
     pub total: Vec<Option<f64>>,
 }
 
-/// Computes the three pairs (κ, μ₁), (κ, α₁), (μ₁, α₁) (of a law its first two parameters), other parameters staying at the estimate.
+/// Computes the three pairs (κ, μ₁), (κ, α₁), (μ₁, α₁) (of a law its first two parameters), other parameters staying at
+/// the estimate.
 ///
 /// # Errors
 /// [`CalibrationError`].

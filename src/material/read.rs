@@ -34,7 +34,8 @@ impl Ogden {
         Ok(material)
     }
 
-    /// The material in the schema of its law, indented, with a line break at the end. Reading it back gives the same numbers.
+    /// The material in the schema of its law, indented, with a line break at the end. Reading it back gives the same
+    /// numbers.
     pub fn to_json(&self) -> String {
         // Serialising fails only for maps with keys that are not strings and for failing writers: neither is here.
         let mut text = serde_json::to_string_pretty(self).expect("a struct of strings and numbers serialises");
