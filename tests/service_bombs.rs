@@ -7,7 +7,7 @@ use flate2::Compression;
 use flate2::write::{GzEncoder, ZlibEncoder};
 use serde_json::{Value, json};
 use service_common::tar::tar_entry;
-use service_common::{Service, lambdak, shipped};
+use service_common::{Service, lambdak, shipped, tar_of};
 use std::io::Write;
 use std::path::Path;
 
@@ -86,7 +86,7 @@ fn raw_step() -> Value {
 
 /// A recording whose `recording.json` is `text`.
 fn with_text(text: &[u8], mask: &[u8], u: &[u8]) -> Vec<u8> {
-    tar(&[("recording.json", text), ("mask.nii.gz", mask), ("u.nii.gz", u)])
+    tar_of(&[("recording.json", text), ("mask.nii.gz", mask), ("u.nii.gz", u)])
 }
 
 fn with_steps(steps: &[Value], mask: &[u8], u: &[u8]) -> Vec<u8> {
@@ -117,7 +117,7 @@ fn uploads() -> Vec<(String, Vec<u8>)> {
             let mut head = recording(std::slice::from_ref(&step));
             head["load"] = json!("load.csv");
             let curve = format!("time_s,drive_mm,force_n\n{}", "0,0,0\n".repeat(10_000_000));
-            tar(&[
+            tar_of(&[
                 ("recording.json", head.to_string().as_bytes()),
                 ("mask.nii.gz", &small_mask),
                 ("load.csv", curve.as_bytes()),
@@ -127,7 +127,7 @@ fn uploads() -> Vec<(String, Vec<u8>)> {
             let mut head = recording(std::slice::from_ref(&step));
             head["load"] = json!("load.csv");
             let curve = format!("time_s,drive_mm,force_n\n0,0,0\n{}", ",".repeat(50_000_000));
-            tar(&[
+            tar_of(&[
                 ("recording.json", head.to_string().as_bytes()),
                 ("mask.nii.gz", &small_mask),
                 ("load.csv", curve.as_bytes()),
@@ -216,7 +216,7 @@ fn bombs_do_not_end_the_service() {
         let form = if ending == "mat" { "matlab" } else { "points" };
         let request =
             json!({ "files": [file], "form": form, "specimen": shipped("two-hole-shear.json"), "drive_mm": [1.0] });
-        let body = tar(&[("import.json", request.to_string().as_bytes()), (&file, &bytes)]);
+        let body = tar_of(&[("import.json", request.to_string().as_bytes()), (&file, &bytes)]);
         let reply = service.call("POST", "/v1/recordings", &[("content-type", "application/x-tar")], &body);
         assert!(matches!(reply.status, 400 | 413 | 422), "{name}: {} {}", reply.status, reply.cause());
         count += 1;

@@ -11,9 +11,9 @@ use crate::field::FieldError;
 use crate::file::ReadingMemory;
 use crate::provenance::VERSION;
 use crate::recording::{
-    Filter, GridOrigin, Image, ImportOptions, LoadCurve, NamedImage, RawRecording, Recording, SeriesMap,
-    VectorFrame, axes_of_affine, mat, raw_recording_from_series, read_points, recording_from_images,
-    recording_from_mat, recording_from_points, write_vectors,
+    Filter, GridOrigin, Image, ImportOptions, LoadCurve, NamedImage, RawRecording, Recording, SeriesMap, VectorFrame,
+    axes_of_affine, mat, raw_recording_from_series, read_points, recording_from_images, recording_from_mat,
+    recording_from_points, write_vectors,
 };
 use crate::report::{displacement_picture, raw_picture};
 use crate::specimen::Specimen;

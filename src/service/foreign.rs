@@ -25,7 +25,7 @@ struct Uploaded<'a> {
 
 impl Uploaded<'_> {
     fn nothing<T>(name: &str) -> Result<T, JobError> {
-        let message = format!("{name:?} is not among the files that were uploaded with {REQUEST_FILE}");
+        let message = format!("it is not among the files that were uploaded with {REQUEST_FILE}");
         Err(JobError::Unreadable { name: name.into(), message })
     }
 }

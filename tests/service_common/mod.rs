@@ -216,3 +216,8 @@ pub fn set_quota(tokens: &Path, index: usize, quota: &str, value: u64) {
     file["tokens"][index][quota] = json!(value);
     std::fs::write(tokens, file.to_string()).unwrap();
 }
+
+/// A tar file of plain files.
+pub fn tar_of(files: &[(&str, &[u8])]) -> Vec<u8> {
+    files.iter().flat_map(|(name, bytes)| tar::tar_entry(name, b'0', bytes)).collect()
+}

@@ -1,10 +1,5 @@
 //! Tar files with right checksums, whatever they hold.
 
-/// A tar file of plain files.
-pub fn tar(files: &[(&str, &[u8])]) -> Vec<u8> {
-    files.iter().flat_map(|(name, bytes)| tar_entry(name, b'0', bytes)).collect()
-}
-
 /// An entry of a name, a type flag (`0` a file, `5` a folder) and a content.
 pub fn tar_entry(name: &str, kind: u8, bytes: &[u8]) -> Vec<u8> {
     let mut header = [0u8; 512];

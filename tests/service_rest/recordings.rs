@@ -1,8 +1,7 @@
 //! Recordings: made, kept, calibrated on.
 
 use super::LONG;
-use super::service_common::tar::tar;
-use super::service_common::{MISFIT, Service, UNFIT, add_token, set_quota, shipped, small_scan};
+use super::service_common::{MISFIT, Service, UNFIT, add_token, set_quota, shipped, small_scan, tar_of};
 use serde_json::json;
 
 const TOO_BIG: (u16, &str) = (422, "too-big-a-problem");
@@ -147,7 +146,7 @@ fn files_of_another_program_become_a_recording() {
         "files": ["scan.mat"], "form": "matlab", "name": "from matlab", "specimen": shipped("two-hole-shear.json"),
     });
     let upload = |request: &serde_json::Value| {
-        let body = tar(&[("import.json", request.to_string().as_bytes()), ("scan.mat", &matlab)]);
+        let body = tar_of(&[("import.json", request.to_string().as_bytes()), ("scan.mat", &matlab)]);
         service.call("POST", "/v1/recordings", &[("content-type", "application/x-tar")], &body)
     };
     let reply = upload(&request);
@@ -161,7 +160,7 @@ fn files_of_another_program_become_a_recording() {
         (404, json!({ "files": ["../scan.mat"] })),
         (422, json!({ "unit": "m" })),
         (422, json!({ "form": "points" })),
-        (422, json!({ "recording": "some", "files": [] })),
+        (404, json!({ "recording": "some", "files": [] })),
         (422, json!({ "unknown": 1 })),
     ] {
         let mut wrong = request.clone();
