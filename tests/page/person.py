@@ -202,7 +202,7 @@ def recordings(page):
     page.until("document.getElementById('recording-zip')")
     # Files of another program: what they are is asked, and they are kept as a recording.
     matlab = pathlib.Path(__file__).resolve().parents[1] / "data" / "import" / "v73.mat"
-    page.files("#recording-files", {"v73.mat": matlab.read_bytes()})
+    page.files("#recording-files", {"v73.mat": base64.b64encode(matlab.read_bytes()).decode()})
     page.until("document.body.innerText.includes('What are v73.mat?')")
     page.screen("files-of-another-program")
     page.click("Upload")
