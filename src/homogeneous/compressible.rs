@@ -114,9 +114,8 @@ fn parameter_derivative(material: &Ogden, parameter: Parameter, e: [f64; 3]) -> 
 ///
 /// ```
 /// use lambdak::homogeneous::{HomogeneousTest, respond};
-/// use lambdak::material::{Ogden, OgdenTerm};
-/// let material =
-///     Ogden { bulk_kpa: 2173.0, terms: vec![OgdenTerm { mu_kpa: 17.0, alpha: 1.91 }] };
+/// use lambdak::material::Ogden;
+/// let material = Ogden::new(2173.0, [(17.0, 1.91)]).unwrap();
 /// let response = respond(&material, &HomogeneousTest::Uniaxial.at(1.5)).unwrap();
 /// assert!(response.principal_stretches.iter().product::<f64>() > 1.0);
 /// ```

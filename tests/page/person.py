@@ -203,7 +203,7 @@ def recordings(page):
     # Files of another program: what they are is asked, and they are kept as a recording.
     matlab = pathlib.Path(__file__).resolve().parents[1] / "data" / "import" / "v73.mat"
     page.files("#recording-files", {"v73.mat": base64.b64encode(matlab.read_bytes()).decode()})
-    page.until("document.body.innerText.includes('What are v73.mat?')")
+    page.until("document.body.innerText.includes('What is v73.mat?')")
     page.screen("files-of-another-program")
     page.click("Upload")
     page.until("[...document.querySelectorAll('section.sheet h3')].some((h) => h.textContent === 'v73')")

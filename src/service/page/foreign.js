@@ -34,7 +34,7 @@ export function foreignForm(files, library) {
     origin: "mask_center",
   };
   const element = sheet(
-    `What are ${files.length === 1 ? files[0].name : `these ${files.length} files`}?`,
+    files.length === 1 ? `What is ${files[0].name}?` : `What are these ${files.length} files?`,
     h(
       "p",
       { class: "quiet" },
@@ -54,6 +54,7 @@ export function foreignForm(files, library) {
       }),
       choice({
         label: "Specimen",
+        wide: true,
         value: 0,
         options: library.specimens.map((s, i) => [i, s.name]),
         put: (i) => {
@@ -107,6 +108,7 @@ export function foreignForm(files, library) {
       form === "matlab" &&
         choice({
           label: "Place of the voxels",
+          wide: true,
           value: asked.origin,
           options: [
             ["mask_center", "the mask is centred on the specimen"],
