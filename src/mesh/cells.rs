@@ -22,7 +22,7 @@ pub(super) struct Style {
     pub shortest_mm: f64,
     /// How far the lines from a cell's corners to the hole bend towards the corner's bisector: 0 = straight, 1 = fully.
     pub bend: f64,
-    /// Which circle stands for a hole that is none ([`SectionHole::power_radius`]).
+    /// Which circle stands for a hole that is none (`SectionHole::power_radius`).
     pub power_weight: f64,
 }
 
