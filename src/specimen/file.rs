@@ -1,7 +1,5 @@
 //! A specimen in a file (`specimen/1`): the fields of [`Specimen`] behind the tag that names the format.
 
-#[cfg(feature = "schema")]
-use super::hole_shape::MAX_HOLE_ANGLE_DEG;
 use super::read::SCHEMA;
 #[cfg(feature = "schema")]
 use super::read::{
@@ -24,8 +22,6 @@ schema_type! {
     pub(super) ExtentMm = number_within(MIN_SIZE_MM..=MAX_SIZE_MM);
     /// The diameter of a hole, mm.
     pub(super) DiameterMm = number_within(MIN_DIAMETER_MM..=MAX_DIAMETER_MM);
-    /// An angle of a hole, degrees.
-    pub(super) AngleDeg = number_within(-MAX_HOLE_ANGLE_DEG..=MAX_HOLE_ANGLE_DEG);
     /// A free name.
     pub(crate) Name = text(MAX_NAME_LENGTH);
     /// Holes, all with the same axis.

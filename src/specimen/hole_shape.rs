@@ -1,5 +1,7 @@
 //! The outline of a hole that is not a circle: an ellipse or a slot with an angle.
 
+#[cfg(feature = "schema")]
+use crate::field::schema::{number_within, schema_type};
 use serde::{Deserialize, Serialize};
 
 /// The longest a hole may be, in multiples of its extent across. Longer ones are cuts rather than holes: their tips are
@@ -7,6 +9,12 @@ use serde::{Deserialize, Serialize};
 pub const MAX_HOLE_ASPECT: f64 = 5.0;
 /// Largest angle of a hole, degrees, either way. Half a turn is the whole range of a hole that looks alike after it.
 pub const MAX_HOLE_ANGLE_DEG: f64 = 180.0;
+
+#[cfg(feature = "schema")]
+schema_type! {
+    /// An angle of a hole, degrees.
+    AngleDeg = number_within(-MAX_HOLE_ANGLE_DEG..=MAX_HOLE_ANGLE_DEG);
+}
 
 /// What an outline that is not a circle looks like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -48,7 +56,7 @@ pub struct HoleShape {
     /// Angle from x to the hole's length, towards the section's other axis (z for holes along the thickness, y for
     /// holes along the width), degrees; 0 by default.
     #[serde(default)]
-    #[cfg_attr(feature = "schema", schema(value_type = super::file::AngleDeg))]
+    #[cfg_attr(feature = "schema", schema(value_type = AngleDeg))]
     pub angle_deg: f64,
 }
 
