@@ -300,7 +300,7 @@ impl CheckedImport {
         let settings = ReconstructOptions { unwrap, anchor: self.request.anchor, filter: self.request.filter };
         let found = reconstruct(raw, &settings).map_err(|e| context.failed(&e))?;
         let named = || FieldError::new(pointer, &raw.id, "phases that move the plates as the drive says");
-        found.recording.check_plate_motion().map_err(|e| named().remedy(e.to_string()))?;
+        found.recording.check_motion().map_err(|e| named().remedy(e.to_string()))?;
         Ok((found.recording, found.sd_mm, found.steps))
     }
 

@@ -1,5 +1,6 @@
 //! Why a recording was not read or written.
 
+use super::flipped_components::FlippedComponents;
 use super::nifti::NiftiError;
 use super::plate_fault::PlateFault;
 use crate::file::MemoryError;
@@ -115,6 +116,20 @@ pub enum RecordingError {
         found_mm: [f64; 3],
         /// What it looks like.
         fault: PlateFault,
+    },
+    /// Components across the drive have the wrong sign.
+    #[error(
+        "step {step}: {flipped}: as stored, the material's volume changes by {found_percent:.1} per cent (root mean square), otherwise by {flipped_percent:.1}; y points across the gap, z along the width, and a component is positive along its axis"
+    )]
+    Signs {
+        /// Which step, from 1.
+        step: usize,
+        /// Which components.
+        flipped: FlippedComponents,
+        /// Root mean square of J − 1 as stored, per cent.
+        found_percent: f64,
+        /// The same with these components' signs flipped, per cent.
+        flipped_percent: f64,
     },
     /// The voxel in `recording.json` is not that of the images.
     #[error(

@@ -234,6 +234,6 @@ pub(super) fn finish(
         load: None,
         notes: Some(notes),
     };
-    recording.check_plate_motion()?;
+    recording.check_motion()?;
     Ok(recording)
 }

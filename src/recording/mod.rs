@@ -1,6 +1,7 @@
 //! Recordings: a folder with `recording.json`, images and a load curve (`mru-recording/1`).
 
 mod error;
+mod flipped_components;
 mod folder;
 mod images;
 mod import;
@@ -17,9 +18,11 @@ mod position;
 mod raw;
 mod read;
 mod scanner;
+mod signs;
 mod write;
 
 pub use error::RecordingError;
+pub use flipped_components::FlippedComponents;
 pub use images::{NamedImage, VectorFrame, axes_of_affine, recording_from_images};
 pub use import::{GridOrigin, ImportError, ImportOptions, IndexAxis};
 pub use lab::recording_from_mat;
@@ -90,6 +93,16 @@ pub enum Filter {
 }
 
 impl Recording {
+    /// Whether its displacements can be those of the specimen that its drives move: at the plates and in the volume.
+    ///
+    /// # Errors
+    /// [`RecordingError::PlateMotion`] where a unit, a sign or the order of components is wrong;
+    /// [`RecordingError::Signs`] where y or z has the wrong sign.
+    pub fn check_motion(&self) -> Result<(), RecordingError> {
+        self.check_plate_motion()?;
+        self.check_signs()
+    }
+
     /// Number of voxels in the mask.
     pub fn num_voxels(&self) -> usize {
         self.mask.iter().filter(|m| **m).count()

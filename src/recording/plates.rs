@@ -20,7 +20,7 @@ impl Recording {
     ///
     /// # Errors
     /// [`RecordingError::PlateMotion`] where a unit, a sign or the order of components is wrong.
-    pub fn check_plate_motion(&self) -> Result<(), RecordingError> {
+    pub(super) fn check_plate_motion(&self) -> Result<(), RecordingError> {
         for (n, step) in self.steps.iter().enumerate() {
             let Some(found_mm) = self.plate_motion_mm(&step.displacement) else { continue };
             if let Some(fault) = fault(found_mm, step.drive_mm, &step.displacement) {

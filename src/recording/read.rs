@@ -124,7 +124,7 @@ impl Recording {
             load: head.load,
             notes: head.json.notes,
         };
-        recording.check_plate_motion()?;
+        recording.check_motion()?;
         let (digest, memory) = head.files.finish();
         Ok(ReadRecording { recording, digest, memory: Arc::new(memory) })
     }
