@@ -1,6 +1,6 @@
 //! Why a recording was not read or written.
 
-use super::flipped_components::FlippedComponents;
+use super::component_fault::ComponentFault;
 use super::nifti::NiftiError;
 use super::plate_fault::PlateFault;
 use crate::file::MemoryError;
@@ -117,19 +117,19 @@ pub enum RecordingError {
         /// What it looks like.
         fault: PlateFault,
     },
-    /// Components across the drive have the wrong sign.
+    /// Components across the drive are mistaken for others.
     #[error(
-        "step {step}: {flipped}: as stored, the material's volume changes by {found_percent:.1} per cent (root mean square), otherwise by {flipped_percent:.1}; y points across the gap, z along the width, and a component is positive along its axis"
+        "step {step}: {fault}: as stored, the material's volume changes by {found_percent:.1} per cent (root mean square), otherwise by {mended_percent:.1}; y points across the gap, z along the width, and a component is positive along its axis (on import: --axes, --components)"
     )]
-    Signs {
+    Components {
         /// Which step, from 1.
         step: usize,
-        /// Which components.
-        flipped: FlippedComponents,
+        /// What seems to be wrong.
+        fault: ComponentFault,
         /// Root mean square of J − 1 as stored, per cent.
         found_percent: f64,
-        /// The same with these components' signs flipped, per cent.
-        flipped_percent: f64,
+        /// The same without the fault, per cent.
+        mended_percent: f64,
     },
     /// The voxel in `recording.json` is not that of the images.
     #[error(

@@ -1,7 +1,7 @@
 //! Recordings: a folder with `recording.json`, images and a load curve (`mru-recording/1`).
 
+mod component_fault;
 mod error;
-mod flipped_components;
 mod folder;
 mod images;
 mod import;
@@ -18,11 +18,11 @@ mod position;
 mod raw;
 mod read;
 mod scanner;
-mod signs;
+mod volume;
 mod write;
 
+pub use component_fault::ComponentFault;
 pub use error::RecordingError;
-pub use flipped_components::FlippedComponents;
 pub use images::{NamedImage, VectorFrame, axes_of_affine, recording_from_images};
 pub use import::{GridOrigin, ImportError, ImportOptions, IndexAxis};
 pub use lab::recording_from_mat;
@@ -97,10 +97,10 @@ impl Recording {
     ///
     /// # Errors
     /// [`RecordingError::PlateMotion`] where a unit, a sign or the order of components is wrong;
-    /// [`RecordingError::Signs`] where y or z has the wrong sign.
+    /// [`RecordingError::Components`] where y and z are exchanged or have the wrong sign.
     pub fn check_motion(&self) -> Result<(), RecordingError> {
         self.check_plate_motion()?;
-        self.check_signs()
+        self.check_volume()
     }
 
     /// Number of voxels in the mask.
