@@ -14,8 +14,12 @@ const NEGLIGIBLE_CHANGE: f64 = 0.015;
 const LARGEST_PRODUCT: f64 = 1.0;
 /// A cell is part of a pair along each of the axes, and pairs with a common cell are not independent.
 const NUM_PAIRS_PER_CELL: f64 = 3.0;
+/// Cells that are asked at most, in all steps together: enough evidence, and bounded work.
+const MAX_CELLS: usize = 200_000;
 /// Along an axis with fewer cells, central differences would not be had in neighbours.
 const MIN_CELLS: usize = 4;
+/// A cell has at most so many voxels along an axis, however thin they are.
+const MAX_VOXELS_ALONG: usize = 8;
 /// The displacement as stored, and each reading of it.
 const NUM_READINGS: usize = 1 + ComponentFault::ALL.len();
 
@@ -31,7 +35,7 @@ impl Recording {
     /// [`RecordingError::Components`] where another reading explains the volume far better.
     pub(super) fn check_volume(&self) -> Result<(), RecordingError> {
         for (n, step) in self.steps.iter().enumerate() {
-            let changes = VolumeChanges::of(self, &step.displacement);
+            let changes = VolumeChanges::of(self, &step.displacement, MAX_CELLS.div_ceil(self.steps.len()));
             let Some((fault, square)) = changes.better_reading() else { continue };
             let percent = |square: f64| 100.0 * square.max(0.0).sqrt();
             let (found_percent, mended_percent) = (percent(changes.mean_square(0)), percent(square));
@@ -44,7 +48,7 @@ impl Recording {
 /// Sums over pairs of neighbouring cells.
 struct VolumeChanges {
     num_pairs: f64,
-    /// Pairs of one placement of the cells over those of all.
+    /// Cells beside each other over cells that begin at every voxel.
     independent_part: f64,
     /// Products of J − 1, by reading; first as stored.
     products: [f64; NUM_READINGS],
@@ -53,27 +57,26 @@ struct VolumeChanges {
 }
 
 impl VolumeChanges {
-    fn of(recording: &Recording, displacement: &[[f64; 3]]) -> VolumeChanges {
+    /// Of every cell that begins at a voxel, or of `max_cells` evenly chosen ones. Nothing is stored.
+    fn of(recording: &Recording, displacement: &[[f64; 3]], max_cells: usize) -> VolumeChanges {
         let grid = &recording.grid;
-        let longest_mm = grid.voxel_mm.into_iter().fold(0.0, f64::max);
-        let per_cell: [usize; 3] = std::array::from_fn(|a| {
-            let cubic = (longest_mm / grid.voxel_mm[a]).round() as usize;
-            cubic.min(grid.shape[a] / MIN_CELLS).max(1)
-        });
-        let num_placements: usize = per_cell.iter().product();
+        let cells = Cells::new(recording, displacement);
         let mut sums = VolumeChanges {
             num_pairs: 0.0,
-            independent_part: 1.0 / num_placements as f64,
+            independent_part: 1.0 / cells.num_voxels as f64,
             products: [0.0; NUM_READINGS],
             falls_squared: [0.0; NUM_READINGS],
         };
-        for placement in 0..num_placements {
-            let first = [
-                placement % per_cell[0],
-                placement / per_cell[0] % per_cell[1],
-                placement / (per_cell[0] * per_cell[1]),
-            ];
-            Cells::new(recording, displacement, per_cell, first).add_pairs_to(&mut sums);
+        for first in (0..grid.num_voxels()).step_by(grid.num_voxels().div_ceil(max_cells)) {
+            let first = grid.indices(first);
+            let Some(here) = cells.volume_changes(first) else { continue };
+            for axis in 0..3 {
+                let mut next = first;
+                next[axis] += cells.per_cell[axis];
+                if let Some(there) = cells.volume_changes(next) {
+                    sums.add(here, there);
+                }
+            }
         }
         sums
     }
@@ -108,72 +111,63 @@ impl VolumeChanges {
     }
 }
 
-/// Displacements averaged over cells of voxels; `None` where a voxel has no displacement.
-struct Cells {
-    shape: [usize; 3],
-    edge_mm: [f64; 3],
-    displacement: Vec<Option<[f64; 3]>>,
+/// Displacements averaged over cells of voxels.
+struct Cells<'a> {
+    recording: &'a Recording,
+    displacement: &'a [[f64; 3]],
+    /// Voxels along each axis.
+    per_cell: [usize; 3],
+    /// Voxels of a cell.
+    num_voxels: usize,
 }
 
-impl Cells {
-    fn new(recording: &Recording, displacement: &[[f64; 3]], per_cell: [usize; 3], first: [usize; 3]) -> Cells {
+impl<'a> Cells<'a> {
+    fn new(recording: &'a Recording, displacement: &'a [[f64; 3]]) -> Self {
         let grid = &recording.grid;
-        let shape: [usize; 3] = std::array::from_fn(|a| (grid.shape[a] - first[a]) / per_cell[a]);
-        let count: usize = per_cell.iter().product();
-        let mean = |cell: [usize; 3]| {
-            let mut sum = [0.0; 3];
-            for i in 0..count {
-                let within = [i % per_cell[0], i / per_cell[0] % per_cell[1], i / (per_cell[0] * per_cell[1])];
-                let v = grid.index(std::array::from_fn(|a| first[a] + cell[a] * per_cell[a] + within[a]));
-                let u = displacement[v];
-                if !recording.mask[v] || u.iter().any(|u| !u.is_finite()) {
-                    return None;
-                }
-                (0..3).for_each(|c| sum[c] += u[c] / count as f64);
-            }
-            Some(sum)
-        };
-        let displacement = (0..shape.iter().product())
-            .map(|i: usize| mean([i % shape[0], i / shape[0] % shape[1], i / (shape[0] * shape[1])]))
-            .collect();
-        let edge_mm = std::array::from_fn(|a| grid.voxel_mm[a] * per_cell[a] as f64);
-        Cells { shape, edge_mm, displacement }
+        let longest_mm = grid.voxel_mm.into_iter().fold(0.0, f64::max);
+        let per_cell: [usize; 3] = std::array::from_fn(|a| {
+            let cubic = (longest_mm / grid.voxel_mm[a]).round() as usize;
+            cubic.min(MAX_VOXELS_ALONG).min(grid.shape[a] / MIN_CELLS).max(1)
+        });
+        Cells { recording, displacement, per_cell, num_voxels: per_cell.iter().product() }
     }
 
-    fn strides(&self) -> [usize; 3] {
-        [1, self.shape[0], self.shape[0] * self.shape[1]]
-    }
-
-    fn place(&self, cell: usize) -> [usize; 3] {
-        [cell % self.shape[0], cell / self.shape[0] % self.shape[1], cell / (self.shape[0] * self.shape[1])]
-    }
-
-    fn add_pairs_to(&self, sums: &mut VolumeChanges) {
-        let changes: Vec<_> = (0..self.displacement.len()).map(|cell| self.volume_changes(cell)).collect();
-        for (cell, here) in changes.iter().enumerate() {
-            let (Some(here), place) = (here, self.place(cell)) else { continue };
-            for (axis, stride) in self.strides().into_iter().enumerate() {
-                if place[axis] + 1 < self.shape[axis]
-                    && let Some(there) = changes[cell + stride]
-                {
-                    sums.add(*here, there);
+    /// Mean over the cell that begins at this voxel; `None` where one of its voxels has no displacement.
+    fn mean(&self, first: [usize; 3]) -> Option<[f64; 3]> {
+        let [nx, ny, nz] = self.per_cell;
+        let mut sum = [0.0; 3];
+        for k in 0..nz {
+            for j in 0..ny {
+                for i in 0..nx {
+                    let v = self.recording.grid.index([first[0] + i, first[1] + j, first[2] + k]);
+                    let u = self.displacement[v];
+                    if !self.recording.mask[v] || u.iter().any(|u| !u.is_finite()) {
+                        return None;
+                    }
+                    (0..3).for_each(|c| sum[c] += u[c]);
                 }
             }
         }
+        Some(sum.map(|sum| sum / self.num_voxels as f64))
     }
 
-    /// J − 1 by central differences, as stored and by every other reading; `None` next to a cell without a
-    /// displacement.
-    fn volume_changes(&self, cell: usize) -> Option<[f64; NUM_READINGS]> {
-        let place = self.place(cell);
+    /// J − 1 of the cell that begins at this voxel by central differences, as stored and by every other reading; `None`
+    /// next to a cell without a displacement.
+    fn volume_changes(&self, first: [usize; 3]) -> Option<[f64; NUM_READINGS]> {
+        let grid = &self.recording.grid;
+        let is_inside = |a: usize| first[a] >= self.per_cell[a] && first[a] + 2 * self.per_cell[a] <= grid.shape[a];
+        if !(0..3).all(is_inside) || !self.recording.mask[grid.index(first)] {
+            return None;
+        }
         let mut gradient = [nalgebra::Vector3::zeros(); 3];
-        for (axis, stride) in self.strides().into_iter().enumerate() {
-            if place[axis] == 0 || place[axis] + 1 >= self.shape[axis] {
-                return None;
-            }
-            let (before, after) = (self.displacement[cell - stride]?, self.displacement[cell + stride]?);
+        for axis in 0..3 {
+            let step = self.per_cell[axis];
+            let (mut before, mut after) = (first, first);
+            before[axis] -= step;
+            after[axis] += step;
+            let (before, after) = (self.mean(before)?, self.mean(after)?);
             for c in 0..3 {
-                gradient[c][axis] = (after[c] - before[c]) / (2.0 * self.edge_mm[axis]);
+                gradient[c][axis] = (after[c] - before[c]) / (2.0 * step as f64 * grid.voxel_mm[axis]);
             }
         }
         let change = |gradient: [nalgebra::Vector3<f64>; 3]| {
