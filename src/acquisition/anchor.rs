@@ -77,7 +77,7 @@ fn at_plate(displacement: &[f64], specimen: &Specimen, grid: &VoxelGrid, is_move
         TestKind::Uniaxial => (0, specimen.block.length_mm),
     };
     let face = if is_moved { 0.5 * extent } else { -0.5 * extent };
-    let stride = [1, grid.shape[0], grid.shape[0] * grid.shape[1]][axis];
+    let stride = grid.stride(axis);
     let n = grid.shape[axis];
     let mut values = Vec::new();
     for start in (0..grid.num_voxels()).filter(|v| (v / stride).is_multiple_of(n)) {

@@ -40,11 +40,11 @@ impl Allowance {
             let largest = ours.states.iter().map(|s| s.drive_mm.abs()).fold(0.0, f64::max);
             for (d, (step, (fields, _))) in target.steps.iter().zip(theirs.derivatives()).enumerate() {
                 let is_largest = ours.states[d].drive_mm.abs() >= largest;
-                for (v, weight) in step.weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
+                for v in step.used() {
                     for c in 0..3 {
                         // The estimates have taken up what looks like a change of the material.
                         let left = theirs.displacements[d][v][c] - ours.displacements[d][v][c];
-                        objective += weight * step.component_weights[c] * left * left;
+                        objective += step.precision[v][c] * left * left;
                         if is_largest {
                             let moved: f64 = fields.iter().zip(&change).map(|(f, x)| f[v][c] * x).sum();
                             squares += (left + moved).powi(2);

@@ -76,7 +76,8 @@ impl Observed {
         part.steps = steps
             .into_iter()
             .map(|(step, [fixed, moved])| {
-                let value = |&v: &u32| step.displacement[places[v as usize] as usize];
+                let place = |&v: &u32| places[v as usize] as usize;
+                let value = |v: &u32| step.displacement[place(v)];
                 let drive_mm = step.drive_mm;
                 let per_mm = |plane: PlanePolynomial, along: f64| {
                     VectorField::new(move |x| {
@@ -86,6 +87,10 @@ impl Observed {
                 };
                 ObservedStep {
                     displacement: part.mask.voxels.iter().map(value).collect(),
+                    relative_noise: step
+                        .relative_noise
+                        .as_ref()
+                        .map(|all| part.mask.voxels.iter().map(|v| all[place(v)]).collect()),
                     faces_per_mm: [Some(per_mm(fixed, 0.0)), Some(per_mm(moved, 1.0))],
                     ..step.clone()
                 }

@@ -16,6 +16,7 @@ mod force_readings;
 mod measured_boundary;
 mod mesh_correction;
 mod noise;
+mod noise_map;
 mod observed;
 mod options;
 mod outcome;

@@ -9,7 +9,7 @@ const MIN_DIFFERENCES: usize = 100;
 /// 1 / the 75 % point of the standard normal distribution: median |x| → standard deviation.
 const MAD_TO_SD: f64 = 1.482_602_218_505_602;
 /// Third differences: they take away what is quadratic in the position.
-const WEIGHTS: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
+pub(super) const THIRD_DIFFERENCE: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
 
 /// Noise per component (mm) from third differences between neighbours along the axis of the smallest voxel edge,
 /// robustly: 1.4826 × median |difference| / √var, over the voxels marked in `flags`. `fields` are displacements on the
@@ -27,7 +27,7 @@ pub fn estimate_noise_sd_mm(
     filter: Filter,
 ) -> Result<[f64; 3], CalibrationError> {
     let axis = (0..3).min_by(|&a, &b| grid.voxel_mm[a].total_cmp(&grid.voxel_mm[b])).unwrap_or(0);
-    let stride = [1, grid.shape[0], grid.shape[0] * grid.shape[1]][axis];
+    let stride = grid.stride(axis);
     let variance = match filter {
         Filter::None => 20.0f64,
         Filter::Hamming2 => 5.0,
@@ -35,7 +35,7 @@ pub fn estimate_noise_sd_mm(
     let mut differences: [Vec<f64>; 3] = Default::default();
     for field in fields {
         for v in 0..grid.num_voxels() {
-            if grid.indices(v)[axis] + WEIGHTS.len() > grid.shape[axis] {
+            if grid.indices(v)[axis] + THIRD_DIFFERENCE.len() > grid.shape[axis] {
                 continue;
             }
             let run = [0, 1, 2, 3].map(|n| v + n * stride);
@@ -43,7 +43,7 @@ pub fn estimate_noise_sd_mm(
                 continue;
             }
             for c in 0..3 {
-                let d: f64 = run.iter().zip(WEIGHTS).map(|(&n, w)| w * field[n][c]).sum();
+                let d: f64 = run.iter().zip(THIRD_DIFFERENCE).map(|(&n, w)| w * field[n][c]).sum();
                 if d.is_finite() {
                     differences[c].push(d.abs());
                 }

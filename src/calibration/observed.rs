@@ -4,6 +4,7 @@
 use super::error::CalibrationError;
 use super::force_readings::{ForceOnTheWay, LoadCell, ObservedForce, read_on_the_way};
 use super::noise::estimate_noise_sd_mm;
+use super::noise_map::relative_noise;
 use super::outliers::{lost_voxels, outlying_voxels};
 use crate::fem::{VectorField, turned_by};
 use crate::mesh::{BlockShape, Mesh, half_extents_mm};
@@ -25,6 +26,9 @@ pub struct ObservedStep {
     pub force: Option<ObservedForce>,
     /// u of the compared voxels, mm, in the mask's order; NaN where missing.
     pub displacement: Vec<[f64; 3]>,
+    /// The noise of each of them in multiples of [`Observed::noise_sd_mm`], in the mask's order; `None` where it is alike
+    /// everywhere.
+    pub relative_noise: Option<Vec<[f64; 3]>>,
     /// What was measured of the fixed and the moved face and is imposed there, beyond the nominal motion of their
     /// plates, per mm of drive. None where plates are taken to move as they were told.
     pub faces_per_mm: [Option<VectorField>; 2],
@@ -43,7 +47,8 @@ pub struct Observed {
     pub on_the_way: Vec<ForceOnTheWay>,
     /// What is unknown of the load cell.
     pub load_cell: LoadCell,
-    /// Noise of a value as given or estimated, per component, mm.
+    /// Noise of a value as given or estimated, per component, mm: that of a typical voxel, where it differs from place
+    /// to place.
     pub noise_sd_mm: [f64; 3],
     /// Whether the noise was estimated because the recording does not state it.
     pub is_noise_estimated: bool,
@@ -89,6 +94,8 @@ impl Observed {
                     .force_n
                     .map(|value_n| ObservedForce { value_n, sd_n: step.force_sd_n.unwrap_or(force_sd_n) }),
                 displacement: mask.voxels.iter().map(|&v| cleaned.field[v as usize]).collect(),
+                relative_noise: relative_noise(&recording.grid, &flags, &cleaned.field, recording.noise_sd_mm)
+                    .map(|all| mask.voxels.iter().map(|&v| all[v as usize]).collect()),
                 faces_per_mm: [None, None],
             })
             .collect();
@@ -138,6 +145,24 @@ impl Observed {
     /// Forces compared.
     pub(super) fn num_forces(&self) -> usize {
         self.steps.iter().filter(|s| s.force.is_some()).count() + self.on_the_way.len()
+    }
+
+    /// Variance of the noise of a value, per component, mm²: voxel `voxel` of the mask at step `step`.
+    pub fn noise_mm2(&self, step: usize, voxel: usize) -> [f64; 3] {
+        let relative = self.steps[step].relative_noise.as_ref().map_or([1.0; 3], |all| all[voxel]);
+        [0, 1, 2].map(|c| (relative[c] * self.noise_sd_mm[c]).powi(2))
+    }
+
+    /// How far the noise differs over the image, per component: the multiples of the typical noise that a tenth and nine
+    /// tenths of all values stay below. `None` where it is alike everywhere, at every step.
+    pub fn noise_range(&self) -> Option<[[f64; 2]; 3]> {
+        let varying: Vec<&[f64; 3]> = self.steps.iter().filter_map(|s| s.relative_noise.as_ref()).flatten().collect();
+        let of_component = |c: usize| {
+            let mut all: Vec<f64> = varying.iter().map(|relative| relative[c]).collect();
+            all.sort_by(f64::total_cmp);
+            [0.1, 0.9].map(|part| all[((all.len() - 1) as f64 * part).round() as usize])
+        };
+        (!varying.is_empty()).then(|| [0, 1, 2].map(of_component))
     }
 
     /// The same recording with other steps.

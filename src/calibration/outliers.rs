@@ -132,7 +132,7 @@ fn median(all: &mut [f64]) -> f64 {
 /// The voxels before and behind a voxel along an axis.
 fn neighbours(grid: &VoxelGrid, voxel: usize, axis: usize) -> [Option<usize>; 2] {
     let at = grid.indices(voxel)[axis];
-    let stride = [1, grid.shape[0], grid.shape[0] * grid.shape[1]][axis];
+    let stride = grid.stride(axis);
     [(at > 0).then(|| voxel - stride), (at + 1 < grid.shape[axis]).then(|| voxel + stride)]
 }
 

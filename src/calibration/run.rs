@@ -219,6 +219,14 @@ impl<'a> Run<'a> {
         for recording in observed.iter().filter(|o| o.is_noise_estimated) {
             self.notes.push(format!("the noise was estimated from the recording: {:.4?} mm", recording.noise_sd_mm));
         }
+        for [x, y, z] in observed.iter().filter_map(Observed::noise_range) {
+            self.notes.push(format!(
+                "the noise differs over the image, and voxels count by the noise around them: a tenth of them have less \
+                 than {:.2?} times the typical one along x, y, z, a tenth more than {:.2?} times",
+                [x[0], y[0], z[0]],
+                [x[1], y[1], z[1]]
+            ));
+        }
         for (n, recording) in observed.iter().enumerate().filter(|(_, o)| o.num_outliers > 0) {
             let of = if observed.len() > 1 { format!(" of recording {}", n + 1) } else { String::new() };
             self.notes.push(format!(

@@ -143,12 +143,10 @@ impl Sums {
         for (d, step) in target.steps.iter().enumerate() {
             let fields = &prediction.sensitivities[d];
             let (mut squares, mut largest, mut num_voxels) = (0.0, 0.0f64, 0usize);
-            for (v, (model, measured)) in prediction.displacements[d].iter().zip(step.measured).enumerate() {
-                // Missing voxels have no weight; their NaN must not enter a product.
-                if step.weights[v] <= 0.0 {
-                    continue;
-                }
-                let weights = step.component_weights.map(|p| p * step.weights[v]);
+            // Missing voxels do not count; their NaN must not enter a product.
+            for v in step.used() {
+                let (model, measured) = (prediction.displacements[d][v], step.measured[v]);
+                let weights = step.precision[v];
                 let misfit = [0, 1, 2].map(|c| measured[c] - model[c]);
                 for c in 0..3 {
                     squares += misfit[c] * misfit[c];

@@ -1,6 +1,6 @@
 //! What a fit compares with: measured values, their weights in the objective, and the noise that they carry.
 //!
-//! The objective is Σ_drives [ Σ_voxels w Σ_c p_c (u_c − ū_c)² + p_F (F − F_model)² ]. With p = 1/σ² it is χ²; what is
+//! The objective is Σ_drives [ Σ_voxels Σ_c p_c (u_c − ū_c)² + p_F (F − F_model)² ]. With p = 1/σ² it is χ²; what is
 //! unknown of the load cell then couples the forces (see [`super::force_readings`]). With other p (the paper's
 //! ℓ_u + βℓ_F, or values that share their noise with their neighbours) the covariance of the estimate is a sandwich of
 //! the objective's curvature and the noise's true covariance.
@@ -42,10 +42,10 @@ pub(super) struct TargetForce {
 #[derive(Clone, Debug)]
 pub(super) struct TargetStep<'a> {
     pub(super) measured: &'a [[f64; 3]],
-    /// w of each voxel: zero where missing; its noise variance is σ²/w.
-    pub(super) weights: Vec<f64>,
-    /// p of each component, mm⁻².
-    pub(super) component_weights: [f64; 3],
+    /// p of each voxel and component, mm⁻²: zero where missing.
+    pub(super) precision: Vec<[f64; 3]>,
+    /// Variance of the noise of each voxel and component, mm²; of filtered values as of a mean of eight.
+    noise_mm2: Vec<[f64; 3]>,
     pub(super) force: Option<TargetForce>,
 }
 
@@ -54,12 +54,17 @@ impl<'a> TargetStep<'a> {
     fn of_force(reading: &ForceOnTheWay) -> TargetStep<'a> {
         let sd_n = reading.force.sd_n;
         let force = TargetForce { value_n: reading.force.value_n, sd_n, weight: 1.0 / (sd_n * sd_n) };
-        TargetStep { measured: &[], weights: Vec::new(), component_weights: [0.0; 3], force: Some(force) }
+        TargetStep { measured: &[], precision: Vec::new(), noise_mm2: Vec::new(), force: Some(force) }
     }
 
     /// Whether anything but a force was measured.
     pub(super) fn is_scanned(&self) -> bool {
-        !self.weights.is_empty()
+        !self.precision.is_empty()
+    }
+
+    /// Places of the voxels that count.
+    pub(super) fn used(&self) -> impl Iterator<Item = usize> {
+        self.precision.iter().enumerate().filter(|(_, p)| p[0] > 0.0).map(|(v, _)| v)
     }
 
     /// Gives the force the weight of the paper's loss.
@@ -75,7 +80,6 @@ impl<'a> TargetStep<'a> {
 pub(super) struct Target<'a> {
     /// Those of the scans, then those at which the force alone was read.
     pub(super) steps: Vec<TargetStep<'a>>,
-    noise_sd_mm: [f64; 3],
     load_cell: LoadCell,
     /// Whether the weights of the forces are the inverse of their covariance.
     is_weighed_by_noise: bool,
@@ -87,17 +91,18 @@ impl<'a> Target<'a> {
     /// Of a synthetic measurement, with χ² as objective.
     pub(super) fn of_measurement(data: &'a Measurement, scan: &ScanSettings) -> Target<'a> {
         let weight = 1.0 / (scan.force_sd_n * scan.force_sd_n);
+        // The variance of a voxel of weight w is σ²/w.
+        let noise_of = |w: &f64| scan.noise_sd_mm.map(|sd| if *w > 0.0 { sd * sd / w } else { 0.0 });
         let steps = (0..data.drives_mm.len())
             .map(|d| TargetStep {
                 measured: &data.displacements[d],
-                weights: data.weights_of(d),
-                component_weights: scan.noise_sd_mm.map(|sd| 1.0 / (sd * sd)),
+                precision: data.weights_of(d).iter().map(|w| scan.noise_sd_mm.map(|sd| w / (sd * sd))).collect(),
+                noise_mm2: data.weights_of(d).iter().map(noise_of).collect(),
                 force: Some(TargetForce { value_n: data.forces_n[d], sd_n: scan.force_sd_n, weight }),
             })
             .chain(data.on_the_way.iter().map(TargetStep::of_force))
             .collect();
-        let (load_cell, noise_sd_mm) = (data.load_cell, scan.noise_sd_mm);
-        Target { steps, noise_sd_mm, load_cell, is_weighed_by_noise: true, view: None }
+        Target { steps, load_cell: data.load_cell, is_weighed_by_noise: true, view: None }
     }
 
     /// Of recordings. The paper's objective is multiplied by a constant that gives it the size of χ².
@@ -110,17 +115,22 @@ impl<'a> Target<'a> {
         let mut targets: Vec<Target<'a>> = Vec::with_capacity(observed.len());
         for (recording, view) in observed.iter().zip(views) {
             let shared = recording.noise_correlation();
+            let weigh = |(u, noise): (&[f64; 3], &[f64; 3])| match is_whole(u) {
+                true => noise.map(|variance| 1.0 / (shared * variance)),
+                false => [0.0; 3],
+            };
             let mut steps = Vec::with_capacity(recording.steps.len());
-            for step in &recording.steps {
-                let weights: Vec<f64> = step.displacement.iter().map(|u| f64::from(u8::from(is_whole(u)))).collect();
-                if !weights.iter().any(|w| *w > 0.0) {
+            for (number, step) in recording.steps.iter().enumerate() {
+                let noise_mm2: Vec<[f64; 3]> =
+                    (0..step.displacement.len()).map(|v| recording.noise_mm2(number, v)).collect();
+                if !step.displacement.iter().any(is_whole) {
                     let name = "the number of voxels with a displacement";
                     return Err(CalibrationError::InvalidValue { name, value: 0.0, requirement: "positive" });
                 }
                 steps.push(TargetStep {
                     measured: &step.displacement,
-                    weights,
-                    component_weights: recording.noise_sd_mm.map(|sd| 1.0 / (shared * sd * sd)),
+                    precision: step.displacement.iter().zip(&noise_mm2).map(weigh).collect(),
+                    noise_mm2,
                     force: step.force.map(|f| TargetForce {
                         value_n: f.value_n,
                         sd_n: f.sd_n,
@@ -130,16 +140,15 @@ impl<'a> Target<'a> {
             }
             steps.extend(recording.on_the_way.iter().map(TargetStep::of_force));
             let view = view.is_filtered().then_some(view);
-            let (load_cell, noise_sd_mm) = (recording.load_cell, recording.noise_sd_mm);
-            targets.push(Target { steps, noise_sd_mm, load_cell, is_weighed_by_noise: true, view });
+            targets.push(Target { steps, load_cell: recording.load_cell, is_weighed_by_noise: true, view });
         }
         if let Objective::Paper { beta } = objective {
             let num_steps: usize = targets.iter().flat_map(|t| &t.steps).filter(|s| s.is_scanned()).count();
             let num_forces = targets.iter().flat_map(|t| &t.steps).filter(|s| s.force.is_some()).count();
             // ℓ × scale is χ² where the noise is the mean one and |u|_max that of the first step.
             let mut scale = None;
-            for target in &mut targets {
-                let precision = target.noise_sd_mm.iter().map(|sd| 1.0 / (sd * sd)).sum::<f64>() / 3.0;
+            for (target, recording) in targets.iter_mut().zip(observed) {
+                let precision = recording.noise_sd_mm.iter().map(|sd| 1.0 / (sd * sd)).sum::<f64>() / 3.0;
                 target.is_weighed_by_noise = false;
                 for step in &mut target.steps {
                     if !step.is_scanned() {
@@ -148,11 +157,13 @@ impl<'a> Target<'a> {
                         step.weigh_force_by_paper(scale * beta / num_forces as f64);
                         continue;
                     }
-                    let used = step.weights.iter().filter(|w| **w > 0.0).count() as f64;
+                    let used = step.used().count() as f64;
                     let squares = step.measured.iter().filter(|u| is_whole(u)).map(|u| u.iter().map(|x| x * x).sum());
                     let largest: f64 = squares.fold(f64::MIN_POSITIVE, f64::max);
                     let scale = *scale.get_or_insert(precision * used * largest * num_steps as f64);
-                    step.component_weights = [scale / (used * largest * num_steps as f64); 3];
+                    for precision in step.precision.iter_mut().filter(|p| p[0] > 0.0) {
+                        *precision = [scale / (used * largest * num_steps as f64); 3];
+                    }
                     step.weigh_force_by_paper(scale * beta / num_forces as f64);
                 }
             }
@@ -214,12 +225,11 @@ impl<'a> Target<'a> {
         let averaged = self.view.map(View::num_averaged);
         let (mut sum, mut count) = (0.0, 0);
         for step in &self.steps {
-            for (v, weight) in step.weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
+            for v in step.used() {
                 // A mean of n acquired values has 8/n of the variance of a mean of eight.
-                let share = averaged.as_ref().map_or(1.0 / weight, |a| 8.0 / a[v] as f64);
+                let share = averaged.as_ref().map_or(1.0, |a| 8.0 / a[v] as f64);
                 for c in 0..3 {
-                    let variance = share * self.noise_sd_mm[c] * self.noise_sd_mm[c];
-                    sum += weight * step.component_weights[c] * variance;
+                    sum += step.precision[v][c] * share * step.noise_mm2[v][c];
                 }
                 count += 3;
             }
@@ -238,45 +248,29 @@ impl<'a> Target<'a> {
         let weighed = self.force_weights() * &forces;
         *score += weighed.transpose() * self.force_covariance() * &weighed;
         for (step, (fields, _)) in self.steps.iter().zip(prediction.derivatives()).filter(|(s, _)| s.is_scanned()) {
-            let weighted: Vec<Vec<[f64; 3]>> =
-                fields
-                    .iter()
-                    .map(|field| {
-                        field
-                            .iter()
-                            .zip(&step.weights)
-                            // Missing voxels have no weight; what stands there must not enter a product.
-                            .map(|(s, w)| {
-                                if *w > 0.0 {
-                                    [0, 1, 2].map(|c| w * step.component_weights[c] * s[c])
-                                } else {
-                                    [0.0; 3]
-                                }
-                            })
-                            .collect()
-                    })
-                    .collect();
-            let (weighted, spread, share) = match self.view {
+            // What a change of each value by the standard deviation of its noise adds to the half gradient; missing
+            // voxels have no weight, and what stands there must not enter a product.
+            let of_field = |field: &Vec<[f64; 3]>| -> Vec<[f64; 3]> {
+                let mut weighted = vec![[0.0; 3]; field.len()];
+                for v in step.used() {
+                    let (precision, noise_mm2) = (step.precision[v], step.noise_mm2[v]);
+                    weighted[v] = [0, 1, 2].map(|c| precision[c] * noise_mm2[c].sqrt() * field[v][c]);
+                }
+                weighted
+            };
+            let weighted: Vec<Vec<[f64; 3]>> = fields.iter().map(of_field).collect();
+            let (weighted, share) = match self.view {
                 // Acquired noise is √8 that of a mean of eight.
                 Some(view) => {
                     let acquired: Result<Vec<_>, _> = weighted.iter().map(|q| view.on_acquired(q)).collect();
-                    (acquired?, Vec::new(), 8.0)
+                    (acquired?, 8.0)
                 }
-                None => (weighted, step.weights.clone(), 1.0),
+                None => (weighted, 1.0),
             };
             for i in 0..n {
                 for j in 0..=i {
-                    let mut sum = 0.0;
-                    for (v, (a, b)) in weighted[i].iter().zip(&weighted[j]).enumerate() {
-                        let variance = match spread.get(v) {
-                            Some(w) if *w > 0.0 => 1.0 / w,
-                            Some(_) => continue,
-                            None => share,
-                        };
-                        for c in 0..3 {
-                            sum += variance * self.noise_sd_mm[c] * self.noise_sd_mm[c] * a[c] * b[c];
-                        }
-                    }
+                    let pairs = weighted[i].iter().flatten().zip(weighted[j].iter().flatten());
+                    let sum = share * pairs.map(|(a, b)| a * b).sum::<f64>();
                     score[(i, j)] += sum;
                     if i != j {
                         score[(j, i)] += sum;

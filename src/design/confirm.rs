@@ -124,11 +124,12 @@ pub fn confirm(
 ) -> Result<Confirmed, EvaluationFailure> {
     let mut evaluated = Vec::new();
     let mut responses_by_mesh = Vec::new();
+    let variants = Variants::of(study, specimen, is_cancelled)?;
     for factor in MESHES {
         let mesh = MeshOptions::graded(specimen, factor);
         let options = EvaluationOptions { mesh, ..EvaluationOptions::standard(specimen) };
         evaluated = by_material(study, specimen, options, factor, is_cancelled)?;
-        responses_by_mesh.push(responses(study, specimen, &evaluated, is_cancelled)?);
+        responses_by_mesh.push(variants.responses(study, &evaluated));
     }
     let responses = mean_over_meshes(&responses_by_mesh);
     let largest = |f: fn(&Response) -> f64| responses.iter().map(f).fold(f64::NEG_INFINITY, f64::max).exp();
@@ -182,7 +183,7 @@ pub fn estimate(
     let options = EvaluationOptions { mesh, sampling, ..EvaluationOptions::standard(specimen) };
     let by_material = by_material(study, specimen, options, fidelity.factor(), is_cancelled)?;
     let responses = if study.budget.variants_in_search {
-        responses(study, specimen, &by_material, is_cancelled)?
+        Variants::of(study, specimen, is_cancelled)?.responses(study, &by_material)
     } else {
         by_material.iter().map(|m| m.response(study)).collect()
     };
@@ -262,32 +263,48 @@ fn share_time(evaluated: &mut [(Evaluation, EvaluationMaps)], limit: f64) -> Res
     evaluated.iter_mut().try_for_each(|(evaluation, maps)| maps.promise(evaluation, &shares, limit))
 }
 
-/// Responses at every material sample. Those at the central values are the evaluations'; a variant's is the centre's
-/// plus the difference that the variant makes on the search's mesh: differences of logarithms at one mesh are far more
-/// accurate than the values, and cost little.
-fn responses(
-    study: &Study,
-    specimen: &Specimen,
-    by_material: &[MaterialEvaluation],
-    is_cancelled: &dyn Fn() -> bool,
-) -> Result<Vec<Response>, EvaluationFailure> {
-    let samples = sample_materials(&study.materials);
-    let central: Vec<Response> = by_material.iter().map(|m| m.response(study)).collect();
-    if samples.len() == central.len() {
-        return Ok(central);
+/// What the priors' variants change.
+struct Variants {
+    /// Of every sample of [`sample_materials`]: its prior, and what it changes of the entries of the response at the
+    /// prior's central values.
+    changes: Vec<(usize, Vec<f64>)>,
+}
+
+impl Variants {
+    /// On the search's mesh: differences of logarithms at one mesh are far more accurate than the values, and cost
+    /// little.
+    fn of(study: &Study, specimen: &Specimen, is_cancelled: &dyn Fn() -> bool) -> Result<Variants, EvaluationFailure> {
+        let samples = sample_materials(&study.materials);
+        if samples.len() == study.materials.len() {
+            return Ok(Variants {
+                changes: (0..samples.len()).map(|index| (samples[index].prior, Vec::new())).collect(),
+            });
+        }
+        let searched = Evaluator::with_variants(study).evaluate(specimen, None, is_cancelled)?;
+        let all: Vec<Vec<f64>> = searched.responses.iter().map(Response::to_vector).collect();
+        let of_sample = |index: usize| {
+            let prior = samples[index].prior;
+            // A prior's central values come first among its samples.
+            let centre = samples.iter().position(|s| s.prior == prior).unwrap_or(index);
+            (prior, all[index].iter().zip(&all[centre]).map(|(variant, centre)| variant - centre).collect())
+        };
+        Ok(Variants { changes: (0..samples.len()).map(of_sample).collect() })
     }
-    let central: Vec<Vec<f64>> = central.iter().map(Response::to_vector).collect();
-    let searched = Evaluator::with_variants(study).evaluate(specimen, None, is_cancelled)?;
-    let coarse: Vec<Vec<f64>> = searched.responses.iter().map(Response::to_vector).collect();
-    let of_sample = |index: usize| {
-        let prior = samples[index].prior;
-        // A prior's central values come first among its samples.
-        let centre = samples.iter().position(|s| s.prior == prior).unwrap_or(index);
-        let moved = central[prior].iter().zip(coarse[index].iter().zip(&coarse[centre]));
-        let moved: Vec<f64> = moved.map(|(value, (variant, centre))| value + variant - centre).collect();
-        Response::from_vector(&moved, searched.responses[index].log_integrated.len())
-    };
-    Ok((0..samples.len()).map(of_sample).collect())
+
+    /// Responses at every material sample, from those at the central values.
+    fn responses(&self, study: &Study, by_material: &[MaterialEvaluation]) -> Vec<Response> {
+        let central: Vec<Response> = by_material.iter().map(|m| m.response(study)).collect();
+        let of_sample = |(prior, changes): &(usize, Vec<f64>)| {
+            let centre = &central[*prior];
+            if changes.is_empty() {
+                return centre.clone();
+            }
+            let moved: Vec<f64> =
+                centre.to_vector().iter().zip(changes).map(|(value, change)| value + change).collect();
+            Response::from_vector(&moved, centre.log_integrated.len())
+        };
+        self.changes.iter().map(of_sample).collect()
+    }
 }
 
 fn failure(error: EvaluationError) -> EvaluationFailure {

@@ -53,6 +53,7 @@ pub(super) fn experiments(
             drive_mm,
             force,
             displacement: vec![[0.0; 3]; observed.mask.num_voxels()],
+            relative_noise: last.relative_noise.clone(),
             faces_per_mm: last.faces_per_mm.clone(),
         };
         let mut planned: Observed = observed.clone();

@@ -53,8 +53,7 @@ struct ComponentField<'a> {
     component: usize,
     /// Per voxel of the grid: its place in the compared mask, `u32::MAX` outside.
     place: &'a [u32],
-    /// Standard deviation of the noise, mm.
-    noise: f64,
+    step: usize,
 }
 
 /// Connected voxels, and how they differ from those around them.
@@ -71,6 +70,11 @@ impl ComponentField<'_> {
         self.field[place as usize][self.component]
     }
 
+    /// Variance of the noise, mm².
+    fn noise_mm2(&self, place: u32) -> f64 {
+        self.observed.noise_mm2(self.step, place as usize)[self.component]
+    }
+
     /// The next voxel along an axis, forward or backward; `None` outside of the sample.
     fn next(&self, place: u32, axis: usize, forward: bool) -> Option<u32> {
         let (mask, grid) = (&self.observed.mask, &self.observed.mask.grid);
@@ -80,15 +84,16 @@ impl ComponentField<'_> {
         is_inside.then(|| self.place[grid.index(at)]).filter(|place| *place != u32::MAX)
     }
 
-    /// The voxels that are joined to `start`, neighbours differing by less than `limit_mm`; marks what it takes in
-    /// `is_seen`.
-    fn region(&self, start: u32, limit_mm: f64, is_seen: &mut [bool]) -> Region {
+    /// The voxels that are joined to `start`, neighbours differing by less than `limit_sd` standard deviations of the
+    /// noise; marks what it takes in `is_seen`.
+    fn region(&self, start: u32, limit_sd: f64, is_seen: &mut [bool]) -> Region {
         is_seen[start as usize] = true;
         let mut region = Region { members: vec![start], steps: Vec::new(), beside: Vec::new() };
         let mut at = 0;
         while at < region.members.len() {
             let member = region.members[at];
             at += 1;
+            let limit_mm = limit_sd * self.noise_mm2(member).sqrt();
             for (axis, forward) in (0..3).flat_map(|axis| [(axis, false), (axis, true)]) {
                 let Some(neighbour) = self.next(member, axis, forward) else { continue };
                 let step = self.value(member) - self.value(neighbour);
@@ -119,16 +124,18 @@ impl ComponentField<'_> {
         if region.members.len() < MIN_JUMP_VOXELS || region.steps.is_empty() {
             return None;
         }
+        let noise_mm2 = region.members.iter().map(|&member| self.noise_mm2(member)).sum::<f64>();
+        let noise = (noise_mm2 / region.members.len() as f64).sqrt();
         let mut steps = region.steps.clone();
         steps.sort_by(f64::total_cmp);
         let size_mm = steps[steps.len() / 2];
         let full: Vec<f64> = steps.iter().copied().filter(|x| (x / size_mm - 1.0).abs() < FULL_STEP).collect();
         let is_sharp = full.len() as f64 >= MIN_FULL_STEPS * steps.len() as f64;
         let spread = (full.iter().map(|x| (x - size_mm).powi(2)).sum::<f64>() / full.len().max(1) as f64).sqrt();
-        let largest = (MAX_SPREAD_SD * std::f64::consts::SQRT_2 * self.noise).hypot(MAX_SPREAD_OF_JUMP * size_mm);
+        let largest = (MAX_SPREAD_SD * std::f64::consts::SQRT_2 * noise).hypot(MAX_SPREAD_OF_JUMP * size_mm);
         let beside = region.beside.iter().sum::<f64>() / region.beside.len().max(1) as f64;
-        let is_flat_beside = beside < NOISE_OF_DIFFERENCE * self.noise + MAX_BESIDE * size_mm.abs();
-        let is_jump = is_sharp && is_flat_beside && spread <= largest && size_mm.abs() >= MIN_JUMP_SD * self.noise;
+        let is_flat_beside = beside < NOISE_OF_DIFFERENCE * noise + MAX_BESIDE * size_mm.abs();
+        let is_jump = is_sharp && is_flat_beside && spread <= largest && size_mm.abs() >= MIN_JUMP_SD * noise;
         is_jump.then_some(size_mm)
     }
 
@@ -143,7 +150,7 @@ impl ComponentField<'_> {
                 if is_seen[start as usize] || !self.value(start).is_finite() {
                     continue;
                 }
-                let region = self.region(start, limit_sd * self.noise, &mut is_seen);
+                let region = self.region(start, limit_sd, &mut is_seen);
                 if region.members.len() as f64 > BULK * num_voxels as f64 {
                     continue;
                 }
@@ -185,8 +192,7 @@ pub fn voxel_jumps(observed: &Observed, residual: &Trace) -> Vec<VoxelJump> {
     let mut found = Vec::new();
     for (step, field) in residual.displacement.iter().enumerate() {
         for component in 0..3 {
-            let noise = observed.noise_sd_mm[component];
-            let field = ComponentField { observed, field, component, place: &place, noise };
+            let field = ComponentField { observed, field, step, component, place: &place };
             for (mut members, size_mm) in field.jumps() {
                 let location = field.location(&members, step);
                 members.sort_unstable();

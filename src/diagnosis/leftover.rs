@@ -25,8 +25,7 @@ pub struct Leftover {
 pub(super) fn structure_of(observed: &Observed, change: &Trace, metric: &Metric) -> f64 {
     let means = BoxMeans::of(observed, &change.displacement, &|step, voxel| metric.is_used(step, voxel));
     // The means take off what noise would add, of which there is none here.
-    let noise_mm2 = |c: usize| observed.noise_sd_mm[c].powi(2) * observed.noise_correlation() / means.voxels_per_box;
-    let squares: f64 = (0..3).map(|c| means.excess_mm2[c] + noise_mm2(c)).sum();
+    let squares: f64 = (0..3).map(|c| means.excess_mm2[c] + means.noise_mm2[c]).sum();
     (squares / 3.0).max(0.0).sqrt()
 }
 

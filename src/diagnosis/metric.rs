@@ -31,7 +31,10 @@ const FORCE_EACH: f64 = 0.001;
 /// The inner product ⟨a, b⟩ = aᵀ C⁻¹ b of traces.
 #[derive(Clone)]
 pub struct Metric {
-    precision: [f64; 3],
+    /// Per step and voxel: variance of a value per component, mm²; of noise, and of what else counts like noise.
+    variance_mm2: Vec<Vec<[f64; 3]>>,
+    /// Per step and voxel: square roots of what it weighs, mm⁻¹; zero where it does not count.
+    roots: Vec<Vec<[f64; 3]>>,
     /// Per step and voxel: whether all of it counts.
     is_used: Vec<Vec<bool>>,
     /// Per voxel: its box at each level (indices into one list).
@@ -105,10 +108,14 @@ impl Metric {
                 s.displacement.iter().enumerate().map(|(v, u)| finite(u) && is_kept(v)).collect()
             })
             .collect();
-        let precision = observed.noise_sd_mm.map(|sd| 1.0 / (sd * sd * observed.noise_correlation()));
+        let correlation = observed.noise_correlation();
+        let of_step = |step: usize| {
+            (0..mask.num_voxels()).map(|v| observed.noise_mm2(step, v).map(|noise| correlation * noise)).collect()
+        };
         let (force_precision, has_force) = force_precision(observed);
-        let mut metric = Metric {
-            precision,
+        Metric {
+            variance_mm2: (0..observed.steps.len()).map(of_step).collect(),
+            roots: Vec::new(),
             is_used,
             boxes,
             num_boxes,
@@ -118,17 +125,32 @@ impl Metric {
             capacitance: Vec::new(),
             force_precision,
             has_force,
+        }
+        .prepared()
+    }
+
+    /// With what follows from the variances, the voxels that count and the shares of time.
+    fn prepared(mut self) -> Metric {
+        let steps = self.variance_mm2.iter().zip(&self.is_used).zip(&self.share);
+        let of_step = |((variances, used), share): ((&Vec<[f64; 3]>, &Vec<bool>), &f64)| -> Vec<[f64; 3]> {
+            let root = |(variance, used): (&[f64; 3], &bool)| match used {
+                true => variance.map(|v| f64::sqrt(share / v)),
+                false => [0.0; 3],
+            };
+            variances.iter().zip(used).map(root).collect()
         };
-        metric.capacitance = metric.capacitances();
-        metric
+        self.roots = steps.map(of_step).collect();
+        self.capacitance = self.capacitances();
+        self
     }
 
     /// The same with `variance_mm2` added to the variance of every voxel, per component: what a model is known to
     /// leave, in patterns that nobody knows, counts like noise.
     pub(super) fn with_variance(mut self, variance_mm2: [f64; 3]) -> Metric {
-        self.precision = [0, 1, 2].map(|c| 1.0 / (1.0 / self.precision[c] + variance_mm2[c]));
-        self.capacitance = self.capacitances();
-        self
+        for own in self.variance_mm2.iter_mut().flatten() {
+            *own = [0, 1, 2].map(|c| own[c] + variance_mm2[c]);
+        }
+        self.prepared()
     }
 
     /// The same for the voxels alone for which `is_kept`.
@@ -137,61 +159,53 @@ impl Metric {
         for used in &mut part.is_used {
             used.iter_mut().enumerate().for_each(|(v, used)| *used &= is_kept(v));
         }
-        part.capacitance = part.capacitances();
-        part
+        part.prepared()
     }
 
     /// The same where the steps get these parts of the time of a whole scan, in which the noise is what is stated: its
     /// variance is as much larger. Steps without an entry get a whole scan.
     pub(super) fn with_time_shares(mut self, shares: &[f64]) -> Metric {
         self.share.iter_mut().zip(shares).for_each(|(own, share)| *own = *share);
-        self.capacitance = self.capacitances();
-        self
+        self.prepared()
     }
 
     /// S⁻¹ + Bᵀ N⁻¹ B per component.
     fn capacitances(&self) -> Vec<Cholesky<f64, Dyn>> {
         let n = self.num_boxes;
-        let mut gram = DMatrix::<f64>::zeros(n, n);
-        for ((used, scale), share) in self.is_used.iter().zip(&self.scale).zip(&self.share) {
-            for (boxes, _) in self.boxes.iter().zip(used).filter(|(_, used)| **used) {
-                for &i in boxes {
-                    for &j in boxes {
-                        gram[(i as usize, j as usize)] += share * scale * scale;
+        let of_component = |c: usize| {
+            let mut matrix = DMatrix::<f64>::zeros(n, n);
+            for (roots, scale) in self.roots.iter().zip(&self.scale) {
+                for (boxes, root) in self.boxes.iter().zip(roots) {
+                    let weight = (scale * root[c]).powi(2);
+                    for &i in boxes {
+                        for &j in boxes {
+                            matrix[(i as usize, j as usize)] += weight;
+                        }
                     }
                 }
             }
-        }
-        self.precision
-            .iter()
-            .map(|precision| {
-                let mut matrix = &gram * *precision;
-                for (i, v) in self.variances.iter().enumerate() {
-                    // A box without voxels has no moments; any positive number serves.
-                    matrix[(i, i)] += 1.0 / v.max(1e-12);
-                }
-                // The sum of a positive diagonal and a Gram matrix is positive definite.
-                Cholesky::new(matrix.clone()).unwrap_or_else(|| Cholesky::new_unchecked(matrix))
-            })
-            .collect()
+            for (i, v) in self.variances.iter().enumerate() {
+                // A box without voxels has no moments; any positive number serves.
+                matrix[(i, i)] += 1.0 / v.max(1e-12);
+            }
+            // The sum of a positive diagonal and a Gram matrix is positive definite.
+            Cholesky::new(matrix.clone()).unwrap_or_else(|| Cholesky::new_unchecked(matrix))
+        };
+        (0..3).map(of_component).collect()
     }
 
     /// Prepares a trace; NaN entries (voxels that a changed specimen does not fill) count as zero.
     pub fn weigh(&self, trace: &Trace) -> Weighed {
         let mut moments = [0, 1, 2].map(|_| DVector::<f64>::zeros(self.num_boxes));
-        let root = self.precision.map(f64::sqrt);
         let mut white = Vec::with_capacity(3 * trace.displacement.iter().map(Vec::len).sum::<usize>());
-        let steps = self.is_used.iter().zip(self.scale.iter().zip(&self.share));
-        for (field, (used, (scale, share))) in trace.displacement.iter().zip(steps) {
-            let of_share = share.sqrt();
-            for ((u, boxes), used) in field.iter().zip(&self.boxes).zip(used) {
+        for (field, (roots, scale)) in trace.displacement.iter().zip(self.roots.iter().zip(&self.scale)) {
+            for ((u, boxes), root) in field.iter().zip(&self.boxes).zip(roots) {
                 for c in 0..3 {
-                    let counts = *used && u[c].is_finite();
-                    white.push(if counts { of_share * root[c] * u[c] } else { 0.0 });
-                    if counts {
-                        for &i in boxes {
-                            moments[c][i as usize] += share * scale * self.precision[c] * u[c];
-                        }
+                    let value = if u[c].is_finite() { root[c] * u[c] } else { 0.0 };
+                    white.push(value);
+                    let moment = scale * root[c] * value;
+                    for &i in boxes {
+                        moments[c][i as usize] += moment;
                     }
                 }
             }

@@ -61,13 +61,22 @@ fn allowances_take_weight_away() {
     }
 }
 
-/// The Woodbury form is the inverse: with x = C y built from its definition, ⟨x, b⟩ = y · b.
+/// The Woodbury form is the inverse: with x = C y built from its definition, ⟨x, b⟩ = y · b; also where the noise
+/// differs over the image.
 #[test]
 fn inner_product_inverts_the_covariance() {
-    let observed = observed();
+    let alike = observed();
+    let mut uneven = observed();
+    let relative = |v: usize| [0.5 + 0.1 * v as f64, 1.0, 3.0 - 0.1 * v as f64];
+    uneven.steps[1].relative_noise = Some((0..uneven.mask.num_voxels()).map(relative).collect());
+    inverts_the_covariance(&alike);
+    inverts_the_covariance(&uneven);
+}
+
+fn inverts_the_covariance(observed: &Observed) {
     let allowance = 0.05;
-    let metric = Metric::new(&observed, allowance, &|_| true);
-    let (y, b) = (trace(&observed, 3), trace(&observed, 4));
+    let metric = Metric::new(observed, allowance, &|_| true);
+    let (y, b) = (trace(observed, 3), trace(observed, 4));
     // C y for displacements: noise, plus per component the boxes' sums over both steps.
     let mut x = y.scaled(0.0);
     let variances = metric.variances.clone();
@@ -82,7 +91,7 @@ fn inner_product_inverts_the_covariance() {
         }
         for (step, field) in x.displacement.iter_mut().enumerate() {
             for (v, (u, boxes)) in field.iter_mut().zip(&metric.boxes).enumerate() {
-                let noise = observed.noise_sd_mm[c].powi(2) * y.displacement[step][v][c];
+                let noise = observed.noise_mm2(step, v)[c] * y.displacement[step][v][c];
                 let smooth: f64 = boxes.iter().map(|&i| variances[i as usize] * sums[i as usize]).sum();
                 u[c] = noise + metric.scale[step] * smooth;
             }

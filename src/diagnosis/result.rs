@@ -157,8 +157,12 @@ pub struct DiagnosisResult {
     pub ranked: Vec<RankedResult>,
     /// The discretisation allowance, mm rms at the largest drive.
     pub allowance_mm: f64,
-    /// Noise per component, mm.
+    /// Noise per component, mm: that of a typical voxel, where it differs from place to place.
     pub noise_sd_mm: [f64; 3],
+    /// The multiples of it that a tenth and nine tenths of all voxels stay below, per component; absent where the noise
+    /// is alike everywhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise_relative_range: Option<[[f64; 2]; 3]>,
     /// Whether it was estimated from the recording.
     pub is_noise_estimated: bool,
     /// Displacement unknowns of the model.
@@ -208,6 +212,7 @@ impl DiagnosisResult {
                 .collect(),
             allowance_mm: d.allowance_mm,
             noise_sd_mm: d.observed.noise_sd_mm,
+            noise_relative_range: d.observed.noise_range(),
             is_noise_estimated: d.observed.is_noise_estimated,
             num_unknowns: d.num_unknowns,
             num_solves: d.num_solves,

@@ -98,7 +98,13 @@ impl Scene {
     /// no more than the drive.
     pub(super) fn between_steps(&self, drive_mm: f64, observed: &[ObservedStep]) -> (Scene, ObservedStep) {
         let mut scene = self.clone();
-        let mut step = ObservedStep { drive_mm, force: None, displacement: Vec::new(), faces_per_mm: [None, None] };
+        let mut step = ObservedStep {
+            drive_mm,
+            force: None,
+            displacement: Vec::new(),
+            relative_noise: None,
+            faces_per_mm: [None, None],
+        };
         if let Some(first) = observed.first() {
             step.faces_per_mm.clone_from(&first.faces_per_mm);
         }
@@ -169,7 +175,7 @@ mod tests {
 
     fn step(drive_mm: f64, value_n: f64) -> ObservedStep {
         let force = Some(ObservedForce { value_n, sd_n: 0.01 });
-        ObservedStep { drive_mm, force, displacement: Vec::new(), faces_per_mm: [None, None] }
+        ObservedStep { drive_mm, force, displacement: Vec::new(), relative_noise: None, faces_per_mm: [None, None] }
     }
 
     /// Translation of the moved plate along x of a scene at a drive, mm.

@@ -38,7 +38,7 @@ impl Recording {
             TestKind::Uniaxial => (0, self.specimen.block.length_mm),
         };
         let grid = &self.grid;
-        let (stride, n) = ([1, grid.shape[0], grid.shape[0] * grid.shape[1]][axis], grid.shape[axis]);
+        let (stride, n) = (grid.stride(axis), grid.shape[axis]);
         let mut motions = [Vec::new(), Vec::new(), Vec::new()];
         for start in (0..grid.num_voxels()).filter(|v| (v / stride).is_multiple_of(n)) {
             let is_measured = |i: &usize| {

@@ -64,9 +64,10 @@ fn header(d: &Diagnosis, r: &DiagnosisResult) -> ReportHeader {
             (
                 "noise per component".into(),
                 format!(
-                    "{} mm{}",
+                    "{} mm{}{}",
                     r.noise_sd_mm.map(|s| significant(s, 3)).join(", "),
-                    if r.is_noise_estimated { " (estimated from the recording)" } else { "" }
+                    if r.is_noise_estimated { " (estimated from the recording)" } else { "" },
+                    r.noise_relative_range.map_or(String::new(), range_in_words)
                 ),
             ),
             (
@@ -75,6 +76,12 @@ fn header(d: &Diagnosis, r: &DiagnosisResult) -> ReportHeader {
             ),
         ],
     }
+}
+
+/// How far the noise differs over the image.
+fn range_in_words(range: [[f64; 2]; 3]) -> String {
+    let of_component = |[low, high]: [f64; 2]| format!("{} to {}", significant(low, 2), significant(high, 2));
+    format!("; over the image {} times as much", range.map(of_component).join(", "))
 }
 
 /// The verdict in words, and how the modulus differs from that believed.

@@ -66,6 +66,11 @@ impl VoxelGrid {
         i + self.shape[0] * (j + self.shape[1] * k)
     }
 
+    /// How far the numbers of neighbours along an axis are apart.
+    pub fn stride(&self, axis: usize) -> usize {
+        self.shape[..axis].iter().product()
+    }
+
     /// (i, j, k) of a linear index.
     pub fn indices(&self, index: usize) -> [usize; 3] {
         let [nx, ny, _] = self.shape;

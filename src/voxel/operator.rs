@@ -33,6 +33,76 @@ pub struct VoxelOperator {
     num_dropped_points: usize,
 }
 
+/// A sample point of a mirrored half carried to the meshed one, the reflection, and ∂X/∂x of the field that is seen
+/// there.
+fn reflected(mesh: &Mesh, (mut point, back): ([f64; 3], Tensor)) -> ([f64; 3], u32, Tensor) {
+    let mut reflection = 0;
+    for (axis, is_mirrored) in [(1, mesh.mirror.y), (2, mesh.mirror.z)] {
+        if is_mirrored && point[axis] < 0.0 {
+            point[axis] = -point[axis];
+            reflection |= axis as u32;
+        }
+    }
+    let signs = SIGNS[reflection as usize];
+    (point, reflection, [0, 1, 2].map(|m| back[m].map(|b| signs[m] * b)))
+}
+
+/// Weights of an element's nodes, summed over the sample points of a voxel that lie in it one after the other.
+struct ElementSums<'a> {
+    mesh: &'a Mesh,
+    is_started: bool,
+    element: u32,
+    reflection: u32,
+    positions: [[f64; 3]; 27],
+    values: [f64; 27],
+    gradients: [[f64; 3]; 27],
+}
+
+impl<'a> ElementSums<'a> {
+    fn new(mesh: &'a Mesh) -> Self {
+        let (positions, values, gradients) = ([[0.0; 3]; 27], [0.0; 27], [[0.0; 3]; 27]);
+        ElementSums { mesh, is_started: false, element: 0, reflection: 0, positions, values, gradients }
+    }
+
+    fn is_of(&self, element: u32, reflection: u32) -> bool {
+        self.is_started && self.element == element && self.reflection == reflection
+    }
+
+    fn start(&mut self, element: u32, reflection: u32) {
+        (self.is_started, self.element, self.reflection) = (true, element, reflection);
+        (self.values, self.gradients) = ([0.0; 27], [[0.0; 3]; 27]);
+        for (position, &node) in self.positions.iter_mut().zip(self.mesh.element(element as usize)) {
+            *position = self.mesh.nodes[node as usize];
+        }
+    }
+
+    /// Adds a point; false where the element is flat there. `back` is ∂X/∂x with the signs of the reflection.
+    fn add(&mut self, reference_coordinates: [f64; 3], back: &Tensor, weight: f64) -> bool {
+        let kind = self.mesh.element_kind;
+        let (n, g) = (kind.shape_functions(reference_coordinates), kind.shape_gradients(reference_coordinates));
+        let mut map = [[0.0; 3]; 3];
+        for (x, g) in self.positions.iter().zip(&g).take(kind.num_nodes()) {
+            for i in 0..3 {
+                for j in 0..3 {
+                    map[i][j] += x[i] * g[j];
+                }
+            }
+        }
+        let Some(inverse) = inverse(&map) else { return false };
+        // ∂ξ_m/∂x_j.
+        let slopes = [0, 1, 2].map(|m| [0, 1, 2].map(|j| (0..3).map(|k| inverse[m][k] * back[k][j]).sum::<f64>()));
+        for (value, n) in self.values.iter_mut().zip(&n) {
+            *value += weight * n;
+        }
+        for (gradient, g) in self.gradients.iter_mut().zip(&g) {
+            for j in 0..3 {
+                gradient[j] += weight * (g[0] * slopes[0][j] + g[1] * slopes[1][j] + g[2] * slopes[2][j]);
+            }
+        }
+        true
+    }
+}
+
 /// Signs of x, y, z under each reflection.
 const SIGNS: [[f64; 3]; 4] = [[1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, -1.0], [1.0, -1.0, -1.0]];
 
@@ -118,15 +188,29 @@ impl VoxelOperator {
         // Place of a key among the current voxel's entries; valid where it is at or after the voxel's first entry.
         let mut place = vec![u32::MAX; 4 * mesh.nodes.len()];
         let mut points = Vec::new();
+        let mut sums = ElementSums::new(mesh);
         for &voxel in voxels {
             let first = self.keys.len();
             points_of(voxel as usize, &mut points);
             let mut total = 0.0;
             for &(point, weight) in &points {
-                if self.add_point(mesh, locator, &mut place, first, place_of(point), weight) {
+                let (point, reflection, back) = reflected(mesh, place_of(point));
+                let Some(location) = locator.locate(mesh, point) else {
+                    self.num_dropped_points += 1;
+                    continue;
+                };
+                if !sums.is_of(location.element, reflection) {
+                    self.take(&mut sums, &mut place, first);
+                    sums.start(location.element, reflection);
+                }
+                if sums.add(location.reference_coordinates, &back, weight) {
+                    self.num_points += 1;
                     total += weight;
+                } else {
+                    self.num_dropped_points += 1;
                 }
             }
+            self.take(&mut sums, &mut place, first);
             if self.keys.len() == first {
                 return Err(voxel as usize);
             }
@@ -139,44 +223,15 @@ impl VoxelOperator {
         Ok(())
     }
 
-    /// Adds one sample point to the current voxel; false where it lies in no element.
-    fn add_point(
-        &mut self,
-        mesh: &Mesh,
-        locator: &Locator,
-        place: &mut [u32],
-        first: usize,
-        (mut point, back): ([f64; 3], Tensor),
-        weight: f64,
-    ) -> bool {
-        let mut reflection = 0;
-        for (axis, is_mirrored) in [(1, mesh.mirror.y), (2, mesh.mirror.z)] {
-            if is_mirrored && point[axis] < 0.0 {
-                point[axis] = -point[axis];
-                reflection |= axis as u32;
-            }
+    /// Adds what was summed in an element to the entries of the current voxel, which begin at `first`.
+    fn take(&mut self, sums: &mut ElementSums, place: &mut [u32], first: usize) {
+        if !sums.is_started {
+            return;
         }
-        let Some(location) = locator.locate(mesh, point) else {
-            self.num_dropped_points += 1;
-            return false;
-        };
-        let (nodes, r) = (mesh.element(location.element as usize), location.reference_coordinates);
-        let (n, g) = (mesh.element_kind.shape_functions(r), mesh.element_kind.shape_gradients(r));
-        let mut map = [[0.0; 3]; 3];
+        sums.is_started = false;
+        let nodes = sums.mesh.element(sums.element as usize);
         for (a, &node) in nodes.iter().enumerate() {
-            let x = mesh.nodes[node as usize];
-            for i in 0..3 {
-                for j in 0..3 {
-                    map[i][j] += x[i] * g[a][j];
-                }
-            }
-        }
-        let Some(inverse) = inverse(&map) else {
-            self.num_dropped_points += 1;
-            return false;
-        };
-        for (a, &node) in nodes.iter().enumerate() {
-            let key = 4 * node + reflection;
+            let key = 4 * node + sums.reflection;
             let mut at = place[key as usize] as usize;
             if at < first || at >= self.keys.len() || self.keys[at] != key {
                 at = self.keys.len();
@@ -185,15 +240,11 @@ impl VoxelOperator {
                 self.values.push(0.0);
                 self.gradients.push([0.0; 3]);
             }
-            self.values[at] += weight * n[a];
-            let slope = [0, 1, 2].map(|j| (0..3).map(|m| g[a][m] * inverse[m][j]).sum::<f64>());
+            self.values[at] += sums.values[a];
             for j in 0..3 {
-                let seen: f64 = (0..3).map(|m| SIGNS[reflection as usize][m] * slope[m] * back[m][j]).sum();
-                self.gradients[at][j] += weight * seen;
+                self.gradients[at][j] += sums.gradients[a][j];
             }
         }
-        self.num_points += 1;
-        true
     }
 
     /// Number of voxels.
@@ -227,20 +278,18 @@ impl VoxelOperator {
     /// [`VoxelError::LengthMismatch`].
     pub fn average(&self, field: &[[f64; 3]]) -> Result<Vec<[f64; 3]>, VoxelError> {
         self.check(field.len(), self.num_nodes, "nodal field")?;
-        Ok(self
-            .offsets
-            .windows(2)
-            .map(|range| {
-                let mut mean = [0.0; 3];
-                for n in range[0] as usize..range[1] as usize {
-                    let (node, signs) = self.entry(n);
-                    for i in 0..3 {
-                        mean[i] += signs[i] * self.values[n] * field[node][i];
-                    }
+        let of_voxel = |range: &[u32]| {
+            let range = range[0] as usize..range[1] as usize;
+            let mut mean = [0.0; 3];
+            for (key, value) in self.keys[range.clone()].iter().zip(&self.values[range]) {
+                let (u, signs) = (field[(key / 4) as usize], SIGNS[(key % 4) as usize]);
+                for i in 0..3 {
+                    mean[i] += signs[i] * value * u[i];
                 }
-                mean
-            })
-            .collect())
+            }
+            mean
+        };
+        Ok(self.offsets.par_windows(2).with_min_len(CHUNK).map(of_voxel).collect())
     }
 
     /// Voxel averages of ∂u_i/∂X_J, `[i][J]`, of a nodal field.
@@ -261,24 +310,20 @@ impl VoxelOperator {
 
     fn gradients_from(&self, start: Tensor, field: &[[f64; 3]]) -> Result<Vec<Tensor>, VoxelError> {
         self.check(field.len(), self.num_nodes, "nodal field")?;
-        Ok(self
-            .offsets
-            .windows(2)
-            .map(|range| {
-                let mut mean = start;
-                for n in range[0] as usize..range[1] as usize {
-                    let (node, signs) = self.entry(n);
-                    let g = self.gradients[n];
-                    for i in 0..3 {
-                        let u = signs[i] * field[node][i];
-                        for j in 0..3 {
-                            mean[i][j] += u * g[j];
-                        }
+        let of_voxel = |range: &[u32]| {
+            let range = range[0] as usize..range[1] as usize;
+            let mut mean = start;
+            for (key, g) in self.keys[range.clone()].iter().zip(&self.gradients[range]) {
+                let (u, signs) = (field[(key / 4) as usize], SIGNS[(key % 4) as usize]);
+                for i in 0..3 {
+                    for j in 0..3 {
+                        mean[i][j] += signs[i] * u[i] * g[j];
                     }
                 }
-                mean
-            })
-            .collect())
+            }
+            mean
+        };
+        Ok(self.offsets.par_windows(2).with_min_len(CHUNK).map(of_voxel).collect())
     }
 
     /// The transpose of [`Self::average`]: Σ_v ∂ū_v/∂u_node · w_v for each node. For adjoint loads.
@@ -290,18 +335,13 @@ impl VoxelOperator {
         let mut nodal = vec![[0.0; 3]; self.num_nodes];
         for (range, weight) in self.offsets.windows(2).zip(weights) {
             for n in range[0] as usize..range[1] as usize {
-                let (node, signs) = self.entry(n);
+                let (node, signs) = ((self.keys[n] / 4) as usize, SIGNS[(self.keys[n] % 4) as usize]);
                 for i in 0..3 {
                     nodal[node][i] += signs[i] * self.values[n] * weight[i];
                 }
             }
         }
         Ok(nodal)
-    }
-
-    fn entry(&self, n: usize) -> (usize, [f64; 3]) {
-        let key = self.keys[n];
-        ((key / 4) as usize, SIGNS[(key % 4) as usize])
     }
 
     fn check(&self, found: usize, expected: usize, what: &'static str) -> Result<(), VoxelError> {

@@ -125,6 +125,10 @@ export const foundWords = (causes) =>
     return count > 1 ? `${words} (${count} times)` : words;
   });
 
+/** How far the noise differs over the image. */
+const noiseRange = (range) =>
+  range ? ` (over the image ${range.map((ends) => ends.map((v) => digits(v, 2)).join(" to ")).join(", ")} times as much)` : "";
+
 /** What was wrong, in a few sentences. */
 function summary(result) {
   const [words, kind] = VERDICTS[result.verdict] ?? [result.verdict, "warn"];
@@ -155,7 +159,8 @@ function summary(result) {
       "p",
       { class: "quiet" },
       `Noise along x, y, z ${result.noise_sd_mm.map((v) => digits(v, 2)).join(", ")} mm` +
-        `${result.is_noise_estimated ? ", estimated from the recording" : ", as the recording states it"}; ` +
+        `${result.is_noise_estimated ? ", estimated from the recording" : ", as the recording states it"}` +
+        `${noiseRange(result.noise_relative_range)}; ` +
         `meshes may leave ${digits(result.allowance_mm, 2)} mm rms.`,
       result.num_outlying_voxels > 0 &&
         ` Voxels left out, since they agree with hardly any neighbour: ${result.num_outlying_voxels}.`,
