@@ -26,8 +26,8 @@ const LEAST_OF_STATED: f64 = 0.3;
 const RANGE: [f64; 2] = [0.25, 16.0];
 
 /// The noise of every voxel of the grid in multiples of the typical one (the median over the voxels), per component;
-/// `None` where it is alike everywhere. `field` is the displacement on the grid, mm, NaN where missing; of a voxel whose
-/// neighbours say nothing the noise is taken as typical. `noise_sd_mm` is the noise, where it is stated.
+/// `None` where it is alike everywhere. `field` is the displacement on the grid, mm, NaN where missing; of a voxel
+/// whose neighbours say nothing the noise is taken as typical. `noise_sd_mm` is the noise, where it is stated.
 pub(super) fn relative_noise(
     grid: &VoxelGrid,
     flags: &[bool],
@@ -178,7 +178,7 @@ mod tests {
         }
     }
 
-    /// A field smoother than the noise that is stated says nothing of it: what its differences show is the displacement.
+    /// A field smoother than the noise that is stated says nothing of it: its differences show the displacement.
     #[test]
     fn smoothed_values_say_nothing() {
         let grid = grid();

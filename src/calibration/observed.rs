@@ -26,8 +26,8 @@ pub struct ObservedStep {
     pub force: Option<ObservedForce>,
     /// u of the compared voxels, mm, in the mask's order; NaN where missing.
     pub displacement: Vec<[f64; 3]>,
-    /// The noise of each of them in multiples of [`Observed::noise_sd_mm`], in the mask's order; `None` where it is alike
-    /// everywhere.
+    /// The noise of each of them in multiples of [`Observed::noise_sd_mm`], in the mask's order; `None` where it is
+    /// alike everywhere.
     pub relative_noise: Option<Vec<[f64; 3]>>,
     /// What was measured of the fixed and the moved face and is imposed there, beyond the nominal motion of their
     /// plates, per mm of drive. None where plates are taken to move as they were told.
@@ -153,8 +153,8 @@ impl Observed {
         [0, 1, 2].map(|c| (relative[c] * self.noise_sd_mm[c]).powi(2))
     }
 
-    /// How far the noise differs over the image, per component: the multiples of the typical noise that a tenth and nine
-    /// tenths of all values stay below. `None` where it is alike everywhere, at every step.
+    /// How far the noise differs over the image, per component: the multiples of the typical noise that a tenth and
+    /// nine tenths of all values stay below. `None` where it is alike everywhere, at every step.
     pub fn noise_range(&self) -> Option<[[f64; 2]; 3]> {
         let varying: Vec<&[f64; 3]> = self.steps.iter().filter_map(|s| s.relative_noise.as_ref()).flatten().collect();
         let of_component = |c: usize| {

@@ -65,7 +65,7 @@ fn voxels_count_by_their_noise() {
     let grid = observed[0].mask.grid.clone();
     let relative = |&v: &u32| [1.0 + 0.5 * grid.center_mm(v as usize)[0].abs(), 1.0, 3.0];
     observed[0].steps[0].relative_noise = Some(observed[0].mask.voxels.iter().map(relative).collect());
-    let mut covariance_of = |objective: Objective| {
+    let covariance_of = |objective: Objective| {
         let mut problem = CalibrationProblem::new(&observed, &coarse, objective).unwrap();
         let predictions = problem.predict(&truth(), None, &tight().solve, &|| false).unwrap();
         let targets = problem.targets().unwrap();

@@ -218,7 +218,6 @@ pub fn study(
     let reference = Reference { fits, candidates };
     let chunk = case.draws.div_ceil(rayon::current_num_threads().max(1)).max(1);
     let starts: Vec<usize> = (0..case.draws).step_by(chunk).collect();
-    // Models are made one after another: the ordering library shares its random state between threads.
     let problems: Vec<CalibrationProblem> = starts.iter().map(|_| new_problem(1.0)).collect::<Result<_, _>>()?;
     let draws: Vec<Vec<Draw>> = problems
         .into_par_iter()

@@ -178,14 +178,14 @@ pub fn verify_in_full(
     is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Verification, CalibrationError> {
     let chunk = options.draws.div_ceil(rayon::current_num_threads().max(1)).max(1);
-    // A model per thread, made one after another: the library that orders the unknowns shares its random state between
-    // threads, and another order means other last digits.
+    // A model per thread.
     let num_models = options.draws.div_ceil(chunk).max(1);
     let solve = &options.fit.solve;
     let (protocol, mesh) = (&options.protocol, &options.truth_mesh);
     let synthetic = SyntheticScan::new(specimen, truth, scan, protocol, mesh, solve, &|| is_cancelled())?;
     let masks = synthetic.masks();
     let mut benches = (0..num_models)
+        .into_par_iter()
         .map(|_| Bench::of_specimen(specimen, &options.fit_mesh, &masks))
         .collect::<Result<Vec<_>, _>>()?;
     verify_with(&mut benches, specimen, truth, &synthetic, options, on_draw, is_cancelled)

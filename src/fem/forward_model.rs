@@ -14,7 +14,9 @@ use crate::mesh::{Mesh, MeshOptions, mesh_specimen, refined};
 use crate::specimen::Specimen;
 
 /// Meshes of fewer elements are solved from rest.
-const WORTH_GUIDING: usize = 1_000;
+const WORTH_GUIDING: usize = 300;
+/// Meshes of fewer elements are guided by a coarse mesh of their own; larger ones are made by splitting theirs.
+const WORTH_NESTING: usize = 1_000;
 
 /// In how many parts plates are brought to where they are by [`ForwardModel::solve_by_parts`].
 const PARTS: i32 = 8;
@@ -59,10 +61,7 @@ impl ForwardModel {
     /// [`PrepareError`].
     pub fn of_specimen(specimen: &Specimen, options: &MeshOptions) -> Result<ForwardModel, PrepareError> {
         let mesh = mesh_specimen(specimen, options)?;
-        if mesh.num_elements() < WORTH_GUIDING {
-            return Ok(ForwardModel::new(mesh, specimen)?);
-        }
-        // Twice the element size, then split: about the same mesh, with a coarse one inside it.
+        // Twice the element size; if split, about the same mesh, with a coarse one inside it.
         let coarser = MeshOptions {
             section_size_mm: 2.0 * options.section_size_mm,
             levels: (options.levels / 2).max(2),
@@ -70,6 +69,14 @@ impl ForwardModel {
             radial_layers: (options.radial_layers / 2).max(1),
             ..*options
         };
+        if mesh.num_elements() < WORTH_GUIDING {
+            return Ok(ForwardModel::new(mesh, specimen)?);
+        }
+        if mesh.num_elements() < WORTH_NESTING {
+            let coarse = mesh_specimen(specimen, &coarser).ok();
+            let guide = coarse.map(|coarse| Guide::beside(coarse, &mesh, specimen)).transpose()?.flatten();
+            return Ok(ForwardModel { guide, ..ForwardModel::new(mesh, specimen)? });
+        }
         let nested = mesh_specimen(specimen, &coarser).ok().and_then(|coarse| Some((refined(&coarse)?, coarse)));
         let Some((refinement, coarse)) = nested else {
             return Ok(ForwardModel::new(mesh, specimen)?);

@@ -6,11 +6,13 @@
 use super::assembler::{Assembler, Configuration};
 use super::element_data::ElementOutput;
 use super::equilibrium::Equilibrium;
+use super::error::SolveError;
 use super::mesh_model::MeshModel;
 use super::newton::Newton;
 use super::options::SolveOptions;
 use crate::material::{LANES, Ogden};
-use crate::mesh::Location;
+use crate::mesh::{Location, Locator, Mesh};
+use crate::specimen::Specimen;
 use std::sync::Arc;
 
 /// A coarse model and how the fine mesh lies in it.
@@ -31,6 +33,26 @@ impl Guide {
     /// Of a coarse model in which fine nodes lie at `nodes` and fine elements in `parents`.
     pub(super) fn new(coarse: MeshModel, nodes: Vec<Location>, parents: Vec<u32>) -> Guide {
         Guide { coarse, nesting: Arc::new(Nesting { nodes, parents }) }
+    }
+
+    /// Of a coarse mesh of the same `specimen` that does not share its nodes with `fine`; `None` where a node of `fine`
+    /// lies too far outside of it.
+    ///
+    /// # Errors
+    /// As [`MeshModel::new`].
+    pub(super) fn beside(coarse: Mesh, fine: &Mesh, specimen: &Specimen) -> Result<Option<Guide>, SolveError> {
+        let locator = Locator::new(&coarse);
+        let center = |e: usize| {
+            let nodes = fine.element(e);
+            let sum = |i: usize| nodes.iter().map(|&n| fine.nodes[n as usize][i]).sum::<f64>();
+            [0, 1, 2].map(|i| sum(i) / nodes.len() as f64)
+        };
+        let nodes: Option<Vec<Location>> = fine.nodes.iter().map(|&x| locator.locate_near(&coarse, x)).collect();
+        let parent = |e: usize| Some(locator.locate_near(&coarse, center(e))?.element);
+        let parents: Option<Vec<u32>> = (0..fine.num_elements()).map(parent).collect();
+        let Some((nodes, parents)) = nodes.zip(parents) else { return Ok(None) };
+        let coarse = MeshModel::new(coarse, specimen, &|_, _| false)?;
+        Ok(Some(Guide::new(coarse, nodes, parents)))
     }
 
     /// The same guide with nothing solved.

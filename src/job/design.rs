@@ -5,8 +5,8 @@ use super::subject::{add_drawings, check_count, num_elements};
 use super::{Context, JobError, Outcome, Progress, RecordingOutline, Request, ResultSchema, Run, cost, summary};
 use crate::calibration::{ParameterSpread, VerifyOptions, verify_in_full};
 use crate::design::{
-    Checkpoint, CheckpointError, DesignEntry, DesignResult, MaterialVerification, ObjectiveKind, SearchError, Study,
-    Unfinished, VerificationSettings, search, study_hash,
+    Checkpoint, CheckpointError, DesignEntry, DesignResult, MaterialPrior, MaterialVerification, ObjectiveKind,
+    SearchError, Study, Unfinished, VerificationSettings, search, study_hash,
 };
 use crate::field::FieldError;
 use crate::material::Ogden;
@@ -14,6 +14,7 @@ use crate::mesh::MeshOptions;
 use crate::provenance::input_hash;
 use crate::report::design_report;
 use crate::sensitivity::Protocol;
+use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -171,8 +172,9 @@ impl CheckedStudy {
             let scan_share = entry.evaluation.scan_share.clone();
             let protocol = Protocol { scan_share, ..study.protocol.clone() };
             let options = VerifyOptions { protocol, ..VerifyOptions::new(specimen, draws, study.seed) };
-            let before = done.load(Ordering::Relaxed);
+            let told = AtomicUsize::new(0);
             let on_draw = || {
+                told.fetch_add(1, Ordering::Relaxed);
                 let count = done.fetch_add(1, Ordering::Relaxed) + 1;
                 let (best, best_specimen) = (Some(result.best.objective), Some(result.best.specimen.clone()));
                 context.progress(&Progress { best, best_specimen, ..Progress::new("verify", count, total) });
@@ -192,16 +194,17 @@ impl CheckedStudy {
                     Err(error) => Some((Vec::new(), Some(error.to_string()))),
                 }
             });
-            done.store(before + draws, Ordering::Relaxed);
+            // Draws that were known before, or that a failure left out.
+            done.fetch_add(draws.saturating_sub(told.load(Ordering::Relaxed)), Ordering::Relaxed);
             verified
         };
-        let mut verified = Vec::new();
-        for prior in &study.materials {
-            let (best, best_failure) = of(&result.best, &prior.material)?;
-            let (base, base_failure) = of(&result.base, &prior.material)?;
+        // Side by side: making the truth of one keeps one thread busy, the draws of another fill the others.
+        let of_material = |prior: &MaterialPrior| {
+            let both = rayon::join(|| of(&result.best, &prior.material), || of(&result.base, &prior.material));
+            let ((best, best_failure), (base, base_failure)) = (both.0?, both.1?);
             let material = prior.name.clone();
-            verified.push(MaterialVerification { material, best, base, best_failure, base_failure });
-        }
-        Some(verified)
+            Some(MaterialVerification { material, best, base, best_failure, base_failure })
+        };
+        study.materials.par_iter().map(of_material).collect()
     }
 }

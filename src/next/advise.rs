@@ -108,15 +108,12 @@ fn trials(
     (posterior, options): (&Posterior, &NextOptions),
     is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Vec<Result<Vec<Trial>, String>> {
-    // Models are made one after another: the ordering library shares its random state between threads.
-    let benches: Vec<(usize, &Point, Result<Bench, NextError>)> = bodies
-        .iter()
-        .enumerate()
-        .flat_map(|(index, body)| points.iter().map(move |p| (index, p, Bench::new(body, plan, options.mesh_factor))))
-        .collect();
-    let mut tried: Vec<Result<Trial, String>> = benches
+    let pairs: Vec<(usize, &Specimen, &Point)> =
+        bodies.iter().enumerate().flat_map(|(index, body)| points.iter().map(move |p| (index, body, p))).collect();
+    let mut tried: Vec<Result<Trial, String>> = pairs
         .into_par_iter()
-        .map(|(index, point, bench)| {
+        .map(|(index, body, point)| {
+            let bench = Bench::new(body, plan, options.mesh_factor);
             let own = all.iter().filter(|c| c.body == index);
             let mut drives: Vec<f64> = own.flat_map(|c| c.drives_mm.iter().copied()).collect();
             drives.sort_by(f64::total_cmp);
