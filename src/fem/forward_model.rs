@@ -73,8 +73,7 @@ impl ForwardModel {
             return Ok(ForwardModel::new(mesh, specimen)?);
         }
         if mesh.num_elements() < WORTH_NESTING {
-            let coarse = mesh_specimen(specimen, &coarser).ok();
-            let guide = coarse.map(|coarse| Guide::beside(coarse, &mesh, specimen)).transpose()?.flatten();
+            let guide = mesh_specimen(specimen, &coarser).ok().and_then(|c| Guide::beside(c, &mesh, specimen));
             return Ok(ForwardModel { guide, ..ForwardModel::new(mesh, specimen)? });
         }
         let nested = mesh_specimen(specimen, &coarser).ok().and_then(|coarse| Some((refined(&coarse)?, coarse)));

@@ -6,7 +6,6 @@
 use super::assembler::{Assembler, Configuration};
 use super::element_data::ElementOutput;
 use super::equilibrium::Equilibrium;
-use super::error::SolveError;
 use super::mesh_model::MeshModel;
 use super::newton::Newton;
 use super::options::SolveOptions;
@@ -36,23 +35,19 @@ impl Guide {
     }
 
     /// Of a coarse mesh of the same `specimen` that does not share its nodes with `fine`; `None` where a node of `fine`
-    /// lies too far outside of it.
-    ///
-    /// # Errors
-    /// As [`MeshModel::new`].
-    pub(super) fn beside(coarse: Mesh, fine: &Mesh, specimen: &Specimen) -> Result<Option<Guide>, SolveError> {
+    /// lies too far outside of it, or where it makes no model.
+    pub(super) fn beside(coarse: Mesh, fine: &Mesh, specimen: &Specimen) -> Option<Guide> {
         let locator = Locator::new(&coarse);
         let center = |e: usize| {
             let nodes = fine.element(e);
             let sum = |i: usize| nodes.iter().map(|&n| fine.nodes[n as usize][i]).sum::<f64>();
             [0, 1, 2].map(|i| sum(i) / nodes.len() as f64)
         };
-        let nodes: Option<Vec<Location>> = fine.nodes.iter().map(|&x| locator.locate_near(&coarse, x)).collect();
+        let nodes: Vec<Location> =
+            fine.nodes.iter().map(|&x| locator.locate_near(&coarse, x)).collect::<Option<_>>()?;
         let parent = |e: usize| Some(locator.locate_near(&coarse, center(e))?.element);
-        let parents: Option<Vec<u32>> = (0..fine.num_elements()).map(parent).collect();
-        let Some((nodes, parents)) = nodes.zip(parents) else { return Ok(None) };
-        let coarse = MeshModel::new(coarse, specimen, &|_, _| false)?;
-        Ok(Some(Guide::new(coarse, nodes, parents)))
+        let parents: Vec<u32> = (0..fine.num_elements()).map(parent).collect::<Option<_>>()?;
+        Some(Guide::new(MeshModel::new(coarse, specimen, &|_, _| false).ok()?, nodes, parents))
     }
 
     /// The same guide with nothing solved.
