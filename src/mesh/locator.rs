@@ -153,41 +153,19 @@ impl Locator {
         Some(self.at(column, layer, zeta))
     }
 
-    /// As [`Self::locate`] for a point that may lie past a face of the mesh by a fifth of an element, as a point of a
-    /// curved wall does in a coarse mesh: in the nearest element, by coordinates that may lie beyond its range.
-    pub fn locate_near(&self, mesh: &Mesh, point: [f64; 3]) -> Option<Location> {
-        let (layer, zeta) = self.layer(point[self.extrusion_axis])?;
-        let section_point = [point[0], point[self.b_axis]];
-        if let Some(column) = self.locate_column(mesh, section_point) {
-            return Some(self.at(column, layer, zeta));
-        }
-        let near = self.cells_near(section_point).filter_map(|cell| {
-            let section_coordinates = invert(mesh.element_kind, &self.cells[cell as usize], section_point)?;
-            let beyond = beyond_cell(mesh.element_kind, section_coordinates);
-            (beyond < REACH).then_some((beyond, Column { cell, section_coordinates }))
-        });
-        let (_, column) = near.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some(self.at(column, layer, zeta))
-    }
-
     /// Where a line along the extrusion meets the section: the part of [`Self::locate`] that takes nearly all its time,
     /// for callers with many points on one line. `section_point` is (x, z) or (x, y), mm; see [`Self::extrusion_axis`].
     pub fn locate_column(&self, mesh: &Mesh, section_point: [f64; 2]) -> Option<Column> {
-        self.cells_near(section_point).find_map(|cell| {
-            let section_coordinates = invert(mesh.element_kind, &self.cells[cell as usize], section_point)?;
-            let section_coordinates = clamp_inside(mesh.element_kind, section_coordinates)?;
-            Some(Column { cell, section_coordinates })
-        })
-    }
-
-    /// Cells whose boxes hold a point of the section.
-    fn cells_near(&self, section_point: [f64; 2]) -> impl Iterator<Item = u32> {
         let [i, j] = self.bin(section_point);
         let bin = i + self.num_bins[0] * j;
-        let cells = self.entries[self.starts[bin] as usize..self.starts[bin + 1] as usize].iter().copied();
-        cells.filter(move |&cell| {
+        self.entries[self.starts[bin] as usize..self.starts[bin + 1] as usize].iter().find_map(|&cell| {
             let [low, high] = self.boxes[cell as usize];
-            (0..2).all(|c| section_point[c] >= low[c] && section_point[c] <= high[c])
+            let is_near = (0..2).all(|c| section_point[c] >= low[c] && section_point[c] <= high[c]);
+            if !is_near {
+                return None;
+            }
+            let section_coordinates = invert(mesh.element_kind, &self.cells[cell as usize], section_point)?;
+            Some(Column { cell, section_coordinates })
         })
     }
 
@@ -232,10 +210,7 @@ pub(super) fn extrusion_axis(mesh: &Mesh) -> usize {
     if (q[1] - p[1]).abs() > (q[2] - p[2]).abs() { 1 } else { 2 }
 }
 
-/// How far past its faces, in reference coordinates, an element still takes points by [`Locator::locate_near`].
-const REACH: f64 = 0.2;
-
-/// Reference coordinates of `p` in a cell or near it.
+/// Reference coordinates of `p` in a cell, clamped to it, if it lies inside within the margin.
 fn invert(kind: ElementKind, points: &[[f64; 2]; 9], p: [f64; 2]) -> Option<[f64; 2]> {
     let count = kind.num_nodes() / 3;
     let mut xi = match kind {
@@ -258,21 +233,13 @@ fn invert(kind: ElementKind, points: &[[f64; 2]; 9], p: [f64; 2]) -> Option<[f64
         // Far outside, the quadratic map folds: keep the iterate near the cell.
         xi = [0, 1].map(|c| (xi[c] - step[c]).clamp(-2.0, 2.0));
         if step[0].abs().max(step[1].abs()) < TOLERANCE {
-            return Some(xi);
+            return clamp_inside(kind, xi);
         }
         if !step[0].is_finite() || !step[1].is_finite() {
             return None;
         }
     }
     None
-}
-
-/// How far reference coordinates lie outside a cell; zero inside.
-fn beyond_cell(kind: ElementKind, [xi, eta]: [f64; 2]) -> f64 {
-    match kind {
-        ElementKind::Hex27 => (xi.abs().max(eta.abs()) - 1.0).max(0.0),
-        ElementKind::Prism21 => (-xi).max(-eta).max(xi + eta - 1.0).max(0.0),
-    }
 }
 
 fn clamp_inside(kind: ElementKind, [xi, eta]: [f64; 2]) -> Option<[f64; 2]> {
