@@ -4,6 +4,7 @@
 //! assembler of other departures ([`Assembler::departed`]) is a value beside the first one.
 
 use super::condensation::Condensation;
+use super::crew::{Crew, Seat};
 use super::departures::Departures;
 use super::departures_on_mesh::{DeparturesOnMesh, PointPositions};
 use super::element_data::{ElementInput, ElementOutput, ElementTables, MAX_GROUPS, MAX_NODES};
@@ -38,6 +39,13 @@ pub(super) struct Assembler {
     departures: Arc<DeparturesOnMesh>,
     kernels: Kernels,
 }
+
+/// Elements whose tangents a thread works out at once: what they give stays in its cache until its turn comes.
+const TANGENTS_AT_ONCE: usize = 2;
+/// The same of residuals.
+const RESIDUALS_AT_ONCE: usize = 8;
+/// Fewer turns are not worth the time that it takes to call for help.
+const TURNS_WORTH_HELP: usize = 32;
 
 /// Where an element vector is evaluated.
 #[derive(Clone, Copy)]
@@ -300,6 +308,34 @@ impl Assembler {
         }
     }
 
+    /// Evaluates all elements in the order of assembly, `at_once` on a thread and with the help of whoever is idle, and
+    /// commits them in that order; `evaluate` returns false where the element is inverted.
+    fn in_turn(
+        &self,
+        at_once: usize,
+        evaluate: &(dyn Fn(usize, &mut ElementOutput) -> bool + Sync),
+        mut commit: impl FnMut(usize, &ElementOutput) + Send,
+    ) -> Result<(), StepFailure> {
+        let order = &self.topology().element_order;
+        let num = order.len().div_ceil(at_once);
+        let elements = |index: usize| order[index * at_once..].iter().take(at_once).map(|&e| e as usize);
+        let _seat = Seat::take();
+        let crew = if num < TURNS_WORTH_HELP { Crew::alone() } else { Crew::gather() };
+        crew.in_turn(
+            num,
+            || (0..at_once).map(|_| ElementOutput::default()).collect::<Vec<_>>(),
+            |outs, index| {
+                for (e, out) in elements(index).zip(outs) {
+                    if !evaluate(e, out) {
+                        return Err(StepFailure::InvertedElement { element: e, jacobian: out.min_jacobian });
+                    }
+                }
+                Ok(())
+            },
+            |outs, index| elements(index).zip(outs).for_each(|(e, out)| commit(e, out)),
+        )
+    }
+
     /// Residual and tangent stiffness at `state`, whose pressure is an independent iterate.
     ///
     /// # Errors
@@ -317,17 +353,15 @@ impl Assembler {
         into.residual.resize(mesh.nodes.len(), [0.0; 3]);
         into.condensation.resize(mesh.num_elements(), Condensation::empty());
         let blocks = into.system.zeroed_blocks();
-        let mut out = ElementOutput::default();
-        for &e in &self.topology().element_order {
-            let e = e as usize;
-            let input = self.input(e, &at, Some(&state.pressure));
-            if !self.kernels.tangent(self.tables(), &input, &mut out) {
-                return Err(StepFailure::InvertedElement { element: e, jacobian: out.min_jacobian });
-            }
-            scatter(mesh.element(e), &out.residual, &mut into.residual);
-            into.condensation[e].keep(&out);
+        let (residual, condensation) = (&mut into.residual, &mut into.condensation);
+        let evaluate = |e: usize, out: &mut ElementOutput| {
+            self.kernels.tangent(self.tables(), &self.input(e, &at, Some(&state.pressure)), out)
+        };
+        self.in_turn(TANGENTS_AT_ONCE, &evaluate, |e, out| {
+            scatter(mesh.element(e), &out.residual, residual);
+            condensation[e].keep(out);
             self.topology().add_element(e, mesh.element(e), &out.stiffness, blocks);
-        }
+        })?;
         self.add_spring_stiffness(blocks);
         self.topology().pin(blocks);
         into.spring_forces = self.add_spring_forces(state.drive_mm, &state.displacement, &mut into.residual);
@@ -349,15 +383,14 @@ impl Assembler {
         let at = Configuration { material, positions: &mesh.nodes, displacement: &state.displacement };
         (into.stands_at, into.has_tangent) = (None, false);
         into.residual.fill([0.0; 3]);
-        let mut out = ElementOutput::default();
-        for &e in &self.topology().element_order {
-            let e = e as usize;
-            if !self.kernels.residual(self.tables(), &self.input(e, &at, Some(&state.pressure)), &mut out) {
-                return Err(StepFailure::InvertedElement { element: e, jacobian: out.min_jacobian });
-            }
-            scatter(mesh.element(e), &out.residual, &mut into.residual);
-            into.condensation[e].keep_gap(&out);
-        }
+        let (residual, condensation) = (&mut into.residual, &mut into.condensation);
+        let evaluate = |e: usize, out: &mut ElementOutput| {
+            self.kernels.residual(self.tables(), &self.input(e, &at, Some(&state.pressure)), out)
+        };
+        self.in_turn(RESIDUALS_AT_ONCE, &evaluate, |e, out| {
+            scatter(mesh.element(e), &out.residual, residual);
+            condensation[e].keep_gap(out);
+        })?;
         into.spring_forces = self.add_spring_forces(state.drive_mm, &state.displacement, &mut into.residual);
         Ok(())
     }

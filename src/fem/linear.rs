@@ -4,21 +4,40 @@
 //! Symbolic work is done once per mesh. Measured on these matrices (κ/μ ≈ 130–800): the single-precision factor takes
 //! half the time and memory, and one iteration of conjugate gradients gains four to five digits.
 
+use super::crew::{Crew, Seat};
 use super::error::LinearError;
+use super::fronts::Fronts;
+use super::multifrontal::{Arenas, Lower, NonPositivePivot, Real, factorise};
+use super::substitution::FactorByFronts;
 use super::topology::Topology;
-use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::Side;
+use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::SupernodalThreshold;
+use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+    CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
 };
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, MatMut, Par, Side, Spec};
 use std::sync::Arc;
 
 /// Pattern and symbolic factorisation of the tangents of one mesh: made once, shared by all systems of that mesh.
 struct Analysis {
     topology: Arc<Topology>,
     symbolic: SymbolicCholesky<usize>,
+    fronts: Fronts,
+}
+
+impl Analysis {
+    fn supernodal(&self) -> &SymbolicSupernodalCholesky<usize> {
+        supernodal(&self.symbolic)
+    }
+}
+
+/// The supernodes, which [`LinearSystem::new`] asked for.
+fn supernodal(symbolic: &SymbolicCholesky<usize>) -> &SymbolicSupernodalCholesky<usize> {
+    match symbolic.raw() {
+        SymbolicCholeskyRaw::Supernodal(supernodal) => supernodal,
+        SymbolicCholeskyRaw::Simplicial(_) => unreachable!("supernodes were asked for"),
+    }
 }
 
 /// A factor in one precision.
@@ -34,13 +53,19 @@ pub(super) struct LinearSystem {
     blocks: Arc<Vec<[f64; 9]>>,
     factor: Option<Arc<Factor>>,
     single_values: Vec<f32>,
-    /// Scratch of the factorisation.
-    memory: Option<MemBuffer>,
+    /// Memory of the factorisation in single precision.
+    arenas: Arenas<f32>,
     num_factorisations: usize,
 }
 
 /// Iterations after which a single-precision factor is given up.
 const MAX_ITERATIONS: usize = 40;
+
+/// Factorisations of more operations are worth the time that it takes to call for help: a tenth of a millisecond.
+const WORTH_HELP: f64 = 1e8;
+
+/// Substitutions with a factor of more entries are worth it.
+const ENTRIES_WORTH_HELP: usize = 1_500_000;
 
 /// Right-hand sides that are solved for at once.
 pub(super) const MAX_COLUMNS: usize = 4;
@@ -61,7 +86,8 @@ impl LinearSystem {
         };
         let symbolic = factorize_symbolic_cholesky(upper, Side::Upper, SymmetricOrdering::Identity, parameters)
             .map_err(|_| LinearError::OutOfMemory { num_unknowns: n })?;
-        Ok(LinearSystem::of(Arc::new(Analysis { topology, symbolic })))
+        let fronts = Fronts::new(supernodal(&symbolic));
+        Ok(LinearSystem::of(Arc::new(Analysis { topology, symbolic, fronts })))
     }
 
     fn of(analysis: Arc<Analysis>) -> LinearSystem {
@@ -70,7 +96,7 @@ impl LinearSystem {
             blocks: Arc::default(),
             factor: None,
             single_values: Vec::new(),
-            memory: None,
+            arenas: Arenas::default(),
             num_factorisations: 0,
         }
     }
@@ -118,20 +144,8 @@ impl LinearSystem {
             Some(Factor::Single(l)) => l,
             _ => vec![0.0; self.analysis.symbolic.len_val()],
         };
-        let Analysis { topology, symbolic } = &*self.analysis;
-        topology.to_scalar(&self.blocks, |x| x as f32, &mut self.single_values);
-        let n = topology.num_unknowns();
-        let pattern =
-            SymbolicSparseColMatRef::new_checked(n, n, &topology.column_pointers, None, &topology.row_indices);
-        let result = symbolic.factorize_numeric_llt(
-            &mut l,
-            SparseColMatRef::new(pattern, &self.single_values[..]),
-            Side::Lower,
-            Default::default(),
-            Par::Seq,
-            MemStack::new(factorisation_memory(&mut self.memory, symbolic, n)?),
-            Spec::default(),
-        );
+        self.analysis.topology.to_scalar(&self.blocks, |x| x as f32, &mut self.single_values);
+        let result = factor_of(&self.analysis, &self.single_values, &mut l, &mut self.arenas);
         if result.is_ok() && l.iter().step_by(97).all(|x| x.is_finite()) {
             self.factor = Some(Arc::new(Factor::Single(l)));
             return Ok(());
@@ -145,31 +159,12 @@ impl LinearSystem {
     /// [`LinearError`].
     fn factorise_double(&mut self) -> Result<(), LinearError> {
         self.factor = None;
-        let Analysis { topology, symbolic } = &*self.analysis;
-        let n = topology.num_unknowns();
-        let mut l = vec![0.0f64; symbolic.len_val()];
+        let mut l = vec![0.0f64; self.analysis.symbolic.len_val()];
         let mut values = Vec::new();
-        topology.to_scalar(&self.blocks, |x| x, &mut values);
-        let pattern =
-            SymbolicSparseColMatRef::new_checked(n, n, &topology.column_pointers, None, &topology.row_indices);
-        let result = symbolic.factorize_numeric_llt(
-            &mut l,
-            SparseColMatRef::new(pattern, &values[..]),
-            Side::Lower,
-            Default::default(),
-            Par::Seq,
-            MemStack::new(factorisation_memory(&mut self.memory, symbolic, n)?),
-            Spec::default(),
-        );
-        match result {
-            Ok(_) => {
-                self.factor = Some(Arc::new(Factor::Double(l)));
-                Ok(())
-            }
-            Err(faer::linalg::solvers::LltError::NonPositivePivot { index }) => {
-                Err(LinearError::NotPositiveDefinite { index })
-            }
-        }
+        self.analysis.topology.to_scalar(&self.blocks, |x| x, &mut values);
+        factor_of(&self.analysis, &values, &mut l, &mut Arenas::default())?;
+        self.factor = Some(Arc::new(Factor::Double(l)));
+        Ok(())
     }
 
     /// Whether a factor (of these or earlier values) exists.
@@ -177,31 +172,19 @@ impl LinearSystem {
         self.factor.is_some()
     }
 
-    /// x ← (factor)⁻¹ x for several right-hand sides, columns of length n.
-    fn precondition(&self, columns: usize, x: &mut [f64], scratch: &mut Scratch) {
-        let (n, symbolic) = (self.num_unknowns(), &self.analysis.symbolic);
+    /// x ← (factor)⁻¹ x for several right-hand sides, one after the other.
+    fn precondition(&self, x: &mut [f64], crew: &Crew) {
+        let (fronts, symbolic) = (&self.analysis.fronts, self.analysis.supernodal());
         match self.factor.as_deref() {
             None => {}
-            Some(Factor::Single(l)) => {
-                let single = &mut scratch.single;
-                single.clear();
-                single.extend(x.iter().map(|&v| v as f32));
-                LltRef::<usize, f32>::new(symbolic, l).solve_in_place_with_conj(
-                    Conj::No,
-                    MatMut::from_column_major_slice_mut(single, n, columns),
-                    Par::Seq,
-                    MemStack::new(&mut scratch.memory),
-                );
-                for (a, &b) in x.iter_mut().zip(single.iter()) {
+            Some(Factor::Single(values)) => {
+                let mut single: Vec<f32> = x.iter().map(|&v| v as f32).collect();
+                FactorByFronts { fronts, symbolic, values }.solve(&mut single, crew);
+                for (a, &b) in x.iter_mut().zip(&single) {
                     *a = f64::from(b);
                 }
             }
-            Some(Factor::Double(l)) => LltRef::<usize, f64>::new(symbolic, l).solve_in_place_with_conj(
-                Conj::No,
-                MatMut::from_column_major_slice_mut(x, n, columns),
-                Par::Seq,
-                MemStack::new(&mut scratch.memory),
-            ),
+            Some(Factor::Double(values)) => FactorByFronts { fronts, symbolic, values }.solve(x, crew),
         }
     }
 
@@ -224,20 +207,12 @@ impl LinearSystem {
             // With an exact factor the iteration refines to rounding; what is left is the matrix's condition.
             None => {
                 let mut x: Vec<Vec<f64>> = right_hand_sides.to_vec();
-                let mut scratch = self.scratch()?;
                 for column in &mut x {
-                    self.precondition(1, column, &mut scratch);
+                    self.precondition(column, &Crew::alone());
                 }
                 Ok(x)
             }
         }
-    }
-
-    fn scratch(&self) -> Result<Scratch, LinearError> {
-        let request = self.analysis.symbolic.solve_in_place_scratch::<f64>(MAX_COLUMNS, Par::Seq);
-        let memory =
-            MemBuffer::try_new(request).map_err(|_| LinearError::OutOfMemory { num_unknowns: self.num_unknowns() })?;
-        Ok(Scratch { memory, single: Vec::new() })
     }
 
     /// Conjugate gradients with the factor at hand, which may be that of a nearby matrix; `None` where `max_iterations`
@@ -256,9 +231,10 @@ impl LinearSystem {
         let m = right_hand_sides.len();
         let mut x = vec![0.0; n * m];
         let mut r: Vec<f64> = right_hand_sides.iter().flatten().copied().collect();
-        let mut scratch = self.scratch()?;
+        let _seat = Seat::take();
+        let crew = if self.analysis.symbolic.len_val() < ENTRIES_WORTH_HELP { Crew::alone() } else { Crew::gather() };
         let mut z = r.clone();
-        self.precondition(m, &mut z, &mut scratch);
+        self.precondition(&mut z, &crew);
         let mut p = z.clone();
         let mut rz: Vec<f64> = (0..m).map(|c| dot(&r[c * n..][..n], &z[c * n..][..n])).collect();
         let target: Vec<f64> =
@@ -293,7 +269,7 @@ impl LinearSystem {
                 break;
             }
             z.copy_from_slice(&r);
-            self.precondition(m, &mut z, &mut scratch);
+            self.precondition(&mut z, &crew);
             for c in 0..m {
                 if is_done[c] {
                     continue;
@@ -310,24 +286,23 @@ impl LinearSystem {
     }
 }
 
-/// What applying a factor needs.
-struct Scratch {
-    memory: MemBuffer,
-    single: Vec<f32>,
-}
-
-/// The scratch of factorisations, taken once.
-fn factorisation_memory<'m>(
-    memory: &'m mut Option<MemBuffer>,
-    symbolic: &SymbolicCholesky<usize>,
-    num_unknowns: usize,
-) -> Result<&'m mut MemBuffer, LinearError> {
-    let buffer = match memory.take() {
-        Some(buffer) => buffer,
-        None => MemBuffer::try_new(symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default()))
-            .map_err(|_| LinearError::OutOfMemory { num_unknowns })?,
-    };
-    Ok(memory.insert(buffer))
+/// Factorises the matrix of these `values` (the lower triangle in the pattern of the unknowns) into `l`, with the help
+/// of whoever is idle.
+///
+/// # Errors
+/// [`LinearError::NotPositiveDefinite`].
+fn factor_of<T: Real>(
+    analysis: &Analysis,
+    values: &[T],
+    l: &mut [T],
+    arenas: &mut Arenas<T>,
+) -> Result<(), LinearError> {
+    let Analysis { topology, fronts, .. } = analysis;
+    let lower = Lower { pointers: &topology.column_pointers, rows: &topology.row_indices, values };
+    let _seat = Seat::take();
+    let crew = if fronts.work < WORTH_HELP { Crew::alone() } else { Crew::gather() };
+    factorise(fronts, analysis.supernodal(), &lower, l, arenas, &crew)
+        .map_err(|NonPositivePivot(index)| LinearError::NotPositiveDefinite { index })
 }
 
 /// y = K x with the lower triangle.

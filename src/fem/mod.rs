@@ -12,6 +12,7 @@ mod adjoint;
 mod assembler;
 mod change;
 mod condensation;
+mod crew;
 mod departures;
 mod departures_on_mesh;
 #[cfg(test)]
@@ -23,6 +24,7 @@ mod error;
 mod fibre_kernel;
 mod fields;
 mod forward_model;
+mod fronts;
 mod graph;
 mod guide;
 mod kernel;
@@ -33,6 +35,7 @@ mod linear;
 mod linearisation;
 mod mesh_model;
 mod minimum_degree;
+mod multifrontal;
 #[cfg(feature = "metis")]
 mod nested_dissection;
 mod newton;
@@ -44,6 +47,7 @@ mod result;
 mod rotation;
 mod stages;
 mod stiffness;
+mod substitution;
 mod tangent;
 #[cfg(test)]
 mod tangent_tests;
