@@ -120,7 +120,7 @@ pub struct Gain {
 pub fn confirm(
     study: &Study,
     specimen: &Specimen,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Confirmed, EvaluationFailure> {
     let mut evaluated = Vec::new();
     let mut responses_by_mesh = Vec::new();
@@ -175,7 +175,7 @@ pub fn estimate(
     study: &Study,
     specimen: &Specimen,
     fidelity: Fidelity,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Evaluated, EvaluationFailure> {
     specimen.validate().map_err(|e| EvaluationFailure::Geometry { reason: e.to_string() })?;
     let mesh = fidelity.mesh_options(specimen);
@@ -197,7 +197,7 @@ fn by_material(
     specimen: &Specimen,
     options: EvaluationOptions,
     mesh_factor: f64,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<MaterialEvaluation>, EvaluationFailure> {
     let mut evaluated: Vec<(Evaluation, EvaluationMaps)> = Vec::new();
     let scanned_mm = specimen.drive_mm.last().copied().unwrap_or(0.0);
@@ -273,7 +273,11 @@ struct Variants {
 impl Variants {
     /// On the search's mesh: differences of logarithms at one mesh are far more accurate than the values, and cost
     /// little.
-    fn of(study: &Study, specimen: &Specimen, is_cancelled: &dyn Fn() -> bool) -> Result<Variants, EvaluationFailure> {
+    fn of(
+        study: &Study,
+        specimen: &Specimen,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Variants, EvaluationFailure> {
         let samples = sample_materials(&study.materials);
         if samples.len() == study.materials.len() {
             return Ok(Variants {

@@ -95,7 +95,7 @@ pub(super) fn sizes_of(
     material: &Ogden,
     evaluation: &Evaluation,
     mesh_factor: f64,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<DetectableSize>, EvaluationFailure> {
     let drives_mm: Vec<f64> = evaluation.steps.iter().map(|s| s.drive_mm).collect();
     let forces_n: Vec<f64> = evaluation.steps.iter().map(|s| s.force_n).collect();

@@ -90,7 +90,7 @@ impl<'a> Evaluator<'a> {
         &self,
         specimen: &Specimen,
         subspace: Option<&Subspace>,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Evaluated, EvaluationFailure> {
         let no_drive = || EvaluationFailure::Geometry { reason: "the specimen has no drive".into() };
         let drive = *specimen.drive_mm.last().ok_or_else(no_drive)?;
@@ -127,7 +127,7 @@ impl<'a> Evaluator<'a> {
         model: &mut ForwardModel,
         drive: f64,
         moves: &[Move],
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Solved, EvaluationFailure> {
         let mut solved =
             Solved { states: Vec::new(), on_the_way: Vec::new(), imitators: Vec::new(), paths: Vec::new() };
@@ -183,7 +183,7 @@ impl<'a> Evaluator<'a> {
         material: &Ogden,
         drive: f64,
         moves: &[Move],
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<OnTheWay, EvaluationFailure> {
         let drives = self.study.protocol.on_the_way_to(drive).force_drives_mm();
         let mut found = OnTheWay { readings: Vec::new(), rates: vec![Vec::new(); moves.len()] };

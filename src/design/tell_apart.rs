@@ -68,7 +68,7 @@ pub(super) struct Imitation<'a> {
     /// The drive of the scan, mm.
     pub drive_mm: f64,
     pub solve: &'a SolveOptions,
-    pub is_cancelled: &'a dyn Fn() -> bool,
+    pub is_cancelled: &'a (dyn Fn() -> bool + Sync),
 }
 
 /// An imitating material, what it does, and how far that is from the scan.

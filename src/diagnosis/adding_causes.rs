@@ -116,13 +116,16 @@ impl Run<'_> {
             self.start_otherwise(begun, &measured, limits)?;
             self.fit_material_anew(&measured, limits)?;
         }
-        let Some(with_set_up) = self.with_set_up(&measured, limits, is_promising)? else {
+        let with_set_up = if is_promising { self.with_set_up(&measured, limits)? } else { None };
+        let Some(with_set_up) = with_set_up else {
             return if are_all_asked { Ok(()) } else { self.ask_all(&measured, limits) };
         };
-        if !are_all_asked && !self.is_explained_by(&with_set_up.findings) {
+        let gains =
+            |run: &Self| run.left_mm(&with_set_up.findings.current) < SET_UP_GAINS * run.left_mm(&run.findings.current);
+        if !(are_all_asked || gains(self) || self.is_explained_by(&with_set_up.findings)) {
             self.ask_all(&measured, limits)?;
         }
-        if self.left_mm(&with_set_up.findings.current) < SET_UP_GAINS * self.left_mm(&self.findings.current) {
+        if gains(self) {
             self.go_on_with(with_set_up);
         }
         Ok(())
@@ -232,23 +235,48 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// The set-up as a whole with causes added to it, where what was named so far leaves much of the misfit and the
-    /// set-up `is_promising`. `None` where it is not asked for, or has no fit.
-    fn with_set_up(
-        &mut self,
-        measured: &Trace,
-        limits: RoundLimits,
-        is_promising: bool,
-    ) -> Result<Option<WithSetUp>, DiagnosisError> {
-        let is_asked = is_promising && !self.is_explained_by(&self.findings);
-        if !is_asked || self.registry.set_up(self.observed).is_empty() {
+    /// The set-up as a whole with causes added to it, where what was named so far leaves much of the misfit: beside the
+    /// causes found one by one, and, where both together leave much of it too, alone. `None` where it is not asked for, or
+    /// has no fit.
+    fn with_set_up(&mut self, measured: &Trace, limits: RoundLimits) -> Result<Option<WithSetUp>, DiagnosisError> {
+        let parts = self.registry.set_up(self.observed);
+        if parts.is_empty() || self.is_explained_by(&self.findings) {
             return Ok(None);
         }
-        self.tell("fitting the set-up as a whole: plates, rig, layers, block");
+        // What the set-up has a part for, or takes up, is left to it.
+        let of_parts: Vec<Supposed> =
+            parts.into_iter().map(|cause| Supposed { values: cause.start(), cause }).collect();
+        let special_cases = self.registry.special_cases(&of_parts);
+        let is_beside = |c: &&Supposed| {
+            let is_part = of_parts.iter().any(|p| p.cause.name() == c.cause.name());
+            !(is_part || special_cases.contains(&c.cause.name()) || c.cause.is_sponge() || c.cause.is_artefact())
+        };
+        let beside: Vec<Supposed> = self.findings.current.causes.iter().filter(is_beside).cloned().collect();
+        let together = if beside.is_empty() { None } else { self.set_up_beside(beside, measured, limits)? };
+        let before_mm = self.left_mm(&self.findings.nominal);
+        if together.as_ref().is_some_and(|f| self.left_mm(&f.findings.current) < SET_UP_LEAVES * before_mm) {
+            return Ok(together);
+        }
+        let alone = self.set_up_beside(Vec::new(), measured, limits)?;
+        let left_mm = |found: &WithSetUp| self.left_mm(&found.findings.current);
+        Ok([together, alone].into_iter().flatten().min_by(|a, b| left_mm(a).total_cmp(&left_mm(b))))
+    }
+
+    /// The set-up as a whole beside some causes, with further causes added to them; `None` where it has no fit.
+    fn set_up_beside(
+        &mut self,
+        beside: Vec<Supposed>,
+        measured: &Trace,
+        limits: RoundLimits,
+    ) -> Result<Option<WithSetUp>, DiagnosisError> {
+        self.tell(match beside.is_empty() {
+            true => "fitting the set-up as a whole: plates, rig, layers, block",
+            false => "fitting the set-up as a whole (plates, rig, layers, block) beside the causes found",
+        });
         // Without the further terms that the nominal fit took to make up for the set-up.
         let start = CauseFit {
             material: self.start.clone(),
-            causes: artefacts_of(&self.findings.current),
+            causes: artefacts_of(&self.findings.current).into_iter().chain(beside).collect(),
             ..self.findings.nominal.clone()
         };
         let Run { inference, registry, .. } = self;

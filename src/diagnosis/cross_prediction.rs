@@ -52,7 +52,7 @@ pub(super) struct Predictor<'a> {
     /// Causes that recordings have in common, of which one size does not serve all.
     pub(super) refused: Vec<CauseIdentity>,
     /// Whether the work is to stop.
-    pub(super) is_cancelled: &'a dyn Fn() -> bool,
+    pub(super) is_cancelled: &'a (dyn Fn() -> bool + Sync),
 }
 
 impl Predictor<'_> {

@@ -108,7 +108,7 @@ pub fn detectable(
     planned: &PlannedScan,
     material: &Ogden,
     options: &DiagnosisOptions,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<Detectable>, DiagnosisError> {
     options.check()?;
     let registry = Registry::standard().without(&options.left_out)?;

@@ -46,8 +46,8 @@ const INTERIOR_ABOVE: f64 = 2.0;
 pub fn diagnose(
     recording: &Recording,
     options: &DiagnosisOptions,
-    progress: &dyn Fn(&str),
-    is_cancelled: &dyn Fn() -> bool,
+    progress: &(dyn Fn(&str) + Sync),
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Diagnosis, DiagnosisError> {
     diagnose_with(&Registry::standard(), recording, options, progress, is_cancelled)
 }
@@ -60,8 +60,8 @@ pub fn diagnose_with(
     registry: &Registry,
     recording: &Recording,
     options: &DiagnosisOptions,
-    progress: &dyn Fn(&str),
-    is_cancelled: &dyn Fn() -> bool,
+    progress: &(dyn Fn(&str) + Sync),
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Diagnosis, DiagnosisError> {
     let registry = registry.clone().without(&options.left_out)?;
     let registry = match options.boundary {
@@ -79,8 +79,8 @@ pub(super) fn diagnose_among(
     registry: &Registry,
     recording: &Recording,
     options: &DiagnosisOptions,
-    progress: &dyn Fn(&str),
-    is_cancelled: &dyn Fn() -> bool,
+    progress: &(dyn Fn(&str) + Sync),
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Diagnosis, DiagnosisError> {
     options.check()?;
     let observed = Observed::new(recording, options.force_sd_n)?.with_boundary(options.boundary)?;
@@ -127,8 +127,8 @@ impl<'a> Run<'a> {
         observed: &'a Observed,
         registry: &'a Registry,
         options: &'a DiagnosisOptions,
-        progress: &'a dyn Fn(&str),
-        is_cancelled: &'a dyn Fn() -> bool,
+        progress: &'a (dyn Fn(&str) + Sync),
+        is_cancelled: &'a (dyn Fn() -> bool + Sync),
     ) -> Result<Run<'a>, DiagnosisError> {
         let mesh_factor = options.mesh_factor;
         let allowance_mm = options.allowance_mm.unwrap_or(ALLOWANCE_OF_DRIVE * largest_drive_mm(observed));

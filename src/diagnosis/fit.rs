@@ -72,7 +72,7 @@ pub fn fit(
     material: &Ogden,
     causes: &[Supposed],
     settings: &FitSettings,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<CauseFit, DiagnosisError> {
     let places = (0..scales(material, causes).len()).collect();
     let causes = causes.to_vec();
@@ -90,7 +90,7 @@ pub fn fit(
 pub(super) fn fit_member(
     member: Member,
     material: &Ogden,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<CauseFit, DiagnosisError> {
     let mut found = fit_members(&mut [member], material, is_cancelled)?;
     // One member, one fit.
@@ -140,7 +140,7 @@ impl Point {
 pub fn fit_members(
     members: &mut [Member],
     material: &Ogden,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<CauseFit>, DiagnosisError> {
     let Some(settings) = members.first().map(|m| m.settings) else { return Ok(Vec::new()) };
     let num = members.iter().flat_map(|m| &m.places).max().map_or(0, |last| last + 1);
@@ -189,7 +189,7 @@ struct MembersProblem<'f, 'a, 'b> {
     num_parameters: usize,
     num_data: f64,
     settings: FitSettings,
-    is_cancelled: &'f dyn Fn() -> bool,
+    is_cancelled: &'f (dyn Fn() -> bool + Sync),
 }
 
 impl LeastSquares for MembersProblem<'_, '_, '_> {
@@ -247,7 +247,7 @@ pub(super) fn deviance_at(
     material: &Ogden,
     causes: &[Supposed],
     settings: &FitSettings,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<f64, DiagnosisError> {
     let prediction = laboratory.predict(material, &scene_of(causes), is_cancelled)?;
     Ok(deviance_of(metric, measured, &prediction, material, causes, settings))
@@ -257,7 +257,7 @@ fn evaluate(
     members: &mut [Member],
     material: Ogden,
     causes: Vec<Vec<Supposed>>,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Point, DiagnosisError> {
     let (mut predictions, mut deviances) = (Vec::new(), Vec::new());
     for (m, causes) in members.iter_mut().zip(&causes) {

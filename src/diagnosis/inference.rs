@@ -39,12 +39,17 @@ pub(super) struct Inference<'a> {
     /// Element size as a factor on the standard one.
     pub(super) mesh_factor: f64,
     /// Whether the work is to stop.
-    pub(super) is_cancelled: &'a dyn Fn() -> bool,
+    pub(super) is_cancelled: &'a (dyn Fn() -> bool + Sync),
     /// Is told what is being done.
-    pub(super) progress: &'a dyn Fn(&str),
+    pub(super) progress: &'a (dyn Fn(&str) + Sync),
 }
 
-impl Inference<'_> {
+impl<'a> Inference<'a> {
+    /// The same for fits beside it, with a laboratory of its own.
+    pub(super) fn twin(&self) -> Inference<'a> {
+        Inference { laboratory: self.laboratory.twin(), metric: self.metric.clone(), ..*self }
+    }
+
     /// What a misfit weighs at the voxels for which `is_kept`.
     pub(super) fn metric_of(&self, is_kept: &dyn Fn(usize) -> bool) -> Metric {
         let metric = Metric::new(self.laboratory.observed(), self.allowance_mm, is_kept);

@@ -77,6 +77,13 @@ impl<'a> Laboratory<'a> {
         })
     }
 
+    /// The same for work beside it: what was prepared is shared, and what either finds the other does not see. Its
+    /// count of equilibria begins anew.
+    pub(super) fn twin(&self) -> Laboratory<'a> {
+        let (stations, own_error) = (self.stations.twin(), self.own_error.clone());
+        Laboratory { stations, own_error, num_solves: 0, ..*self }
+    }
+
     /// The recording looked at.
     pub fn observed(&self) -> &'a Observed {
         self.observed
@@ -104,7 +111,7 @@ impl<'a> Laboratory<'a> {
         &mut self,
         material: &Ogden,
         scene: &Scene,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Prediction, DiagnosisError> {
         let at = self.stations.at(scene)?;
         // A cancellation is seen between the steps' equilibria, of which each takes a second at most.
@@ -160,7 +167,7 @@ impl<'a> Laboratory<'a> {
         material: &Ogden,
         drive_mm: f64,
         last: Option<&Equilibrium>,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Equilibrium, DiagnosisError> {
         let moves_plates = model.departures().moves_plates();
         match model.solve(material, drive_mm, last, &self.solve, is_cancelled) {
@@ -190,7 +197,7 @@ impl<'a> Laboratory<'a> {
         material: &Ogden,
         scene: &Scene,
         drives_mm: &[f64],
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Vec<(f64, Vec<f64>, KernelState)>, DiagnosisError> {
         let at = self.stations.at(scene)?;
         let mut last: Option<Equilibrium> = None;

@@ -21,6 +21,7 @@ use super::trace::Trace;
 use crate::calibration::Observed;
 use crate::mesh::MeshOptions;
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 /// Element size of the finer mesh as a factor on ours.
 pub(super) const FINER: f64 = 0.5;
@@ -93,7 +94,7 @@ impl<'a> Finer<'a> {
         measured: &Trace,
         settings: &FitSettings,
         fitted: &mut CauseFit,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<MeshDefect, DiagnosisError> {
         let mut defect = self.defect(fitted, is_cancelled)?;
         for pass in 1..=MAX_CORRECTIONS {
@@ -118,7 +119,11 @@ impl<'a> Finer<'a> {
     ///
     /// # Errors
     /// As [`Self::correct`].
-    pub fn defect(&mut self, fitted: &CauseFit, is_cancelled: &dyn Fn() -> bool) -> Result<MeshDefect, DiagnosisError> {
+    pub fn defect(
+        &mut self,
+        fitted: &CauseFit,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
+    ) -> Result<MeshDefect, DiagnosisError> {
         let theirs = self.laboratory.predict(&fitted.material, &fitted.scene(), is_cancelled)?;
         Ok(MeshDefect { trace: theirs.trace.plus(-1.0, &fitted.prediction.trace), ratio: self.ratio })
     }
@@ -136,7 +141,7 @@ pub fn widen(
     settings: &FitSettings,
     fitted: &mut CauseFit,
     defect: Option<&MeshDefect>,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<(), DiagnosisError> {
     let observed = laboratory.observed();
     let columns = derivatives(laboratory, &fitted.material, &fitted.causes, &fitted.prediction)?;
@@ -151,12 +156,13 @@ pub fn widen(
         factor.solve(&DVector::from_iterator(weighed.len(), weighed.iter().map(|c| metric.inner(c, &change))))
     };
     // The shift by the error of our mesh, as each of the other meshes tells it.
-    let mut shifts = Vec::new();
-    for (coarser, force_prisms) in COARSER {
+    let material = &fitted.material;
+    let by_mesh = |&(coarser, force_prisms): &(f64, bool)| {
         let mesh = MeshOptions { force_prisms, ..MeshOptions::scaled(&observed.specimen, coarser * mesh_factor) };
-        let theirs = Laboratory::new(observed, &mesh)?.predict(&fitted.material, &fitted.scene(), is_cancelled)?;
-        shifts.push(shift_by(&fitted.prediction.trace.plus(-1.0, &theirs.trace)) / (coarser.powf(ORDER) - 1.0));
-    }
+        let theirs = Laboratory::new(observed, &mesh)?.predict(material, &fitted.scene(), is_cancelled)?;
+        Ok(shift_by(&fitted.prediction.trace.plus(-1.0, &theirs.trace)) / (coarser.powf(ORDER) - 1.0))
+    };
+    let mut shifts = COARSER.par_iter().map(by_mesh).collect::<Result<Vec<_>, DiagnosisError>>()?;
     // The part of that error which the correction by the finer mesh leaves.
     let left = defect.map_or(1.0, |d| d.ratio.powf(ORDER));
     shifts.extend(defect.map(|d| shift_by(&d.trace) / (1.0 - left)));

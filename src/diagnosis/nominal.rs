@@ -19,7 +19,7 @@ use crate::material::{Ogden, OgdenTerm};
 pub(super) fn first_guess(
     laboratory: &mut Laboratory,
     believed: Option<&Ogden>,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Ogden, DiagnosisError> {
     if let Some(believed) = believed {
         return Ok(believed.clone());

@@ -208,7 +208,12 @@ impl Registry {
     }
 
     /// Artefacts of a residual; `progress` is told how many there are.
-    pub(super) fn artefacts(&self, observed: &Observed, residual: &Trace, progress: &dyn Fn(&str)) -> Vec<Supposed> {
+    pub(super) fn artefacts(
+        &self,
+        observed: &Observed,
+        residual: &Trace,
+        progress: &(dyn Fn(&str) + Sync),
+    ) -> Vec<Supposed> {
         let mut all = Vec::new();
         for entry in &self.entries {
             if let Origin::Artefact { find, in_words } = entry.origin {

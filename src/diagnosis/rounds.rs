@@ -16,6 +16,7 @@ use super::registry::Registry;
 use super::score_round::{RoundScope, RoundScores, leading, score_suspects};
 use super::supposed::Supposed;
 use super::trace::Trace;
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Two fits end in the same place where their predictions differ by less than this part of the cause's effect.
@@ -37,15 +38,17 @@ const SHORTER_STARTS: [f64; 3] = [1.0, 0.4, 0.1];
 const NEAR_TOLERANCES: f64 = 5.0;
 
 /// A fit with one more cause.
-struct Trial {
+struct Trial<'a> {
     /// Fall of the deviance, less ln n per parameter of the cause.
     gain: f64,
     fit: CauseFit,
     /// Whether the fit went on to its end.
     is_settled: bool,
+    /// What it was made with.
+    inference: Inference<'a>,
 }
 
-impl Trial {
+impl Trial<'_> {
     /// Its gain as it counts against others.
     fn counted(&self) -> f64 {
         let is_sponge = self.fit.causes.last().is_some_and(|c| c.cause.is_sponge());
@@ -195,12 +198,12 @@ pub(super) fn add_causes<'r>(
 ///
 /// # Errors
 /// [`DiagnosisError`]: the work was cancelled.
-fn fit_leading(
-    inference: &mut Inference,
+fn fit_leading<'a>(
+    inference: &mut Inference<'a>,
     scored: &Scored,
     findings: &mut Findings,
     measured: &Trace,
-) -> Result<Vec<Trial>, DiagnosisError> {
+) -> Result<Vec<Trial<'a>>, DiagnosisError> {
     let Scored { candidates, known, .. } = scored;
     let mut trials: Vec<Trial> = Vec::new();
     let least = LEAST_PROMISE * smallest_share(&findings.current.causes) * findings.explained();
@@ -230,67 +233,85 @@ fn fit_leading(
 /// A cause and the values of its parameters from which its fit starts.
 type Start = (Arc<dyn Cause>, Vec<f64>);
 
-/// Adds the fits from `starts`, which end early, and goes on with those of all trials that may be the best.
+/// Adds the fits from `starts`, which end early, and goes on with those of all trials that may be the best. Fits are
+/// made side by side, each with a laboratory of its own, so that none depends on what another found.
 ///
 /// # Errors
 /// [`DiagnosisError`]: the work was cancelled.
-fn fit_starts(
-    inference: &mut Inference,
+fn fit_starts<'a>(
+    inference: &mut Inference<'a>,
     findings: &mut Findings,
     measured: &Trace,
     known: &[Trace],
     starts: &[Start],
-    trials: &mut Vec<Trial>,
+    trials: &mut Vec<Trial<'a>>,
 ) -> Result<(), DiagnosisError> {
     if starts.is_empty() {
         return Ok(());
     }
     let settings = inference.settings;
     let tolerance = settings.tolerance.max(ROUGH_TOLERANCE * inference.misfit_beyond_noise(&findings.current));
-    inference.settings.relative_tolerance = ROUGH_TOLERANCE;
-    for (cause, values) in starts {
-        trials.extend(tried(inference, findings, measured, known, cause, values));
+    let round = findings.num_rounds;
+    let twins: Vec<(Inference, &Start)> = starts.iter().map(|start| (inference.twin(), start)).collect();
+    let current = &findings.current;
+    let found: Vec<Option<Trial>> = twins
+        .into_par_iter()
+        .map(|(mut twin, start)| {
+            twin.settings.relative_tolerance = ROUGH_TOLERANCE;
+            let fitted = tried(&mut twin, current, round, measured, known, start);
+            twin.settings = settings;
+            fitted.map(|(gain, fit)| Trial { gain, fit, is_settled: false, inference: twin })
+        })
+        .collect();
+    for ((cause, _), trial) in starts.iter().zip(&found) {
+        // Suspects without an identity of their own, as two balls, share the last entry.
+        let identity = cause.identity();
+        if let (Some(trial), Some(ranked)) = (trial, findings.ranked.iter_mut().rev().find(|r| r.identity == identity))
+        {
+            ranked.fitted = Some(trial.gain);
+        }
     }
-    inference.settings = settings;
+    trials.extend(found.into_iter().flatten());
     let best = trials.iter().map(Trial::counted).fold(f64::NEG_INFINITY, f64::max);
     let near = (best - 2.0 * AMBIGUITY).max(EVIDENCE) - NEAR_TOLERANCES * tolerance;
-    for trial in trials.iter_mut().filter(|t| !t.is_settled && t.counted() > near) {
-        match inference.fit(measured, &trial.fit.material, &trial.fit.causes) {
-            Ok(fit) => *trial = Trial { gain: gain_of(inference, &findings.current, &fit), fit, is_settled: true },
-            Err(error) if (inference.is_cancelled)() => return Err(error),
-            Err(_) => {}
+    let current = &findings.current;
+    trials.par_iter_mut().filter(|t| !t.is_settled && t.counted() > near).try_for_each(|trial| {
+        match trial.inference.fit(measured, &trial.fit.material, &trial.fit.causes) {
+            Ok(fit) => {
+                (trial.gain, trial.is_settled) = (gain_of(&trial.inference, current, &fit), true);
+                trial.fit = fit;
+                Ok(())
+            }
+            Err(error) if (trial.inference.is_cancelled)() => Err(error),
+            Err(_) => Ok(()),
         }
+    })?;
+    for trial in trials {
+        inference.laboratory.num_solves += std::mem::take(&mut trial.inference.laboratory.num_solves);
     }
     Ok(())
 }
 
-/// The fit with one more cause, which ends early; `None` where it has none or the work is cancelled.
+/// The fit with one more cause, which ends early, and what it gains; `None` where it has none or the work is cancelled.
 fn tried(
     inference: &mut Inference,
-    findings: &mut Findings,
+    current: &CauseFit,
+    round: usize,
     measured: &Trace,
     known: &[Trace],
-    cause: &Arc<dyn Cause>,
-    values: &[f64],
-) -> Option<Trial> {
+    (cause, values): &Start,
+) -> Option<(f64, CauseFit)> {
     if (inference.is_cancelled)() {
         return None;
     }
-    (inference.progress)(&format!("round {}: fitting '{}'", findings.num_rounds, cause.description()));
-    let current = &findings.current;
+    (inference.progress)(&format!("round {round}: fitting '{}'", cause.description()));
     let mut fit_from = |values: Vec<f64>| {
         let mut supposed = current.causes.clone();
         supposed.push(Supposed { cause: cause.clone(), values });
         inference.fit_with_leaps(measured, &current.material, &supposed, known).ok()
     };
     let fit = SHORTER_STARTS.into_iter().find_map(|part| fit_from(between(&cause.start(), values, part)))?;
-    let gain = gain_of(inference, current, &fit);
-    // Suspects without an identity of their own, as two balls, share the last entry.
-    let identity = cause.identity();
-    if let Some(ranked) = findings.ranked.iter_mut().rev().find(|r| r.identity == identity) {
-        ranked.fitted = Some(gain);
-    }
-    Some(Trial { gain, fit, is_settled: false })
+    Some((gain_of(inference, current, &fit), fit))
 }
 
 /// A start `part` of the way from one to the other.
@@ -306,14 +327,14 @@ fn gain_of(inference: &Inference, current: &CauseFit, fit: &CauseFit) -> f64 {
 
 /// Names the best trial as a cause where the evidence for it is strong enough, with what cannot be told apart from it;
 /// whether it did.
-fn take_best(
-    inference: &mut Inference,
+fn take_best<'a>(
+    inference: &mut Inference<'a>,
     findings: &mut Findings,
-    trials: Vec<Trial>,
+    trials: Vec<Trial<'a>>,
     evidence: f64,
 ) -> Result<bool, DiagnosisError> {
     let mut trials = trials.into_iter();
-    let Some(best) = trials.next() else { return Ok(false) };
+    let Some(mut best) = trials.next() else { return Ok(false) };
     let effect = best.fit.prediction.trace.plus(-1.0, &findings.current.prediction.trace);
     let share = smallest_share(&findings.current.causes);
     let least = evidence.max(share * findings.explained());
@@ -334,6 +355,9 @@ fn take_best(
     }
     findings.causes.push(last_cause(inference, &best, &effect));
     findings.current = best.fit;
+    // Its laboratory has the models and the equilibria from which the next round starts.
+    best.inference.laboratory.num_solves += inference.laboratory.num_solves;
+    inference.laboratory = best.inference.laboratory;
     Ok(true)
 }
 

@@ -15,7 +15,7 @@ pub(super) struct Search<'s, 'a> {
     /// The score test of what that fit leaves, with the material and the causes so far free.
     pub(super) test: &'s ScoreTest<'s>,
     /// Whether the work is to stop.
-    pub(super) is_cancelled: &'s dyn Fn() -> bool,
+    pub(super) is_cancelled: &'s (dyn Fn() -> bool + Sync),
     /// The most that a suspect of this round explains so far, to first order. Causes are asked in the order of the
     /// registry.
     pub(super) top: f64,
@@ -29,7 +29,7 @@ impl<'s, 'a> Search<'s, 'a> {
         laboratory: &'s mut Laboratory<'a>,
         current: &'s CauseFit,
         test: &'s ScoreTest<'s>,
-        is_cancelled: &'s dyn Fn() -> bool,
+        is_cancelled: &'s (dyn Fn() -> bool + Sync),
     ) -> Search<'s, 'a> {
         Search { laboratory, current, test, is_cancelled, top: 0.0, bonds: None, stiffness: None }
     }

@@ -3,7 +3,7 @@
 use super::error::DiagnosisError;
 use super::scene::{MovedCut, Pose, Scene};
 use crate::calibration::{Observed, Placing, View};
-use crate::fem::{Equilibrium, ForwardModel, PrepareError};
+use crate::fem::{Departures, Equilibrium, ForwardModel, PrepareError};
 use crate::mesh::{
     BlockShape, DesignVariable, Mesh, MeshOptions, cut_offset, half_extents_mm, made_mesh, mesh_cut_specimen, morphed,
     shape_velocity,
@@ -28,17 +28,31 @@ pub(super) struct Station {
     /// The mesh of the specimen as drawn, with the cut where it was meshed.
     base: Arc<Mesh>,
     /// The mesh of the drawn block with the holes and the cut as they are.
-    drawn: Mesh,
+    drawn: Arc<Mesh>,
     /// Of the block as made.
     pub(super) model: ForwardModel,
     /// Of the image as it lies.
-    pub(super) view: View,
+    pub(super) view: Arc<View>,
     pose: Pose,
     /// The last equilibria, from which the next start.
     pub(super) states: Vec<Equilibrium>,
 }
 
 impl Station {
+    /// The same for work beside it: what it prepared is shared, and what is solved with either is not seen by the other.
+    fn twin(&self) -> Station {
+        Station {
+            holes: self.holes.clone(),
+            base: self.base.clone(),
+            drawn: self.drawn.clone(),
+            model: self.model.departed(&Departures::default()),
+            view: self.view.clone(),
+            pose: self.pose,
+            states: self.states.clone(),
+            ..*self
+        }
+    }
+
     /// Where the view takes the image to lie.
     pub(super) fn pose(&self) -> &Pose {
         &self.pose
@@ -73,6 +87,11 @@ impl<'a> Stations<'a> {
         Stations { observed, options, nominal: Arc::new(nominal), all: Vec::new() }
     }
 
+    /// The same for work beside them.
+    pub(super) fn twin(&self) -> Stations<'a> {
+        Stations { nominal: self.nominal.clone(), all: self.all.iter().map(Station::twin).collect(), ..*self }
+    }
+
     /// Forgets the equilibria.
     pub(super) fn forget(&mut self) {
         self.all.iter_mut().for_each(|s| s.states.clear());
@@ -99,7 +118,8 @@ impl<'a> Stations<'a> {
         if let Some(at) = found {
             let station = &mut self.all[at];
             if station.pose != pose {
-                station.view = self.observed.placed_view(&made, &station.drawn, &placing(&pose, scene.shape))?;
+                let view = self.observed.placed_view(&made, &station.drawn, &placing(&pose, scene.shape))?;
+                station.view = Arc::new(view);
                 station.pose = pose;
             }
             return Ok(at);
@@ -134,7 +154,8 @@ impl<'a> Stations<'a> {
             self.all.remove(1);
         }
         let (shape, cut) = (scene.shape, scene.cut);
-        self.all.push(Station { holes, releases, shape, cut, base, drawn: mesh, model, view, pose, states });
+        let (drawn, view) = (Arc::new(mesh), Arc::new(view));
+        self.all.push(Station { holes, releases, shape, cut, base, drawn, model, view, pose, states });
         Ok(self.all.len() - 1)
     }
 

@@ -94,8 +94,8 @@ impl Common {
 pub fn together(
     diagnoses: &[(&str, &Diagnosis)],
     mesh_factor: f64,
-    progress: &dyn Fn(&str),
-    is_cancelled: &dyn Fn() -> bool,
+    progress: &(dyn Fn(&str) + Sync),
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<TogetherResult, DiagnosisError> {
     // A material that serves all needs as many terms as the richest of them.
     let start = diagnoses.iter().map(|(_, d)| &d.corrected.material).max_by_key(|m| m.terms.len());
@@ -141,7 +141,7 @@ struct CommonFit<'a> {
     cases: Vec<Case<'a>>,
     /// Number of the one material's parameters.
     num_material: usize,
-    is_cancelled: &'a dyn Fn() -> bool,
+    is_cancelled: &'a (dyn Fn() -> bool + Sync),
 }
 
 /// The sum of the deviances of all recordings.
@@ -171,7 +171,7 @@ impl CommonFit<'_> {
         &mut self,
         shared: &[CauseFit],
         own: &[Vec<Supposed>],
-        progress: &dyn Fn(&str),
+        progress: &(dyn Fn(&str) + Sync),
     ) -> Result<Vec<(CauseIdentity, CommonCause)>, DiagnosisError> {
         let mut found = Vec::new();
         for cause in own[0].iter().filter(|c| !c.cause.is_artefact()) {
@@ -267,7 +267,7 @@ fn widen_all(
     cases: &mut [Case],
     mesh_factor: f64,
     shared: &mut [CauseFit],
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<(), DiagnosisError> {
     let num_material = shared[0].material.parameters().len();
     let noise: Vec<f64> = shared[0].sd[..num_material].to_vec();

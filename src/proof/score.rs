@@ -120,7 +120,7 @@ pub fn score_one(
     hidden: &Hidden,
     is_known: bool,
     mesh_factor: f64,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Scored, ConcealError> {
     let made = conceal(specimen, &Experiment::of_one(hidden))?;
     let mut options = DiagnosisOptions { mesh_factor, ..DiagnosisOptions::default() };

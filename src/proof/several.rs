@@ -129,7 +129,7 @@ pub fn score_experiment(
     kind: ExperimentKind,
     experiment: &Experiment,
     mesh_factor: f64,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<SeveralScored, ConcealError> {
     let own_specimen = specimen_of(specimen, experiment);
     let made = conceal(&own_specimen, experiment)?;

@@ -84,10 +84,10 @@ pub(super) const AT_BOUNDARY: &[CauseName] = &[
 ];
 
 /// The causes that act inside the sample. They say little of a misfit that vanishes once the boundary is as measured.
+/// (Swelling does not belong here: it moves the boundary, and what it does to the inside vanishes with that.)
 pub(super) const INSIDE: &[CauseName] = &[
     gradient::ENTRY.name,
     law::ENTRY.name,
-    swelling::ENTRY.name,
     hole::ENTRY.name,
     cut::ENTRY.name,
     fibre::ENTRY.name,
