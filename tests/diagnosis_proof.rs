@@ -5,8 +5,8 @@ mod common;
 
 use lambdak::diagnosis::{CauseName, Diagnosis, DiagnosisOptions, Verdict, diagnose};
 use lambdak::proof::{
-    Experiment, Hidden, HiddenCause, ProofOptions, conceal, draw_cause, draw_harmless, draw_several, draw_with_unknown,
-    prove, score_one,
+    Experiment, ExperimentKind, Hidden, HiddenCause, ProofOptions, conceal, draw_cause, draw_harmless, draw_several,
+    draw_with_unknown, prove, score_experiment, score_one,
 };
 use lambdak::specimen::Specimen;
 
@@ -129,6 +129,20 @@ fn an_ambiguous_cause_comes_with_the_experiment() {
     // Half way both do half of what they do, under the same noise: nothing new.
     let at = |drive: f64| experiments.iter().find(|e| (e.drive_mm - drive).abs() < 1e-9).map_or(0.0, |e| e.distance_sd);
     assert!(at(3.5) < at(10.5), "{experiments:?}");
+}
+
+/// Bonds that give and a sample that has swollen: what swelling does inside follows from how it moves the boundary, so
+/// that the interior test passes. Both are named, and nothing in their place.
+#[test]
+fn swelling_beside_soft_bonds_is_named() {
+    let experiment = draw_several(811_890_992_310);
+    assert_eq!(
+        experiment.hidden.iter().map(|h| h.cause).collect::<Vec<_>>(),
+        [HiddenCause::Bond, HiddenCause::Swelling]
+    );
+    let found = score_experiment(&specimen(), ExperimentKind::Several, &experiment, 2.2, &common::never).unwrap();
+    assert!(found.causes.iter().all(|c| c.is_detectable && c.is_named), "{found:?}");
+    assert!(found.false_names.is_empty(), "{found:?}");
 }
 
 /// One seed, one experiment. Several causes are of different kinds and begin with the mount and the material; a hidden

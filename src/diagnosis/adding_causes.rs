@@ -28,6 +28,10 @@ const SET_UP_GAINS: f64 = 0.7;
 /// explains a smaller part of what was left than the one before it did.
 const LEAST_OF_FIRST: f64 = 0.2;
 
+/// Causes inside the sample no longer wait where those at its boundary have explained so much that less than this part
+/// of the misfit (in squares) is left: what is left may be inside.
+const MOST: f64 = 0.5;
+
 /// Where causes leave a misfit unexplained, one that alone explained at least this part of what the first did is tried
 /// in its place: the greedy choice between two that explain nearly the same may be the wrong one.
 const NEARLY_AS_MUCH: f64 = 0.95;
@@ -105,7 +109,11 @@ impl Run<'_> {
             lefts.borrow_mut().push(inference.misfit_beyond_noise(&findings.current));
             let is_explained = is_explained(left, before_mm, inference.allowance_mm);
             are_given_up.set(is_promising && !is_explained && explain_ever_less(&lefts.borrow()));
-            let asked = if is_explained { everything } else { first };
+            let are_most_explained = {
+                let lefts = lefts.borrow();
+                lefts.last() < lefts.first().map(|before| MOST * before).as_ref()
+            };
+            let asked = if is_explained || are_most_explained { everything } else { first };
             (!are_given_up.get()).then_some(asked)
         };
         if fit_round(inference, findings, &measured, &scored)? {

@@ -10,6 +10,9 @@ const EVIDENCE: f64 = 6.0;
 const FALL: f64 = 0.5;
 /// Root mean squares of J − 1 below this are no matter of the components: rubbers are compressed by as much.
 const NEGLIGIBLE_CHANGE: f64 = 0.015;
+/// A sample may have swollen or shrunk by up to this part of its volume, everywhere alike, which is no matter of the
+/// components either.
+const LARGEST_SWELLING: f64 = 0.1;
 /// Products of volume changes count up to this size, so that a few cells of noise do not decide.
 const LARGEST_PRODUCT: f64 = 1.0;
 /// A cell is part of a pair along each of the axes, and pairs with a common cell are not independent.
@@ -28,8 +31,9 @@ impl Recording {
     /// the components y and z.
     ///
     /// Voxels are averaged into cells about as long along every axis, so that noise along the shortest edge does not
-    /// drown the rest. The measure is the mean product of J − 1 in neighbouring cells: central differences there share
-    /// no voxel, so that noise does not enter it, and of a material that keeps its volume it is zero.
+    /// drown the rest. The measure is the mean product of J − 1 in neighbouring cells, less what is the same in all of
+    /// them and may be swelling: central differences there share no voxel, so that noise does not enter it, and of a
+    /// material that keeps its volume it is zero.
     ///
     /// # Errors
     /// [`RecordingError::Components`] where another reading explains the volume far better.
@@ -61,19 +65,25 @@ impl VolumeChanges {
     fn of(recording: &Recording, displacement: &[[f64; 3]], max_cells: usize) -> VolumeChanges {
         let grid = &recording.grid;
         let cells = Cells::new(recording, displacement);
+        let first = (0..grid.num_voxels()).step_by(grid.num_voxels().div_ceil(max_cells)).map(|v| grid.indices(v));
+        let swelling = mean_swelling(first.clone().filter_map(|first| cells.volume_changes(first)));
         let mut sums = VolumeChanges {
             num_pairs: 0.0,
             independent_part: 1.0 / cells.num_voxels as f64,
             products: [0.0; NUM_READINGS],
             falls_squared: [0.0; NUM_READINGS],
         };
-        for first in (0..grid.num_voxels()).step_by(grid.num_voxels().div_ceil(max_cells)) {
-            let first = grid.indices(first);
-            let Some(here) = cells.volume_changes(first) else { continue };
+        let beyond = |first: [usize; 3]| {
+            let mut changes = cells.volume_changes(first)?;
+            changes.iter_mut().zip(swelling).for_each(|(change, swelling)| *change -= swelling);
+            Some(changes)
+        };
+        for first in first {
+            let Some(here) = beyond(first) else { continue };
             for axis in 0..3 {
                 let mut next = first;
                 next[axis] += cells.per_cell[axis];
-                if let Some(there) = cells.volume_changes(next) {
+                if let Some(there) = beyond(next) {
                     sums.add(here, there);
                 }
             }
@@ -109,6 +119,16 @@ impl VolumeChanges {
         let is_large = stored > NEGLIGIBLE_CHANGE * NEGLIGIBLE_CHANGE;
         (is_evident && is_large && mended < FALL * stored).then_some((fault, mended))
     }
+}
+
+/// By reading, the mean of J − 1, as far as it may be swelling.
+fn mean_swelling(changes: impl Iterator<Item = [f64; NUM_READINGS]>) -> [f64; NUM_READINGS] {
+    let (mut sums, mut count) = ([0.0; NUM_READINGS], 0.0);
+    for changes in changes {
+        sums.iter_mut().zip(changes).for_each(|(sum, change)| *sum += change);
+        count += 1.0;
+    }
+    sums.map(|sum| (sum / f64::max(count, 1.0)).clamp(-LARGEST_SWELLING, LARGEST_SWELLING))
 }
 
 /// Displacements averaged over cells of voxels.
@@ -195,9 +215,15 @@ mod tests {
     /// A bar pulled by a fifth of its length that keeps its volume and thins in y more than in z, with noise, stored as
     /// `stored` does.
     fn pulled(stored: impl Fn([f64; 3]) -> [f64; 3]) -> Result<(), RecordingError> {
+        swollen(1.0, stored)
+    }
+
+    /// As [`pulled`], of a bar that has swollen by a factor in volume, along y and z.
+    fn swollen(volume: f64, stored: impl Fn([f64; 3]) -> [f64; 3]) -> Result<(), RecordingError> {
         let specimen = Specimen::from_json(include_str!("../../geometries/uniaxial-bar.json")).expect("a specimen");
         let grid = VoxelGrid::covering(&specimen, [1.0, 0.4, 1.0]).expect("a grid");
-        let stretch: [f64; 3] = [1.2, 1.0 / (1.2 * 0.96), 0.96];
+        let across = f64::sqrt(volume);
+        let stretch: [f64; 3] = [1.2, across / (1.2 * 0.96), 0.96 * across];
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         let displacement = (0..grid.num_voxels())
             .map(|v| {
@@ -240,6 +266,15 @@ mod tests {
                 }
                 other => panic!("{fault:?}: {other:?}"),
             }
+        }
+    }
+
+    /// Swelling changes the volume, too; the components are as they should be.
+    #[test]
+    fn a_sample_that_swells_or_shrinks_is_taken() {
+        for volume in [0.92, 0.95, 1.05, 1.08] {
+            swollen(volume, |u| u).expect("a sample that swelled");
+            assert!(swollen(volume, |[x, y, z]| [x, -y, z]).is_err(), "{volume}");
         }
     }
 
