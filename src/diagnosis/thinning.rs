@@ -82,7 +82,8 @@ impl QuadraticModel {
     }
 
     /// What the parameters of a cause cost: of one that is believed in the logarithm of how far the data narrow the
-    /// belief (the Occam factor of Laplace's approximation), of any other ln n.
+    /// belief (the Occam factor of Laplace's approximation), of any other ln n. What is no part of the set-up must be
+    /// called for by as much evidence as any cause.
     fn cost(&self, cause: usize, supposed: &Supposed, inference: &Inference) -> f64 {
         let parameters = supposed.cause.parameters();
         if parameters.iter().any(|p| p.believed_sd.is_none()) {
@@ -92,7 +93,8 @@ impl QuadraticModel {
         let prior: f64 = parameters.iter().map(|p| -2.0 * prior_scales(p).ln()).sum();
         let log_determinant =
             own.cholesky().map_or(0.0, |c| 2.0 * c.l().diagonal().iter().map(|x| x.ln()).sum::<f64>());
-        (log_determinant - prior).max(0.0)
+        let evidence = if supposed.cause.is_of_set_up() { 0.0 } else { EVIDENCE };
+        (log_determinant - prior).max(0.0) + evidence
     }
 
     /// The model without a cause: the others have followed.
