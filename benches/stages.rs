@@ -1,8 +1,8 @@
 //! Times each stage of solve and evaluate on the two-hole double-lap shear specimen (full model, 5 mm), at about 20, 70
 //! and 200 thousand unknowns, and of one design evaluation. `cargo bench --bench stages [-- 20k]`.
 //!
-//! Medians of repeated runs, wall seconds on all threads (of one with `RAYON_NUM_THREADS=1`), and the ratio of each stage to
-//! the whole forward solution.
+//! Medians of repeated runs, wall seconds on all threads (of one with `RAYON_NUM_THREADS=1`), and the ratio of each
+//! stage to the whole forward solution.
 
 use lambdak::fem::{ForwardModel, SolveOptions};
 use lambdak::material::Ogden;

@@ -244,8 +244,8 @@ impl Run<'_> {
     }
 
     /// The set-up as a whole with causes added to it, where what was named so far leaves much of the misfit: beside the
-    /// causes found one by one, and, where both together leave much of it too, alone. `None` where it is not asked for, or
-    /// has no fit.
+    /// causes found one by one, and, where both together leave much of it too, alone. `None` where it is not asked
+    /// for, or has no fit.
     fn with_set_up(&mut self, measured: &Trace, limits: RoundLimits) -> Result<Option<WithSetUp>, DiagnosisError> {
         let parts = self.registry.set_up(self.observed);
         if parts.is_empty() || self.is_explained_by(&self.findings) {

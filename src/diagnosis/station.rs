@@ -39,7 +39,7 @@ pub(super) struct Station {
 }
 
 impl Station {
-    /// The same for work beside it: what it prepared is shared, and what is solved with either is not seen by the other.
+    /// The same for work beside it: what it prepared is shared, and what either solves the other does not see.
     fn twin(&self) -> Station {
         Station {
             holes: self.holes.clone(),

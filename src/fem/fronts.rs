@@ -1,16 +1,16 @@
 //! Fronts: the dense matrices in which a sparse matrix is factorised, their tree, and who works on which of them.
 //!
 //! The multifrontal method (Duff and Reid 1983; Liu 1992, SIAM Review 34) eliminates the columns of one supernode in a
-//! dense matrix of these columns' rows, and hands what is left of the rows below, the *update*, to the front of the next
+//! dense matrix of these columns' rows. What is left of the rows below, the *update*, goes to the front of the next
 //! column that it touches. Updates come and go as on a stack where fronts are taken in postorder.
 //!
-//! Subtrees that share nothing are *tasks*, on which threads work side by side; the fronts above them follow one by one.
-//! How the tree is divided does not depend on the number of threads, so that results do not either.
+//! Subtrees that share nothing are *tasks*, on which threads work side by side; the fronts above them follow one by
+//! one. How the tree is divided does not depend on the number of threads, so that results do not either.
 
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use std::ops::Range;
 
-/// Marks a front without a parent, and the arena of fronts above all tasks.
+/// Marks a front without a parent.
 const NONE: u32 = u32::MAX;
 /// Subtrees with more than this part of all operations are divided.
 const LARGEST_TASK: f64 = 1.0 / 16.0;
@@ -139,7 +139,8 @@ impl Fronts {
         self.places[s]
     }
 
-    /// Operations of one front: ⅓ n³ + n² m + n m² multiplications and as many additions, half of the last for symmetry.
+    /// Operations of one front of n columns and m rows below: a Cholesky factor of n columns, n columns divided by it,
+    /// and half of their square.
     fn work_of(&self, s: usize) -> f64 {
         let (n, m) = (self.num_columns(s) as f64, self.num_below(s) as f64);
         n * n * n / 3.0 + n * n * m + n * m * m

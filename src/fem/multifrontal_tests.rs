@@ -118,8 +118,8 @@ fn solved(matrix: &Matrix, symbolic: &SymbolicCholesky<usize>, crew: &Crew) -> (
     (values, x)
 }
 
-/// A x is the right-hand side to rounding (condition number about 50, sums of 27 terms), on trees of one task and of many
-/// with fronts that are shared, and what several threads find is what one finds to the last bit.
+/// A x is the right-hand side to rounding (condition number about 50, sums of 27 terms), on trees of one task and of
+/// many with fronts that are shared, and what several threads find is what one finds to the last bit.
 #[test]
 fn a_factor_solves_its_matrix_on_any_number_of_threads() {
     for (size, is_divided) in [([1, 1, 1], false), ([5, 4, 3], false), ([13, 14, 15], true)] {
