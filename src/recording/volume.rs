@@ -10,9 +10,9 @@ const EVIDENCE: f64 = 6.0;
 const FALL: f64 = 0.5;
 /// Root mean squares of J − 1 below this are no matter of the components: rubbers are compressed by as much.
 const NEGLIGIBLE_CHANGE: f64 = 0.015;
-/// A sample may have swollen or shrunk by up to this part of its volume, everywhere alike, which is no matter of the
-/// components either.
-const LARGEST_SWELLING: f64 = 0.1;
+/// A sample may have swollen or shrunk by up to this part of its volume, everywhere alike (2 % of its length), which is
+/// no matter of the components either.
+const LARGEST_SWELLING: f64 = 0.06;
 /// Products of volume changes count up to this size, so that a few cells of noise do not decide.
 const LARGEST_PRODUCT: f64 = 1.0;
 /// A cell is part of a pair along each of the axes, and pairs with a common cell are not independent.
@@ -223,7 +223,7 @@ mod tests {
         let specimen = Specimen::from_json(include_str!("../../geometries/uniaxial-bar.json")).expect("a specimen");
         let grid = VoxelGrid::covering(&specimen, [1.0, 0.4, 1.0]).expect("a grid");
         let across = f64::sqrt(volume);
-        let stretch: [f64; 3] = [1.2, across / (1.2 * 0.96), 0.96 * across];
+        let stretch: [f64; 3] = [1.2, across / (1.2 * 0.93), 0.93 * across];
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         let displacement = (0..grid.num_voxels())
             .map(|v| {
@@ -272,7 +272,7 @@ mod tests {
     /// Swelling changes the volume, too; the components are as they should be.
     #[test]
     fn a_sample_that_swells_or_shrinks_is_taken() {
-        for volume in [0.92, 0.95, 1.05, 1.08] {
+        for volume in [0.95, 0.98, 1.02, 1.05] {
             swollen(volume, |u| u).expect("a sample that swelled");
             assert!(swollen(volume, |[x, y, z]| [x, -y, z]).is_err(), "{volume}");
         }
