@@ -4,7 +4,7 @@
 use super::cause_fit::CauseFit;
 use super::diagnose::Run;
 use super::error::DiagnosisError;
-use super::evidence::{EVIDENCE, OF_IMAGE_ALONE, UNEXPLAINED, is_large_force, penalty};
+use super::evidence::{EVIDENCE, UNEXPLAINED, penalty};
 use super::findings::Findings;
 use super::inference::Inference;
 use super::interior::InteriorTest;
@@ -90,11 +90,8 @@ impl Run<'_> {
         let left_mm =
             |fitted: &CauseFit, metric: &Metric| leftover(observed, &fitted.residual, metric).structured_rms_mm;
         let before_mm = left_mm(&findings.current, &inference.metric);
-        // What is no more than a mesh's has no cause but in the image.
-        if before_mm < inference.allowance_mm && !is_large_force(observed, &findings.current.residual) {
-            let of_image = self.registry.clone().of_image_alone(&observed.specimen);
-            let asked = Asked { registry: &of_image, with_terms: false, evidence: OF_IMAGE_ALONE * EVIDENCE };
-            return add_causes(inference, findings, &measured, limits, &|_, _| Some(asked));
+        if inference.leaves_no_more_than_a_mesh(&findings.current) {
+            return add_causes(inference, findings, &measured, limits, &|_, _| Some(everything));
         }
         let begun = findings.current.clone();
         let scored = score_round(inference, first, findings, limits)?;
@@ -109,10 +106,7 @@ impl Run<'_> {
             lefts.borrow_mut().push(inference.misfit_beyond_noise(&findings.current));
             let is_explained = is_explained(left, before_mm, inference.allowance_mm);
             are_given_up.set(is_promising && !is_explained && explain_ever_less(&lefts.borrow()));
-            let are_most_explained = {
-                let lefts = lefts.borrow();
-                lefts.last() < lefts.first().map(|before| MOST * before).as_ref()
-            };
+            let are_most_explained = matches!(lefts.borrow()[..], [before, .., last] if last < MOST * before);
             let asked = if is_explained || are_most_explained { everything } else { first };
             (!are_given_up.get()).then_some(asked)
         };

@@ -143,10 +143,6 @@ pub trait Cause: Send + Sync {
     fn identity(&self) -> CauseIdentity {
         CauseIdentity { name: self.name(), variant: self.variant() }
     }
-    /// Whether it holds other suspects of its name: beside one of them it says little that is new.
-    fn is_several_in_one(&self) -> bool {
-        false
-    }
     /// How many suspects of its name are fitted in full in one round. More than one where suspects differ in their
     /// place or direction and first order does not tell reliably which of them is right.
     fn max_suspects(&self) -> usize {

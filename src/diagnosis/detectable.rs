@@ -29,7 +29,7 @@ use super::cause::{Cause, CauseName};
 use super::diagnose::BELIEVED_LOG_SD;
 use super::error::DiagnosisError;
 use super::evidence::{
-    ALLOWANCE_OF_DRIVE, EVIDENCE, OF_IMAGE_ALONE, SPONGE_COUNTS, penalty, times_to_large, times_to_large_force,
+    ALLOWANCE_OF_DRIVE, EVIDENCE, OF_IMAGE_ALONE, counted_part, penalty, times_to_large, times_to_large_force,
 };
 use super::laboratory::Laboratory;
 use super::leftover::structure_of;
@@ -99,8 +99,6 @@ impl Detectable {
 /// probability by a diagnosis with `options`, the sample being of `material`: one entry per parameter of each cause, in
 /// the order of the registry. Solves one equilibrium per drive.
 ///
-/// A cause that holds others of its name (a gain error of all axes) has no entry of its own.
-///
 /// # Errors
 /// [`DiagnosisError`]: a setting is out of its range, the specimen cannot be modelled or has no equilibrium, or the
 /// work was cancelled.
@@ -135,7 +133,7 @@ pub fn detectable(
     let prepared = ScoreTest::new(&metric, &nuisance[0].scaled(0.0), &nuisance, &priors).prepare(&directions);
     let room = Room { observed: &observed, metric: &metric, allowance_mm, suspects, firsts, prepared };
     let mut found = Vec::new();
-    for (index, cause) in room.suspects.iter().enumerate().filter(|(_, c)| !c.is_several_in_one()) {
+    for (index, cause) in room.suspects.iter().enumerate() {
         for place in 0..cause.parameters().len() {
             let direction = room.firsts[index] + place;
             let own = own_effect(&directions[direction], &nuisance, &room.prepared.projected, direction);
@@ -242,7 +240,7 @@ impl Room<'_> {
         let cause = &self.suspects[index];
         let num_parameters = cause.parameters().len();
         Contender {
-            weight: if cause.is_sponge() { SPONGE_COUNTS } else { 1.0 },
+            weight: counted_part(&**cause),
             num_parameters: num_parameters as f64,
             cost: penalty(self.metric, num_parameters),
         }
@@ -278,9 +276,6 @@ struct Alike {
 /// weight, against ρ λ + p′ − cost of the other.
 fn root_noncentrality(own: Contender, rival: Contender, Alike { share, overlap }: Alike) -> f64 {
     let ahead = own.weight - rival.weight * share;
-    if ahead < ROUNDING {
-        return f64::INFINITY;
-    }
     let behind = own.weight * (own.cost - own.num_parameters) - rival.weight * (rival.cost - rival.num_parameters);
     let (a, b) = (own.weight, rival.weight);
     let slope = (a * a - 2.0 * a * b * share + b * b * share).max(0.0);
@@ -288,6 +283,9 @@ fn root_noncentrality(own: Contender, rival: Contender, Alike { share, overlap }
     let constant = 2.0 * of_noise.max(0.0);
     // ahead λ − behind ≥ z √(4 slope λ + constant); with √(x + y) ≤ √x + √y a quadratic in √λ.
     let (half, rest) = (NORMAL_QUANTILE * slope.sqrt(), behind + NORMAL_QUANTILE * constant.sqrt());
+    if ahead < ROUNDING {
+        return if slope < ROUNDING && rest < 0.0 { 0.0 } else { f64::INFINITY };
+    }
     let discriminant = half * half + ahead * rest;
     // Where it costs so much less that the other is behind at any size, there is nothing to ask.
     if discriminant < 0.0 { 0.0 } else { ((half + discriminant.sqrt()) / ahead).max(0.0) }

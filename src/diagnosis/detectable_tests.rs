@@ -122,6 +122,8 @@ fn a_rival_is_left_behind_by_what_it_cannot_explain() {
     let ahead = |own, rival, share| root_noncentrality(own, rival, Alike { share, overlap: share });
     // One that explains everything for no more parameters is never told apart.
     assert_eq!(ahead(of(1.0, 1.0), of(1.0, 1.0), 1.0), f64::INFINITY);
+    // For so many more that noise does not pay for them it is no rival.
+    assert_eq!(ahead(of(1.0, 1.0), of(6.0, 1.0), 1.0), 0.0);
     // One that explains nothing and costs far more is never in the way.
     assert_eq!(ahead(of(1.0, 1.0), of(6.0, 1.0), 0.0), 0.0);
     // The more of the effect it explains, and the fewer parameters it has, the larger the effect must be.

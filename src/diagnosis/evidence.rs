@@ -1,5 +1,6 @@
 //! How much evidence a cause needs: the limits that all stages of a diagnosis share.
 
+use super::cause::Cause;
 use super::metric::Metric;
 use super::supposed::Supposed;
 use super::trace::Trace;
@@ -23,7 +24,7 @@ pub(super) const SMALLEST_SHARE: f64 = 0.02;
 const SMALLEST_SHARE_OF_EXACT: f64 = 0.004;
 /// The gain of a smooth field without a mechanism counts for this part: it takes up what several causes leave, and
 /// each of them first explains a part of that. What later causes make needless is taken out at the end.
-pub(super) const SPONGE_COUNTS: f64 = 1.0 / 3.0;
+const SPONGE_COUNTS: f64 = 1.0 / 3.0;
 /// The allowance where none is stated, as a part of the largest drive.
 pub(super) const ALLOWANCE_OF_DRIVE: f64 = 1e-3;
 /// Structured misfit that is left counts as unexplained above this multiple of the allowance (rms).
@@ -35,6 +36,11 @@ const SMALLEST_EFFECT: f64 = 1.0;
 /// The part of what `causes` explain that a further cause must explain.
 pub(super) fn smallest_share(causes: &[Supposed]) -> f64 {
     if causes.iter().any(|c| c.cause.is_idealised()) { SMALLEST_SHARE } else { SMALLEST_SHARE_OF_EXACT }
+}
+
+/// The part of what a cause explains that counts against other causes, and against what is called for.
+pub(super) fn counted_part(cause: &dyn Cause) -> f64 {
+    if cause.is_sponge() { SPONGE_COUNTS } else { 1.0 }
 }
 
 /// What parameters cost in deviance: ln n for each, n being the number of data.

@@ -2,7 +2,7 @@
 
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
-use super::evidence::EVIDENCE;
+use super::evidence::{EVIDENCE, is_large_force};
 use super::fit::{Member, deviance_at, fit, fit_member, scales};
 use super::laboratory::Laboratory;
 use super::leftover::leftover;
@@ -86,6 +86,13 @@ impl<'a> Inference<'a> {
     pub(super) fn misfit_of(&self, residual: &Trace) -> f64 {
         let weighed = self.metric.weigh(residual);
         self.metric.inner(&weighed, &weighed)
+    }
+
+    /// Whether what a fit leaves, in displacements and in forces, is no more than the error of a mesh.
+    pub(super) fn leaves_no_more_than_a_mesh(&self, fitted: &CauseFit) -> bool {
+        let observed = self.laboratory.observed();
+        let left = leftover(observed, &fitted.residual, &self.metric);
+        left.structured_rms_mm < self.allowance_mm && !is_large_force(observed, &fitted.residual)
     }
 
     /// How much of a fit's deviance noise does not account for.

@@ -25,6 +25,9 @@ const MAX_READINGS: usize = 1200;
 const MIN_READINGS: usize = 20;
 /// Allowance of the force model, relative to the force: common effects of the mesh are in the free material.
 const ALLOWANCE: f64 = 0.002;
+/// The error of the force model is a smooth function of the drive: errors at drives that lie so far apart, as a part of
+/// the largest, are hardly correlated.
+const SMOOTH_OVER: f64 = 0.3;
 /// Allowance below the largest drive so far, relative to the force there: the deformation of a sample that remembers is
 /// not quite that of the elastic one.
 const ALLOWANCE_OF_MEMORY: f64 = 0.004;
@@ -74,7 +77,8 @@ impl LoadProblem {
         let work: Vec<f64> = drive_mm.iter().map(|d| ElasticTable::at(&table.work, d.abs())).collect();
         let largest_work = work.iter().fold(1e-12f64, |s, w| s.max(*w));
         let white_sd_n = white_noise(&drive_mm, &measured_n, drift_sd_n);
-        let covariance = covariance_of_readings(&time_s, white_sd_n, &allowances(&drive_mm, &elastic_n), drift_sd_n);
+        let errors = ReadingErrors { white_sd_n, drift_sd_n, allowance_n: allowances(&drive_mm, &elastic_n) };
+        let covariance = errors.covariance(&time_s, &drive_mm, &elastic_n);
         let whitener = Cholesky::new(covariance)?;
         let direction = directions(&drive_mm);
         Some(LoadProblem {
@@ -252,12 +256,27 @@ fn allowances(drive_mm: &[f64], elastic: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Covariance of the readings, N²: drift, white noise and allowance.
-fn covariance_of_readings(time_s: &[f64], white: f64, allowance: &[f64], drift_sd_n: f64) -> DMatrix<f64> {
-    let n = time_s.len();
-    DMatrix::from_fn(n, n, |i, j| {
-        let drift = drift_sd_n * drift_sd_n * (-(time_s[i] - time_s[j]).abs() / DRIFT_TIME_S).exp();
-        let each = if i == j { white * white + allowance[i] * allowance[i] } else { 0.0 };
-        drift + each
-    })
+/// What readings err by.
+struct ReadingErrors {
+    /// Standard deviation of their noise, N.
+    white_sd_n: f64,
+    /// Standard deviation of the load cell's slow drift, N.
+    drift_sd_n: f64,
+    /// Allowance of each reading, N.
+    allowance_n: Vec<f64>,
+}
+
+impl ReadingErrors {
+    /// Covariance of the readings, N²: drift, noise, allowance, and an error of the force model that is a smooth
+    /// function of the drive.
+    fn covariance(&self, time_s: &[f64], drive_mm: &[f64], elastic_n: &[f64]) -> DMatrix<f64> {
+        let largest_mm = drive_mm.iter().fold(1e-12f64, |s, d| s.max(d.abs()));
+        DMatrix::from_fn(time_s.len(), time_s.len(), |i, j| {
+            let drift = self.drift_sd_n.powi(2) * (-(time_s[i] - time_s[j]).abs() / DRIFT_TIME_S).exp();
+            let apart = (drive_mm[i] - drive_mm[j]) / (SMOOTH_OVER * largest_mm);
+            let smooth = ALLOWANCE.powi(2) * elastic_n[i] * elastic_n[j] * (-0.5 * apart * apart).exp();
+            let each = if i == j { self.white_sd_n.powi(2) + self.allowance_n[i].powi(2) } else { 0.0 };
+            drift + smooth + each
+        })
+    }
 }

@@ -169,10 +169,10 @@ impl Registry {
     }
 
     /// The parameters of the causes for which every recording of a specimen is tested, each once: the cause, the
-    /// parameter's number among those of that name, and its name. A cause that holds others of its name adds none.
+    /// parameter's number among those of that name, and its name.
     pub fn tested_parameters(&self, specimen: &Specimen) -> Vec<(CauseName, usize, String)> {
         let mut found: Vec<(CauseName, usize, String)> = Vec::new();
-        for cause in self.tested(specimen).iter().filter(|c| !c.is_several_in_one()) {
+        for cause in self.tested(specimen) {
             for parameter in cause.parameters() {
                 let own = || found.iter().filter(|(name, ..)| *name == cause.name());
                 let place = own().count();

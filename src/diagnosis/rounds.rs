@@ -5,7 +5,7 @@ use super::candidate::Candidate;
 use super::cause::Cause;
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
-use super::evidence::{EVIDENCE, ROUGH_TOLERANCE, SPONGE_COUNTS, is_large, penalty, smallest_share};
+use super::evidence::{EVIDENCE, OF_IMAGE_ALONE, ROUGH_TOLERANCE, counted_part, is_large, penalty, smallest_share};
 use super::experiment::experiments;
 use super::findings::Findings;
 use super::found::FoundCause;
@@ -51,15 +51,14 @@ struct Trial<'a> {
 impl Trial<'_> {
     /// Its gain as it counts against others.
     fn counted(&self) -> f64 {
-        let is_sponge = self.fit.causes.last().is_some_and(|c| c.cause.is_sponge());
-        if is_sponge { SPONGE_COUNTS * self.gain } else { self.gain }
+        self.fit.causes.last().map_or(1.0, |c| counted_part(&*c.cause)) * self.gain
     }
 }
 
 /// What the first half of a round found.
-pub(super) struct Scored<'r> {
+pub(super) struct Scored {
     /// The causes asked for.
-    registry: &'r Registry,
+    registry: Registry,
     /// Suspects, most explaining first.
     pub(super) candidates: Vec<Candidate>,
     /// Changes of the prediction with the parameters of the fit so far, for fits of further causes; empty where these
@@ -91,21 +90,30 @@ pub(super) struct Asked<'r> {
     pub(super) evidence: f64,
 }
 
-/// The first half of a round: tests all suspects to first order.
+/// The first half of a round: tests all suspects to first order. Where what is left is no more than a mesh's error, it
+/// has no cause but in the image, for which far more evidence is called for.
 ///
 /// # Errors
 /// [`DiagnosisError`]: the work was cancelled, or the fit so far has no derivatives.
-pub(super) fn score_round<'r>(
+pub(super) fn score_round(
     inference: &mut Inference,
-    asked: Asked<'r>,
+    asked: Asked,
     findings: &mut Findings,
     limits: RoundLimits,
-) -> Result<Scored<'r>, DiagnosisError> {
+) -> Result<Scored, DiagnosisError> {
     findings.num_rounds += 1;
     let round = findings.num_rounds;
     (inference.progress)(&format!("round {round}: testing causes"));
     let scope = RoundScope { has_load_curve: limits.has_load_curve };
-    let RoundScores { candidates, known, maps } = score_suspects(inference, asked.registry, &findings.current, scope)?;
+    let Asked { registry, with_terms, evidence } = asked;
+    let (registry, with_terms, evidence) = match inference.leaves_no_more_than_a_mesh(&findings.current) {
+        true => {
+            let specimen = &inference.laboratory.observed().specimen;
+            (registry.clone().of_image_alone(specimen), false, OF_IMAGE_ALONE * evidence)
+        }
+        false => (registry.clone(), with_terms, evidence),
+    };
+    let RoundScores { candidates, known, maps } = score_suspects(inference, &registry, &findings.current, scope)?;
     if round == 1 {
         findings.maps.extend(maps);
     }
@@ -118,7 +126,7 @@ pub(super) fn score_round<'r>(
     }));
     // The nominal model's few parameters are worked out at every step: they change most with the first cause.
     let known = if findings.current.causes.is_empty() { Vec::new() } else { known };
-    Ok(Scored { registry: asked.registry, candidates, known, with_terms: asked.with_terms, evidence: asked.evidence })
+    Ok(Scored { registry, candidates, known, with_terms, evidence })
 }
 
 /// The second half of a round: fits the leading candidates and names the best, unless a further Ogden term of the
@@ -145,7 +153,7 @@ pub(super) fn fit_round(
     }
     let is_named = take_best(inference, findings, trials, scored.evidence)?;
     if is_named {
-        take_out_artefacts(inference, scored.registry, findings, measured)?;
+        take_out_artefacts(inference, &scored.registry, findings, measured)?;
     }
     Ok(is_named)
 }
@@ -339,12 +347,13 @@ fn take_best<'a>(
     let share = smallest_share(&findings.current.causes);
     let least = evidence.max(share * findings.explained());
     (inference.progress)(&format!(
-        "round {}: '{}' lowers the deviance by {:.0}; {least:.0} are called for",
+        "round {}: '{}' lowers the deviance by {:.0}, of which {:.0} count; {least:.0} are called for",
         findings.num_rounds,
         best.fit.causes.last().map_or_else(String::new, |c| c.cause.description()),
-        best.gain
+        best.gain,
+        best.counted()
     ));
-    if best.gain < least || !is_large(inference.laboratory.observed(), &effect, inference.allowance_mm) {
+    if best.counted() < least || !is_large(inference.laboratory.observed(), &effect, inference.allowance_mm) {
         return Ok(false);
     }
     for other in trials {

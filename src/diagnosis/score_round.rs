@@ -141,7 +141,6 @@ pub(super) fn suspects_of(
         .filter(|c| has_several_drives || !c.needs_several_drives())
         .filter(|c| !(is_said.contains(&c.name()) || has_set_up && c.is_sponge()))
         .filter(|c| !found.iter().any(|s| s.cause.identity() == c.identity()))
-        .filter(|c| !(c.is_several_in_one() && found.iter().any(|s| s.cause.name() == c.name())))
         .collect()
 }
 

@@ -3,13 +3,14 @@
 //! Near its end a fit's deviance is a quadratic form in its parameters. Of that form it is known at once what it costs
 //! to do without a cause (Wald's statistic with all others free to follow), and where the others go. Causes are taken
 //! out one after the other, the one that is missed least first (backward elimination), as long as none of them is
-//! missed by more than it costs; then what is left is fitted again. A cause that changes the sample must also do more
+//! missed by more than it costs; then what is left is fitted again. Beside the set-up, whose models idealise, any other
+//! cause must explain the part that rounds call for, too. A cause that changes the sample must also do more
 //! than a mesh's error could: where hardly anything would be left without it, it goes, whatever the evidence. One that
 //! changes the image alone, and by no more than that, needs far more evidence than usual.
 
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
-use super::evidence::{EVIDENCE, OF_IMAGE_ALONE, UNEXPLAINED, penalty};
+use super::evidence::{EVIDENCE, OF_IMAGE_ALONE, UNEXPLAINED, penalty, smallest_share};
 use super::fit::{derivatives, normal_matrix, prior_scales};
 use super::found::FoundCause;
 use super::inference::Inference;
@@ -64,14 +65,18 @@ impl QuadraticModel {
     /// The part of the matrix that belongs to a cause once all others have followed (its Schur complement); `None`
     /// where the others are not known.
     fn own(&self, cause: usize) -> Option<DMatrix<f64>> {
-        let places = self.places_of(cause);
+        self.schur_complement(&self.places_of(cause))
+    }
+
+    /// The matrix at `places` once all other parameters have followed; `None` where these are not known.
+    fn schur_complement(&self, places: &[usize]) -> Option<DMatrix<f64>> {
         let rest: Vec<usize> = (0..self.owners.len()).filter(|i| !places.contains(i)).collect();
         let part = |rows: &[usize], columns: &[usize]| {
             DMatrix::from_fn(rows.len(), columns.len(), |i, j| self.matrix[(rows[i], columns[j])])
         };
-        let cross = part(&rest, &places);
+        let cross = part(&rest, places);
         let followed = part(&rest, &rest).cholesky()?.solve(&cross);
-        Some(part(&places, &places) - cross.tr_mul(&followed))
+        Some(part(places, places) - cross.tr_mul(&followed))
     }
 
     /// By how much the deviance rises without a cause, all others free to follow; infinite where it is not known.
@@ -79,6 +84,13 @@ impl QuadraticModel {
         let places = self.places_of(cause);
         let away = DVector::from_fn(places.len(), |i, _| self.away[places[i]]);
         self.own(cause).map_or(f64::INFINITY, |own| away.dot(&(own * &away)))
+    }
+
+    /// By how much the deviance rises without any cause, the material free to follow: what all of them explain.
+    fn explained(&self) -> f64 {
+        let places: Vec<usize> = (0..self.owners.len()).filter(|i| self.owners[*i].is_some()).collect();
+        let away = DVector::from_fn(places.len(), |i, _| self.away[places[i]]);
+        self.schur_complement(&places).map_or(0.0, |own| away.dot(&(own * &away)))
     }
 
     /// What the parameters of a cause cost: of one that is believed in the logarithm of how far the data narrow the
@@ -158,13 +170,16 @@ pub(super) fn thinned(
 ) -> Result<CauseFit, DiagnosisError> {
     let mut model = QuadraticModel::of(inference, &fitted)?;
     let mut left: Vec<usize> = (0..fitted.causes.len()).collect();
+    let has_set_up = fitted.causes.iter().any(|s| s.cause.is_of_set_up());
+    let least_beside_set_up = if has_set_up { smallest_share(&fitted.causes) * model.explained() } else { 0.0 };
     loop {
         let least = left
             .iter()
             .filter(|&&cause| may_go(&fitted.causes[cause]))
             .map(|&cause| {
                 let supposed = &fitted.causes[cause];
-                let (missed, cost) = (model.missed(cause), model.cost(cause, supposed, inference));
+                let least = if supposed.cause.is_of_set_up() { 0.0 } else { least_beside_set_up };
+                let (missed, cost) = (model.missed(cause), model.cost(cause, supposed, inference).max(least));
                 let (name, left_mm) = (supposed.cause.name(), model.left_without_mm(cause));
                 (inference.progress)(&format!(
                     "without '{name}' {left_mm:.4} mm rms are left and the deviance rises by {missed:.0}; it costs {cost:.0}"

@@ -57,6 +57,7 @@ pub(super) const REGISTRY: &[Entry] = &[
     registration::ENTRY,
     cell::OF_STEPS,
     hole::ENTRY,
+    outline::ENTRY,
     fibre::ENTRY,
     debond::ENTRY,
     bond::ENTRY,
@@ -66,7 +67,7 @@ pub(super) const REGISTRY: &[Entry] = &[
     registration::OF_SET_UP,
     swelling::OF_SET_UP,
     layer::ENTRY,
-    outline::ENTRY,
+    outline::OF_SET_UP,
 ];
 
 /// The causes that act where the sample is held. They say nothing of a part of it whose boundary was measured.

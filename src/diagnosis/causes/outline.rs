@@ -1,7 +1,6 @@
 //! The block is not the one of the drawing.
 
 use super::layer::bonded_axis;
-use crate::calibration::Observed;
 use crate::diagnosis::cause::{Category, Cause, CauseName, CauseParameter};
 use crate::diagnosis::entry::{Entry, Origin};
 use crate::diagnosis::location::Location;
@@ -15,12 +14,21 @@ const REMEDY: &str =
     "Measure the block as cast (length, width, thickness, slant of its faces) and give the specimen those sizes.";
 /// Its line in the registry.
 pub(super) const ENTRY: Entry =
-    Entry { name: NAME, remedy: REMEDY, origin: Origin::SetUp { parts: suspects, special_cases: &[] } };
+    Entry { name: NAME, remedy: REMEDY, origin: Origin::Tested(|specimen| suspects(specimen, FaceForm::Plane)) };
+/// Its line in the registry as a part of the set-up.
+pub(super) const OF_SET_UP: Entry = Entry {
+    name: NAME,
+    remedy: REMEDY,
+    origin: Origin::SetUp {
+        parts: |observed| suspects(&observed.specimen, FaceForm::SecondDegree),
+        special_cases: &[],
+    },
+};
 
 /// A dumb-bell keeps its standard outline.
-fn suspects(observed: &Observed) -> Vec<Arc<dyn Cause>> {
-    match observed.specimen.outline {
-        Outline::Block => vec![Arc::new(Block::of(&observed.specimen))],
+fn suspects(specimen: &Specimen, form: FaceForm) -> Vec<Arc<dyn Cause>> {
+    match specimen.outline {
+        Outline::Block => vec![Arc::new(Block::of(specimen, form))],
         Outline::Iso37Type4 => Vec::new(),
     }
 }
@@ -30,20 +38,37 @@ const BELIEVED_MM: f64 = 0.3;
 /// It is believed to bow by about this, mm: what is cut or cast gives way and shrinks.
 const BELIEVED_BOW_MM: f64 = 0.2;
 
-/// Terms of a surface of second degree.
-const SURFACE_TERMS: usize = 6;
+/// What a free face may be in place of the drawn one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FaceForm {
+    /// A plane: length or width, slanted ends, a wedge.
+    Plane,
+    /// A surface of second degree: also ends that bow in or out.
+    SecondDegree,
+}
 
-/// Each free face of the block is a surface of second degree of its own: length or width, slanted ends, a wedge, ends
-/// that bow in or out.
+impl FaceForm {
+    /// How many terms its polynomial has.
+    fn num_terms(self) -> usize {
+        match self {
+            FaceForm::Plane => 3,
+            FaceForm::SecondDegree => 6,
+        }
+    }
+}
+
+/// Each free face of the block is a surface of its own.
 pub struct Block {
     /// The axes across the free faces.
     axes: [usize; 2],
+    /// What the faces are.
+    form: FaceForm,
 }
 
 impl Block {
     /// The free faces of a specimen.
-    pub fn of(specimen: &Specimen) -> Block {
-        Block { axes: [[1, 2], [0, 2], [0, 1]][bonded_axis(specimen)] }
+    pub fn of(specimen: &Specimen, form: FaceForm) -> Block {
+        Block { axes: [[1, 2], [0, 2], [0, 1]][bonded_axis(specimen)], form }
     }
 }
 
@@ -70,6 +95,9 @@ impl Cause for Block {
                     let name = format!("{face}{plane}_mm");
                     all.push(CauseParameter::new(name, 0.1, [-3.0, 3.0]).believed(BELIEVED_MM));
                 }
+                if self.form == FaceForm::Plane {
+                    continue;
+                }
                 for bow in [format!("{a}{a}"), format!("{a}{b}"), format!("{b}{b}")] {
                     let name = format!("{face}_bow_{bow}_mm");
                     all.push(CauseParameter::new(name, 0.1, [-2.0, 2.0]).believed(BELIEVED_BOW_MM));
@@ -80,11 +108,11 @@ impl Cause for Block {
     }
 
     fn is_idealised(&self) -> bool {
-        true
+        self.form == FaceForm::SecondDegree
     }
 
     fn apply(&self, values: &[f64], scene: &mut Scene) {
-        for (n, surface) in values.chunks(SURFACE_TERMS).enumerate() {
+        for (n, surface) in values.chunks(self.form.num_terms()).enumerate() {
             let face = &mut scene.shape.faces_mm[self.axes[n / 2]][n % 2];
             for (offset, value) in face.iter_mut().zip(surface) {
                 *offset += value;
@@ -93,12 +121,12 @@ impl Cause for Block {
     }
 
     fn location(&self, values: &[f64], specimen: &Specimen) -> Option<Location> {
-        let size = |n: &usize| values[SURFACE_TERMS * n].abs();
+        let size = |n: &usize| values[self.form.num_terms() * n].abs();
         let face = (0..4).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0);
         Some(Location::of_face(specimen, self.axes[face / 2], face % 2, "free face"))
     }
 
     fn is_of_set_up(&self) -> bool {
-        true
+        self.form == FaceForm::SecondDegree
     }
 }
