@@ -212,7 +212,7 @@ fn smooth_minimum(distances: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::test_specimens::{bar, dumbbell, off_axis, solid, specimen, two_holes, width_holes};
+    use crate::mesh::test_specimens::{bar, changed, dumbbell, off_axis, solid, specimen, two_holes, width_holes};
     use crate::mesh::{MeshOptions, mesh_specimen};
     use std::f64::consts::PI;
 
@@ -223,21 +223,6 @@ mod tests {
         let (plus, minus) = (morphed(&mesh, &velocity, h), morphed(&mesh, &velocity, -h));
         let rate = (plus.volume() - minus.volume()) / (2.0 * h);
         (mesh, rate)
-    }
-
-    fn set(specimen: &Specimen, variable: DesignVariable, step: f64) -> Specimen {
-        let mut s = specimen.clone();
-        match variable {
-            DesignVariable::HoleX(i) => s.holes[i].center_mm[0] += step,
-            DesignVariable::HoleOther(i) => s.holes[i].center_mm[1] += step,
-            DesignVariable::HoleDiameter(i) => s.holes[i].diameter_mm += step,
-            DesignVariable::HoleLength(i) => s.holes[i].shape.iter_mut().for_each(|shape| shape.length_mm += step),
-            DesignVariable::HoleAngle(i) => s.holes[i].shape.iter_mut().for_each(|shape| shape.angle_deg += step),
-            DesignVariable::BlockLength => s.block.length_mm += step,
-            DesignVariable::BlockThickness => s.block.thickness_mm += step,
-            DesignVariable::BlockWidth => s.block.width_mm += step,
-        }
-        s
     }
 
     /// The morphed mesh passes the whole check of the changed specimen: walls are circles of the new size and place,
@@ -263,7 +248,7 @@ mod tests {
                     let step = 0.05;
                     let velocity = shape_velocity(&mesh, &specimen, variable);
                     let moved = morphed(&mesh, &velocity, step);
-                    let result = moved.check(&set(&specimen, variable, step));
+                    let result = moved.check(&changed(&specimen, variable, step));
                     assert!(result.is_ok(), "{variable:?} of {}: {result:?}", specimen.name);
                 }
             }
@@ -291,7 +276,7 @@ mod tests {
                 let step = 0.1;
                 let [v, w] = [first, second].map(|variable| shape_velocity(&mesh, &s, variable));
                 let moved = morphed(&morphed(&mesh, &v, step), &w, sign * step);
-                moved.check(&set(&set(&s, first, step), second, sign * step)).unwrap();
+                moved.check(&changed(&changed(&s, first, step), second, sign * step)).unwrap();
             }
             let odd = shape_velocity(&mesh, &s, DesignVariable::HoleOther(2));
             assert!(odd.iter().flatten().all(|v| *v == 0.0));
@@ -328,7 +313,7 @@ mod tests {
         let mesh = mesh_specimen(&s, &MeshOptions::standard(&s)).unwrap();
         let velocity = shape_velocity(&mesh, &s, DesignVariable::BlockLength);
         let moved = morphed(&mesh, &velocity, 0.5);
-        moved.check(&set(&s, DesignVariable::BlockLength, 0.5)).unwrap();
+        moved.check(&changed(&s, DesignVariable::BlockLength, 0.5)).unwrap();
         assert!(shape_velocity(&mesh, &s, DesignVariable::BlockWidth).iter().flatten().all(|v| *v == 0.0));
         assert!(shape_velocity(&mesh, &s, DesignVariable::HoleX(3)).iter().flatten().all(|v| *v == 0.0));
     }

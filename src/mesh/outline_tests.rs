@@ -1,6 +1,6 @@
 //! Meshes around holes that are not circles: they conform, fill the specimen, and follow their design.
 
-use super::test_specimens::{Random, specimen};
+use super::test_specimens::{Random, changed, specimen};
 use super::{DesignVariable, ElementKind, Mesh, MeshOptions, mesh_specimen, morphed, shape_velocity};
 use crate::specimen::{Hole, HoleAxis, HoleKind, HoleShape, Specimen, TestKind};
 use std::f64::consts::PI;
@@ -118,21 +118,6 @@ fn volumes_converge_to_the_closed_form() {
     }
 }
 
-fn set(specimen: &Specimen, variable: DesignVariable, step: f64) -> Specimen {
-    let mut s = specimen.clone();
-    match variable {
-        DesignVariable::HoleX(i) => s.holes[i].center_mm[0] += step,
-        DesignVariable::HoleOther(i) => s.holes[i].center_mm[1] += step,
-        DesignVariable::HoleDiameter(i) => s.holes[i].diameter_mm += step,
-        DesignVariable::HoleLength(i) => s.holes[i].shape.iter_mut().for_each(|shape| shape.length_mm += step),
-        DesignVariable::HoleAngle(i) => s.holes[i].shape.iter_mut().for_each(|shape| shape.angle_deg += step),
-        DesignVariable::BlockLength => s.block.length_mm += step,
-        DesignVariable::BlockThickness => s.block.thickness_mm += step,
-        DesignVariable::BlockWidth => s.block.width_mm += step,
-    }
-    s
-}
-
 /// The morphed mesh passes the whole check of the changed specimen, at steps of any size but for the angle: a turn
 /// moves the wall off itself by the square of the step (1e-7 mm at a hundredth of a degree), which the check allows.
 #[test]
@@ -152,7 +137,7 @@ fn the_morphed_mesh_is_a_mesh_of_the_changed_specimen() {
                 (BlockWidth, 0.05),
             ] {
                 let moved = morphed(&mesh, &shape_velocity(&mesh, &s, variable), step);
-                let result = moved.check(&set(&s, variable, step));
+                let result = moved.check(&changed(&s, variable, step));
                 assert!(result.is_ok(), "{variable:?} of {}: {result:?}", s.name);
             }
         }
@@ -174,7 +159,7 @@ fn mirrored_pairs_turn_against_each_other() {
         {
             let [v, w] = [first, second].map(|variable| shape_velocity(&mesh, &s, variable));
             let moved = morphed(&morphed(&mesh, &v, step), &w, sign * step);
-            moved.check(&set(&set(&s, first, step), second, sign * step)).unwrap();
+            moved.check(&changed(&changed(&s, first, step), second, sign * step)).unwrap();
         }
         assert!(shape_velocity(&mesh, &s, HoleAngle(2)).iter().flatten().all(|v| *v == 0.0));
     }

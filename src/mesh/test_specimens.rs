@@ -1,5 +1,6 @@
 //! Specimens and random numbers for the mesh tests.
 
+use super::DesignVariable;
 use crate::specimen::{Block, Hole, HoleAxis, Outline, Specimen, TestKind};
 
 /// A block with holes (first, second coordinate, diameter).
@@ -71,4 +72,20 @@ impl Random {
     pub fn below(&mut self, n: u64) -> usize {
         (self.next() % n) as usize
     }
+}
+
+/// A specimen with one of its sizes larger by `step`, mm or degrees.
+pub(super) fn changed(specimen: &Specimen, variable: DesignVariable, step: f64) -> Specimen {
+    let mut s = specimen.clone();
+    match variable {
+        DesignVariable::HoleX(i) => s.holes[i].center_mm[0] += step,
+        DesignVariable::HoleOther(i) => s.holes[i].center_mm[1] += step,
+        DesignVariable::HoleDiameter(i) => s.holes[i].diameter_mm += step,
+        DesignVariable::HoleLength(i) => s.holes[i].shape.iter_mut().for_each(|shape| shape.length_mm += step),
+        DesignVariable::HoleAngle(i) => s.holes[i].shape.iter_mut().for_each(|shape| shape.angle_deg += step),
+        DesignVariable::BlockLength => s.block.length_mm += step,
+        DesignVariable::BlockThickness => s.block.thickness_mm += step,
+        DesignVariable::BlockWidth => s.block.width_mm += step,
+    }
+    s
 }
