@@ -188,6 +188,10 @@ pub trait Cause: Send + Sync {
     fn is_sponge(&self) -> bool {
         false
     }
+    /// Whether it has so many parameters at the sample's surface that it follows what a mesh gets wrong.
+    fn follows_mesh_errors(&self) -> bool {
+        false
+    }
     /// Leaps: values that a fit which ended at `values` could not reach by small steps, and that may explain more.
     fn leaps(&self, _values: &[f64]) -> Vec<Vec<f64>> {
         Vec::new()

@@ -29,7 +29,7 @@ use super::cause::{Cause, CauseName};
 use super::diagnose::BELIEVED_LOG_SD;
 use super::error::DiagnosisError;
 use super::evidence::{
-    ALLOWANCE_OF_DRIVE, EVIDENCE, OF_IMAGE_ALONE, counted_part, penalty, times_to_large, times_to_large_force,
+    ALLOWANCE_OF_DRIVE, EVIDENCE, OF_IMAGE_ALONE, counted_part, penalty, times_to_large_force, times_to_large_of,
 };
 use super::laboratory::Laboratory;
 use super::leftover::structure_of;
@@ -197,7 +197,7 @@ impl Room<'_> {
             let value = evidence + penalty(self.metric, parameters.len());
             (noncentrality_to_exceed(value, parameters.len() as f64, DETECTION_PROBABILITY) / information).sqrt()
         };
-        let large = times_to_large(self.observed, own, self.allowance_mm);
+        let large = times_to_large_of(cause, self.observed, own, self.allowance_mm);
         // What the nominal fit leaves must be seen before causes are looked for.
         let in_boxes = self.allowance_mm / structure_of(self.observed, own, self.metric);
         let looked_for = in_boxes.min(times_to_large_force(self.observed, own));

@@ -29,9 +29,6 @@ const SPONGE_COUNTS: f64 = 1.0 / 3.0;
 pub(super) const ALLOWANCE_OF_DRIVE: f64 = 1e-3;
 /// Structured misfit that is left counts as unexplained above this multiple of the allowance (rms).
 pub(super) const UNEXPLAINED: f64 = 2.0;
-/// An effect counts as physics where its displacement (rms) exceeds this multiple of the allowance, or its force the
-/// allowance of forces.
-const SMALLEST_EFFECT: f64 = 1.0;
 
 /// The part of what `causes` explain that a further cause must explain.
 pub(super) fn smallest_share(causes: &[Supposed]) -> f64 {
@@ -66,8 +63,24 @@ pub(super) fn is_large(observed: &Observed, effect: &Trace, allowance_mm: f64) -
     times_to_large(observed, effect, allowance_mm) < 1.0
 }
 
-/// The multiple of a change of the prediction beyond which it is more than a mesh's; infinite where nothing changes.
-pub(super) fn times_to_large(observed: &Observed, effect: &Trace, allowance_mm: f64) -> f64 {
-    let last = Trace { displacement: effect.displacement.last().cloned().into_iter().collect(), force: vec![] };
-    times_to_large_force(observed, effect).min(SMALLEST_EFFECT * allowance_mm / last.rms_mm())
+/// The multiple of a change of the prediction beyond which it is more than a mesh's: its displacement (rms at the last
+/// drive) more than the allowance, or a force more than that of forces; infinite where nothing changes.
+fn times_to_large(observed: &Observed, effect: &Trace, allowance_mm: f64) -> f64 {
+    times_to_large_force(observed, effect).min(allowance_mm / rms_at_last_mm(effect))
+}
+
+/// The multiple of what a cause changes beyond which it is more than a mesh's.
+///
+/// Every free face of a block is a little off. A cause with so many parameters that it follows what another code's mesh
+/// gets wrong must change the displacement by as much as would be called unexplained.
+pub(super) fn times_to_large_of(cause: &dyn Cause, observed: &Observed, effect: &Trace, allowance_mm: f64) -> f64 {
+    match cause.follows_mesh_errors() {
+        true => UNEXPLAINED * allowance_mm / rms_at_last_mm(effect),
+        false => times_to_large(observed, effect, allowance_mm),
+    }
+}
+
+/// Root mean square of a change of the displacement at the last drive, mm.
+fn rms_at_last_mm(effect: &Trace) -> f64 {
+    Trace { displacement: effect.displacement.last().cloned().into_iter().collect(), force: vec![] }.rms_mm()
 }

@@ -5,7 +5,9 @@ use super::candidate::Candidate;
 use super::cause::Cause;
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
-use super::evidence::{EVIDENCE, OF_IMAGE_ALONE, ROUGH_TOLERANCE, counted_part, is_large, penalty, smallest_share};
+use super::evidence::{
+    EVIDENCE, OF_IMAGE_ALONE, ROUGH_TOLERANCE, counted_part, penalty, smallest_share, times_to_large_of,
+};
 use super::experiment::experiments;
 use super::findings::Findings;
 use super::found::FoundCause;
@@ -353,7 +355,11 @@ fn take_best<'a>(
         best.gain,
         best.counted()
     ));
-    if best.counted() < least || !is_large(inference.laboratory.observed(), &effect, inference.allowance_mm) {
+    let is_large = best.fit.causes.last().is_some_and(|found| {
+        let observed = inference.laboratory.observed();
+        times_to_large_of(&*found.cause, observed, &effect, inference.allowance_mm) < 1.0
+    });
+    if best.counted() < least || !is_large {
         return Ok(false);
     }
     for other in trials {

@@ -34,6 +34,21 @@ impl Equilibrium {
             serial: None,
         }
     }
+
+    /// Adds `part` times the difference of two states of the same mesh to displacements and pressures.
+    pub(super) fn add_difference(&mut self, part: f64, a: &Equilibrium, b: &Equilibrium) {
+        add_difference(&mut self.displacement, part, &a.displacement, &b.displacement);
+        add_difference(&mut self.pressure, part, &a.pressure, &b.pressure);
+    }
+}
+
+/// x += part × (a − b).
+fn add_difference<const N: usize>(x: &mut [[f64; N]], part: f64, a: &[[f64; N]], b: &[[f64; N]]) {
+    for (x, (a, b)) in x.iter_mut().zip(a.iter().zip(b)) {
+        for i in 0..N {
+            x[i] += part * (a[i] - b[i]);
+        }
+    }
 }
 
 /// A number that no other solution of this process has: tells whether an assembled tangent is that of an equilibrium.

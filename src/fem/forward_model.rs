@@ -162,7 +162,7 @@ impl ForwardModel {
         let mut newton = self.fine.newton(material, options, is_cancelled);
         // A start at the same drive is nearer than what the coarse mesh finds.
         let guide = self.guide.as_mut().filter(|_| start.is_none_or(|s| s.drive_mm != drive_mm));
-        let found = match guide.and_then(|guide| guide.lead(&mut newton, drive_mm)) {
+        let found = match guide.and_then(|guide| guide.lead(&mut newton, drive_mm, start)) {
             Some(found) => Ok(found),
             None => newton.solve(drive_mm, start),
         };

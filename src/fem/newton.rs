@@ -11,8 +11,11 @@ use super::linearisation::Linearisation;
 use super::options::{SolveOptions, Statistics};
 use crate::material::Ogden;
 
-/// Relative residual below which the factor of an earlier iterate is tried first.
-const REUSE_BELOW: f64 = 1e-4;
+/// Relative residual below which the factor of an earlier iterate is tried first: the tangent changes by about as much.
+const REUSE_BELOW: f64 = 0.1;
+
+/// Relative residual from which a Newton step reaches the tolerance.
+const LAST_STEP_BELOW: f64 = 1e-4;
 
 /// Conjugate-gradient iterations that such a factor is given: they cost as much as a new one.
 const REUSE_ITERATIONS: usize = 10;
@@ -163,9 +166,7 @@ impl Newton<'_> {
         let increment = drive_mm - from.drive_mm;
         match previous {
             Some(p) if (from.drive_mm - p.drive_mm).abs() > 0.0 => {
-                let r = increment / (from.drive_mm - p.drive_mm);
-                extrapolate(&mut trial.displacement, &from.displacement, &p.displacement, r);
-                extrapolate(&mut trial.pressure, &from.pressure, &p.pressure, r);
+                trial.add_difference(increment / (from.drive_mm - p.drive_mm), from, p);
             }
             _ => {
                 for (x, lift) in trial.displacement.iter_mut().zip(&plates.lift) {
@@ -185,18 +186,19 @@ impl Newton<'_> {
         let system = &mut self.linearisation.system;
         let right = [right];
         let mut x = None;
+        // Quadratic convergence leaves residual² at best: the linear solve need not be better than a tenth of it.
+        let of_step = 0.1 * residual;
         if is_near {
-            let accuracy = (0.3 * self.options.tolerance / residual).clamp(1e-7, 1e-2);
+            // The last step is to be the last.
+            let accuracy = if residual < LAST_STEP_BELOW { 0.3 * self.options.tolerance / residual } else { of_step };
+            let accuracy = accuracy.clamp(1e-7, 1e-2);
             x = system.iterate(&right, accuracy, REUSE_ITERATIONS).ok().flatten();
         }
         let mut x = match x {
             Some(x) => x,
             None => {
                 system.factorise().map_err(StepFailure::Linear)?;
-                // Quadratic convergence leaves residual² at best: the linear solve need not be better than a tenth of
-                // it.
-                let accuracy = (0.1 * residual).clamp(1e-9, 1e-3);
-                system.solve(&right, accuracy).map_err(StepFailure::Linear)?
+                system.solve(&right, of_step.clamp(1e-9, 1e-3)).map_err(StepFailure::Linear)?
             }
         };
         Ok(x.swap_remove(0))
@@ -246,15 +248,6 @@ pub(super) fn finished(
     linearisation.stands_at = state.serial;
     state.reaction_imbalance = (moved[0] + fixed[0]).abs() / moved[0].abs().max(1e-12);
     state
-}
-
-/// x = a + r (a − b).
-fn extrapolate<const N: usize>(x: &mut [[f64; N]], a: &[[f64; N]], b: &[[f64; N]], r: f64) {
-    for (x, (a, b)) in x.iter_mut().zip(a.iter().zip(b)) {
-        for i in 0..N {
-            x[i] = a[i] + r * (a[i] - b[i]);
-        }
-    }
 }
 
 /// A Newton step that can be shortened.

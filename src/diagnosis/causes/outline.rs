@@ -126,6 +126,10 @@ impl Cause for Block {
         Some(Location::of_face(specimen, self.axes[face / 2], face % 2, "free face"))
     }
 
+    fn follows_mesh_errors(&self) -> bool {
+        true
+    }
+
     fn is_of_set_up(&self) -> bool {
         self.form == FaceForm::SecondDegree
     }
