@@ -99,6 +99,27 @@ fn what_was_read_and_left_out_is_said() {
     assert_eq!(value["files"][0]["num_rows"], 81);
 }
 
+/// A law in the first invariant is written for the programs that have it; another program is refused by name.
+#[test]
+fn laws_are_exported_to_the_programs_that_have_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let gent = r#"{ "schema": "gent/1", "bulk_kpa": 2000.0, "mu_kpa": 16.0, "j_m": 30.0 }"#;
+    std::fs::write(folder.path().join("gent.json"), gent).unwrap();
+    let text = run(folder.path(), &["export", "material", "gent.json", "--out", "cards"]);
+    assert!(text.status.success(), "{}", String::from_utf8_lossy(&text.stderr));
+    let cards = folder.path().join("cards");
+    let files = ["material-ansys.inp", "material-comsol.txt", "material-febio.xml"];
+    assert!(files.iter().all(|file| cards.join(file).is_file()));
+    assert!(!cards.join("material-abaqus.inp").exists() && !cards.join("material-calculix.inp").exists());
+    let ansys = std::fs::read_to_string(cards.join(files[0])).unwrap();
+    // MPa: 16 kPa, and 2/κ.
+    assert!(ansys.ends_with("TB,HYPER,1,1,,GENT\nTBDATA,1,1.6e-2,3.0e1,1.0e0\n"), "{ansys}");
+    let refused = run(folder.path(), &["export", "material", "gent.json", "--format", "abaqus"]);
+    assert_eq!(refused.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(said.contains("Abaqus has no law of Gent; write the material for Ansys, COMSOL, FEBio"), "{said}");
+}
+
 #[test]
 fn bad_input_ends_with_code_two_and_says_why() {
     let folder = tempfile::tempdir().unwrap();

@@ -217,7 +217,7 @@ fn proof(_: &ArgMatches, _: &mut Asked) -> Result<PathBuf, CliError> {
 }
 
 fn of_material(command: Command) -> Command {
-    command.arg(Arg::new("MATERIAL").help("Material file (ogden/1), such as the material.json of a fit").required(true))
+    command.arg(Arg::new("MATERIAL").help("Material file, such as the material.json of a fit").required(true))
 }
 
 fn exported_material(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliError> {

@@ -1,8 +1,9 @@
 //! The text of a material for each program.
 
-use super::convention::{Constant, Convention, MaterialFormat};
+use super::convention::{Constant, Converted, Shape};
 use super::error::ExportError;
 use super::label::label;
+use super::programs::MaterialFormat;
 use crate::homogeneous::StressUnit;
 use crate::material::Ogden;
 
@@ -43,33 +44,40 @@ pub fn material_card(
     unit: StressUnit,
     origin: &Origin,
 ) -> Result<String, ExportError> {
-    let convention = format.convention();
-    let constants = convention.constants(material, unit)?;
-    let lines = comments(convention, unit, origin);
+    let converted = format.convert(material, unit)?;
+    let lines = comments(&converted, format, material.law_name(), unit, origin);
     Ok(match format {
         MaterialFormat::Abaqus | MaterialFormat::Calculix => {
-            commented("** ", &lines) + &keyword_material(&constants, &label(origin.name))
+            commented("** ", &lines) + &keyword_material(&converted, &label(origin.name))
         }
-        MaterialFormat::Ansys => commented("! ", &lines) + &commands(&constants),
-        MaterialFormat::Comsol => commented("% ", &lines) + &parameters(&constants),
+        MaterialFormat::Ansys => commented("! ", &lines) + &commands(&converted),
+        MaterialFormat::Comsol => commented("% ", &lines) + &parameters(&converted),
         MaterialFormat::Febio => {
             // Two minus signs end a comment in XML.
             let inner = lines.join("\n  ").replace("--", "- -");
-            format!("<!-- {inner} -->\n{}", febio_material(&constants, &label(origin.name), ""))
+            format!("<!-- {inner} -->\n{}", febio_material(&converted, &label(origin.name), ""))
         }
     })
 }
 
 /// What the reader of a card should know.
-fn comments(convention: &Convention, unit: StressUnit, origin: &Origin) -> Vec<String> {
+fn comments(
+    converted: &Converted,
+    format: MaterialFormat,
+    law: &str,
+    unit: StressUnit,
+    origin: &Origin,
+) -> Vec<String> {
     let Origin { name, version, input_hash } = origin;
     let name = name.replace(['\n', '\r'], " ");
+    let (convention, program, unit) = (converted.convention, format.program(), unit.symbol());
+    let meaning = match convention.shape {
+        Shape::Terms { .. } => "l1, l2, l3: principal stretches times J^(-1/3)",
+        Shape::Law { .. } => "I1: sum of the squares of the principal stretches, times J^(-2/3)",
+    };
     vec![
-        format!(
-            "{name}: Ogden material for {}, written by lambdak {version} (inputs {input_hash})",
-            convention.program
-        ),
-        format!("Stresses in {}. l1, l2, l3: principal stretches times J^(-1/3).", unit.symbol()),
+        format!("{name}: {law} material for {program}, written by lambdak {version} (inputs {input_hash})"),
+        format!("Stresses in {unit}. {meaning}."),
         convention.energy.to_string(),
         format!("Volume: {}.", convention.law.meaning()),
     ]
@@ -79,20 +87,19 @@ fn commented(mark: &str, lines: &[String]) -> String {
     lines.iter().map(|line| format!("{mark}{line}\n")).collect()
 }
 
-/// `*MATERIAL` with `*HYPERELASTIC` as Abaqus and CalculiX read it: all factors and exponents, then D_1 to D_N, of
-/// which those after the first are zero (no such term).
-pub(super) fn keyword_material(constants: &[Constant], name: &str) -> String {
-    let num_terms = constants.len() / 2;
-    let mut numbers: Vec<String> = constants.iter().map(Constant::text).collect();
-    numbers.resize(3 * num_terms, super::number::number(0.0));
-    let lines: String = numbers.chunks(PER_LINE).map(|line| line.join(", ") + "\n").collect();
-    format!("*MATERIAL, NAME={name}\n*HYPERELASTIC, OGDEN, N={num_terms}\n{lines}")
+/// `*MATERIAL` with `*HYPERELASTIC` as Abaqus and CalculiX read it: the constants of the change of shape, then D_1 and
+/// further, of which those after the first are no part of the energy.
+pub(super) fn keyword_material(converted: &Converted, name: &str) -> String {
+    let lines: String = converted.padded().chunks(PER_LINE).map(|line| line.join(", ") + "\n").collect();
+    let order = converted.order().map_or(String::new(), |order| format!(", N={order}"));
+    format!("*MATERIAL, NAME={name}\n*HYPERELASTIC, {}{order}\n{lines}", converted.convention.keyword)
 }
 
 /// Commands of Ansys for the material number 1; d_2 and further are zero where they are not given (no such term).
-fn commands(constants: &[Constant]) -> String {
-    let mut text = format!("TB,HYPER,1,1,{},OGDEN\n", constants.len() / 2);
-    for (index, part) in constants.chunks(PER_TBDATA).enumerate() {
+fn commands(converted: &Converted) -> String {
+    let order = converted.order().map_or(String::new(), |order| order.to_string());
+    let mut text = format!("TB,HYPER,1,1,{order},{}\n", converted.convention.keyword);
+    for (index, part) in converted.constants.chunks(PER_TBDATA).enumerate() {
         let numbers: Vec<String> = part.iter().map(Constant::text).collect();
         text += &format!("TBDATA,{},{}\n", PER_TBDATA * index + 1, numbers.join(","));
     }
@@ -100,19 +107,20 @@ fn commands(constants: &[Constant]) -> String {
 }
 
 /// Parameters as COMSOL loads them: name, expression with unit, description.
-fn parameters(constants: &[Constant]) -> String {
+fn parameters(converted: &Converted) -> String {
     let line = |c: &Constant| {
         // A plain number has no unit there.
         let unit = if c.unit == "1" { String::new() } else { format!("[{}]", c.unit) };
-        format!("{} {}{unit} \"Ogden material\"\n", c.name, c.text())
+        format!("{} {}{unit} \"{} material\"\n", c.name, c.text(), converted.convention.keyword)
     };
-    constants.iter().map(line).collect()
+    converted.constants.iter().map(line).collect()
 }
 
 /// A `material` of FEBio.
-pub(super) fn febio_material(constants: &[Constant], name: &str, indent: &str) -> String {
-    let mut text = format!("{indent}<material id=\"1\" name=\"{name}\" type=\"Ogden\">\n");
-    for c in constants {
+pub(super) fn febio_material(converted: &Converted, name: &str, indent: &str) -> String {
+    let kind = converted.convention.keyword;
+    let mut text = format!("{indent}<material id=\"1\" name=\"{name}\" type=\"{kind}\">\n");
+    for c in &converted.constants {
         let tag = c.name.replace('_', "");
         text += &format!("{indent}  <{tag}>{}</{tag}>\n", c.text());
     }

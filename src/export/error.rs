@@ -4,13 +4,18 @@
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExportError {
-    /// The material is a law in the first invariant.
+    /// The program does not have the material's law.
     #[error(
-        "cards for {program} are written of Ogden's terms only; fit Ogden terms, or set its constants down by hand"
+        "{program} has no law of {law}; write the material for {}, or fit another law for {program}",
+        others.join(", ")
     )]
-    NotOgden {
+    NoSuchLaw {
         /// The program.
         program: &'static str,
+        /// The law.
+        law: &'static str,
+        /// The programs that have it.
+        others: Vec<&'static str>,
     },
     /// The material has more terms than the program reads.
     #[error("the material has {count} Ogden terms and {program} reads at most {limit}; fit fewer terms")]

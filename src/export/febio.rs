@@ -47,7 +47,7 @@ pub(super) fn deck(written: &Written, numbered: &Numbered) -> String {
          <Module type=\"solid\">\n    <units>mm-N-s</units>\n  </Module>\n{}  <Material>\n{}  </Material>\n  <Mesh>\n    \
          <Nodes name=\"nodes\">\n",
         control(drives_mm.len()),
-        febio_material(&written.constants, name, "    "),
+        febio_material(&written.material, name, "    "),
     );
     for (n, x) in numbered.nodes() {
         // Writing to a string does not fail.

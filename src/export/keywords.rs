@@ -57,7 +57,7 @@ pub(super) fn deck(written: &Written, numbered: &Numbered, dialect: &Dialect) ->
     for set in &held {
         let _ = write!(text, "*NSET, NSET={}\n{}", set.name, lines_of(&set.nodes));
     }
-    text += &keyword_material(&written.constants, name);
+    text += &keyword_material(&written.material, name);
     let _ = write!(text, "*SOLID SECTION, ELSET=SPECIMEN, MATERIAL={name}\n*BOUNDARY\n");
     for set in &held {
         for component in (0..3).filter(|&c| set.is_zero[c]).map(|c| c + 1) {

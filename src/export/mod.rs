@@ -1,6 +1,7 @@
 //! Materials and models for other programs: cards in the convention of each, and whole input files.
 //!
-//! * [`MaterialFormat`]: the conventions of Abaqus, Ansys, CalculiX, COMSOL and FEBio, and their constants from ours.
+//! * [`MaterialFormat`]: Abaqus, Ansys, CalculiX, COMSOL and FEBio, the laws that each has, and its constants from
+//!   ours.
 //! * [`material_card`]: the text that such a program reads.
 //! * [`model_file()`]: a specimen's mesh, material, boundary conditions and drives as Abaqus, CalculiX and FEBio
 //!   read them.
@@ -18,9 +19,11 @@ mod label;
 mod model;
 mod model_file;
 mod number;
+mod programs;
 
 pub use card::{Origin, material_card};
-pub use convention::{Constant, Convention, MaterialFormat, VolumetricLaw};
+pub use convention::{Constant, Convention, Converted, VolumetricLaw};
 pub use error::ExportError;
 pub use model::Model;
 pub use model_file::{ModelFormat, model_file};
+pub use programs::MaterialFormat;

@@ -1,6 +1,6 @@
 //! A mesh with material, boundary conditions and drives, numbered as other programs number.
 
-use super::convention::Constant;
+use super::convention::Converted;
 use crate::material::Ogden;
 use crate::mesh::{ElementKind, Mesh};
 use crate::report::nodes_in_vtk_order;
@@ -23,7 +23,7 @@ pub(super) struct Written<'a> {
     /// The kind of element.
     pub kind: ElementKind,
     /// The material in the program's convention, MPa.
-    pub constants: Vec<Constant>,
+    pub material: Converted,
     /// Drives along x, mm.
     pub drives_mm: &'a [f64],
     /// What the reader should know, line by line.

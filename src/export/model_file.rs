@@ -1,10 +1,11 @@
 //! The input file of a model for each program.
 
 use super::card::Origin;
-use super::convention::{Constant, MaterialFormat};
+use super::convention::Converted;
 use super::error::ExportError;
 use super::label::label;
 use super::model::{Model, Numbered, Written};
+use super::programs::MaterialFormat;
 use super::{febio, keywords};
 use crate::homogeneous::StressUnit;
 use crate::material::Ogden;
@@ -38,7 +39,7 @@ impl ModelFormat {
 
     /// The program, as it is called.
     pub fn program(self) -> &'static str {
-        self.material().convention().program
+        self.material().program()
     }
 
     /// Whether the program reads `material`.
@@ -46,12 +47,12 @@ impl ModelFormat {
     /// # Errors
     /// [`ExportError`].
     pub fn check(self, material: &Ogden) -> Result<(), ExportError> {
-        self.constants(material).map(|_| ())
+        self.convert(material).map(|_| ())
     }
 
-    /// The constants of `material` in MPa, which go with mm and N.
-    fn constants(self, material: &Ogden) -> Result<Vec<Constant>, ExportError> {
-        self.material().convention().constants(material, StressUnit::MPa)
+    /// `material` in the program's convention in MPa, which go with mm and N.
+    fn convert(self, material: &Ogden) -> Result<Converted, ExportError> {
+        self.material().convert(material, StressUnit::MPa)
     }
 
     /// Name of the model's file.
@@ -93,7 +94,7 @@ pub fn model_file(model: &Model, format: ModelFormat, origin: &Origin) -> Result
     let numbered = Numbered::new(model.mesh);
     let written = Written {
         kind: model.mesh.element_kind,
-        constants: format.constants(model.material)?,
+        material: format.convert(model.material)?,
         drives_mm: model.drives_mm,
         comments: comments(model, origin),
         name: label(origin.name),

@@ -5,7 +5,7 @@
 
 use super::export_result::Card;
 use super::{Context, JobError, Outcome, Request, ResultSchema, Run, summary};
-use crate::export::{ExportError, MaterialFormat, Origin, material_card};
+use crate::export::{Converted, ExportError, MaterialFormat, Origin, material_card};
 use crate::field::FieldError;
 use crate::homogeneous::StressUnit;
 use crate::material::Ogden;
@@ -17,13 +17,13 @@ use utoipa::ToSchema;
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExportMaterialRequest {
-    /// The material (`ogden/1`), such as the `material.json` of a fit.
+    /// The material, Ogden's or another law, such as the `material.json` of a fit.
     pub material: Ogden,
-    /// Name of the material in the files; `ogden` where it is left out.
+    /// Name of the material in the files; that of its law, such as `ogden`, where it is left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(max_length = 200)]
     pub name: Option<String>,
-    /// Programs that it is written for; all that read so many terms where the list is left out.
+    /// Programs that it is written for; all that have its law and read so many terms where the list is left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(min_items = 1, max_items = 5)]
     pub formats: Option<Vec<MaterialFormat>>,
@@ -50,17 +50,17 @@ struct ExportMaterialResult<'a> {
 }
 
 impl ExportMaterialRequest {
-    fn name(&self) -> &str {
-        self.name.as_deref().unwrap_or("ogden")
+    fn name(&self) -> String {
+        self.name.clone().unwrap_or_else(|| self.material.law_name().to_lowercase())
     }
 
     fn card(&self, format: MaterialFormat) -> Result<Card, ExportError> {
-        let convention = format.convention();
+        let Converted { convention, constants } = format.convert(&self.material, self.stress_unit)?;
         Ok(Card {
             format,
-            program: convention.program,
+            program: format.program(),
             file: format.file_name(),
-            constants: convention.constants(&self.material, self.stress_unit)?,
+            constants,
             energy: convention.energy,
             volumetric_law: convention.law,
             manual: convention.manual,
@@ -73,7 +73,7 @@ impl ExportMaterialRequest {
             None => Ok(MaterialFormat::ALL.into_iter().filter_map(|f| self.card(f).ok()).collect()),
             Some(formats) => {
                 let unfit = |(index, e): (usize, ExportError)| {
-                    FieldError::new(format!("/formats/{index}"), formats[index].convention().program, "left out")
+                    FieldError::new(format!("/formats/{index}"), formats[index].program(), "left out")
                         .remedy(e.to_string())
                 };
                 let card = |(index, &f): (usize, &MaterialFormat)| self.card(f).map_err(|e| unfit((index, e)));
@@ -110,22 +110,22 @@ impl Run for ExportMaterialRequest {
     }
 
     fn run(&self, context: &Context) -> Result<Outcome, JobError> {
-        let cards = self.cards()?;
+        let (cards, name) = (self.cards()?, self.name());
         let result = ExportMaterialResult {
             schema: "export-material/1",
             version: VERSION,
             input_hash: &context.input_hash,
-            name: self.name(),
+            name: &name,
             material: &self.material,
             stress_unit: self.stress_unit,
             cards: &cards,
         };
-        let mut outcome = Outcome::new("export-material.json", &result, summary::export_material(self.name(), &cards))?;
-        let origin = Origin { name: self.name(), version: VERSION, input_hash: &context.input_hash };
+        let mut outcome = Outcome::new("export-material.json", &result, summary::export_material(&name, &cards))?;
+        let origin = Origin { name: &name, version: VERSION, input_hash: &context.input_hash };
         for card in &cards {
             let text = material_card(&self.material, card.format, self.stress_unit, &origin)
                 .map_err(|e| context.failed(&e))?;
-            outcome.add(card.file.clone(), text);
+            outcome.add(card.file, text);
         }
         Ok(outcome)
     }

@@ -18,7 +18,7 @@ use utoipa::ToSchema;
 pub struct ExportModelRequest {
     /// The specimen (`specimen/1`).
     pub specimen: Specimen,
-    /// The material (`ogden/1`); Ecoflex 00-20 where it is left out.
+    /// The material, Ogden's or another law; Ecoflex 00-20 where it is left out.
     #[serde(default = "defaults::ecoflex")]
     pub material: Ogden,
     /// Drives in mm instead of the specimen's; one load step each.
@@ -32,7 +32,8 @@ pub struct ExportModelRequest {
     /// Mesh the whole specimen even where it has mirror planes.
     #[serde(default)]
     pub is_whole: bool,
-    /// Programs that it is written for; all that read so many terms where the list is left out.
+    /// Programs that it is written for; all that have the material's law and read so many terms where the list is left
+    /// out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(min_items = 1, max_items = 3)]
     pub formats: Option<Vec<ModelFormat>>,

@@ -10,7 +10,7 @@ pub(super) struct Card {
     pub(super) format: MaterialFormat,
     /// The program, as it is called.
     pub(super) program: &'static str,
-    pub(super) file: String,
+    pub(super) file: &'static str,
     /// Its constants.
     pub(super) constants: Vec<Constant>,
     pub(super) energy: &'static str,

@@ -239,6 +239,18 @@ pub enum LawKind {
 }
 
 impl LawKind {
+    /// All of them.
+    pub const ALL: [LawKind; 3] = [LawKind::Yeoh, LawKind::Gent, LawKind::ArrudaBoyce];
+
+    /// The name by which it goes: `Yeoh`, `Gent`, `Arruda-Boyce`.
+    pub fn name(self) -> &'static str {
+        match self {
+            LawKind::Yeoh => "Yeoh",
+            LawKind::Gent => "Gent",
+            LawKind::ArrudaBoyce => "Arruda-Boyce",
+        }
+    }
+
     /// Laws with this initial shear modulus (kPa) to start fits from, from stiffening late to early. The stresses of
     /// Yeoh's law are linear in its coefficients: one start is enough.
     pub fn starts(self, shear_kpa: f64) -> Vec<InvariantLaw> {
@@ -276,6 +288,15 @@ impl InvariantLaw {
             InvariantLaw::Yeoh(law) => law,
             InvariantLaw::Gent(law) => law,
             InvariantLaw::ArrudaBoyce(law) => law,
+        }
+    }
+
+    /// Which one it is.
+    pub fn kind(&self) -> LawKind {
+        match self {
+            InvariantLaw::Yeoh(_) => LawKind::Yeoh,
+            InvariantLaw::Gent(_) => LawKind::Gent,
+            InvariantLaw::ArrudaBoyce(_) => LawKind::ArrudaBoyce,
         }
     }
 

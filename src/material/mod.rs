@@ -138,6 +138,11 @@ impl Ogden {
         material.validate().map(|()| material)
     }
 
+    /// Its law as it is called: `Ogden`, or the name of its law in the first invariant.
+    pub fn law_name(&self) -> &'static str {
+        self.law.map_or("Ogden", |law| law.kind().name())
+    }
+
     /// κ, μ₁, α₁, μ₂, α₂, …, then those of the law.
     pub fn parameters(&self) -> Vec<Parameter> {
         let mut all = vec![Parameter::Kappa];
