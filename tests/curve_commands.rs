@@ -1,7 +1,7 @@
 //! `lambdak uniaxial` and `lambdak curves` as a user runs them.
 
-use lambdak::homogeneous::{HomogeneousTest, ShearTerm, incompressible_stress};
-use lambdak::material::Ogden;
+use lambdak::homogeneous::{CurveLaw, HomogeneousTest, ShearTerm, incompressible_stress};
+use lambdak::material::{Gent, InvariantLaw, Ogden};
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -97,6 +97,64 @@ fn what_was_read_and_left_out_is_said() {
     let modulus = value["initial_shear_modulus_kpa"]["value"].as_f64().unwrap();
     assert!(modulus > 11.2 && modulus < 13.9, "{modulus}");
     assert_eq!(value["files"][0]["num_rows"], 81);
+}
+
+/// Curves of a Gent material: its law is fitted, predicts what is kept back, is told to be the best, and its material
+/// is one that other programs read.
+#[test]
+fn laws_are_fitted_and_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let law = InvariantLaw::Gent(Gent { mu_kpa: 16.0, limit: 6.0 });
+    for (name, test, end) in [
+        ("ut.csv", HomogeneousTest::Uniaxial, 2.5),
+        ("et.csv", HomogeneousTest::Equibiaxial, 1.7),
+        ("ps.csv", HomogeneousTest::PureShear, 2.2),
+    ] {
+        let mut text = String::from("stretch,nominal_stress_kpa\n");
+        for i in 1..=40 {
+            let drive = 1.0 + (end - 1.0) * f64::from(i) / 40.0;
+            let ripple = 1.0 + 0.002 * (7.3 * f64::from(i) * f64::from(i)).sin();
+            text += &format!("{drive},{}\n", ripple * law.incompressible_stress(&test.at(drive)));
+        }
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    let tests = ["uniaxial=ut.csv", "equibiaxial=et.csv", "pure-shear=ps.csv", "--keep-back", "equibiaxial"];
+    let json = run(folder.path(), &[&["curves"], &tests[..], &["--law", "gent", "--json", "--out", "gent"]].concat());
+    assert!(json.status.success(), "{}", String::from_utf8_lossy(&json.stderr));
+    let value: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+    assert_eq!((value["law"].as_str(), value["num_terms"].as_u64()), (Some("gent"), Some(0)));
+    for (index, (name, truth)) in [("mu", 16.0), ("j_m", 6.0)].into_iter().enumerate() {
+        let found = &value["parameters"][index];
+        assert_eq!(found["name"], name);
+        // The ripple is 0.14 % rms.
+        assert!((found["value"].as_f64().unwrap() / truth - 1.0).abs() < 0.005, "{found}");
+    }
+    assert!(value["kept_back"][0]["relative_rms_error"].as_f64().unwrap() < 0.01);
+    assert_eq!(
+        (&value["laws"]["laws"][0]["name"], &value["laws"]["laws"][0]["num_parameters"]),
+        (&"Gent".into(), &2.into())
+    );
+    let material = std::fs::read_to_string(folder.path().join("gent/material.json")).unwrap();
+    assert!(material.contains("gent/1") && folder.path().join("gent/laws.svg").is_file(), "{material}");
+    let cards =
+        run(folder.path(), &["export", "material", "gent/material.json", "--format", "febio", "--out", "cards"]);
+    assert!(cards.status.success(), "{}", String::from_utf8_lossy(&cards.stderr));
+    let ogden = run(folder.path(), &[&["curves"], &tests[..], &["--terms", "1"]].concat());
+    let shown = String::from_utf8_lossy(&ogden.stdout).into_owned();
+    assert!(
+        shown.contains("Gent (2 parameters) describes the curves better than Ogden, 1 term (2 parameters)"),
+        "{shown}"
+    );
+    let uniaxial = run(folder.path(), &["uniaxial", "ut.csv", "--law", "gent"]);
+    let shown = String::from_utf8_lossy(&uniaxial.stdout).into_owned();
+    assert!(
+        shown.contains("law of Gent") && shown.contains("no law describes the curves better than Gent ("),
+        "{shown}"
+    );
+    let refused = run(folder.path(), &[&["curves"], &tests[..], &["--law", "gent", "--exact"]].concat());
+    assert_eq!(refused.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(said.contains("--exact") && said.contains("the law of Gent has no terms"), "{said}");
 }
 
 /// A law in the first invariant is written for the programs that have it; another program is refused by name.

@@ -10,8 +10,10 @@
 mod prerequisites;
 
 use lambdak::homogeneous::{
-    CsvOptions, Curve, CurveFitOptions, HomogeneousTest, StressUnit, fit_curves, fit_terms, matches_of, read_csv,
+    CsvOptions, Curve, CurveFitOptions, HomogeneousTest, StressUnit, compare_laws, fit_curves, fit_terms, matches_of,
+    read_csv,
 };
+use lambdak::material::LawKind;
 use lambdak::rate::{Hypothesis, LoadCurve, LoadCurveOptions, LoadCurveVerdict, analyse_load_curve};
 use prerequisites::Missing;
 use std::path::{Path, PathBuf};
@@ -51,6 +53,30 @@ fn treloar_three_terms_meet_three_tests() -> Result<(), Missing> {
     Ok(())
 }
 
+/// Treloar's rubber is what laws of chains that come to their end were made for: with two parameters they describe it
+/// better, by BIC, than two of Ogden's terms with four, and their shear modulus is that of the literature, about
+/// 0.3 MPa.
+fn treloar_is_a_network_of_chains() -> Result<(), Missing> {
+    let folder = prerequisites::real_data("classical")?;
+    let curves = classical(&folder, "Treloar_1944");
+    let options = CurveFitOptions::default();
+    let comparison = compare_laws(&curves, &fit_curves(&curves, &options).unwrap(), &options).unwrap();
+    let of = |law: Option<LawKind>, num_terms: usize| {
+        let found = comparison.laws.iter().find(|e| e.law == law && e.num_terms == num_terms).unwrap();
+        println!("{}: {} parameters, BIC {:.1}", found.name, found.num_parameters, found.bic);
+        found
+    };
+    let two_terms = of(None, 2);
+    for law in [LawKind::Gent, LawKind::ArrudaBoyce] {
+        let found = of(Some(law), 0);
+        assert!(found.num_parameters == 2 && two_terms.num_parameters == 4);
+        assert!(found.bic < two_terms.bic, "{} {}", found.bic, two_terms.bic);
+        let modulus = found.initial_shear_modulus_kpa.value;
+        assert!((250.0..350.0).contains(&modulus), "{modulus}");
+    }
+    Ok(())
+}
+
 /// Meunier's silicone: fitted in uniaxial tension and compression and in pure shear, equibiaxial predicted.
 fn meunier_equibiaxial_is_predicted() -> Result<(), Missing> {
     let folder = prerequisites::real_data("classical")?;
@@ -59,7 +85,7 @@ fn meunier_equibiaxial_is_predicted() -> Result<(), Missing> {
     let options = CurveFitOptions { also_stable_at: equibiaxial.states.clone(), ..CurveFitOptions::default() };
     let sequence = fit_curves(&fitted, &options).unwrap();
     for fit in &sequence.fits {
-        let kept = matches_of(&fit.terms(), None, std::slice::from_ref(&equibiaxial)).unwrap();
+        let kept = fit.matches(std::slice::from_ref(&equibiaxial)).unwrap();
         println!(
             "{} terms: fitted R² {:.5} {:.5}; equibiaxial predicted R² {:.5}, rms {:.1} kPa ({:.2} %)",
             fit.num_terms,
@@ -70,7 +96,7 @@ fn meunier_equibiaxial_is_predicted() -> Result<(), Missing> {
             100.0 * kept[0].relative_rms_error
         );
     }
-    let kept = matches_of(&sequence.chosen().terms(), None, &[equibiaxial]).unwrap();
+    let kept = sequence.chosen().matches(&[equibiaxial]).unwrap();
     println!("chosen {} terms", sequence.chosen().num_terms);
     // The bulge test turns up beyond a stretch of 1.8, which the other two tests do not show: the prediction misses it
     // (an error of about a fifth). What is asked is the curve below that.
@@ -119,7 +145,7 @@ fn compressed_cylinders_predict_each_other() -> Result<(), Missing> {
         };
         let fit = fit_terms(&[read("A1")], 2, &CurveFitOptions::default()).unwrap();
         for name in ["A1", "A5", "B1"] {
-            let m = &matches_of(&fit.terms, None, &[read(name)]).unwrap()[0];
+            let m = &matches_of(&fit.law, None, &[read(name)]).unwrap()[0];
             println!(
                 "{grade} fitted on A1, {name}: R² {:.5}, error {:.2} %",
                 m.r_squared,
@@ -249,6 +275,7 @@ fn adhesive_relaxation_is_predicted() -> Result<(), Missing> {
 
 prerequisites::test_binary!(
     treloar_three_terms_meet_three_tests,
+    treloar_is_a_network_of_chains,
     meunier_equibiaxial_is_predicted,
     silicones_in_tension_are_all_fitted,
     compressed_cylinders_predict_each_other,

@@ -173,6 +173,22 @@ class Results(Scratch):
         self.assertFalse(fit.is_bulk_held)
         self.assertGreater(fit.initial_shear_modulus.interval_95[1], fit.initial_shear_modulus.value)
 
+    def test_curves_of_a_law(self):
+        stretch = [1 + 0.05 * n for n in range(1, 31)]
+        # Gent's law, 16 kPa and 6, but for a little waviness.
+        first = [s * s + 2 / s - 3 for s in stretch]
+        stress = [
+            16 * 6 / (6 - x) * (s - s**-2) * (1 + 1e-3 * math.sin(7.3 * n * n))
+            for n, (s, x) in enumerate(zip(stretch, first))
+        ]
+        fit = lk.uniaxial({"stretch": stretch, "nominal_stress_kpa": stress}, law="gent", folder=self.folder / "fit")
+        self.assertEqual((fit.law, fit.num_terms), ("gent", 0))
+        # The waviness is 0.07 % rms.
+        self.assertAlmostEqual(fit.parameters["j_m"].value, 6.0, delta=0.03)
+        self.assertEqual(next(iter(fit.bic_above_best)), "Gent")
+        cards = lk.export_material(fit.material, folder=self.folder / "cards").cards
+        self.assertEqual(set(cards), {"ansys", "comsol", "febio"})
+
     def test_what_the_program_does_not_know_is_nan(self):
         from lambdak._results import _estimates
 

@@ -153,7 +153,8 @@ const COLUMNS: [Flag; 5] = [
     Flag::of("area", "columns/area_mm2"),
 ];
 /// Options of fits to curves.
-const FITS: [Flag; 4] = [
+const FITS: [Flag; 5] = [
+    Flag::of("law", "fit/law"),
     Flag::of("terms", "fit/max_terms"),
     Flag::of("bulk", "fit/bulk_kpa"),
     Flag::of("min-alpha-gap", "fit/min_alpha_gap"),
@@ -171,6 +172,7 @@ const CURVES: &[Flag] = &[
     FITS[1],
     FITS[2],
     FITS[3],
+    FITS[4],
 ];
 const UNIAXIAL: &[Flag] = &[
     Flag::read("specimen", "specimen", JsonFile),
@@ -184,6 +186,7 @@ const UNIAXIAL: &[Flag] = &[
     FITS[1],
     FITS[2],
     FITS[3],
+    FITS[4],
 ];
 const PAPER_TABLES: &[Flag] = &[
     Flag::of("noise", "noise_sd_mm"),

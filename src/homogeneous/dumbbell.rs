@@ -7,12 +7,12 @@
 
 use super::curve::{Curve, CurveError};
 use super::deformation::HomogeneousTest;
-use super::fit::{BULK_OVER_SHEAR, material_of};
+use super::fit::BULK_OVER_SHEAR;
 use super::fit_options::{CurveFitError, CurveFitOptions};
 use super::result::{CurveFitSequence, fit_curves};
 use super::table::{ForceTable, TableError};
 use crate::fem::{ForwardModel, PrepareError, SolveError, SolveOptions};
-use crate::material::ShearTerm;
+use crate::material::Ogden;
 use crate::mesh::MeshOptions;
 use crate::specimen::{Outline, Specimen, dumbbell};
 use serde::{Deserialize, Serialize};
@@ -113,18 +113,16 @@ pub enum DumbbellError {
 /// [`DumbbellError::Solve`].
 pub fn gauge_stretches(
     model: &mut ForwardModel,
-    terms: &[ShearTerm],
-    bulk_kpa: f64,
+    material: &Ogden,
     displacement_mm: &[f64],
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Vec<GaugePoint>, SolveError> {
-    let material = material_of(terms, bulk_kpa);
-    let path = model.solve_path(&material, displacement_mm, &SolveOptions::default(), is_cancelled)?;
+    let path = model.solve_path(material, displacement_mm, &SolveOptions::default(), is_cancelled)?;
     Ok(path
         .iter()
         .map(|state| {
             let (mut sum, mut volume) = (0.0, 0.0);
-            for q in model.quadrature_fields(&material, state) {
+            for q in model.quadrature_fields(material, state) {
                 if q.position[0].abs() <= HALF_GAUGE_MM {
                     sum += q.volume_mm3 * q.deformation_gradient[0][0];
                     volume += q.volume_mm3;
@@ -169,7 +167,7 @@ pub fn fit_dumbbell(
         let sequence = fit_curves(&[curve], &options.fit)?;
         let chosen = sequence.chosen();
         let bulk_kpa = options.fit.bulk_kpa.unwrap_or(BULK_OVER_SHEAR * chosen.initial_shear_modulus_kpa.value);
-        let conversion = gauge_stretches(&mut model, &chosen.terms(), bulk_kpa, &drives, is_cancelled)?;
+        let conversion = gauge_stretches(&mut model, &chosen.fitted_law().material(bulk_kpa), &drives, is_cancelled)?;
         let at: Vec<f64> = std::iter::once(0.0).chain(conversion.iter().map(|c| c.displacement_mm)).collect();
         let gauge: Vec<f64> = std::iter::once(1.0).chain(conversion.iter().map(|c| c.gauge_stretch)).collect();
         let table = ForceTable::new(&at, &gauge)?;

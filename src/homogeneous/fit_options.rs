@@ -2,11 +2,14 @@
 
 use super::curve::CurveError;
 use super::deformation::Deformation;
+use crate::material::LawKind;
 
-/// Settings of [`super::fit_terms`] and [`super::fit_curves`].
+/// Settings of [`super::fit_terms`], [`super::fit_law`] and [`super::fit_curves`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct CurveFitOptions {
-    /// Fits with 1 to this many terms.
+    /// A law in the first invariant in the place of Ogden's terms.
+    pub law: Option<LawKind>,
+    /// Fits with 1 to this many of Ogden's terms.
     pub max_terms: usize,
     /// Whether the first term is a neo-Hookean one, α = 2 held.
     pub neo_hookean: bool,
@@ -16,8 +19,8 @@ pub struct CurveFitOptions {
     pub min_alpha_gap: f64,
     /// Range of the exponents.
     pub alpha_range: [f64; 2],
-    /// States beyond the data in which a material with negative products μα must be stable too: those that will be
-    /// predicted.
+    /// States beyond the data in which a material with negative products μα, or a law in the first invariant, must be
+    /// stable too: those that will be predicted.
     pub also_stable_at: Vec<Deformation>,
     /// Starts that are refined per number of terms.
     pub num_starts: usize,
@@ -26,6 +29,7 @@ pub struct CurveFitOptions {
 impl Default for CurveFitOptions {
     fn default() -> Self {
         CurveFitOptions {
+            law: None,
             max_terms: 3,
             neo_hookean: false,
             bulk_kpa: None,
@@ -61,6 +65,25 @@ pub enum CurveFitError {
         num_terms: usize,
         /// Data points.
         num_data: usize,
+    },
+    /// More unknowns of a law in the first invariant than data.
+    #[error("the law of {law} has {num_parameters} parameters and needs more than the {num_data} data points")]
+    TooFewForLaw {
+        /// The law.
+        law: &'static str,
+        /// Its parameters.
+        num_parameters: usize,
+        /// Data points.
+        num_data: usize,
+    },
+    /// No start of a law in the first invariant led anywhere.
+    #[error(
+        "no material with the law of {law} was found that is stable in every state of these curves and of those kept \
+         back; check the stresses' signs and units, or ask for another law"
+    )]
+    NoLawFit {
+        /// The law.
+        law: &'static str,
     },
     /// No start led anywhere.
     #[error(

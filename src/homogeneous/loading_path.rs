@@ -1,8 +1,8 @@
 //! Whether a material stays stable while a test loads it: the stability of [`crate::material`] in the states between
 //! rest and those of the data.
 
+use super::curve_law::CurveLaw;
 use super::deformation::{Deformation, HomogeneousTest};
-use crate::material::{ShearTerm, initial_shear_modulus_kpa, smallest_relative_stiffness};
 
 /// Smallest stiffness that still counts as positive, relative to the initial shear modulus.
 const MARGIN: f64 = 1e-6;
@@ -23,25 +23,30 @@ fn path_to(state: &Deformation) -> impl Iterator<Item = Deformation> + '_ {
 }
 
 /// Whether the material is stable on the way to all of `states`.
-pub fn is_stable(terms: &[ShearTerm], states: &[Deformation]) -> bool {
-    let is_stable_at = |s: Deformation| smallest_relative_stiffness(terms, s.log_stretches()) > MARGIN;
-    initial_shear_modulus_kpa(terms) > 0.0 && states.iter().flat_map(path_to).all(is_stable_at)
+pub fn is_stable(law: &dyn CurveLaw, states: &[Deformation]) -> bool {
+    let is_stable_at = |s: Deformation| law.smallest_relative_stiffness(s.log_stretches()) > MARGIN;
+    law.initial_shear_modulus_kpa() > 0.0 && states.iter().flat_map(path_to).all(is_stable_at)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::curve_law::OgdenTerms;
     use super::*;
+    use crate::material::{ShearTerm, laws};
 
-    fn term(modulus_kpa: f64, alpha: f64) -> ShearTerm {
-        ShearTerm { modulus_kpa, alpha }
+    fn terms<const N: usize>(all: [(f64, f64); N]) -> OgdenTerms {
+        OgdenTerms::free(&all.map(|(modulus_kpa, alpha)| ShearTerm { modulus_kpa, alpha }))
     }
 
     /// At rest every increment meets the same stiffness Σ c, twice the shear modulus. Rounding only.
     #[test]
     fn rest_has_the_initial_stiffness() {
         let rest = HomogeneousTest::Uniaxial.at(1.0).log_stretches();
-        let found = smallest_relative_stiffness(&[term(30.0, 2.0), term(-4.0, 5.0)], rest);
+        let found = terms([(30.0, 2.0), (-4.0, 5.0)]).smallest_relative_stiffness(rest);
         assert!((found - 2.0).abs() < 1e-12);
+        for law in laws() {
+            assert!((CurveLaw::smallest_relative_stiffness(&law, rest) - 2.0).abs() < 1e-12, "{law:?}");
+        }
     }
 
     /// Products μα > 0 are stable everywhere; a softening pair is stable near rest and not far from it, where the
@@ -49,8 +54,8 @@ mod tests {
     #[test]
     fn instability_is_found_where_the_cauchy_stress_turns() {
         let states: Vec<Deformation> = [0.3, 0.7, 1.5, 4.0].iter().map(|&l| HomogeneousTest::Uniaxial.at(l)).collect();
-        assert!(is_stable(&[term(30.0, 2.0), term(4.0, -5.0)], &states));
-        let soft = [term(30.0, 2.0), term(-4.0, 5.0)];
+        assert!(is_stable(&terms([(30.0, 2.0), (4.0, -5.0)]), &states));
+        let soft = terms([(30.0, 2.0), (-4.0, 5.0)]);
         assert!(is_stable(&soft, &[HomogeneousTest::Uniaxial.at(1.2)]));
         assert!(!is_stable(&soft, &[HomogeneousTest::Uniaxial.at(2.5)]));
         // Uniaxial increments are among all increments: h₁ + h₃/2 < 0 implies instability.

@@ -1,26 +1,26 @@
 //! Fits with one to N terms, the choice among them, and what is known of the parameters.
 
 use super::curve::{Curve, CurveMatch};
-use super::fit::{TermFit, fit_terms, fitted_material, matches_of};
+use super::curve_law::{CurveLaw, LawValue, OgdenTerms};
+use super::deformation::Deformation;
+use super::fit::{LawFit, fit_law, fit_terms, fitted_material, matches_of, model_stress};
 use super::fit_options::{CurveFitError, CurveFitOptions};
 use super::selection::{Selection, compare, independent_count};
 use super::statistics::t_quantile;
-use crate::material::{MaterialError, Ogden, ShearTerm, initial_shear_modulus_kpa, smallest_relative_stiffness};
+use crate::material::{LawKind, MaterialError, Ogden, ShearTerm};
 use crate::optimise::covariance;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// Singular values of the scaled Jacobian below this part of the largest count as none.
 const CUTOFF: f64 = 1e-6;
-/// A term that carries less than this part of the stress has faded.
-const FADED: f64 = 1e-3;
 
 /// A parameter and what the data say of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct CurveParameter {
-    /// `mu_1` (kPa), `alpha_1`, …
+    /// `mu_1` (kPa), `alpha_1`, …; of a law in the first invariant `c_1`, `mu` (kPa), `j_m`, `lambda_m`.
     pub name: String,
     /// Best value.
     pub value: f64,
@@ -45,22 +45,24 @@ pub struct Interval {
     pub interval_95: [f64; 2],
 }
 
-/// A fit with a number of terms.
+/// A fit with a number of Ogden's terms, or of a law in the first invariant.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct CurveFit {
-    /// Terms, the neo-Hookean one included.
+    /// The law in the first invariant; none with Ogden's terms.
+    pub law: Option<LawKind>,
+    /// Ogden's terms, the neo-Hookean one included; zero with a law in the first invariant.
     pub num_terms: usize,
     /// Whether one term is neo-Hookean (α = 2 held).
     pub neo_hookean: bool,
     /// κ, kPa; none for the incompressible limit, where homogeneous tests say nothing of it.
     pub bulk_kpa: Option<f64>,
-    /// μ₁, α₁, μ₂, … largest exponent first.
+    /// μ₁, α₁, μ₂, … largest exponent first, or those of the law.
     pub parameters: Vec<CurveParameter>,
     /// Correlation of the parameters in this order; rows of what is held or not identifiable are zero.
     pub correlation: Vec<Vec<f64>>,
-    /// ½ Σ μα.
+    /// ½ Σ μα, or 2 W′(0) of a law in the first invariant.
     pub initial_shear_modulus_kpa: Interval,
     /// How each curve is met.
     pub curves: Vec<CurveMatch>,
@@ -75,12 +77,49 @@ pub struct CurveFit {
 }
 
 impl CurveFit {
-    /// The terms.
+    /// Ogden's terms; none with a law in the first invariant.
     pub fn terms(&self) -> Vec<ShearTerm> {
+        if self.law.is_some() {
+            return Vec::new();
+        }
         self.parameters
-            .chunks(2)
+            .chunks_exact(2)
             .map(|p| ShearTerm { modulus_kpa: p[0].value * p[1].value, alpha: p[1].value })
             .collect()
+    }
+
+    /// The fitted law.
+    pub fn fitted_law(&self) -> Box<dyn CurveLaw> {
+        match self.law {
+            None => Box::new(OgdenTerms::free(&self.terms())),
+            Some(kind) => Box::new(kind.law(&self.parameters.iter().map(|p| p.value).collect::<Vec<_>>())),
+        }
+    }
+
+    /// Its stresses in some states, kPa. `None` where a state has no response.
+    pub fn stress(&self, states: &[Deformation]) -> Option<Vec<f64>> {
+        model_stress(self.fitted_law().as_ref(), self.bulk_kpa, states)
+    }
+
+    /// How it meets curves. `None` where a state has no response.
+    pub fn matches(&self, curves: &[Curve]) -> Option<Vec<CurveMatch>> {
+        matches_of(self.fitted_law().as_ref(), self.bulk_kpa, curves)
+    }
+
+    /// What the fit is called: `2 terms`, `neo-Hookean + 1`, or the name of its law.
+    pub fn name(&self) -> String {
+        match (self.law, self.num_terms, self.neo_hookean) {
+            (Some(kind), _, _) => kind.name().into(),
+            (None, 1, true) => "neo-Hookean".into(),
+            (None, n, true) => format!("neo-Hookean + {}", n - 1),
+            (None, 1, false) => "1 term".into(),
+            (None, n, false) => format!("{n} terms"),
+        }
+    }
+
+    /// Free parameters.
+    pub fn num_parameters(&self) -> usize {
+        self.parameters.iter().filter(|p| !p.held).count()
     }
 
     /// The fit as a material ([`fitted_material`]).
@@ -88,15 +127,17 @@ impl CurveFit {
     /// # Errors
     /// As [`fitted_material`].
     pub fn material(&self) -> Result<Ogden, MaterialError> {
-        fitted_material(&self.terms(), self.bulk_kpa)
+        fitted_material(self.fitted_law().as_ref(), self.bulk_kpa)
     }
 }
 
-/// Fits of one family (with or without a neo-Hookean term), 1 to N terms.
+/// Fits of one family: 1 to N of Ogden's terms (with or without a neo-Hookean one), or a law in the first invariant.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct CurveFitSequence {
+    /// The law in the first invariant; none with Ogden's terms.
+    pub law: Option<LawKind>,
     /// Whether one term is neo-Hookean.
     pub neo_hookean: bool,
     /// The fits, fewest terms first.
@@ -112,7 +153,8 @@ impl CurveFitSequence {
     }
 }
 
-/// Fits with 1 to `options.max_terms` terms to all curves together, and the choice among them.
+/// Fits to all curves together, and the choice among them: of 1 to `options.max_terms` of Ogden's terms, or of the law
+/// in the first invariant that the options name.
 ///
 /// A number of terms for which the data are too few, or no stable material is found, ends the sequence; the first must
 /// exist.
@@ -120,7 +162,10 @@ impl CurveFitSequence {
 /// # Errors
 /// [`CurveFitError`].
 pub fn fit_curves(curves: &[Curve], options: &CurveFitOptions) -> Result<CurveFitSequence, CurveFitError> {
-    let mut found: Vec<TermFit> = vec![fit_terms(curves, 1, options)?];
+    if let Some(kind) = options.law {
+        return Ok(sequence(curves, &[fit_law(curves, kind, options)?], options));
+    }
+    let mut found = vec![fit_terms(curves, 1, options)?];
     for num_terms in 2..=options.max_terms {
         match fit_terms(curves, num_terms, options) {
             Ok(fit) => found.push(fit),
@@ -128,28 +173,33 @@ pub fn fit_curves(curves: &[Curve], options: &CurveFitOptions) -> Result<CurveFi
             Err(other) => return Err(other),
         }
     }
-    let richest = found.last().map_or(0, |f| f.num_parameters());
-    let num_data: usize = curves.iter().map(|c| c.states.len()).sum();
-    // The correlation that counts is that of the residuals that the best of these models cannot remove.
-    let best = found.iter().min_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares));
-    let independent = best
-        .map_or(num_data as f64, |f| independent_count(&by_curve(curves, f.residual.as_slice()), richest as f64 + 2.0));
-    let models: Vec<(String, usize, f64)> = found
-        .iter()
-        .map(|f| (name_of(f.terms.len(), options.neo_hookean), f.num_parameters(), f.sum_of_squares))
-        .collect();
-    let selection = compare(&models, num_data, independent);
-    let fits = found.iter().map(|f| describe(curves, f, options)).collect();
-    Ok(CurveFitSequence { neo_hookean: options.neo_hookean, fits, selection })
+    Ok(sequence(curves, &found, options))
 }
 
-fn name_of(num_terms: usize, neo_hookean: bool) -> String {
-    match (num_terms, neo_hookean) {
-        (1, true) => "neo-Hookean".into(),
-        (n, true) => format!("neo-Hookean + {}", n - 1),
-        (1, false) => "1 term".into(),
-        (n, false) => format!("{n} terms"),
+/// What is said of fits, the simplest first.
+fn sequence<L: CurveLaw>(curves: &[Curve], found: &[LawFit<L>], options: &CurveFitOptions) -> CurveFitSequence {
+    let fits: Vec<CurveFit> = found.iter().map(|f| describe(curves, f, options)).collect();
+    let num_data: usize = curves.iter().map(|c| c.states.len()).sum();
+    let independent = independent_of_best(curves, found.iter().map(|f| (f.residual.as_slice(), f.num_parameters())));
+    let models: Vec<(String, usize, f64)> =
+        fits.iter().map(|f| (f.name(), f.num_parameters(), f.sum_of_squares)).collect();
+    let selection = compare(&models, num_data, independent);
+    CurveFitSequence { law: options.law, neo_hookean: options.neo_hookean, fits, selection }
+}
+
+/// How many independent data the curves are worth to models with these residuals and numbers of parameters: the
+/// correlation that counts is that of the residuals that the best of them cannot remove.
+pub(super) fn independent_of_best<'a>(curves: &[Curve], models: impl Iterator<Item = (&'a [f64], usize)>) -> f64 {
+    let num_data: usize = curves.iter().map(|c| c.states.len()).sum();
+    let squares = |residual: &[f64]| residual.iter().map(|r| r * r).sum::<f64>();
+    let (mut best, mut richest): (Option<&[f64]>, usize) = (None, 0);
+    for (residual, num_parameters) in models {
+        richest = richest.max(num_parameters);
+        if best.is_none_or(|b| squares(residual) < squares(b)) {
+            best = Some(residual);
+        }
     }
+    best.map_or(num_data as f64, |residual| independent_count(&by_curve(curves, residual), richest as f64 + 2.0))
 }
 
 fn by_curve<'a>(curves: &[Curve], values: &'a [f64]) -> Vec<&'a [f64]> {
@@ -165,7 +215,8 @@ fn by_curve<'a>(curves: &[Curve], values: &'a [f64]) -> Vec<&'a [f64]> {
 }
 
 /// Parameters with intervals, matches and notes.
-fn describe(curves: &[Curve], fit: &TermFit, options: &CurveFitOptions) -> CurveFit {
+fn describe<L: CurveLaw>(curves: &[Curve], fit: &LawFit<L>, options: &CurveFitOptions) -> CurveFit {
+    let law = &fit.law;
     let num_data = fit.residual.len() as f64;
     let num_parameters = fit.num_parameters() as f64;
     let independent = independent_count(&by_curve(curves, fit.residual.as_slice()), num_parameters + 2.0);
@@ -175,33 +226,27 @@ fn describe(curves: &[Curve], fit: &TermFit, options: &CurveFitOptions) -> Curve
     let estimated = fit.sum_of_squares / left * (num_data / independent);
     // With known noise a misfit above it still widens the intervals.
     let variance = if is_known { estimated.max(1.0) } else { estimated };
-    let (log_covariance, is_determined) = covariance(&fit.jacobian, variance, CUTOFF);
-    // (ln c, α) → (μ, α): dμ = μ d ln c − μ/α dα.
-    let n = 2 * fit.terms.len();
-    let mut map = DMatrix::identity(n, n);
-    for (t, term) in fit.terms.iter().enumerate() {
-        map[(2 * t, 2 * t)] = term.mu_kpa();
-        map[(2 * t, 2 * t + 1)] = -term.mu_kpa() / term.alpha;
-    }
-    let physical = &map * &log_covariance * map.transpose();
+    let (covariance_of_unknowns, is_determined) = covariance(&fit.jacobian, variance, CUTOFF);
+    let map = law.parameter_map();
+    let physical = &map * &covariance_of_unknowns * map.transpose();
     let t95 = t_quantile(0.05, (independent - num_parameters).max(1.0));
-    let mut parameters = Vec::with_capacity(n);
-    for i in 0..n {
-        let (t, is_alpha) = (i / 2, i % 2 == 1);
-        let held = is_alpha && fit.held == Some(t);
-        let value = if is_alpha { fit.terms[t].alpha } else { fit.terms[t].mu_kpa() };
-        // μ needs both of its term's unknowns.
-        let identifiable = is_determined[i] && (is_alpha || fit.held == Some(t) || is_determined[i + 1]) && !held;
+    let values = law.parameters();
+    let n = values.len();
+    // A parameter needs all unknowns that it depends on, but for those that are held.
+    let is_known_by_data = |i: usize| (0..n).all(|u| map[(i, u)] == 0.0 || is_determined[u] || values[u].held);
+    let describe_value = |(i, p): (usize, &LawValue)| {
+        let identifiable = !p.held && is_known_by_data(i);
         let sd = identifiable.then(|| physical[(i, i)].max(0.0).sqrt());
-        parameters.push(CurveParameter {
-            name: format!("{}_{}", if is_alpha { "alpha" } else { "mu" }, t + 1),
-            value,
+        CurveParameter {
+            name: p.name.clone(),
+            value: p.value,
             sd,
-            interval_95: sd.map(|s| [value - t95 * s, value + t95 * s]),
+            interval_95: sd.map(|s| [p.value - t95 * s, p.value + t95 * s]),
             identifiable,
-            held,
-        });
-    }
+            held: p.held,
+        }
+    };
+    let parameters: Vec<CurveParameter> = values.iter().enumerate().map(describe_value).collect();
     let correlation = (0..n)
         .map(|a| {
             (0..n)
@@ -212,18 +257,21 @@ fn describe(curves: &[Curve], fit: &TermFit, options: &CurveFitOptions) -> Curve
                 .collect()
         })
         .collect();
-    // ½ Σ c: its gradient in ln c is ½ c.
-    let modulus = initial_shear_modulus_kpa(&fit.terms);
-    let gradient = DMatrix::from_fn(1, n, |_, i| if i % 2 == 0 { 0.5 * fit.terms[i / 2].modulus_kpa } else { 0.0 });
-    let modulus_sd = (&gradient * &log_covariance * gradient.transpose())[(0, 0)].max(0.0).sqrt();
-    let matches = matches_of(&fit.terms, options.bulk_kpa, curves).unwrap_or_default();
+    let modulus = law.initial_shear_modulus_kpa();
+    let gradient = DMatrix::from_row_slice(1, n, &law.modulus_gradient());
+    let modulus_sd = (&gradient * &covariance_of_unknowns * gradient.transpose())[(0, 0)].max(0.0).sqrt();
     let smallest = curves
         .iter()
         .flat_map(|c| c.states.iter())
-        .map(|s| smallest_relative_stiffness(&fit.terms, s.log_stretches()))
+        .map(|s| law.smallest_relative_stiffness(s.log_stretches()))
         .fold(f64::INFINITY, f64::min);
+    let mut notes = law.notes(&fit.jacobian, fit.is_at_limit);
+    if !fit.is_converged {
+        notes.push("the refinement ran out of evaluations".into());
+    }
     CurveFit {
-        num_terms: fit.terms.len(),
+        law: options.law,
+        num_terms: if options.law.is_some() { 0 } else { n / 2 },
         neo_hookean: options.neo_hookean,
         bulk_kpa: options.bulk_kpa,
         parameters,
@@ -232,37 +280,10 @@ fn describe(curves: &[Curve], fit: &TermFit, options: &CurveFitOptions) -> Curve
             value: modulus,
             interval_95: [modulus - t95 * modulus_sd, modulus + t95 * modulus_sd],
         },
-        curves: matches,
+        curves: matches_of(law, options.bulk_kpa, curves).unwrap_or_default(),
         sum_of_squares: fit.sum_of_squares,
         chi2_per_datum: fit.sum_of_squares / left,
         smallest_stiffness: smallest,
-        notes: notes(fit),
+        notes,
     }
-}
-
-/// What is degenerate about a fit.
-fn notes(fit: &TermFit) -> Vec<String> {
-    let mut notes = Vec::new();
-    // ∂r/∂ln c is the term's own stress in units of the weight.
-    let share: Vec<f64> = (0..fit.terms.len()).map(|t| fit.jacobian.column(2 * t).norm()).collect();
-    let largest = share.iter().fold(0.0f64, |a, b| a.max(*b));
-    for (t, s) in share.iter().enumerate() {
-        if *s < FADED * largest {
-            notes.push(format!("term {} has faded: it carries less than {FADED} of the stress", t + 1));
-        }
-        let alpha = fit.terms[t].alpha;
-        if alpha.abs() < 0.05 {
-            notes.push(format!(
-                "alpha_{0} is near 0, where mu_{0} grows without limit; mu alpha is the meaningful product",
-                t + 1
-            ));
-        }
-    }
-    if fit.is_at_limit {
-        notes.push("an exponent stands at the end of its range or at the least distance from its neighbour".into());
-    }
-    if !fit.is_converged {
-        notes.push("the refinement ran out of evaluations".into());
-    }
-    notes
 }

@@ -2,6 +2,7 @@
 //! to a gauge stretch of 4, its force with noise, and the fits of the paper's Table 1.
 
 use super::curve::Curve;
+use super::curve_law::{CurveLaw, OgdenTerms};
 use super::deformation::HomogeneousTest;
 use super::dumbbell::{DumbbellError, DumbbellOptions, fit_dumbbell, gauge_stretches};
 use super::fit_options::CurveFitOptions;
@@ -87,7 +88,7 @@ pub fn uniaxial_stand_in(
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<UniaxialStandIn, DumbbellError> {
     let modulus = initial_shear_modulus_kpa(&TRUTH);
-    let bulk_kpa = BULK_RATIO * modulus;
+    let truth = OgdenTerms::free(&TRUTH).material(BULK_RATIO * modulus);
     let truth_mesh = MeshOptions::scaled(specimen, options.truth_factor);
     let mut model = ForwardModel::of_specimen(specimen, &truth_mesh)?;
     let largest = LARGEST_PULL * dumbbell::effective_length_mm();
@@ -98,7 +99,7 @@ pub fn uniaxial_stand_in(
         if recorded.last().is_some_and(|p: &super::dumbbell::GaugePoint| p.gauge_stretch > GAUGE_STRETCHES[1]) {
             break;
         }
-        recorded.extend(gauge_stretches(&mut model, &TRUTH, bulk_kpa, chunk, is_cancelled)?);
+        recorded.extend(gauge_stretches(&mut model, &truth, chunk, is_cancelled)?);
     }
     recorded.retain(|p| p.gauge_stretch <= GAUGE_STRETCHES[1]);
     let top = recorded.iter().fold(0.0f64, |a, p| a.max(p.force_n));

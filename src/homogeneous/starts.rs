@@ -1,26 +1,21 @@
 //! Where fits start: at given exponents the stress is linear in c, so a grid of exponents is searched by linear fits.
 
 use super::curve::Curve;
+use super::curve_law::OgdenTerms;
 use super::deformation::incompressible_derivative;
 use super::fit_options::CurveFitOptions;
-use crate::material::ShearTerm;
+use crate::material::{InvariantLaw, LawKind, LawParameter, ShearTerm, first_invariant_less_3};
 use nalgebra::{DMatrix, DVector};
 
 /// Distance of the grid's exponents.
 const GRID_STEP: f64 = 1.0;
 /// A start's vanishing term is raised to this part of the largest one at its own scale.
 const SMALL_PART: f64 = 1e-3;
-
-/// Terms to start from, largest exponent first.
-#[derive(Clone, Debug)]
-pub(super) struct Start {
-    pub(super) terms: Vec<ShearTerm>,
-    /// Which term has its exponent held at 2.
-    pub(super) held: Option<usize>,
-}
+/// The end of a law lies at this multiple of the largest Ī₁ − 3 of the data at least.
+const ROOM: f64 = 1.2;
 
 /// The most promising starts with `num_terms` terms, best first; no two are neighbours on the grid.
-pub(super) fn starts(curves: &[Curve], num_terms: usize, options: &CurveFitOptions) -> Vec<Start> {
+pub(super) fn starts(curves: &[Curve], num_terms: usize, options: &CurveFitOptions) -> Vec<OgdenTerms> {
     let [low, high] = options.alpha_range;
     let count = ((high - low) / GRID_STEP).floor() as usize;
     let mut grid: Vec<f64> = (0..=count).map(|i| high - GRID_STEP * i as f64).collect();
@@ -45,7 +40,7 @@ pub(super) fn starts(curves: &[Curve], num_terms: usize, options: &CurveFitOptio
         }
     });
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut out: Vec<Start> = Vec::new();
+    let mut out: Vec<OgdenTerms> = Vec::new();
     // Half of the places for each kind of sign.
     for is_positive in [true, false] {
         let mut kept: Vec<&Vec<usize>> = Vec::new();
@@ -61,7 +56,7 @@ pub(super) fn starts(curves: &[Curve], num_terms: usize, options: &CurveFitOptio
             let terms: Vec<ShearTerm> =
                 set.iter().zip(c).map(|(&i, &c)| ShearTerm { modulus_kpa: c, alpha: grid[i] }).collect();
             let held = if options.neo_hookean { terms.iter().position(|t| (t.alpha - 2.0).abs() < 1e-9) } else { None };
-            out.push(Start { terms, held });
+            out.push(OgdenTerms { terms, held });
         }
     }
     // c·D/α is singular in μ = c/α at α = 0 for the compressible form: step off it.
@@ -73,6 +68,23 @@ pub(super) fn starts(curves: &[Curve], num_terms: usize, options: &CurveFitOptio
         }
     }
     out
+}
+
+/// Starts of a law in the first invariant: its own, with the shear modulus of the neo-Hookean material nearest to the
+/// curves, and with room for every state where the law has an end.
+pub(super) fn law_starts(curves: &[Curve], kind: LawKind) -> Vec<InvariantLaw> {
+    // Where no positive modulus comes near, the scale of the stresses is as good a start as any.
+    let scale = curves.iter().map(Curve::scale_kpa).fold(0.0, f64::max);
+    let shear_kpa = Columns::new(curves, &[2.0]).fit(&[0], true).map_or(scale, |(_, c)| 0.5 * c[0]);
+    let states = curves.iter().flat_map(|c| &c.states);
+    let largest = states.map(|s| first_invariant_less_3(s.log_stretches())).fold(0.0, f64::max);
+    let with_room = |mut law: InvariantLaw| {
+        if law.largest_x() < ROOM * largest {
+            law.set(LawParameter::Limit, ROOM * largest);
+        }
+        law
+    };
+    kind.starts(shear_kpa).into_iter().map(with_room).collect()
 }
 
 /// Calls `visit` with every set of grid indices whose exponents keep their distance (and hold 2 where asked).

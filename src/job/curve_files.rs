@@ -6,7 +6,7 @@ use crate::homogeneous::{
     BULK_OVER_SHEAR, CsvCurve, CsvOptions, CsvReading, Curve, CurveFitOptions, HomogeneousTest, StressUnit, Unloading,
     read_csv,
 };
-use crate::material::{MaterialError, Ogden};
+use crate::material::{LawKind, MaterialError, Ogden};
 use crate::report::plain_number;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -171,6 +171,9 @@ impl TestCurve {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CurveFitSettings {
+    /// A law in the first invariant in the place of Ogden's terms. All laws are compared whichever is fitted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub law: Option<LawKind>,
     /// Fits with one to this many Ogden terms.
     #[serde(default = "max_terms")]
     #[schema(minimum = 1, maximum = 4, default = max_terms)]
@@ -200,6 +203,7 @@ fn min_alpha_gap() -> f64 {
 impl Default for CurveFitSettings {
     fn default() -> Self {
         CurveFitSettings {
+            law: None,
             max_terms: max_terms(),
             bulk_kpa: None,
             min_alpha_gap: min_alpha_gap(),
@@ -223,6 +227,7 @@ impl CurveFitSettings {
 
     pub(super) fn options(&self, neo_hookean: bool) -> CurveFitOptions {
         CurveFitOptions {
+            law: self.law,
             max_terms: self.max_terms,
             neo_hookean,
             bulk_kpa: self.bulk_kpa,

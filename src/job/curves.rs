@@ -6,11 +6,11 @@ use super::curve_files::{
 use super::{Context, JobError, Outcome, Request, ResultSchema, Run, summary};
 use crate::field::FieldError;
 use crate::homogeneous::{
-    Curve, CurveFit, CurveFitSequence, CurveMatch, CurveParameter, Interval, fit_curves, matches_of,
+    Curve, CurveFit, CurveFitSequence, CurveMatch, CurveParameter, Interval, LawComparison, compare_laws, fit_curves,
 };
-use crate::material::Ogden;
+use crate::material::{LawKind, Ogden};
 use crate::provenance::VERSION;
-use crate::report::fit_picture;
+use crate::report::{fit_picture, law_picture};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -41,13 +41,17 @@ struct CurvesResult<'a> {
     schema: &'static str,
     version: &'static str,
     input_hash: &'a str,
+    /// The law in the first invariant that is used; none with Ogden's terms.
+    law: Option<LawKind>,
     num_terms: usize,
     parameters: &'a [CurveParameter],
     initial_shear_modulus_kpa: Interval,
     chi2_per_datum: f64,
     fits: &'a CurveFitSequence,
+    /// All laws side by side.
+    laws: &'a LawComparison,
     kept_back: Vec<CurveMatch>,
-    /// The fit that is used as `ogden/1`; none where its parameters are beyond what a material may hold.
+    /// The fit that is used as a material of its law; none where its parameters are beyond what a material may hold.
     material: Option<Ogden>,
     /// Whether the material's bulk modulus was held in the fit; else it only stands for the incompressible limit.
     is_bulk_held: bool,
@@ -66,7 +70,7 @@ struct CheckedCurves {
 impl Request for CurvesRequest {
     const COMMAND: &'static str = "curves";
     const COLLECTION: &'static str = "curve-fits";
-    const ABOUT: &'static str = "Ogden terms fitted to curves of several homogeneous tests together.";
+    const ABOUT: &'static str = "Ogden terms, or another law, fitted to curves of several homogeneous tests together.";
 
     fn example() -> serde_json::Value {
         serde_json::json!({ "curves": [{ "test": "uniaxial", "csv": super::defaults::example_curve() }], "fit": { "max_terms": 1 } })
@@ -95,6 +99,13 @@ impl Request for CurvesRequest {
         if errors.is_empty() && fitted.is_empty() {
             errors.push(FieldError::new("/curves", "all kept back", "at least one curve that is fitted"));
         }
+        if let Some(kind) = self.fit.law {
+            let settings = [("/has_neo_hookean_term", self.has_neo_hookean_term), ("/is_exact", self.is_exact)];
+            for (pointer, _) in settings.iter().filter(|(_, is_asked)| *is_asked) {
+                let remedy = format!("the law of {} has no terms; leave out one of the two", kind.name());
+                errors.push(FieldError::new(*pointer, true, "left out beside a law").remedy(remedy));
+            }
+        }
         files.append(&mut kept_files);
         if errors.is_empty() {
             Ok(Box::new(CheckedCurves { request: self, fitted, kept_back, files }))
@@ -122,31 +133,40 @@ impl Run for CheckedCurves {
         } else {
             sequence.chosen()
         };
-        let predicted = matches_of(&used.terms(), used.bulk_kpa, &self.kept_back)
+        let laws = compare_laws(&self.fitted, &sequence, &options).map_err(|e| fit_failed(&e))?;
+        let predicted = used
+            .matches(&self.kept_back)
             .ok_or_else(|| fit_failed(&"the fitted material has no response in a state kept back"))?;
         let material = used.material();
         let result = CurvesResult {
             schema: "curves/1",
             version: VERSION,
             input_hash: &context.input_hash,
+            law: used.law,
             num_terms: used.num_terms,
             parameters: &used.parameters,
             initial_shear_modulus_kpa: used.initial_shear_modulus_kpa,
             chi2_per_datum: used.chi2_per_datum,
             fits: &sequence,
+            laws: &laws,
             kept_back: predicted,
             material: material.as_ref().ok().cloned(),
             is_bulk_held: used.bulk_kpa.is_some(),
             files: &self.files,
         };
-        let text = reports_in_words(&self.files) + &summary::curves(&sequence, used, &result.kept_back);
+        let text = reports_in_words(&self.files) + &summary::curves(&sequence, used, &laws, &result.kept_back);
         let mut outcome = Outcome::new("curves.json", &result, text)?;
         add_material(&mut outcome, &material, result.is_bulk_held);
         let all: Vec<(&Curve, bool)> =
             self.fitted.iter().map(|c| (c, false)).chain(self.kept_back.iter().map(|c| (c, true))).collect();
         let mut fits: Vec<&CurveFit> = vec![used];
         fits.extend(sequence.fits.iter().filter(|f| f.num_terms != used.num_terms));
-        outcome.add("curves.svg", fit_picture("Curves: the fit (full) and the others (dashed)", &all, &fits));
+        let title = match used.law {
+            None => "Curves: the fit (full) and the others (dashed)".to_string(),
+            Some(kind) => format!("Curves: the law of {}", kind.name()),
+        };
+        outcome.add("curves.svg", fit_picture(&title, &all, &fits));
+        outcome.add("laws.svg", law_picture(&laws));
         Ok(outcome)
     }
 }

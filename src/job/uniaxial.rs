@@ -1,4 +1,5 @@
-//! Uniaxial: the traditional route, one curve of a strip or a dumb-bell fitted with Ogden terms.
+//! Uniaxial: the traditional route, one curve of a strip or a dumb-bell fitted with Ogden terms, or with a law in the
+//! first invariant.
 
 use super::curve_files::{
     CurveColumns, CurveFitSettings, CurveReport, add_material, fit_failed, reports_in_words, unfit,
@@ -7,12 +8,12 @@ use super::{Context, JobError, Outcome, Progress, Request, ResultSchema, Run, de
 use crate::field::FieldError;
 use crate::homogeneous::{
     CsvCurve, Curve, CurveFit, CurveFitSequence, CurveParameter, DumbbellFit, DumbbellOptions, HomogeneousTest,
-    Interval, fit_curves, fit_dumbbell,
+    Interval, LawComparison, compare_laws, fit_curves, fit_dumbbell,
 };
-use crate::material::Ogden;
+use crate::material::{LawKind, Ogden};
 use crate::mesh::MeshSize;
 use crate::provenance::VERSION;
-use crate::report::fit_picture;
+use crate::report::{fit_picture, law_picture};
 use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -58,13 +59,17 @@ struct UniaxialResult<'a> {
     schema: &'static str,
     version: &'static str,
     input_hash: &'a str,
+    /// The law in the first invariant that is fitted; none with Ogden's terms.
+    law: Option<LawKind>,
     num_terms: usize,
     parameters: &'a [CurveParameter],
     initial_shear_modulus_kpa: Interval,
     chi2_per_datum: f64,
     fits: &'a [CurveFitSequence],
+    /// All laws side by side; those of a dumb-bell fitted to the gauge's stretches that the fit above found.
+    laws: &'a LawComparison,
     conversion: Option<&'a DumbbellFit>,
-    /// The chosen fit as `ogden/1`; none where its parameters are beyond what a material may hold.
+    /// The chosen fit as a material of its law; none where its parameters are beyond what a material may hold.
     material: Option<Ogden>,
     /// Whether the material's bulk modulus was held in the fit; else it only stands for the incompressible limit.
     is_bulk_held: bool,
@@ -78,7 +83,7 @@ struct CheckedUniaxial {
     file: CurveReport,
 }
 
-/// The fits of both families (free terms; a neo-Hookean term held), their curve, and what converted the grips.
+/// The fits of the families (free terms; a neo-Hookean term held; a law), their curve, and what converted the grips.
 struct Fits {
     families: Vec<CurveFitSequence>,
     curve: Curve,
@@ -89,7 +94,7 @@ impl Request for UniaxialRequest {
     const COMMAND: &'static str = "uniaxial";
     const COLLECTION: &'static str = "uniaxial-fits";
     const ABOUT: &'static str =
-        "The traditional route: one uniaxial curve, of a strip or a dumb-bell, fitted with Ogden terms.";
+        "The traditional route: one uniaxial curve, of a strip or a dumb-bell, fitted with Ogden terms or another law.";
 
     fn example() -> serde_json::Value {
         serde_json::json!({ "csv": super::defaults::example_curve(), "fit": { "max_terms": 1 } })
@@ -122,6 +127,11 @@ impl Request for UniaxialRequest {
 }
 
 impl CheckedUniaxial {
+    /// The families of fits: whether a neo-Hookean term is held. A law has no terms, and one family.
+    fn families(&self) -> &'static [bool] {
+        if self.request.fit.law.is_some() { &[false] } else { &[false, true] }
+    }
+
     fn of_strip(&self) -> Result<Fits, JobError> {
         let curve = Curve::new("uniaxial", HomogeneousTest::Uniaxial, &self.csv.drive, &self.csv.stress)
             .map_err(|e| unfit("/csv", &e))?;
@@ -129,7 +139,7 @@ impl CheckedUniaxial {
             let options = self.request.fit.options(neo_hookean);
             fit_curves(std::slice::from_ref(&curve), &options).map_err(|e| fit_failed(&e))
         };
-        let families = [false, true].iter().map(family).collect::<Result<Vec<_>, _>>()?;
+        let families = self.families().iter().map(family).collect::<Result<Vec<_>, _>>()?;
         Ok(Fits { families, curve, conversion: None })
     }
 
@@ -138,7 +148,7 @@ impl CheckedUniaxial {
         let mesh = self.request.mesh.options(specimen);
         let mut families = Vec::new();
         let mut first: Option<DumbbellFit> = None;
-        for neo_hookean in [false, true] {
+        for &neo_hookean in self.families() {
             let note = if neo_hookean { ", neo-Hookean term held" } else { "" };
             context.progress(&Progress::stage(&format!("converting grips to gauge and fitting{note}")));
             let fit = self.request.fit.options(neo_hookean);
@@ -165,31 +175,39 @@ impl Run for CheckedUniaxial {
         let Fits { families, curve, conversion } =
             if self.csv.is_displacement { self.of_dumbbell(context)? } else { self.of_strip()? };
         let chosen = families[0].chosen();
+        let laws = compare_laws(std::slice::from_ref(&curve), &families[0], &self.request.fit.options(false))
+            .map_err(|e| fit_failed(&e))?;
         let material = chosen.material();
         let result = UniaxialResult {
             schema: "uniaxial/1",
             version: VERSION,
             input_hash: &context.input_hash,
+            law: chosen.law,
             num_terms: chosen.num_terms,
             parameters: &chosen.parameters,
             initial_shear_modulus_kpa: chosen.initial_shear_modulus_kpa,
             chi2_per_datum: chosen.chi2_per_datum,
             fits: &families,
+            laws: &laws,
             conversion: conversion.as_ref(),
             material: material.as_ref().ok().cloned(),
             is_bulk_held: chosen.bulk_kpa.is_some(),
             files: [&self.file],
         };
         let text = reports_in_words(std::slice::from_ref(&self.file))
-            + &summary::uniaxial(&self.title(), &families, conversion.as_ref());
+            + &summary::uniaxial(&self.title(), &families, &laws, conversion.as_ref());
         let mut outcome = Outcome::new("uniaxial.json", &result, text)?;
         add_material(&mut outcome, &material, result.is_bulk_held);
         for (family, name) in families.iter().zip(["fits", "fits-neo-hookean"]) {
             let mut fits: Vec<&CurveFit> = vec![family.chosen()];
             fits.extend(family.fits.iter().filter(|f| f.num_terms != family.chosen().num_terms));
-            let title = "Uniaxial curve: chosen fit (full) and the others (dashed)";
-            outcome.add(format!("{name}.svg"), fit_picture(title, &[(&curve, false)], &fits));
+            let title = match family.law {
+                None => "Uniaxial curve: chosen fit (full) and the others (dashed)".to_string(),
+                Some(kind) => format!("Uniaxial curve: the law of {}", kind.name()),
+            };
+            outcome.add(format!("{name}.svg"), fit_picture(&title, &[(&curve, false)], &fits));
         }
+        outcome.add("laws.svg", law_picture(&laws));
         Ok(outcome)
     }
 }

@@ -5,6 +5,7 @@
 //! tangent or in stability, follows from W′ and W″; a law of one's own needs [`FirstInvariantEnergy`] alone.
 
 use super::Lanes;
+use super::limits::{MAX_CHAIN_LIMIT, MAX_LOCKING_STRETCH, MAX_MODULUS_KPA, MIN_CHAIN_LIMIT, MIN_LOCKING_STRETCH};
 
 /// What the material model needs to know of an energy W(x), x = Ī₁ − 3.
 pub trait FirstInvariantEnergy {
@@ -58,6 +59,16 @@ impl LawParameter {
     /// Whether it may have either sign, and be zero.
     pub fn has_any_sign(self) -> bool {
         matches!(self, LawParameter::Coefficient(n) if n > 0)
+    }
+
+    /// Its least and largest value; a modulus that may not have either sign is above zero.
+    pub fn range(self) -> [f64; 2] {
+        match self {
+            LawParameter::Coefficient(0) | LawParameter::Modulus => [0.0, MAX_MODULUS_KPA],
+            LawParameter::Coefficient(_) => [-MAX_MODULUS_KPA, MAX_MODULUS_KPA],
+            LawParameter::Limit => [MIN_CHAIN_LIMIT, MAX_CHAIN_LIMIT],
+            LawParameter::LockingStretch => [MIN_LOCKING_STRETCH, MAX_LOCKING_STRETCH],
+        }
     }
 }
 
@@ -249,6 +260,26 @@ impl LawKind {
             LawKind::Gent => "Gent",
             LawKind::ArrudaBoyce => "Arruda-Boyce",
         }
+    }
+
+    /// Its parameters, in their order.
+    pub fn parameters(self) -> &'static [LawParameter] {
+        self.law(&[]).parameters()
+    }
+
+    /// The law with these values of its parameters, in their order; those that are missing are no numbers.
+    pub fn law(self, values: &[f64]) -> InvariantLaw {
+        let mut law = match self {
+            LawKind::Yeoh => InvariantLaw::Yeoh(Yeoh { coefficients_kpa: [f64::NAN; 3] }),
+            LawKind::Gent => InvariantLaw::Gent(Gent { mu_kpa: f64::NAN, limit: f64::NAN }),
+            LawKind::ArrudaBoyce => {
+                InvariantLaw::ArrudaBoyce(ArrudaBoyce { mu_kpa: f64::NAN, locking_stretch: f64::NAN })
+            }
+        };
+        for (parameter, value) in law.parameters().iter().zip(values) {
+            law.set(*parameter, *value);
+        }
+        law
     }
 
     /// Laws with this initial shear modulus (kPa) to start fits from, from stiffening late to early. The stresses of

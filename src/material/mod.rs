@@ -22,10 +22,14 @@ pub use limits::{
     MIN_CHAIN_LIMIT, MIN_LOCKING_STRETCH, SCHEMA, YEOH_SCHEMA,
 };
 pub use ogden_lanes::{MAX_TERMS, SpectralState, Tensor};
+pub(crate) use point::first_invariant_less_3;
 pub use point::{energy_density, first_piola_kirchhoff_stress, material_tangent, stress_parameter_derivative};
 pub use shear_modulus::initial_shear_modulus_kpa;
 pub use shear_term::{ShearTerm, power_difference};
-pub use stability::{least_relative_stiffness, smallest_principal_stiffness_kpa, smallest_relative_stiffness};
+pub use stability::{
+    least_relative_stiffness, smallest_principal_stiffness_kpa, smallest_relative_stiffness,
+    smallest_relative_stiffness_of_law,
+};
 
 use serde::{Deserialize, Serialize};
 

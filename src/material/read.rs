@@ -1,10 +1,7 @@
 //! Reading, writing and validating a material (`ogden/1`, `yeoh/1`, `gent/1`, `arruda_boyce/1`).
 
-use super::invariant_law::{InvariantLaw, LawParameter};
-use super::limits::{
-    MAX_ALPHA, MAX_CHAIN_LIMIT, MAX_LOCKING_STRETCH, MAX_MODULUS_KPA, MIN_ALPHA, MIN_CHAIN_LIMIT, MIN_LOCKING_STRETCH,
-    SCHEMAS,
-};
+use super::invariant_law::InvariantLaw;
+use super::limits::{MAX_ALPHA, MAX_MODULUS_KPA, MIN_ALPHA, SCHEMAS};
 use super::stability::has_stable_product;
 use super::{MAX_TERMS, MaterialError, Ogden};
 use crate::field::{FieldError, FieldPath};
@@ -109,12 +106,7 @@ impl Ogden {
 fn check_law(law: &InvariantLaw, problems: &mut Vec<MaterialError>) {
     for parameter in law.parameters() {
         let value = law.value(*parameter);
-        let [min, max] = match parameter {
-            LawParameter::Coefficient(0) | LawParameter::Modulus => [0.0, MAX_MODULUS_KPA],
-            LawParameter::Coefficient(_) => [-MAX_MODULUS_KPA, MAX_MODULUS_KPA],
-            LawParameter::Limit => [MIN_CHAIN_LIMIT, MAX_CHAIN_LIMIT],
-            LawParameter::LockingStretch => [MIN_LOCKING_STRETCH, MAX_LOCKING_STRETCH],
-        };
+        let [min, max] = parameter.range();
         let unit = if parameter.is_modulus() { "_kpa" } else { "" };
         let name = format!("{}{unit}", parameter.name());
         if !value.is_finite() {

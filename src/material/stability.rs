@@ -51,6 +51,20 @@ pub fn smallest_principal_stiffness_kpa(terms: &[ShearTerm], log_stretches: [f64
     half_trace - (half_trace * half_trace - determinant).max(0.0).sqrt()
 }
 
+/// The smallest stiffness (kPa) of a state with traceless log stretches where the principal axes turn.
+fn turning_stiffness_kpa(terms: &[ShearTerm], e: [f64; 3]) -> f64 {
+    let h = principal_stiffnesses(terms, e);
+    let in_plane = |(j, k): (usize, usize)| {
+        let apart = e[j] - e[k];
+        if apart.abs() < EQUAL_STRETCHES {
+            0.5 * (h[j] + h[k])
+        } else {
+            terms.iter().map(|t| t.modulus_kpa * power_difference(t.alpha, e[j], e[k]).0).sum::<f64>() / apart
+        }
+    };
+    [(0, 1), (1, 2), (0, 2)].map(in_plane).into_iter().fold(f64::INFINITY, f64::min)
+}
+
 /// The smallest stiffness of a state with traceless log stretches over all increments, turns of the axes included,
 /// relative to the initial shear modulus: 2 at rest, negative where the material is unstable.
 pub fn smallest_relative_stiffness(terms: &[ShearTerm], log_stretches: [f64; 3]) -> f64 {
@@ -62,16 +76,20 @@ pub fn smallest_relative_stiffness(terms: &[ShearTerm], log_stretches: [f64; 3])
     let b = (h[0] - h[1]) / 12f64.sqrt();
     let c = (h[0] + h[1] + 4.0 * h[2]) / 6.0;
     let mut smallest = 0.5 * (a + c) - (0.25 * (a - c).powi(2) + b * b).sqrt();
-    for (j, k) in [(0, 1), (1, 2), (0, 2)] {
-        let apart = e[j] - e[k];
-        let stiffness = if apart.abs() < EQUAL_STRETCHES {
-            0.5 * (h[j] + h[k])
-        } else {
-            terms.iter().map(|t| t.modulus_kpa * power_difference(t.alpha, e[j], e[k]).0).sum::<f64>() / apart
-        };
-        smallest = smallest.min(stiffness);
-    }
+    smallest = smallest.min(turning_stiffness_kpa(terms, e));
     smallest / initial_shear_modulus_kpa(terms).abs().max(1e-300)
+}
+
+/// The same as [`smallest_relative_stiffness`] of a law in the first invariant. It acts like an Ogden term of exponent
+/// 2 with c = 4 W′ where the principal axes turn. Minus infinity beyond the states that the law allows.
+pub fn smallest_relative_stiffness_of_law(law: &InvariantLaw, log_stretches: [f64; 3]) -> f64 {
+    let keeping = smallest_stiffness_of_law_kpa(law, log_stretches);
+    if !keeping.is_finite() {
+        return f64::NEG_INFINITY;
+    }
+    let modulus_kpa = 4.0 * law.slopes_at(first_invariant_less_3(log_stretches))[0];
+    let turning = turning_stiffness_kpa(&[ShearTerm { modulus_kpa, alpha: 2.0 }], log_stretches);
+    keeping.min(turning) / law.initial_shear_modulus_kpa()
 }
 
 /// The smallest stiffness over states with these isochoric principal stretches and on the way to them, as a fraction of
@@ -115,6 +133,7 @@ fn smallest_stiffness_of_law_kpa(law: &InvariantLaw, log_stretches: [f64; 3]) ->
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::material::LawKind;
 
     fn ogden(terms: &[[f64; 2]]) -> Ogden {
         let terms = terms.iter().map(|&[mu_kpa, alpha]| OgdenTerm { mu_kpa, alpha }).collect();
@@ -164,6 +183,43 @@ mod tests {
             }
         }
         assert!(is_equal_somewhere);
+    }
+
+    /// A law in the first invariant is as stiff as the Ogden term that it is without its stiffening, and where it
+    /// stiffens as the least curvature of its energy along logarithmic strains; beyond its end there is nothing.
+    #[test]
+    fn laws_have_the_stiffness_of_their_energy() {
+        let neo_hookean = LawKind::Yeoh.law(&[8.0, 0.0, 0.0]);
+        let term = [ShearTerm { modulus_kpa: 32.0, alpha: 2.0 }];
+        for e in [[0.0; 3], [0.4, -0.15, -0.25], [0.2, 0.2, -0.4]] {
+            let (found, wanted) =
+                (smallest_relative_stiffness_of_law(&neo_hookean, e), smallest_relative_stiffness(&term, e));
+            assert!((found - wanted).abs() < 1e-12, "{found} {wanted}");
+        }
+        let gent = LawKind::Gent.law(&[16.0, 9.0]);
+        let softening = LawKind::Yeoh.law(&[8.0, -2.5, 0.0]);
+        let invariant = |e: [f64; 3]| e.iter().map(|v| (2.0 * v).exp()).sum::<f64>() - 3.0;
+        let e = [0.4f64, -0.15, -0.25];
+        // A law that stiffens resists turns of the axes the least, one that softens changes of the stretches.
+        for (law, is_turning_least) in [(gent, true), (softening, false)] {
+            let keeping = (0..720)
+                .map(|n| {
+                    let angle = f64::from(n) * std::f64::consts::PI / 720.0;
+                    let (c, s) = (angle.cos() / 2f64.sqrt(), angle.sin() / 6f64.sqrt());
+                    let (d, h) = ([c + s, s - c, -2.0 * s], 1e-4);
+                    let at = |t: f64| law.energy_density(invariant([0, 1, 2].map(|i| e[i] + t * d[i])));
+                    (at(h) - 2.0 * at(0.0) + at(-h)) / (h * h)
+                })
+                .fold(f64::INFINITY, f64::min);
+            // τ is 2 W′ λ² but for its mean.
+            let stress = e.map(|v| 2.0 * law.slopes_at(invariant(e))[0] * (2.0 * v).exp());
+            let turning = (stress[1] - stress[2]) / (e[1] - e[2]);
+            assert_eq!(turning < keeping, is_turning_least, "{turning} {keeping}");
+            // Truncation h² and the quarter degree between directions.
+            let (found, least) = (16.0 * smallest_relative_stiffness_of_law(&law, e), turning.min(keeping));
+            assert!((found - least).abs() < 1e-4 * least.abs(), "{found} {least}");
+        }
+        assert_eq!(smallest_relative_stiffness_of_law(&gent, [1.3, -0.65, -0.65]), f64::NEG_INFINITY);
     }
 
     /// The volumetric part: for increments that change the volume the compressible material's stress power is that of

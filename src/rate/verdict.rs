@@ -1,6 +1,6 @@
 //! What an analysis of load curves says.
 
-use crate::homogeneous::{CurveMatch, Interval, ShearTerm, fitted_material};
+use crate::homogeneous::{CurveMatch, Interval, OgdenTerms, ShearTerm, fitted_material};
 use crate::material::{MaterialError, Ogden};
 use serde::{Deserialize, Serialize};
 
@@ -145,7 +145,8 @@ impl CurveMaterial {
     /// As [`fitted_material`].
     pub fn material(&self) -> Result<Ogden, MaterialError> {
         let term = |p: &[CauseParameter]| ShearTerm { modulus_kpa: p[0].value * p[1].value, alpha: p[1].value };
-        fitted_material(&self.parameters.chunks_exact(2).map(term).collect::<Vec<_>>(), None)
+        let terms: Vec<ShearTerm> = self.parameters.chunks_exact(2).map(term).collect();
+        fitted_material(&OgdenTerms::free(&terms), None)
     }
 }
 

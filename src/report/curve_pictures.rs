@@ -2,7 +2,7 @@
 
 use super::bars::{BarGroup, GroupedBars};
 use super::curves::{CurveSeries, CurvesPlot};
-use crate::homogeneous::{Curve, CurveFit, Deformation, model_stress};
+use crate::homogeneous::{Curve, CurveFit, Deformation, LawComparison, LawEvidence};
 use crate::rate::{CurveTrace, LoadCurveVerdict};
 
 /// What a state is drawn at: stretch or amount of shear.
@@ -21,7 +21,7 @@ pub fn fit_picture(title: &str, curves: &[(&Curve, bool)], fits: &[&CurveFit]) -
         .map(|(curve, is_kept_back)| CurveSeries {
             name: curve.name.clone(),
             points: curve.states.iter().zip(&curve.nominal_stress_kpa).map(|(s, p)| [abscissa(s), *p]).collect(),
-            models: fits.iter().filter_map(|f| model_stress(&f.terms(), f.bulk_kpa, &curve.states)).collect(),
+            models: fits.iter().filter_map(|f| f.stress(&curve.states)).collect(),
             is_predicted: *is_kept_back,
         })
         .collect();
@@ -30,6 +30,23 @@ pub fn fit_picture(title: &str, curves: &[(&Curve, bool)], fits: &[&CurveFit]) -
         x_label: "stretch (or amount of shear)".into(),
         y_label: "nominal stress, kPa".into(),
         series,
+    }
+    .to_svg()
+}
+
+/// How much more BIC every law has than the best one.
+pub fn law_picture(comparison: &LawComparison) -> String {
+    let group = |e: &LawEvidence| {
+        let plural = if e.num_parameters == 1 { "" } else { "s" };
+        let label = format!("{}: {} parameter{plural}", e.name, e.num_parameters);
+        BarGroup { label, values: vec![e.bic_above_best] }
+    };
+    GroupedBars {
+        title: "Laws compared: less is better".into(),
+        axis_label: "BIC above the best".into(),
+        series: vec!["fitted to all curves".into()],
+        groups: comparison.laws.iter().map(group).collect(),
+        ..GroupedBars::default()
     }
     .to_svg()
 }

@@ -84,7 +84,7 @@ pub use color::ColorMap;
 pub use confusion::confusion_picture;
 pub use contour_map::{ContourPanel, ContourPlot};
 pub use correlation::CorrelationPlot;
-pub use curve_pictures::{fit_picture, load_curve_pictures};
+pub use curve_pictures::{fit_picture, law_picture, load_curve_pictures};
 pub use curves::{CurveSeries, CurvesPlot};
 pub use density::{DensityPanel, DensityPlot};
 pub use design_detection::{ComparedSize, compared_sizes};

@@ -469,6 +469,7 @@ def uniaxial(
     *,
     specimen: Optional[Specimen] = None,
     mesh: Optional[Mesh] = None,
+    law: Optional[str] = None,
     max_terms: Optional[int] = None,
     bulk_kpa: Optional[float] = None,
     min_alpha_gap: Optional[float] = None,
@@ -483,13 +484,13 @@ def uniaxial(
     threads: Optional[int] = None,
     on_progress: Optional[OnProgress] = None,
 ) -> CurveFit:
-    """Ogden fits to one uniaxial curve, of a strip, or of a dumb-bell by its grips' displacement and force."""
+    """Fits of Ogden terms, or of a `law`, to one uniaxial curve: of a strip, or of a dumb-bell by grips and force."""
     request = given(
         csv=_csv(curve),
         specimen=specimen,
         mesh=mesh,
         name=name,
-        fit=_fit(max_terms, bulk_kpa, min_alpha_gap, has_all_branches),
+        fit=_fit(law, max_terms, bulk_kpa, min_alpha_gap, has_all_branches),
         columns=_columns(drive_column, stress_column, stress_unit, length_mm, area_mm2),
     )
     done = _run("uniaxial", request, folder, threads, on_progress)
@@ -502,6 +503,7 @@ def curves(
     kept_back: Sequence[str] = (),
     has_neo_hookean_term: Optional[bool] = None,
     is_exact: Optional[bool] = None,
+    law: Optional[str] = None,
     max_terms: Optional[int] = None,
     bulk_kpa: Optional[float] = None,
     min_alpha_gap: Optional[float] = None,
@@ -515,7 +517,7 @@ def curves(
     threads: Optional[int] = None,
     on_progress: Optional[OnProgress] = None,
 ) -> CurveFit:
-    """Ogden fits to curves of several tests together: `{"uniaxial": …, "pure_shear": …}`.
+    """Fits of Ogden terms, or of a `law`, to curves of several tests: `{"uniaxial": …, "pure_shear": …}`.
 
     Tests are `uniaxial`, `equibiaxial`, `pure_shear` and `simple_shear`; those named in `kept_back` are predicted.
     """
@@ -528,7 +530,7 @@ def curves(
         ],
         has_neo_hookean_term=has_neo_hookean_term,
         is_exact=is_exact,
-        fit=_fit(max_terms, bulk_kpa, min_alpha_gap, has_all_branches),
+        fit=_fit(law, max_terms, bulk_kpa, min_alpha_gap, has_all_branches),
         columns=_columns(drive_column, stress_column, stress_unit, length_mm, area_mm2),
     )
     done = _run("curves", request, folder, threads, on_progress)
@@ -536,13 +538,18 @@ def curves(
 
 
 def _fit(
+    law: Optional[str],
     max_terms: Optional[int],
     bulk_kpa: Optional[float],
     min_alpha_gap: Optional[float],
     has_all_branches: Optional[bool],
 ) -> Dict[str, Any]:
     return given(
-        max_terms=max_terms, bulk_kpa=bulk_kpa, min_alpha_gap=min_alpha_gap, has_all_branches=has_all_branches
+        law=law,
+        max_terms=max_terms,
+        bulk_kpa=bulk_kpa,
+        min_alpha_gap=min_alpha_gap,
+        has_all_branches=has_all_branches,
     )
 
 

@@ -698,7 +698,7 @@ class Design(Result):
 
 @dataclass(frozen=True, eq=False)
 class CurveFit(Result):
-    """Ogden terms of curves of homogeneous tests (`uniaxial/1`, `curves/1`).
+    """Ogden terms, or another law, of curves of homogeneous tests (`uniaxial/1`, `curves/1`).
 
     `material` is `None` where the parameters are beyond what a material may hold. Its bulk modulus stands for the
     incompressible limit where `is_bulk_held` is false.
@@ -709,6 +709,9 @@ class CurveFit(Result):
     parameters: Mapping[str, Estimate]
     initial_shear_modulus: Estimate
     is_bulk_held: bool
+    law: Optional[str]
+    bic_above_best: Mapping[str, float]
+    """BIC of every law less the smallest one, best first: which law describes the curves with the fewest parameters."""
 
     @classmethod
     def of(cls, raw: Mapping[str, Any], folder: Path) -> "CurveFit":
@@ -722,6 +725,8 @@ class CurveFit(Result):
             parameters=_estimates(raw["parameters"]),
             initial_shear_modulus=_shear_modulus(raw),
             is_bulk_held=raw["is_bulk_held"],
+            law=raw["law"],
+            bic_above_best={law["name"]: law["bic_above_best"] for law in raw["laws"]["laws"]},
         )
 
     def _rows(self) -> List[Row]:

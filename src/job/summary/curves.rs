@@ -1,9 +1,16 @@
 //! Fits of curves as text.
 
 use super::num;
-use crate::homogeneous::{CurveFit, CurveFitSequence, CurveMatch, DumbbellFit};
+use crate::homogeneous::{
+    CurveFit, CurveFitSequence, CurveMatch, DumbbellFit, LawComparison, LawEvidence, MIN_BIC_DIFFERENCE,
+};
 
-pub(in crate::job) fn uniaxial(name: &str, families: &[CurveFitSequence], conversion: Option<&DumbbellFit>) -> String {
+pub(in crate::job) fn uniaxial(
+    name: &str,
+    families: &[CurveFitSequence],
+    laws: &LawComparison,
+    conversion: Option<&DumbbellFit>,
+) -> String {
     let mut text = format!("{name}\n");
     if let Some(c) = conversion {
         text += &format!(
@@ -23,9 +30,19 @@ pub(in crate::job) fn uniaxial(name: &str, families: &[CurveFitSequence], conver
         }
     }
     for family in families {
-        text += if family.neo_hookean { "\nwith a neo-Hookean term (alpha = 2 held)\n" } else { "\nfree terms\n" };
-        text += &sequence_table(family);
+        text += &match (family.law, family.neo_hookean) {
+            (Some(kind), _) => format!("\nlaw of {}\n", kind.name()),
+            (None, true) => "\nwith a neo-Hookean term (alpha = 2 held)\n".into(),
+            (None, false) => "\nfree terms\n".into(),
+        };
+        // Of a law there is one fit, whose evidence stands beside that of the others.
+        if family.law.is_none() {
+            text += &sequence_table(family);
+        }
         text += &fit_table(family.chosen());
+    }
+    if let Some(family) = families.first() {
+        text += &law_table(laws, family.chosen());
     }
     text
 }
@@ -68,13 +85,56 @@ fn sequence_table(sequence: &CurveFitSequence) -> String {
     text
 }
 
+/// All laws side by side, and whether another one than `used` describes the curves better.
+fn law_table(laws: &LawComparison, used: &CurveFit) -> String {
+    let mut text = String::from(
+        "\nlaws compared\n  law                 parameters  misfit            BIC  above the best   shear modulus kPa (95 %)\n",
+    );
+    for e in &laws.laws {
+        let g = e.initial_shear_modulus_kpa;
+        text += &format!(
+            "  {:<20}{:>9}  {:<10}{:>11} {:>15}   {} ({} to {})\n",
+            e.name,
+            e.num_parameters,
+            num(e.sum_of_squares, 5),
+            num(e.bic, 7),
+            num(e.bic_above_best, 4),
+            num(g.value, 4),
+            num(g.interval_95[0], 4),
+            num(g.interval_95[1], 4)
+        );
+    }
+    for left_out in &laws.left_out {
+        text += &format!("  {}: {}\n", left_out.name, left_out.reason);
+    }
+    let with = |e: &LawEvidence| {
+        let plural = if e.num_parameters == 1 { "" } else { "s" };
+        format!("{} ({} parameter{plural})", e.name, e.num_parameters)
+    };
+    if let Some(used) = laws.of(used) {
+        text += &match laws.better_than(used) {
+            Some(better) => format!("  {} describes the curves better than {}\n", with(better), with(used)),
+            None => format!("  no law describes the curves better than {}\n", with(used)),
+        };
+    }
+    text + &format!(
+        "  {} data worth {} independent ones; a BIC of {MIN_BIC_DIFFERENCE} less is the least that counts\n",
+        laws.num_data,
+        num(laws.num_independent, 3)
+    )
+}
+
 /// One fit's parameters and matches.
 fn fit_table(fit: &CurveFit) -> String {
     let mut text = String::from("  parameter        value         sd   95 % interval\n");
     for (index, p) in fit.parameters.iter().enumerate() {
-        // Factors (every other parameter) are as good as unknown where they scatter by more than themselves; an
-        // exponent near zero may be well known all the same.
-        let is_unknown = |sd: f64| index % 2 == 0 && sd > p.value.abs();
+        // What keeps its sign is as good as unknown where it scatters by more than itself; an exponent or a coefficient
+        // near zero may be well known all the same.
+        let keeps_sign = match fit.law {
+            None => index % 2 == 0,
+            Some(kind) => kind.parameters().get(index).is_some_and(|p| !p.has_any_sign()),
+        };
+        let is_unknown = |sd: f64| keeps_sign && sd > p.value.abs();
         let rest = match (p.held, p.sd, p.interval_95) {
             (true, _, _) => "      held".to_string(),
             (_, Some(sd), _) if is_unknown(sd) => format!("{:>10}   not identifiable", num(sd, 5)),
@@ -105,9 +165,20 @@ fn fit_table(fit: &CurveFit) -> String {
 }
 
 /// Joint fits, the one that is used, and what it predicts of curves kept back.
-pub(in crate::job) fn curves(sequence: &CurveFitSequence, used: &CurveFit, kept_back: &[CurveMatch]) -> String {
-    let mut text = sequence_table(sequence);
-    text += &format!("\n{} term{}\n", used.num_terms, if used.num_terms == 1 { "" } else { "s" });
+pub(in crate::job) fn curves(
+    sequence: &CurveFitSequence,
+    used: &CurveFit,
+    laws: &LawComparison,
+    kept_back: &[CurveMatch],
+) -> String {
+    let mut text = match used.law {
+        // Of a law there is one fit, whose evidence stands beside that of the others.
+        Some(kind) => format!("law of {}\n", kind.name()),
+        None => {
+            let plural = if used.num_terms == 1 { "" } else { "s" };
+            sequence_table(sequence) + &format!("\n{} term{plural}\n", used.num_terms)
+        }
+    };
     text += &fit_table(used);
     for m in kept_back {
         text += &format!(
@@ -119,5 +190,5 @@ pub(in crate::job) fn curves(sequence: &CurveFitSequence, used: &CurveFit, kept_
             num(m.largest_error_kpa, 4)
         );
     }
-    text
+    text + &law_table(laws, used)
 }
