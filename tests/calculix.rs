@@ -190,7 +190,13 @@ impl Case {
         if self.has_prisms {
             let forward = self.model(factor);
             let (mesh, multiplicity) = (forward.mesh(), forward.multiplicity());
-            let model = Model { mesh, material: &self.material, drives_mm: &self.drives_mm, multiplicity };
+            let model = Model {
+                mesh,
+                material: &self.material,
+                drives_mm: &self.drives_mm,
+                direction: [1.0, 0.0, 0.0],
+                multiplicity,
+            };
             let origin = Origin { name: "prisms", version: "0", input_hash: "0" };
             let text = model_file(&model, ModelFormat::Calculix, &origin).unwrap();
             assert!(text.contains("TYPE=C3D15,"));

@@ -46,7 +46,7 @@ fn random_specimen(random: &mut Random) -> Specimen {
             .collect();
         let mut s = specimen(test, extents, axis, &holes);
         s.name = "random".into();
-        s.drive_mm = vec![s.max_supported_drive_mm()];
+        s.drive_mm = vec![s.drive_limit_mm()];
         if s.validate().is_ok() {
             return s;
         }

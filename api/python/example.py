@@ -14,7 +14,7 @@ found = service.check(specimen, study["limits"], voxel_mm=scan["voxel_mm"])
 print("can be made:", found["is_valid"], "· closest limit:", found["margins"][0]["name"])
 
 # %% A mistake is pointed at.
-wrong = {**specimen, "drive_mm": [-1.0]}
+wrong = {**specimen, "drive_mm": [0.0]}
 try:
     service.evaluate(wrong, material)
 except ProblemError as error:

@@ -93,7 +93,9 @@ pub fn loading_history(
         let x: f64 = StandardNormal.sample(&mut rng);
         sd * x
     };
-    let curve = Monotone::new(drives_mm, forces_n);
+    // All drives lie on one side of rest: their magnitudes are in the order of the curve.
+    let distances_mm: Vec<f64> = drives_mm.iter().map(|d| d.abs()).collect();
+    let curve = Monotone::new(&distances_mm, forces_n);
     let mut windows = Vec::with_capacity(drives_mm.len());
     // Corners of the drive over time, with the cell's drift.
     let mut corners = vec![[0.0, 0.0, 0.0], [program.rest_s, 0.0, 0.0]];
@@ -118,7 +120,7 @@ pub fn loading_history(
         let ([t0, d0, c0], [t1, d1, c1]) = (corners[piece], corners[piece + 1]);
         let part = if t1 > t0 { ((time - t0) / (t1 - t0)).clamp(0.0, 1.0) } else { 1.0 };
         let (drive, drift) = (d0 + part * (d1 - d0), c0 + part * (c1 - c0));
-        let force = curve.at(drive) + drift + normal(program.reading_sd_n);
+        let force = curve.at(drive.abs()) + drift + normal(program.reading_sd_n);
         load.time_s.push(time);
         load.drive_mm.push((1e4 * drive).round() / 1e4);
         load.force_n.push((1e4 * force).round() / 1e4);
@@ -186,6 +188,12 @@ mod tests {
             assert!((load.mean_force_n(*window).unwrap() - force).abs() < 1e-4);
         }
         assert!(load.drive_mm.windows(2).all(|d| d[1] >= d[0]));
+        // The other way all is negative, but for noise and drift: none here.
+        let quiet = LoadProgram { drift_sd_n: 0.0, reading_sd_n: 0.0, ..LoadProgram::default() };
+        let [there, back] = [1.0, -1.0]
+            .map(|sign| loading_history(&[sign * 2.5, sign * 5.0], &[sign * 5.0, sign * 11.0], &quiet, 3).unwrap().0);
+        let is_negative = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a + b).abs() < 1e-12);
+        assert!(is_negative(&there.force_n, &back.force_n) && is_negative(&there.drive_mm, &back.drive_mm));
         // The force rises with the drive: the curve between the holds is monotone (rounding 10⁻⁴).
         assert!(load.force_n.windows(2).all(|f| f[1] >= f[0] - 1e-4));
     }

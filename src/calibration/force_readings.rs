@@ -7,6 +7,7 @@
 use super::error::CalibrationError;
 use crate::recording::Recording;
 use crate::sensitivity::Protocol;
+use crate::specimen::farthest_from_zero;
 use nalgebra::{DMatrix, DVector};
 
 /// A force with its uncertainty.
@@ -80,7 +81,7 @@ pub(super) fn read_on_the_way(
     protocol: &Protocol,
     force_sd_n: f64,
 ) -> Result<Vec<ForceOnTheWay>, CalibrationError> {
-    let largest_mm = recording.steps.iter().map(|s| s.drive_mm).fold(0.0, f64::max);
+    let largest_mm = farthest_from_zero(recording.steps.iter().map(|s| s.drive_mm));
     let sd_n = recording.steps.iter().find_map(|s| s.force_sd_n).unwrap_or(force_sd_n);
     let is_scanned = |drive_mm: f64| recording.steps.iter().any(|s| Protocol::is_same_drive(s.drive_mm, drive_mm));
     let mut readings = Vec::new();

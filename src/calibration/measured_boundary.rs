@@ -78,11 +78,11 @@ impl Observed {
             .map(|(step, [fixed, moved])| {
                 let place = |&v: &u32| places[v as usize] as usize;
                 let value = |v: &u32| step.displacement[place(v)];
-                let drive_mm = step.drive_mm;
+                let (drive_mm, direction) = (step.drive_mm, self.specimen.drive_direction());
                 let per_mm = |plane: PlanePolynomial, along: f64| {
                     VectorField::new(move |x| {
                         let u = plane.at(x);
-                        [u[0] / drive_mm - along, u[1] / drive_mm, u[2] / drive_mm]
+                        [0, 1, 2].map(|i| u[i] / drive_mm - along * direction[i])
                     })
                 };
                 ObservedStep {

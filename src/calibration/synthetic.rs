@@ -115,7 +115,7 @@ impl SyntheticScan {
     ) -> Result<SyntheticScan, CalibrationError> {
         protocol.suits(specimen, specimen.drive_mm.len())?;
         let is_scanned = |drive_mm: f64| specimen.drive_mm.iter().any(|d| Protocol::is_same_drive(*d, drive_mm));
-        let largest_mm = specimen.drive_mm.iter().copied().fold(0.0, f64::max);
+        let largest_mm = specimen.largest_drive_mm();
         let mut forces_mm = protocol.on_the_way_to(largest_mm).force_drives_mm();
         forces_mm.retain(|d| !is_scanned(*d));
         let reading =
@@ -223,7 +223,7 @@ impl SyntheticScan {
         }
         readings.push((0.0, 0.0));
         readings.extend(data.drives_mm.iter().copied().zip(data.forces_n.iter().copied()));
-        readings.sort_by(|a, b| a.0.total_cmp(&b.0));
+        readings.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
         let time_s = (0..readings.len()).map(|n| n as f64).collect();
         let (drive_mm, force_n) = readings.into_iter().unzip();
         Some(LoadCurve { time_s, drive_mm, force_n })

@@ -18,6 +18,7 @@ pub(super) fn block() -> Specimen {
         outline: Outline::Block,
         holes: vec![],
         drive_mm: vec![4.0],
+        drive_angle_deg: 0.0,
         samples_in_parallel: 2,
         other_samples: Vec::new(),
     }

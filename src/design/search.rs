@@ -78,6 +78,7 @@ pub fn search(
     progress: ProgressSink,
     is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Found, SearchError> {
+    study.check_search()?;
     let run = SearchRun { study, evaluator: Evaluator::new(study), checkpoint, is_cancelled, progress };
     run.run()
 }

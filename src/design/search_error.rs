@@ -2,12 +2,16 @@
 
 use super::checkpoint::CheckpointError;
 use super::evaluation_failure::EvaluationFailure;
+use super::study_error::StudyError;
 use super::unfinished::Unfinished;
 
 /// Why a search has no result.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SearchError {
+    /// The study is none that designs can be searched for with.
+    #[error(transparent)]
+    Study(#[from] StudyError),
     /// The base specimen cannot be evaluated, so there is nothing to compare with.
     #[error("the base specimen cannot be evaluated: {cause}; change the base, its drive or the material")]
     Base {

@@ -190,6 +190,18 @@ impl Study {
     }
 }
 
+impl Study {
+    /// Whether designs can be searched for: besides what makes it a study, its base is driven as designs are. (A study
+    /// may stand for more than a search, so that its base may be driven either way.)
+    ///
+    /// # Errors
+    /// [`StudyError::BaseDrivenBackwards`].
+    pub fn check_search(&self) -> Result<(), StudyError> {
+        let drive_mm = self.base.largest_drive_mm();
+        if drive_mm < 0.0 { Err(StudyError::BaseDrivenBackwards { drive_mm }) } else { Ok(()) }
+    }
+}
+
 /// Kinds and angles of holes.
 fn check_hole_shapes(shapes: &VaryHoleShapes, problems: &mut Vec<StudyError>) {
     let is_repeated = shapes.kinds.len() > 1 && shapes.kinds[1..].contains(&shapes.kinds[0]);

@@ -104,6 +104,12 @@ pub enum StudyError {
         /// Largest travel, mm.
         limit_mm: f64,
     },
+    /// The base is pushed together or sheared the other way, and designs are driven forwards.
+    #[error("the base is driven to {drive_mm} mm, and designs to positive drives; give the base positive drives")]
+    BaseDrivenBackwards {
+        /// The base's largest drive, mm.
+        drive_mm: f64,
+    },
     /// There is nothing to tell apart.
     #[error("objective.kind: tell_apart needs at least two materials to tell apart")]
     NothingToTellApart {
@@ -229,6 +235,10 @@ impl StudyError {
             }
             E::NoDrive { min_mm, limit_mm } => {
                 FieldError::new("/vary/drive_mm/min", min_mm, format!("at most limits.max_drive_mm, {limit_mm} mm"))
+            }
+            E::BaseDrivenBackwards { drive_mm } => {
+                FieldError::new("/base/drive_mm", drive_mm, "positive drives in a search for a design")
+                    .remedy("vary.drive_mm drives every design forwards")
             }
             E::NothingToTellApart { count } => {
                 FieldError::new("/materials", format!("a list of {count}"), "a list of at least two")

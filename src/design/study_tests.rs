@@ -58,7 +58,7 @@ fn a_study_may_have_a_protocol() {
     // Each drive once, in order, and those before the scan alone.
     assert_eq!(study.protocol.on_the_way_to(5.0).force_drives_mm(), [2.0]);
     assert_eq!(study.protocol.force_drives_mm(), [2.0, 5.0]);
-    value["protocol"]["force_drive_mm"][1] = json!(-1.0);
+    value["protocol"]["force_drive_mm"][1] = json!(0.0);
     let errors = Study::from_request(&value).expect_err("it is refused");
     assert_eq!(errors.iter().map(|e| e.pointer.as_str()).collect::<Vec<_>>(), ["/protocol/force_drive_mm/1"]);
 }
@@ -66,7 +66,7 @@ fn a_study_may_have_a_protocol() {
 #[test]
 fn each_rule_has_its_pointer() {
     for (pointer, bad) in [
-        ("/base/drive_mm/0", json!(-1.0)),
+        ("/base/drive_mm/0", json!(0.0)),
         ("/base/holes/0/diameter_mm", json!(0.0)),
         ("/materials/1/material/terms/0/alpha", json!(0.0)),
         ("/materials/1/name", json!("soft")),

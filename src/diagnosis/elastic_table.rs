@@ -3,7 +3,8 @@
 use super::error::DiagnosisError;
 use crate::rate::ForceTable;
 
-/// Elastic force over drive with its derivatives with respect to scaled material parameters.
+/// Elastic force in the direction of the drive over the distance from rest, with its derivatives with respect to scaled
+/// material parameters. It is of the way that the recorded steps go.
 pub struct ElasticTable {
     /// F∞ over drive, N.
     pub(super) force: ForceTable,
@@ -14,7 +15,7 @@ pub struct ElasticTable {
 }
 
 impl ElasticTable {
-    /// From forces (N) and derivatives at rising drives (mm) that start at zero.
+    /// From forces (N) and derivatives at rising distances (mm) that start at zero.
     ///
     /// # Errors
     /// [`DiagnosisError::Setting`] where the drives do not rise.

@@ -36,6 +36,14 @@ pub enum DiagnosisError {
         /// What is wrong with it, and what to change.
         problem: String,
     },
+    /// The plate does not move along x, as causes of the set-up take it.
+    #[error(
+        "the specimen's drive_angle_deg is {value_deg}°; a diagnosis is of drives along x alone: calibrate it, or turn the specimen's frame"
+    )]
+    DriveAngle {
+        /// The angle, degrees.
+        value_deg: f64,
+    },
     /// A setting is out of range.
     #[error("{name} is {value}; it must be {requirement}")]
     Setting {

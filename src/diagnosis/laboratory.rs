@@ -61,6 +61,9 @@ impl<'a> Laboratory<'a> {
     /// # Errors
     /// [`DiagnosisError`]: the specimen cannot be meshed.
     pub fn new(observed: &'a Observed, mesh: &MeshOptions) -> Result<Laboratory<'a>, DiagnosisError> {
+        if !observed.specimen.is_driven_along_x() {
+            return Err(DiagnosisError::DriveAngle { value_deg: observed.specimen.drive_angle_deg });
+        }
         let options = MeshOptions { use_mirror: false, ..*mesh };
         let nominal = mesh_specimen(&observed.specimen, &options).map_err(crate::fem::PrepareError::from)?;
         Ok(Laboratory {

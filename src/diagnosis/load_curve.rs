@@ -11,6 +11,7 @@ use super::memory_kernel::{KernelState, MemoryKernel};
 use super::trace::Trace;
 use crate::calibration::Observed;
 use crate::recording::Recording;
+use crate::specimen::farthest_from_zero;
 
 /// Drives of the load curve's table.
 const TABLE_POINTS: usize = 8;
@@ -34,7 +35,8 @@ pub(super) fn read_load_curve(
     let Some(curve) = recording.load.as_ref().filter(|_| observed.steps.iter().any(|s| s.force.is_some())) else {
         return Ok(None);
     };
-    let largest_mm = curve.drive_mm.iter().fold(largest_drive_mm(observed), |s, d| s.max(d.abs()));
+    let reached_mm = curve.drive_mm.iter().fold(largest_drive_mm(observed), |s, d| s.max(d.abs()));
+    let largest_mm = reached_mm.copysign(farthest_from_zero(observed.steps.iter().map(|s| s.drive_mm)));
     let (table, kernel) = elastic_table(inference, nominal, largest_mm)?;
     let drift = observed.steps.iter().filter_map(|s| s.force).map(|f| f.sd_n).fold(0.0, f64::max);
     let windows: Vec<Option<[f64; 2]>> = recording.steps.iter().map(|s| s.window_s).collect();
@@ -56,7 +58,8 @@ pub(super) fn take_off_effects(recorded: &mut Trace, load: Option<&LoadHistoryFi
     true
 }
 
-/// F∞ over drive with its derivatives with respect to scaled material parameters (but κ), and what its memory needs.
+/// F∞ over drive with its derivatives with respect to scaled material parameters (but κ), and what its memory needs, on
+/// the way to a drive (mm).
 fn elastic_table(
     inference: &mut Inference,
     fitted: &CauseFit,
@@ -69,11 +72,13 @@ fn elastic_table(
     let rows = laboratory.load_curve(&fitted.material, &fitted.scene(), &drives, *is_cancelled)?;
     let parameters = fitted.material.parameters();
     let from_rest = |values: Vec<f64>| -> Vec<f64> { std::iter::once(0.0).chain(values).collect() };
-    let forces = from_rest(rows.iter().map(|r| r.0).collect());
+    // The table is of distances from rest and of forces in the direction of the drives.
+    let way = largest_mm.signum();
+    let forces = from_rest(rows.iter().map(|r| way * r.0).collect());
     let derivatives: Vec<Vec<f64>> = (1..parameters.len())
-        .map(|i| from_rest(rows.iter().map(|r| r.1[i] * fitted.material.value(parameters[i])).collect()))
+        .map(|i| from_rest(rows.iter().map(|r| way * r.1[i] * fitted.material.value(parameters[i])).collect()))
         .collect();
-    let table = ElasticTable::new(&from_rest(drives), &forces, &derivatives)?;
+    let table = ElasticTable::new(&from_rest(drives.iter().map(|d| d.abs()).collect()), &forces, &derivatives)?;
     let states: Vec<KernelState> = rows.into_iter().map(|r| r.2).collect();
     let kernel = MemoryKernel::new(&states).ok_or(DiagnosisError::Setting {
         name: "the number of drives of the load curve's table",

@@ -76,9 +76,11 @@ impl KernelState {
 }
 
 impl MemoryKernel {
-    /// From states at rising drives; the first one, close to rest, stands for it.
+    /// From states away from rest in one direction; the first one, close to rest, stands for it.
     pub fn new(states: &[KernelState]) -> Option<MemoryKernel> {
-        let drives_mm: Vec<f64> = states.iter().map(|s| s.drive_mm).collect();
+        // Distances from rest, and forces in the direction of the drives.
+        let drives_mm: Vec<f64> = states.iter().map(|s| s.drive_mm.abs()).collect();
+        let way = states.last().map_or(1.0, |s| s.drive_mm.signum());
         let from_rest: Vec<f64> = std::iter::once(0.0).chain(drives_mm.iter().copied()).collect();
         let mut rows = Vec::with_capacity(states.len());
         for b in states {
@@ -86,7 +88,7 @@ impl MemoryKernel {
             for a in states {
                 let sum: f64 =
                     (0..b.volume_mm3.len()).map(|q| b.volume_mm3[q] * a.stress[q].dot(&b.strain_rate[q])).sum();
-                row.push(b.scale * sum);
+                row.push(way * b.scale * sum);
             }
             rows.push(ForceTable::new(&from_rest, &row).ok()?);
         }

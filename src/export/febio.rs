@@ -58,7 +58,7 @@ pub(super) fn deck(written: &Written, numbered: &Numbered) -> String {
         let _ = writeln!(text, "      <elem id=\"{e}\">{}</elem>", list(&nodes));
     }
     text += "    </Elements>\n";
-    let held = numbered.held();
+    let held = numbered.held(&written.driven);
     for set in &held {
         let _ = writeln!(text, "    <NodeSet name=\"{}\">{}</NodeSet>", set.name, list(&set.nodes));
     }
@@ -77,11 +77,18 @@ pub(super) fn deck(written: &Written, numbered: &Numbered) -> String {
     }
     let drives = std::iter::once(0.0).chain(drives_mm.iter().copied());
     let largest_steps = (0..=drives_mm.len()).map(|_| 1.0 / STEPS_PER_DRIVE as f64);
+    for (component, part) in &written.driven {
+        let (axis, part) = (["x", "y", "z"][*component], number(*part));
+        let name = if written.driven.len() > 1 { format!("drive_{axis}") } else { "drive".into() };
+        let _ = write!(
+            text,
+            "    <bc name=\"{name}\" node_set=\"{MOVED}\" type=\"prescribed displacement\">\n      <dof>{axis}</dof>\n      \
+             <value lc=\"1\">{part}</value>\n      <relative>0</relative>\n    </bc>\n"
+        );
+    }
     let _ = write!(
         text,
-        "    <bc name=\"drive\" node_set=\"{MOVED}\" type=\"prescribed displacement\">\n      <dof>x</dof>\n      \
-         <value lc=\"1\">1.0</value>\n      <relative>0</relative>\n    </bc>\n  </Boundary>\n  <LoadData>\n{}{}  \
-         </LoadData>\n",
+        "  </Boundary>\n  <LoadData>\n{}{}  </LoadData>\n",
         curve(1, "LINEAR", drives),
         curve(2, "STEP", largest_steps),
     );

@@ -53,7 +53,7 @@ pub(super) fn deck(written: &Written, numbered: &Numbered, dialect: &Dialect) ->
         nodes.insert(0, e);
         text += &lines_of(&nodes);
     }
-    let held = numbered.held();
+    let held = numbered.held(&written.driven);
     for set in &held {
         let _ = write!(text, "*NSET, NSET={}\n{}", set.name, lines_of(&set.nodes));
     }
@@ -65,9 +65,12 @@ pub(super) fn deck(written: &Written, numbered: &Numbered, dialect: &Dialect) ->
         }
     }
     for drive in written.drives_mm {
-        let drive = number(*drive);
         let _ = write!(text, "*STEP, NLGEOM, INC=1000\n*STATIC\n0.25, 1.0, 1.0e-5, 0.5\n*BOUNDARY\n");
-        let _ = write!(text, "{MOVED}, 1, 1, {drive}\n{}*END STEP\n", dialect.output);
+        for (component, part) in &written.driven {
+            let n = component + 1;
+            let _ = writeln!(text, "{MOVED}, {n}, {n}, {}", number(drive * part));
+        }
+        let _ = writeln!(text, "{}*END STEP", dialect.output);
     }
     text
 }

@@ -12,8 +12,10 @@ pub struct Model<'a> {
     pub mesh: &'a Mesh,
     /// The material.
     pub material: &'a Ogden,
-    /// Drives along x, mm, one load step each.
+    /// Drives, mm, one load step each.
     pub drives_mm: &'a [f64],
+    /// Unit vector in which the moved face goes for a positive drive.
+    pub direction: [f64; 3],
     /// How often the mesh stands in the test: mirrored copies times samples.
     pub multiplicity: f64,
 }
@@ -24,8 +26,10 @@ pub(super) struct Written<'a> {
     pub kind: ElementKind,
     /// The material in the program's convention, MPa.
     pub material: Converted,
-    /// Drives along x, mm.
+    /// Drives, mm.
     pub drives_mm: &'a [f64],
+    /// Components (from 0) of the moved face that are driven, and their part of the drive.
+    pub driven: Vec<(usize, f64)>,
     /// What the reader should know, line by line.
     pub comments: Vec<String>,
     /// Name that all programs read.
@@ -85,12 +89,12 @@ impl<'a> Numbered<'a> {
     }
 
     /// The sets of nodes that are held, none of them empty: name, numbers, and the components (x, y, z) that are zero.
-    /// The moved nodes are driven along x.
-    pub(super) fn held(&self) -> Vec<NodeSet> {
+    /// The moved nodes are driven in the other `driven` components.
+    pub(super) fn held(&self, driven: &[(usize, f64)]) -> Vec<NodeSet> {
         let mesh = self.mesh;
         let all = [
             ("FIXED", self.set(&mesh.fixed_nodes, false), [true; 3]),
-            (MOVED, self.set(&mesh.moved_nodes, false), [false, true, true]),
+            (MOVED, self.set(&mesh.moved_nodes, false), [0, 1, 2].map(|i| driven.iter().all(|(d, _)| *d != i))),
             ("MIRROR_Y", self.set(&mesh.mirror_y_nodes, true), [false, true, false]),
             ("MIRROR_Z", self.set(&mesh.mirror_z_nodes, true), [false, false, true]),
         ];

@@ -78,10 +78,15 @@ fn comments(model: &Model, origin: &Origin) -> Vec<String> {
         [one] => format!("The mesh ends at the mirror plane {one}."),
         several => format!("The mesh ends at the mirror planes {}.", several.join(" and ")),
     };
+    let way = match model.direction {
+        [x, _, _] if x >= 1.0 => "x".to_string(),
+        [x, y, z] => format!("({x:.6}, {y:.6}, {z:.6})"),
+    };
     vec![
         format!("{name}: written by lambdak {version} (inputs {input_hash})"),
-        "Lengths in mm, forces in N, stresses in MPa. The moved face is driven along x, one load step for each drive."
-            .into(),
+        format!(
+            "Lengths in mm, forces in N, stresses in MPa. The moved face is driven along {way}, one load step for each drive."
+        ),
         format!("{part} Forces of the whole test are the reactions on the moved face times {}.", model.multiplicity),
     ]
 }
@@ -96,6 +101,7 @@ pub fn model_file(model: &Model, format: ModelFormat, origin: &Origin) -> Result
         kind: model.mesh.element_kind,
         material: format.convert(model.material)?,
         drives_mm: model.drives_mm,
+        driven: (0..3).map(|i| (i, model.direction[i])).filter(|(_, part)| part.abs() > 0.0).collect(),
         comments: comments(model, origin),
         name: label(origin.name),
     };

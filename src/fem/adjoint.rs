@@ -25,7 +25,7 @@ impl Tangent<'_> {
         let plates = assembler.plates();
         let force_factor = by_force * assembler.multiplicity() * 1e-3;
         let plate: Vec<[f64; 3]> =
-            plates.is_moved.iter().map(|m| [if *m { force_factor } else { 0.0 }, 0.0, 0.0]).collect();
+            plates.is_moved.iter().map(|m| plates.vector(if *m { force_factor } else { 0.0 })).collect();
         let mut buffer = vec![[0.0; 3]; plate.len()];
         let driven = Some(&plates.driven_elements[..]);
         assembler

@@ -465,9 +465,10 @@ impl Assembler {
         sum
     }
 
-    /// Force (N) along +x of the whole test that the residual `residual` (kPa·mm²) puts on the moved plate.
+    /// Force (N) of the whole test in the direction of the drive that the residual `residual` (kPa·mm²) puts on the
+    /// moved plate.
     pub(super) fn force_n(&self, residual: &[[f64; 3]]) -> f64 {
-        self.reaction(residual)[0] * self.multiplicity() * 1e-3
+        self.plates().along(self.reaction(residual)) * self.multiplicity() * 1e-3
     }
 }
 

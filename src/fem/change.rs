@@ -101,7 +101,7 @@ impl Tangent<'_> {
     pub fn change_of_nodes(&self, velocity: Option<&[[f64; 3]]>, drive_rate: f64) -> Change {
         let mut imposed = self.still();
         for &v in &self.assembler.mesh().moved_nodes {
-            imposed[v as usize][0] = drive_rate;
+            imposed[v as usize] = self.assembler.plates().vector(drive_rate);
         }
         if let Some(velocity) = velocity {
             self.add_turning_of_plates(velocity, &mut imposed);

@@ -107,7 +107,7 @@ impl Tangent<'_> {
         for s in sensitivities {
             let g = self.linearisation_along(along, s)?;
             right.push(assembler.collect(&g, -1.0));
-            reactions.push(assembler.reaction(&g)[0]);
+            reactions.push(assembler.plates().along(assembler.reaction(&g)));
         }
         let solutions = self.solve_all(&right, ACCURACY)?;
         let mut buffer = vec![[0.0; 3]; mesh.nodes.len()];
@@ -120,7 +120,7 @@ impl Tangent<'_> {
             parameters.push(ParameterSensitivity {
                 parameter: s.parameter,
                 displacement: change,
-                force_n: (g + assembler.reaction(&buffer)[0]) * assembler.multiplicity() * 1e-3,
+                force_n: (g + assembler.plates().along(assembler.reaction(&buffer))) * assembler.multiplicity() * 1e-3,
             });
         }
         Ok(PathSensitivity { displacement, force_n, parameters })

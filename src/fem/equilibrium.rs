@@ -11,7 +11,7 @@ pub struct Equilibrium {
     pub displacement: Vec<[f64; 3]>,
     /// Pressure coefficients of each element.
     pub pressure: Vec<[f64; 4]>,
-    /// Force along +x on the moved face, N: the whole specimen, times the samples in parallel.
+    /// Force in the direction of the drive on the moved face, N: the whole specimen, times the samples in parallel.
     pub force_n: f64,
     /// Force along +y on the moved face, N, likewise (zero where y is a mirror).
     pub normal_force_n: f64,

@@ -23,9 +23,10 @@ const PARTS: i32 = 8;
 
 /// A mesh made ready for solving: boundary conditions, elimination order, symbolic factorisation, workspace.
 ///
-/// The moved plate or grip is displaced by the drive along x; the fixed one not at all. A model may depart from this
-/// nominal experiment ([`ForwardModel::departed`]). A large mesh made by [`ForwardModel::of_specimen`] has a coarse one
-/// inside it, whose equilibria guide the nominal model. What was solved last never changes what is solved next.
+/// The moved plate or grip is displaced by the drive in its direction; the fixed one not at all. A model may depart
+/// from this nominal experiment ([`ForwardModel::departed`]). A large mesh made by [`ForwardModel::of_specimen`] has a
+/// coarse one inside it, whose equilibria guide the nominal model. What was solved last never changes what is solved
+/// next.
 pub struct ForwardModel {
     pub(super) fine: MeshModel,
     guide: Option<Guide>,

@@ -110,7 +110,7 @@ impl Guide {
             displacement[v as usize] = [0.0; 3];
         }
         for &v in &mesh.moved_nodes {
-            displacement[v as usize] = [from.drive_mm, 0.0, 0.0];
+            displacement[v as usize] = fine.plates().vector(from.drive_mm);
         }
         for &v in &mesh.mirror_y_nodes {
             displacement[v as usize][1] = 0.0;

@@ -12,6 +12,7 @@ mod adjoint;
 mod assembler;
 mod change;
 mod condensation;
+mod contact;
 mod crew;
 mod departures;
 mod departures_on_mesh;
@@ -56,6 +57,7 @@ mod variation_kernel;
 mod verification;
 
 pub use change::{Change, ChangeSensitivity};
+pub use contact::Contact;
 pub use departures::{Departures, FIRM_BOND_KPA_PER_MM, Fibre, Field, PlateMotion, VectorField};
 pub use derivatives::{ParameterSensitivity, PathSensitivity};
 pub use equilibrium::Equilibrium;

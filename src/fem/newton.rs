@@ -170,7 +170,9 @@ impl Newton<'_> {
             }
             _ => {
                 for (x, lift) in trial.displacement.iter_mut().zip(&plates.lift) {
-                    x[0] += increment * lift;
+                    for (x, component) in x.iter_mut().zip(plates.direction) {
+                        *x += increment * lift * component;
+                    }
                 }
             }
         }
@@ -242,11 +244,12 @@ pub(super) fn finished(
         }
     }
     // kPa·mm² = 10⁻³ N.
-    state.force_n = moved[0] * assembler.multiplicity() * 1e-3;
+    let [on_moved, on_fixed] = [moved, fixed].map(|force| assembler.plates().along(force));
+    state.force_n = on_moved * assembler.multiplicity() * 1e-3;
     state.normal_force_n = if mesh.mirror.y { 0.0 } else { moved[1] * assembler.multiplicity() * 1e-3 };
     state.serial = Some(Serial::next());
     linearisation.stands_at = state.serial;
-    state.reaction_imbalance = (moved[0] + fixed[0]).abs() / moved[0].abs().max(1e-12);
+    state.reaction_imbalance = (on_moved + on_fixed).abs() / on_moved.abs().max(1e-12);
     state
 }
 

@@ -4,7 +4,8 @@ use super::departures::Departures;
 use crate::mesh::Mesh;
 use crate::specimen::{Specimen, TestKind};
 
-/// The plates or grips of a test, on a mesh. The moved one is displaced by the drive along x; the fixed one not at all.
+/// The plates or grips of a test, on a mesh. The moved one is displaced by the drive in its direction; the fixed one
+/// not at all.
 pub(super) struct Plates {
     /// Whether each node is on the moved face.
     pub(super) is_moved: Vec<bool>,
@@ -16,7 +17,9 @@ pub(super) struct Plates {
     pub(super) released: Vec<(u32, f64)>,
     /// Elements with a node on the moved face.
     pub(super) driven_elements: Vec<u32>,
-    /// Affine displacement along x per unit of drive at each node: the first guess of a load step.
+    /// Unit vector in which the moved plate goes for a positive drive.
+    pub(super) direction: [f64; 3],
+    /// Affine displacement in that direction per unit of drive at each node: the first guess of a load step.
     pub(super) lift: Vec<f64>,
     /// Largest first load step, mm.
     pub(super) first_step_mm: f64,
@@ -63,6 +66,7 @@ impl Plates {
             is_released: flags,
             released,
             driven_elements,
+            direction: specimen.drive_direction(),
             lift: mesh.nodes.iter().map(|x| x[axis] / extent + 0.5).collect(),
             // One step to a shear strain of 0.8 takes five or six iterations; stretching is more nonlinear.
             first_step_mm: if axis == 1 { 0.85 } else { 0.3 } * extent,
@@ -72,6 +76,16 @@ impl Plates {
                 center
             }),
         }
+    }
+
+    /// The part of a force or a displacement in the direction of the drive.
+    pub(super) fn along(&self, vector: [f64; 3]) -> f64 {
+        (0..3).map(|i| vector[i] * self.direction[i]).sum()
+    }
+
+    /// The vector of a length in the direction of the drive.
+    pub(super) fn vector(&self, length: f64) -> [f64; 3] {
+        self.direction.map(|component| length * component)
     }
 
     /// Nodes that move with a plate.
@@ -88,7 +102,9 @@ impl Plates {
             (&departures.fixed_plate, self.face_centers[0], 0.0)
         };
         let mut u = motion.displacement([0, 1, 2].map(|i| x[i] - center[i]), drive_mm);
-        u[0] += along;
+        for (u, component) in u.iter_mut().zip(self.direction) {
+            *u += along * component;
+        }
         if let Some(face) = &departures.faces_per_mm[usize::from(self.is_moved[v])] {
             for (u, rate) in u.iter_mut().zip(face.at(x)) {
                 *u += drive_mm * rate;

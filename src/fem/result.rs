@@ -1,5 +1,6 @@
 //! The result of a forward solution (`solve/1`).
 
+use super::contact::Contact;
 use super::equilibrium::Equilibrium;
 use super::forward_model::ForwardModel;
 use super::options::Statistics;
@@ -12,7 +13,7 @@ use serde::{Deserialize, Serialize};
 pub struct SolveResult {
     /// Always `solve/1`.
     pub schema: String,
-    /// Drives, increasing.
+    /// Drives, away from rest.
     pub steps: Vec<SolveStep>,
     /// Elements of the mesh.
     pub num_elements: usize,
@@ -37,7 +38,7 @@ pub struct SolveResult {
 pub struct SolveStep {
     /// Drive, mm.
     pub drive_mm: f64,
-    /// Force along +x on the moved face, all samples together, N.
+    /// Force in the direction of the drive on the moved face, all samples together, N.
     pub force_n: f64,
     /// Where there are several kinds of samples: the force of all samples of each kind, N.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -50,6 +51,9 @@ pub struct SolveStep {
     pub largest_principal_stretch: f64,
     /// Smallest and largest det F at a quadrature point.
     pub jacobian_range: [f64; 2],
+    /// Where a bar that is pushed together touches itself or its grips, which the model does not know: what then.
+    #[serde(default, skip_serializing_if = "Contact::is_none")]
+    pub contact: Contact,
     /// Solver work.
     pub statistics: Statistics,
 }
@@ -90,7 +94,7 @@ impl SolveResult {
     }
 
     /// Adds an equilibrium; `extremes` are the largest principal stretch, the smallest and the largest det F.
-    pub fn push(&mut self, equilibrium: &Equilibrium, extremes: [f64; 3], statistics: Statistics) {
+    pub fn push(&mut self, equilibrium: &Equilibrium, extremes: [f64; 3], contact: Contact, statistics: Statistics) {
         self.steps.push(SolveStep {
             drive_mm: equilibrium.drive_mm,
             force_n: equilibrium.force_n,
@@ -99,6 +103,7 @@ impl SolveResult {
             reaction_imbalance: equilibrium.reaction_imbalance,
             largest_principal_stretch: extremes[0],
             jacobian_range: [extremes[1], extremes[2]],
+            contact,
             statistics,
         });
     }

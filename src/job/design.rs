@@ -42,7 +42,7 @@ impl Request for Study {
     }
 
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
-        let mut errors = Vec::new();
+        let mut errors: Vec<FieldError> = self.check_search().err().iter().map(|e| e.field_error()).collect();
         let budget = self.budget;
         let evaluations = budget
             .refine

@@ -27,6 +27,10 @@ pub(super) fn check_detectable(
         let allowed = "false where the specimen has other_samples or several blocks are scanned";
         return Err(refused(allowed).remedy("a diagnosis is of one block alone: evaluate that one by itself"));
     }
+    if !specimen.is_driven_along_x() {
+        let remedy = "a diagnosis is of drives along x alone; leave out drive_angle_deg";
+        return Err(refused("false where the specimen has a drive_angle_deg").remedy(remedy));
+    }
     let num_voxels = VoxelGrid::covering(specimen, scan.voxel_mm).map_or(0, |grid| grid.num_voxels());
     if num_voxels * num_drives > MAX_VALUES {
         let allowed = format!("false above {MAX_VALUES} voxels of all drives together");

@@ -73,9 +73,13 @@ pub(super) struct CheckedEvaluation {
 
 impl EvaluationRequest {
     /// Everything that is wrong with it beyond the limits of single fields, and the drives that it asks for.
-    pub(super) fn checked(self) -> Result<CheckedEvaluation, Vec<FieldError>> {
+    pub(super) fn checked(mut self) -> Result<CheckedEvaluation, Vec<FieldError>> {
         let mut errors: Vec<FieldError> = Vec::new();
-        driven(&self.specimen, self.drive_mm.as_ref(), &mut errors);
+        let driven = driven(&self.specimen, self.drive_mm.as_ref(), &mut errors);
+        if self.specimen.is_other_way(driven.largest_drive_mm()) {
+            // The mesh of a bar that is pushed is another one than that of a bar that is pulled.
+            self.specimen = driven;
+        }
         errors.extend(self.material.field_errors().into_iter().map(|e| e.below("/material")));
         errors.extend(self.scan.field_errors().into_iter().map(|e| e.below("/scan")));
         errors.extend(self.protocol.field_errors().into_iter().map(|e| e.below("/protocol")));

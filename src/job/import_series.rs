@@ -15,11 +15,12 @@ pub(super) fn check_series(map: &SeriesMap, specimen: Option<&Specimen>, errors:
         let allowed = "x, y and z once each, such as y,z,x or -y,z,-x";
         errors.push(FieldError::new("/series/scanner_axes", format!("{axes:?}"), allowed));
     }
-    let limit_mm = specimen.filter(|s| s.field_errors().is_empty()).map(Specimen::max_supported_drive_mm);
+    let sound = specimen.filter(|s| s.field_errors().is_empty());
     for (n, step) in map.steps.iter().enumerate() {
         let at = |field: &str| format!("/series/steps/{n}/{field}");
-        if let Some(limit_mm) = limit_mm.filter(|limit| step.drive_mm > *limit) {
-            let allowed = format!("at most {limit_mm:.4}, the largest that is supported for this specimen");
+        if let Some(specimen) = sound.filter(|s| !s.supports_drive(step.drive_mm)) {
+            let limit_mm = specimen.drive_limit_mm();
+            let allowed = format!("from 0 (excluded) to {limit_mm:.4}, what is supported for this specimen");
             errors.push(FieldError::new(at("drive_mm"), step.drive_mm, allowed));
         }
         for (axis, value) in step.mm_per_radian.into_iter().enumerate() {

@@ -30,8 +30,8 @@ pub struct NextRequest {
     #[serde(default)]
     #[schema(max_items = 20)]
     pub specimens: Vec<Specimen>,
-    /// Drives in mm at which every specimen could be scanned; where left out, num_drives from the study's smallest to
-    /// its largest.
+    /// How far every specimen could be driven for a scan, mm, in the direction of its own drives; where left out,
+    /// num_drives from the study's smallest to its largest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(min_items = 1, max_items = 20)]
     pub drive_mm: Option<Vec<f64>>,
@@ -146,7 +146,10 @@ impl Request for NextRequest {
         }
         for (index, drive) in self.drive_mm.iter().flatten().enumerate() {
             if !(*drive > 0.0 && drive.is_finite()) {
-                errors.push(FieldError::new(format!("/drive_mm/{index}"), *drive, "a finite number above 0"));
+                errors.push(
+                    FieldError::new(format!("/drive_mm/{index}"), *drive, "a finite number above 0")
+                        .remedy("every specimen goes so far in the direction of its own drives"),
+                );
             }
         }
         for (name, precision) in &self.precision_by_parameter {

@@ -45,7 +45,10 @@ pub enum NoResponse {
 /// [`NoResponse`].
 pub fn quick_response(specimen: &Specimen, material: &Ogden) -> Result<QuickResponse, NoResponse> {
     let failed = |e: &dyn std::fmt::Display| NoResponse::Failed(e.to_string());
-    let drive = specimen.drive_mm.iter().copied().reduce(f64::max).ok_or(NoResponse::NoDrive)?;
+    let drive = specimen.largest_drive_mm();
+    if !(drive.abs() > 0.0) {
+        return Err(NoResponse::NoDrive);
+    }
     let samples = specimen.samples();
     let mut seconds = 0.0;
     for sample in &samples {

@@ -152,7 +152,7 @@ impl CheckedSolve {
                 .solve(material, drive, last.as_ref(), &SolveOptions::default(), &|| context.is_cancelled())
                 .map_err(|e| context.failed(&e))?;
             let fields = model.quadrature_fields(material, &found);
-            result.push(&found, extremes(&fields), model.statistics());
+            result.push(&found, extremes(&fields), model.contact(sample, &found), model.statistics());
             if self.request.fields == FieldDrives::Every || index + 1 == num_drives {
                 let vtu = vtu_of(&model, material, &found).map_err(|e| context.failed(&e))?;
                 fields_of_drives.push((drive, index + 1, vtu));

@@ -135,9 +135,11 @@ impl Domain {
             let image = h.mirrored([1.0, -1.0]);
             specimen.holes.iter().any(|other| other.difference_mm(&image) < COINCIDENT * scale)
         });
-        // Plates move along x, the section is mirrored in b and the extrusion in its own axis. y = 0 is no mirror
-        // plane in shear: one plate moves, the other does not.
-        let may = |axis: usize| options.use_mirror && (axis == 2 || uniaxial);
+        // Where plates move along x, the section is mirrored in b and the extrusion in its own axis. y = 0 is no mirror
+        // plane in shear: one plate moves, the other does not. A bar that is pushed together may buckle to a side,
+        // which a half or a quarter of it could not.
+        let use_mirror = options.use_mirror && !specimen.is_compressed();
+        let may = |axis: usize| use_mirror && if axis == 2 { specimen.is_driven_along_x() } else { uniaxial };
         let section_mirrored = may(b_axis) && holes_symmetric;
         let extrusion_mirrored = may(extrusion_axis);
         let is_mirrored = |axis| if axis == b_axis { section_mirrored } else { extrusion_mirrored };

@@ -9,7 +9,7 @@ use super::trial::{Bench, Trial};
 use super::worth::{Knowledge, MOST_SCANS, Worth};
 use crate::calibration::Observed;
 use crate::material::Parameter;
-use crate::specimen::Specimen;
+use crate::specimen::{Specimen, farthest_from_zero, leads_on};
 use rayon::prelude::*;
 use std::cmp::Ordering;
 
@@ -116,7 +116,7 @@ fn trials(
             let bench = Bench::new(body, plan, options.mesh_factor);
             let own = all.iter().filter(|c| c.body == index);
             let mut drives: Vec<f64> = own.flat_map(|c| c.drives_mm.iter().copied()).collect();
-            drives.sort_by(f64::total_cmp);
+            drives.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
             drives.dedup();
             let trial = |mut bench: Bench| bench.trial(&drives, &point.material, plan, posterior, &|| is_cancelled());
             bench.and_then(trial).map_err(|error| error.to_string())
@@ -206,7 +206,8 @@ impl Comparison<'_> {
             at_last = (index, last.relative_sd[index]);
         }
         let is_read = |drive: &f64| {
-            candidate.drives_mm.last().is_some_and(|last| drive < last) && !candidate.drives_mm.contains(drive)
+            candidate.drives_mm.last().is_some_and(|last| leads_on(*drive, *last))
+                && !candidate.drives_mm.contains(drive)
         };
         let steps = || trials[0].steps.iter().filter(|s| candidate.drives_mm.contains(&s.drive_mm));
         let beyond = steps().map(|s| s.scanned.part_beyond());
@@ -217,7 +218,7 @@ impl Comparison<'_> {
             force_drive_mm: trials[0].readings.iter().map(|r| r.0).filter(is_read).collect(),
             is_repeat: candidate.is_repeat(),
             minutes,
-            force_n: steps().map(|s| s.force_n).fold(0.0, f64::max),
+            force_n: farthest_from_zero(steps().map(|s| s.force_n)),
             part_beyond: beyond.fold(0.0, f64::max),
             promised_relative_sd: after.relative_sd.clone(),
             gain,

@@ -10,7 +10,7 @@ use crate::specimen::Specimen;
 pub(super) struct Candidate {
     /// Its specimen, by its place among [`bodies`].
     pub(super) body: usize,
-    /// Drives that are scanned, mm, increasing.
+    /// Drives that are scanned, mm, away from rest.
     pub(super) drives_mm: Vec<f64>,
     /// How often each was scanned before.
     pub(super) num_done: Vec<usize>,
@@ -42,8 +42,8 @@ pub(super) fn bodies(observed: &[Observed], plan: &Plan) -> Vec<Specimen> {
     all
 }
 
-/// Drives at which every specimen at hand may be scanned, mm.
-pub(super) fn drives_mm(plan: &Plan, options: &NextOptions) -> Vec<f64> {
+/// How far every specimen at hand may be driven in the direction of its own drives, mm.
+pub(super) fn distances_mm(plan: &Plan, options: &NextOptions) -> Vec<f64> {
     if let Some(drives) = &options.drives_mm {
         let mut drives = drives.clone();
         drives.sort_by(f64::total_cmp);
@@ -84,14 +84,14 @@ pub(super) fn candidates(
         }
     };
     for (index, _) in bodies.iter().enumerate().filter(|(_, b)| plan.specimens.iter().any(|s| is_same_body(s, b))) {
-        for drive in drives_mm(plan, options) {
-            add(new(index, vec![drive]));
+        for distance in distances_mm(plan, options) {
+            add(new(index, vec![distance.copysign(bodies[index].largest_drive_mm())]));
         }
     }
     for recording in observed {
         if let Some(index) = bodies.iter().position(|b| is_same_body(b, &recording.specimen)) {
             let mut drives: Vec<f64> = recording.steps.iter().map(|s| s.drive_mm).collect();
-            drives.sort_by(f64::total_cmp);
+            drives.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
             add(new(index, drives));
         }
     }

@@ -43,7 +43,8 @@ pub struct NextOptions {
     pub mesh_factor: f64,
     /// Whether the error of that mesh is predicted by one of half the size and taken off the recordings.
     pub has_mesh_correction: bool,
-    /// Candidates' drives, mm; where left out `num_drives` from the study's smallest to its largest.
+    /// Candidates' drives, mm, in the direction of each specimen's own; where left out `num_drives` from
+    /// the study's smallest to its largest.
     pub drives_mm: Option<Vec<f64>>,
     /// Number of those.
     pub num_drives: usize,

@@ -179,10 +179,10 @@ pub(super) fn is_same_drive(a: f64, b: f64) -> bool {
     (a - b).abs() < 1e-3
 }
 
-/// Whether two specimens differ by name and drives alone.
+/// Whether two specimens differ by name and drives alone, and are driven in the same direction.
 pub(super) fn is_same_body(a: &Specimen, b: &Specimen) -> bool {
     let body = |s: &Specimen| Specimen { name: String::new(), drive_mm: Vec::new(), ..s.clone() };
-    body(a) == body(b)
+    body(a) == body(b) && !a.is_other_way(b.largest_drive_mm())
 }
 
 /// What the recordings tell, at the estimate.

@@ -10,7 +10,7 @@ use crate::kinematics::{decompose, principal_stretches};
 use crate::material::Ogden;
 use crate::mesh::MeshOptions;
 use crate::sensitivity::{EvaluationError, Scanner, unknowns_of};
-use crate::specimen::{LimitMargin, Specimen};
+use crate::specimen::{LimitMargin, Specimen, farthest_from_zero};
 use crate::voxel::Sampling;
 
 /// A drive of a trial.
@@ -67,11 +67,11 @@ impl Bench {
         posterior: &Posterior,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Trial, NextError> {
-        let largest = scanned_mm.iter().copied().fold(0.0, f64::max);
+        let largest = farthest_from_zero(scanned_mm.iter().copied());
         let forces_mm = plan.study.protocol.on_the_way_to(largest).force_drives_mm();
         let mut drives: Vec<(f64, bool)> =
             scanned_mm.iter().map(|d| (*d, true)).chain(forces_mm.iter().map(|d| (*d, false))).collect();
-        drives.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
+        drives.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()).then(b.1.cmp(&a.1)));
         let (mut trial, mut last) = (Trial::default(), None);
         for (drive_mm, is_scanned) in drives {
             let found = self.model.solve(material, drive_mm, last.as_ref(), &SolveOptions::default(), is_cancelled);

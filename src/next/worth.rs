@@ -6,6 +6,7 @@ use super::options::Precision;
 use super::posterior::{Point, Posterior, UNKNOWN_RELATIVE_SD};
 use super::trial::Trial;
 use crate::sensitivity::{FisherInformation, JointInformation};
+use crate::specimen::{farthest_from_zero, leads_on};
 
 /// Most further scans of one kind that are thought of.
 pub(super) const MOST_SCANS: usize = 1000;
@@ -94,9 +95,10 @@ impl Worth<'_> {
             sum.add_times(1.0, &of(done as f64 + num)?)?;
             sum.add_times(-1.0, &of(done as f64)?)?;
         }
-        let largest = self.candidate.drives_mm.iter().copied().fold(0.0, f64::max);
+        let largest = farthest_from_zero(self.candidate.drives_mm.iter().copied());
         let is_scanned = |drive: f64| self.candidate.drives_mm.contains(&drive);
-        let readings = self.trials[p].readings.iter().filter(|(drive, _)| *drive < largest && !is_scanned(*drive));
+        let readings =
+            self.trials[p].readings.iter().filter(|(drive, _)| leads_on(*drive, largest) && !is_scanned(*drive));
         readings.for_each(|(_, reading)| reading.add_to(&mut sum, num, discrepancy));
         Ok(Some(sum.carried_to(material)?))
     }

@@ -159,14 +159,14 @@ pub enum RecordingError {
     },
     /// A drive is no drive of the specimen.
     #[error(
-        "steps[{step}].drive_mm is {drive_mm}; it must be above 0 and at most {limit_mm:.4} mm, the largest that is supported for this specimen"
+        "steps[{step}].drive_mm is {drive_mm}; it must lie between 0 (excluded) and {limit_mm:.4} mm, the farthest that is supported in the direction of the specimen's own drives"
     )]
     Drive {
         /// Which step, from 0 as in `recording.json`.
         step: usize,
         /// Its drive, mm.
         drive_mm: f64,
-        /// Largest, mm.
+        /// The farthest, mm.
         limit_mm: f64,
     },
     /// A step holds displacements and raw phases.

@@ -48,7 +48,7 @@ pub enum PlateFault {
     Unit(MistakenUnit),
     /// The plate moves backwards.
     #[error(
-        "the sign of the x component seems to be flipped; x points in the direction of the drive (on import: --axes, such as -y,z,-x)"
+        "the sign of the x component seems to be flipped; x points in the direction of a positive drive (on import: --axes, such as -y,z,-x)"
     )]
     Sign,
     /// Another component than x follows the drive.
@@ -61,6 +61,16 @@ pub enum PlateFault {
         component: char,
         /// The unit, where that is wrong, too.
         unit: Option<MistakenUnit>,
+    },
+    /// The plate moves in another direction than the specimen's drive, at an angle from x.
+    #[error(
+        "the plate moves at {found_deg:.0}° from x towards z, and the specimen's drive_angle_deg is {told_deg}°: correct the angle, or the order and signs of the components (on import: --components, --axes)"
+    )]
+    Direction {
+        /// Angle of the plate's motion in the plane of the plates, degrees.
+        found_deg: f64,
+        /// The specimen's, degrees.
+        told_deg: f64,
     },
     /// A component moves much further than what drives the plate.
     #[error(

@@ -2,7 +2,7 @@
 //! there at once, and nowhere later.
 
 use super::{MistakenUnit, PlateFault, Recording, RecordingError};
-use crate::specimen::TestKind;
+use crate::specimen::{Specimen, TestKind};
 
 /// Ratios of plate motion and drive within these bounds are taken as one: mounts give way, and lines to the plates err.
 const NEAR_ONE: std::ops::RangeInclusive<f64> = 0.5..=1.6;
@@ -12,6 +12,8 @@ const REACH: f64 = 0.15;
 const SMALL_IN_M: f64 = 0.02;
 /// The same of centimetres, in which nothing moves further than twice the drive.
 const SMALL_IN_CM: f64 = 0.2;
+/// Cosine of the angle by which a plate that is driven obliquely may be off: 37°.
+const NEAR_DIRECTION: f64 = 0.8;
 /// A component below this part of what follows the drive does not follow it.
 const STILL: f64 = 0.2;
 
@@ -23,7 +25,11 @@ impl Recording {
     pub(super) fn check_plate_motion(&self) -> Result<(), RecordingError> {
         for (n, step) in self.steps.iter().enumerate() {
             let Some(found_mm) = self.plate_motion_mm(&step.displacement) else { continue };
-            if let Some(fault) = fault(found_mm, step.drive_mm, &step.displacement) {
+            let found = match self.specimen.is_driven_along_x() {
+                true => fault(found_mm, step.drive_mm, &step.displacement),
+                false => oblique_fault(found_mm, step.drive_mm, &self.specimen),
+            };
+            if let Some(fault) = found {
                 return Err(RecordingError::PlateMotion { step: n + 1, drive_mm: step.drive_mm, found_mm, fault });
             }
         }
@@ -67,7 +73,7 @@ impl Recording {
 fn fault(found_mm: [f64; 3], drive_mm: f64, displacement: &[[f64; 3]]) -> Option<PlateFault> {
     let ratios = found_mm.map(|motion| motion / drive_mm);
     let is_near = |ratio: f64| NEAR_ONE.contains(&ratio);
-    let is_below = |part: f64| displacement.iter().flatten().all(|u| !(u.abs() > part * drive_mm));
+    let is_below = |part: f64| displacement.iter().flatten().all(|u| !(u.abs() > part * drive_mm.abs()));
     let unit_of = |ratio: f64| {
         MistakenUnit::ALL.into_iter().find(|unit| {
             let is_small = match unit {
@@ -105,20 +111,42 @@ fn fault(found_mm: [f64; 3], drive_mm: f64, displacement: &[[f64; 3]]) -> Option
     }
 }
 
+/// The same where the plate moves at an angle: not one component alone should then follow the drive.
+fn oblique_fault(found_mm: [f64; 3], drive_mm: f64, specimen: &Specimen) -> Option<PlateFault> {
+    let direction = specimen.drive_direction();
+    let size = found_mm.iter().map(|m| m * m).sum::<f64>().sqrt() / drive_mm.abs();
+    let along = (0..3).map(|i| found_mm[i] * direction[i]).sum::<f64>() / drive_mm;
+    let is_near = |ratio: f64| NEAR_ONE.contains(&ratio);
+    if let Some(unit) = MistakenUnit::ALL.into_iter().find(|unit| is_near(along * unit.in_mm())) {
+        return Some(PlateFault::Unit(unit));
+    }
+    if is_near(size) && along < NEAR_DIRECTION * size {
+        // Where the drive is negative the plate's own angle is that of the opposite motion.
+        let [x, _, z] = found_mm.map(|m| m * drive_mm.signum());
+        let (found_deg, told_deg) = (z.atan2(x).to_degrees(), specimen.drive_angle_deg);
+        return Some(PlateFault::Direction { found_deg, told_deg });
+    }
+    let most = if found_mm[0].abs() > found_mm[2].abs() { 'x' } else { 'z' };
+    (size > *NEAR_ONE.end()).then_some(PlateFault::TooFar { component: most, times: size })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::recording::{Filter, RecordedStep};
-    use crate::specimen::Specimen;
     use crate::voxel::VoxelGrid;
 
-    /// A block in simple shear by 5 mm, each displacement changed by `change`.
+    /// A block in simple shear by 5 mm, each displacement changed by `change`; or by another drive.
     fn sheared(change: impl Fn([f64; 3]) -> [f64; 3]) -> Result<(), RecordingError> {
+        driven_to(5.0, change)
+    }
+
+    fn driven_to(drive_mm: f64, change: impl Fn([f64; 3]) -> [f64; 3]) -> Result<(), RecordingError> {
         let specimen = Specimen::from_json(include_str!("../../geometries/solid-shear.json")).expect("a specimen");
         let grid = VoxelGrid::covering(&specimen, [2.0, 0.5, 2.0]).expect("a grid");
-        let at = |v: usize| [5.0 * (grid.center_mm(v)[1] / specimen.block.thickness_mm + 0.5), 0.0, 0.1];
+        let at = |v: usize| [drive_mm * (grid.center_mm(v)[1] / specimen.block.thickness_mm + 0.5), 0.0, 0.1];
         let displacement = (0..grid.num_voxels()).map(|v| change(at(v))).collect();
-        let step = RecordedStep { drive_mm: 5.0, force_n: None, force_sd_n: None, window_s: None, displacement };
+        let step = RecordedStep { drive_mm, force_n: None, force_sd_n: None, window_s: None, displacement };
         let mask = vec![true; grid.num_voxels()];
         let recording = Recording {
             id: "sheared".into(),
@@ -137,6 +165,14 @@ mod tests {
     #[test]
     fn what_is_wrong_is_named() {
         sheared(|u| u).expect("as it should be");
+        driven_to(-5.0, |u| u).expect("the other way");
+        let metres = driven_to(-5.0, |u| u.map(|u| u / 1e3));
+        assert!(matches!(
+            metres,
+            Err(RecordingError::PlateMotion { fault: PlateFault::Unit(MistakenUnit::Metres), .. })
+        ));
+        let flipped = driven_to(-5.0, |[x, y, z]| [-x, y, z]);
+        assert!(matches!(flipped, Err(RecordingError::PlateMotion { fault: PlateFault::Sign, .. })));
         sheared(|u| u.map(|u| 0.7 * u)).expect("a mount that gives way");
         sheared(|u| [u[0] + 40.0, u[1], u[2]]).expect("a phase without a zero");
         sheared(|_| [0.0; 3]).expect("nothing moved: that is for the diagnosis");

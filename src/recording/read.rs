@@ -199,8 +199,8 @@ impl<'a> Head<'a> {
 }
 
 pub(super) fn check_step(n: usize, step: &StepJson, specimen: &Specimen) -> Result<(), RecordingError> {
-    let limit_mm = specimen.max_supported_drive_mm();
-    if !(step.drive_mm > 0.0 && step.drive_mm <= limit_mm) {
+    if !specimen.supports_drive(step.drive_mm) {
+        let limit_mm = specimen.drive_limit_mm();
         return Err(RecordingError::Drive { step: n, drive_mm: step.drive_mm, limit_mm });
     }
     if step.displacement.is_some() && step.raw.is_some() {

@@ -5,7 +5,7 @@ use super::fixture::Fixture;
 use super::observation::median;
 use crate::fem::{Equilibrium, SolveOptions};
 use crate::material::Ogden;
-use crate::specimen::{Specimen, TestKind};
+use crate::specimen::{Specimen, TestKind, leads_on};
 use serde::{Deserialize, Serialize};
 
 /// Largest median stretch that may be asked for.
@@ -19,7 +19,7 @@ const MAX_DRIVE_SOLVES: usize = 30;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DriveSelection {
-    /// These, mm, increasing.
+    /// These, mm: away from rest in one direction.
     DriveMm(Vec<f64>),
     /// The one at which the median of λ over voxels has this value.
     MedianStretch(f64),
@@ -35,8 +35,8 @@ impl DriveSelection {
     }
 }
 
-/// Refuses empty, unordered and unreachable selections.
-pub(super) fn check_drives(drives: &DriveSelection) -> Result<(), EvaluationError> {
+/// Refuses empty, unordered and unreachable selections, and drives the other way than the specimen's own.
+pub(super) fn check_drives(specimen: &Specimen, drives: &DriveSelection) -> Result<(), EvaluationError> {
     match drives {
         DriveSelection::DriveMm(drives_mm) => {
             if drives_mm.is_empty() {
@@ -44,8 +44,12 @@ pub(super) fn check_drives(drives: &DriveSelection) -> Result<(), EvaluationErro
             }
             let mut previous_mm = 0.0;
             for &drive_mm in drives_mm {
-                if !drive_mm.is_finite() || drive_mm <= previous_mm {
+                if !drive_mm.is_finite() || !leads_on(previous_mm, drive_mm) {
                     return Err(EvaluationError::InvalidDrive { drive_mm, previous_mm });
+                }
+                if specimen.is_other_way(drive_mm) {
+                    let specimen_mm = specimen.largest_drive_mm();
+                    return Err(EvaluationError::OtherWay { drive_mm, specimen_mm });
                 }
                 previous_mm = drive_mm;
             }
@@ -61,10 +65,14 @@ pub(super) fn check_drives(drives: &DriveSelection) -> Result<(), EvaluationErro
     }
 }
 
-/// The drive at which a homogeneous specimen has stretch amplitude λ: shear γ = λ − 1/λ over the thickness, or λ − 1
-/// over the length.
+/// The drive at which a homogeneous specimen has stretch amplitude λ, in the direction of its own drives: shear
+/// γ = λ − 1/λ over the thickness, or λ − 1 over the length, which in compression (k = 0) is 1/λ − 1.
 fn homogeneous_drive_mm(specimen: &Specimen, stretch: f64) -> f64 {
     match specimen.test {
+        TestKind::Uniaxial if specimen.is_compressed() => (1.0 / stretch - 1.0) * specimen.block.length_mm,
+        TestKind::DoubleLapShear if specimen.largest_drive_mm() < 0.0 => {
+            (1.0 / stretch - stretch) * specimen.block.thickness_mm
+        }
         TestKind::DoubleLapShear => (stretch - 1.0 / stretch) * specimen.block.thickness_mm,
         TestKind::Uniaxial => (stretch - 1.0) * specimen.block.length_mm,
     }
@@ -102,8 +110,8 @@ pub(super) fn solve_for_median(
     found.map(|paths| (paths, count)).ok_or(EvaluationError::NoDrive)
 }
 
-/// Finds the drive at which an increasing function `median_at(drive)` with value 1 at rest has the value `target`:
-/// secant steps inside a bracket, else bisection. The last call is at the drive returned.
+/// Finds the drive at which a function `median_at(drive)` that rises away from rest, where it is 1, has the value
+/// `target`: secant steps inside a bracket, else bisection. The last call is at the drive returned.
 fn find_drive(
     guess_mm: f64,
     target: f64,

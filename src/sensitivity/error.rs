@@ -28,13 +28,25 @@ pub enum EvaluationError {
     /// No drive was given.
     #[error("no drive to evaluate; give at least one, in mm")]
     NoDrive,
-    /// Drives must be positive and increase.
-    #[error("drive {drive_mm} mm after {previous_mm} mm; drives must be finite, positive and increasing")]
+    /// Drives must lead away from rest in one direction.
+    #[error(
+        "drive {drive_mm} mm after {previous_mm} mm; drives must be finite and lead away from rest in one direction"
+    )]
     InvalidDrive {
         /// The drive, mm.
         drive_mm: f64,
         /// The one before, mm (0 for the first).
         previous_mm: f64,
+    },
+    /// A drive goes the other way than those of the specimen, whose mesh is made for them.
+    #[error(
+        "drive {drive_mm} mm goes the other way than the specimen's own, {specimen_mm} mm; give the specimen drives in that direction"
+    )]
+    OtherWay {
+        /// The drive, mm.
+        drive_mm: f64,
+        /// The specimen's largest, mm.
+        specimen_mm: f64,
     },
     /// The median stretch asked for is not above 1 or not a number.
     #[error("median stretch {value} asked for; it must lie between 1 and {limit}")]

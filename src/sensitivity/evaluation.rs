@@ -63,7 +63,7 @@ pub fn evaluate(
     options: &EvaluationOptions,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<(Evaluation, EvaluationMaps), EvaluationError> {
-    check_drives(drives)?;
+    check_drives(specimen, drives)?;
     let mut fixture = Fixture::new(specimen, scan, options)?;
     evaluate_fixture(&mut fixture, material, drives, &[], options, is_cancelled)
 }
@@ -82,7 +82,7 @@ pub fn evaluate_fixture(
     options: &EvaluationOptions,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<(Evaluation, EvaluationMaps), EvaluationError> {
-    check_drives(drives)?;
+    check_drives(fixture.specimen(), drives)?;
     options.protocol.suits(fixture.specimen(), drives.count())?;
     let (equilibria, num_equilibria) = match drives {
         DriveSelection::DriveMm(drives_mm) => {
@@ -323,7 +323,7 @@ fn add_forces(
     if drives.is_empty() {
         return Ok(Vec::new());
     }
-    check_drives(&DriveSelection::DriveMm(drives.clone()))?;
+    check_drives(fixture.specimen(), &DriveSelection::DriveMm(drives.clone()))?;
     let nuisances = options.protocol.nuisances();
     let reading = Drive { is_scanned: false, nuisances: &nuisances };
     let paths = fixture.solve_path(material, &drives, &[], &options.solve, is_cancelled)?;

@@ -2,15 +2,15 @@
 //! what is not known exactly of the set-up.
 
 #[cfg(feature = "schema")]
-use crate::field::schema::{integer_within, number_above, number_within, numbers, schema_type};
+use crate::field::schema::{integer_within, number, number_within, numbers, schema_type};
 use crate::field::{FieldError, FieldPath};
-use crate::specimen::{MAX_OTHER_SAMPLES, MAX_SAMPLES_IN_PARALLEL, Specimen};
+use crate::specimen::{MAX_OTHER_SAMPLES, MAX_SAMPLES_IN_PARALLEL, Specimen, leads_on};
 use serde::{Deserialize, Serialize};
 
 #[cfg(feature = "schema")]
 schema_type! {
-    /// Drives, mm, each above 0.
-    ForceDrivesMm = numbers(number_above(0.0), 0..=1000);
+    /// Drives, mm, none of them 0.
+    ForceDrivesMm = numbers(number(), 0..=1000);
     /// A standard deviation of at most 1000, or 0 for what is known exactly.
     SdOrZero = number_within(0.0..=1000.0);
     /// A number of samples.
@@ -36,7 +36,8 @@ pub(super) const SAME_DRIVE_MM: f64 = 1e-9;
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = ProtocolSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Protocol {
-    /// Drives at which the force alone is read, mm: on the way to a scan they take no time in the scanner.
+    /// Drives at which the force alone is read, mm, in the direction of the specimen's: on the way to a scan they take
+    /// no time in the scanner.
     #[cfg_attr(feature = "schema", schema(value_type = ForceDrivesMm))]
     pub force_drive_mm: Vec<f64>,
     /// Standard deviation of the load cell's gain, as a part of the force.
@@ -98,6 +99,18 @@ pub enum ProtocolMismatch {
         /// Scanned drives.
         num_drives: usize,
     },
+    /// A force is to be read on a way that the specimen does not go.
+    #[error(
+        "force_drive_mm[{index}] is {drive_mm} mm, and the specimen is driven to {specimen_mm} mm; read forces on that way"
+    )]
+    OtherWay {
+        /// Which drive of the protocol.
+        index: usize,
+        /// The drive, mm.
+        drive_mm: f64,
+        /// The specimen's largest, mm.
+        specimen_mm: f64,
+    },
 }
 
 impl ProtocolMismatch {
@@ -111,6 +124,10 @@ impl ProtocolMismatch {
                 let value = format!("a list of {count}");
                 FieldError::new("/scan_share", value, format!("one share for each of {num_drives} scanned drives"))
                     .remedy("or leave it out: every drive then gets the time of a whole scan")
+            }
+            ProtocolMismatch::OtherWay { index, drive_mm, specimen_mm } => {
+                let path = FieldPath::of("force_drive_mm").index(*index);
+                FieldError::new(path.pointer(), *drive_mm, format!("on the way from 0 to {specimen_mm} mm"))
             }
         }
     }
@@ -152,6 +169,10 @@ impl Protocol {
         if !self.scan_share.is_empty() && self.scan_share.len() != num_drives {
             return Err(ProtocolMismatch::Shares { count: self.scan_share.len(), num_drives });
         }
+        if let Some(index) = self.force_drive_mm.iter().position(|d| specimen.is_other_way(*d)) {
+            let (drive_mm, specimen_mm) = (self.force_drive_mm[index], specimen.largest_drive_mm());
+            return Err(ProtocolMismatch::OtherWay { index, drive_mm, specimen_mm });
+        }
         Ok(())
     }
 
@@ -168,14 +189,14 @@ impl Protocol {
     /// The same without the forces that are not on the way to `drive_mm`: those at it or beyond.
     pub fn on_the_way_to(&self, drive_mm: f64) -> Protocol {
         let mut own = self.clone();
-        own.force_drive_mm.retain(|d| *d < drive_mm - SAME_DRIVE_MM);
+        own.force_drive_mm.retain(|d| leads_on(*d, drive_mm) && !Protocol::is_same_drive(*d, drive_mm));
         own
     }
 
-    /// The drives at which the force alone is read, in order and each once, mm.
+    /// The drives at which the force alone is read, away from rest and each once, mm.
     pub fn force_drives_mm(&self) -> Vec<f64> {
         let mut drives = self.force_drive_mm.clone();
-        drives.sort_by(f64::total_cmp);
+        drives.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
         drives.dedup_by(|a, b| Protocol::is_same_drive(*a, *b));
         drives
     }
@@ -184,9 +205,9 @@ impl Protocol {
     pub fn field_errors(&self) -> Vec<FieldError> {
         let mut errors = Vec::new();
         for (index, drive_mm) in self.force_drive_mm.iter().enumerate() {
-            if !(*drive_mm > 0.0 && drive_mm.is_finite()) {
+            if !(drive_mm.abs() > 0.0 && drive_mm.is_finite()) {
                 let path = FieldPath::of("force_drive_mm").index(index);
-                errors.push(FieldError::new(path.pointer(), *drive_mm, "a finite number above 0"));
+                errors.push(FieldError::new(path.pointer(), *drive_mm, "a finite number, above or below 0"));
             }
         }
         if !(1..=MAX_BLOCKS_SCANNED).contains(&self.blocks_scanned) {

@@ -180,7 +180,11 @@ impl Drawing {
         let [length, thickness, breadth] = [block.length_mm, block.thickness_mm, block.width_mm].map(format_mm);
         let faces = match specimen.test {
             TestKind::DoubleLapShear => {
-                format!("Double-lap shear, faces y = ±{} bonded", format_mm(0.5 * block.thickness_mm))
+                let faces = format!("Double-lap shear, faces y = ±{} bonded", format_mm(0.5 * block.thickness_mm));
+                match specimen.is_driven_along_x() {
+                    true => faces,
+                    false => format!("{faces}, moved {}° from x to z", format_mm(specimen.drive_angle_deg)),
+                }
             }
             TestKind::Uniaxial => format!("Uniaxial, faces x = ±{} bonded", format_mm(0.5 * block.length_mm)),
         };

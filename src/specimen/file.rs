@@ -1,9 +1,11 @@
 //! A specimen in a file (`specimen/1`): the fields of [`Specimen`] behind the tag that names the format.
 
+#[cfg(feature = "schema")]
+use super::drives::{MAX_DRIVE_ANGLE_DEG, MAX_DRIVES};
 use super::read::SCHEMA;
 #[cfg(feature = "schema")]
 use super::read::{
-    MAX_DIAMETER_MM, MAX_DRIVES, MAX_HOLES, MAX_NAME_LENGTH, MAX_OTHER_SAMPLES, MAX_SAMPLES_IN_PARALLEL, MAX_SIZE_MM,
+    MAX_DIAMETER_MM, MAX_HOLES, MAX_NAME_LENGTH, MAX_OTHER_SAMPLES, MAX_SAMPLES_IN_PARALLEL, MAX_SIZE_MM,
     MIN_DIAMETER_MM, MIN_SIZE_MM,
 };
 use super::{Block, Hole, Outline, Sample, Specimen, TestKind};
@@ -26,8 +28,10 @@ schema_type! {
     pub(crate) Name = text(MAX_NAME_LENGTH);
     /// Holes, all with the same axis.
     pub(super) Holes = list_of::<Hole>(0..=MAX_HOLES), of Hole;
-    /// Drives, mm, positive and increasing.
+    /// Drives, mm: all positive and rising, or all negative and falling.
     Drives = numbers(number(), 1..=MAX_DRIVES);
+    /// Angle of the drive, degrees.
+    DriveAngle = number_within(-MAX_DRIVE_ANGLE_DEG..=MAX_DRIVE_ANGLE_DEG);
     /// Further samples of a double-lap test that share drive and load cell.
     OtherSamples = list_of::<Sample>(0..=MAX_OTHER_SAMPLES), of Sample;
     /// How many identical samples share the load cell.
@@ -55,9 +59,15 @@ pub(super) struct SpecimenFile {
     #[serde(default)]
     #[cfg_attr(feature = "schema", schema(value_type = Holes))]
     holes: Vec<Hole>,
-    /// Drives at which the specimen is scanned, mm, increasing.
+    /// Drives at which the specimen is scanned, mm: all positive and rising, or all negative and falling. Negative ones
+    /// push the grips of a uniaxial test together, or shear the other way.
     #[cfg_attr(feature = "schema", schema(value_type = Drives))]
     drive_mm: Vec<f64>,
+    /// Angle of the drive from x towards z, in the plane of the plates of a double-lap test, degrees; 0 by default.
+    /// Forces are along the drive.
+    #[serde(default, skip_serializing_if = "is_along_x")]
+    #[cfg_attr(feature = "schema", schema(value_type = DriveAngle))]
+    drive_angle_deg: f64,
     /// How many identical samples share the load cell; 1 by default.
     #[serde(default = "single_sample")]
     #[cfg_attr(feature = "schema", schema(value_type = SamplesInParallel))]
@@ -73,6 +83,10 @@ fn is_block(outline: &Outline) -> bool {
     *outline == Outline::Block
 }
 
+fn is_along_x(angle_deg: &f64) -> bool {
+    *angle_deg == 0.0
+}
+
 fn single_sample() -> u32 {
     1
 }
@@ -86,6 +100,7 @@ impl From<SpecimenFile> for Specimen {
             outline: file.outline,
             holes: file.holes,
             drive_mm: file.drive_mm,
+            drive_angle_deg: file.drive_angle_deg,
             samples_in_parallel: file.samples_in_parallel,
             other_samples: file.other_samples,
         }
@@ -102,6 +117,7 @@ impl From<Specimen> for SpecimenFile {
             outline: specimen.outline,
             holes: specimen.holes,
             drive_mm: specimen.drive_mm,
+            drive_angle_deg: specimen.drive_angle_deg,
             samples_in_parallel: specimen.samples_in_parallel,
             other_samples: specimen.other_samples,
         }

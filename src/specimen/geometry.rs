@@ -63,14 +63,15 @@ impl Specimen {
         }
     }
 
-    /// Whether loads and geometry are symmetric under y → −y. Only a uniaxial test is.
+    /// Whether loads and geometry are symmetric under y → −y. Only a uniaxial test is; a bar that is pushed together
+    /// may bend all the same.
     pub fn is_mirror_y(&self) -> bool {
         self.test == TestKind::Uniaxial && self.mirror_defect_mm([1.0, -1.0, 1.0]) <= MIRROR_TOLERANCE_MM
     }
 
-    /// Whether loads and geometry are symmetric under z → −z.
+    /// Whether loads and geometry are symmetric under z → −z: a drive at an angle is not.
     pub fn is_mirror_z(&self) -> bool {
-        self.mirror_defect_mm([1.0, 1.0, -1.0]) <= MIRROR_TOLERANCE_MM
+        self.is_driven_along_x() && self.mirror_defect_mm([1.0, 1.0, -1.0]) <= MIRROR_TOLERANCE_MM
     }
 
     /// Whether the geometry alone is symmetric under x → −x. The loads never are.
@@ -136,31 +137,6 @@ impl Specimen {
         let nearest = (0..WALL_POINTS).map(|i| step * i as f64).max_by(|p, q| depth(*p).total_cmp(&depth(*q)));
         let middle = nearest.unwrap_or(0.0);
         at(largest_between(&depth, middle - step, middle + step))
-    }
-
-    /// Elongation or slip at which the test reaches a nominal deformation, as a fraction of `drive_mm`: shear strain
-    /// drive/thickness (of the thinnest sample), or stretch 1 + drive/length. For a dumb-bell the length is the one
-    /// over which the narrow portion's strain would give the whole elongation ([`dumbbell::effective_length_mm`]).
-    pub fn nominal_deformation(&self, drive_mm: f64) -> f64 {
-        match self.test {
-            TestKind::DoubleLapShear => drive_mm / self.thinnest_mm(),
-            TestKind::Uniaxial => 1.0 + drive_mm / self.nominal_length_mm(),
-        }
-    }
-
-    /// The drive at the limit of what is supported, mm (shear strain 1.5 or nominal stretch 3).
-    pub fn max_supported_drive_mm(&self) -> f64 {
-        match self.test {
-            TestKind::DoubleLapShear => super::MAX_SHEAR_STRAIN * self.thinnest_mm(),
-            TestKind::Uniaxial => (super::MAX_NOMINAL_STRETCH - 1.0) * self.nominal_length_mm(),
-        }
-    }
-
-    fn nominal_length_mm(&self) -> f64 {
-        match self.outline {
-            Outline::Block => self.block.length_mm,
-            Outline::Iso37Type4 => dumbbell::effective_length_mm(),
-        }
     }
 
     /// Signed distance (positive inside) from a point of the section to a side, mm, and the unit vector to it.

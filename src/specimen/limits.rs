@@ -119,11 +119,11 @@ pub struct ManufacturingLimits {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(value_type = Option<PositiveNumber>, nullable = false))]
     pub min_voxels_across_ligament: Option<f64>,
-    /// Largest force of the actuator or load cell, all samples together, N.
+    /// Largest force of the actuator or load cell, all samples together and either way, N.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(value_type = Option<PositiveForceN>, nullable = false))]
     pub max_force_n: Option<f64>,
-    /// Largest travel of the actuator, mm.
+    /// Largest travel of the actuator either way, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(value_type = Option<PositiveMm>, nullable = false))]
     pub max_drive_mm: Option<f64>,
@@ -375,7 +375,7 @@ impl ManufacturingLimits {
     /// principal stretch anywhere. A quantity that is not limited gives no margin.
     pub fn check_response(&self, drive_mm: f64, force_n: f64, local_stretch: f64) -> Vec<LimitMargin> {
         [
-            ("max_drive_mm", drive_mm, self.max_drive_mm),
+            ("max_drive_mm", drive_mm.abs(), self.max_drive_mm),
             ("max_force_n", force_n.abs(), self.max_force_n),
             ("max_local_stretch", local_stretch, self.max_local_stretch),
         ]

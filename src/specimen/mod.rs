@@ -20,6 +20,7 @@ mod drawing_sheet;
 mod drawing_stl;
 mod drawing_svg;
 mod drawing_table;
+mod drives;
 pub mod dumbbell;
 mod ellipse;
 mod file;
@@ -48,6 +49,10 @@ pub use drawing_dxf::to_dxf;
 #[cfg(feature = "triangles")]
 pub use drawing_stl::{DrawingError, to_stl};
 pub use drawing_svg::to_svg;
+pub use drives::{
+    MAX_DRIVE_ANGLE_DEG, MAX_DRIVES, MAX_NOMINAL_STRETCH, MAX_SHEAR_STRAIN, MIN_NOMINAL_STRETCH, farthest_from_zero,
+    leads_on,
+};
 pub use geometry::MIRROR_TOLERANCE_MM;
 pub use hole_shape::{HoleKind, HoleShape, MAX_HOLE_ANGLE_DEG, MAX_HOLE_ASPECT};
 pub use hole_wall::HoleWall;
@@ -56,9 +61,8 @@ pub use ligament::{Ligament, LigamentKind, SectionEdge};
 pub use limits::{DiameterRange, LimitMargin, ManufacturingLimits, Symmetry};
 pub use limits_error::LimitsError;
 pub use read::{
-    MAX_DIAMETER_MM, MAX_DRIVES, MAX_HOLES, MAX_NAME_LENGTH, MAX_NOMINAL_STRETCH, MAX_OTHER_SAMPLES,
-    MAX_SAMPLES_IN_PARALLEL, MAX_SHEAR_STRAIN, MAX_SIZE_MM, MIN_DIAMETER_MM, MIN_SIZE_MM, SCHEMA,
-    min_meshable_ligament_mm,
+    MAX_DIAMETER_MM, MAX_HOLES, MAX_NAME_LENGTH, MAX_OTHER_SAMPLES, MAX_SAMPLES_IN_PARALLEL, MAX_SIZE_MM,
+    MIN_DIAMETER_MM, MIN_SIZE_MM, SCHEMA, min_meshable_ligament_mm,
 };
 pub use read_error::SpecimenError;
 
@@ -69,9 +73,10 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = TestSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum TestKind {
-    /// Faces y = ±thickness/2 bonded to rigid plates; the one at +y moves by +drive along x.
+    /// Faces y = ±thickness/2 bonded to rigid plates; the one at +y moves by the drive along x, or at an
+    /// angle from it towards z.
     DoubleLapShear,
-    /// Faces x = ±length/2 bonded to rigid grips; the one at +x moves by +drive along x.
+    /// Faces x = ±length/2 bonded to rigid grips; the one at +x moves by the drive along x.
     Uniaxial,
 }
 
@@ -199,8 +204,12 @@ pub struct Specimen {
     pub outline: Outline,
     /// Holes; all with the same axis.
     pub holes: Vec<Hole>,
-    /// Drives at which the specimen is scanned, mm, increasing.
+    /// Drives at which the specimen is scanned, mm: all positive or all negative, away from rest. Negative ones push
+    /// the grips together, or shear the other way.
     pub drive_mm: Vec<f64>,
+    /// Angle of the drive from x towards z, in the plane of the plates of a double-lap test, degrees; 0 in a uniaxial
+    /// one.
+    pub drive_angle_deg: f64,
     /// How many samples like this one share the load cell.
     pub samples_in_parallel: u32,
     /// Further samples that share drive and load cell, in a double-lap test: blocks of their own size, with holes of

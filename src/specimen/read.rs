@@ -19,20 +19,12 @@ pub const MIN_DIAMETER_MM: f64 = 0.1;
 pub const MAX_DIAMETER_MM: f64 = MAX_SIZE_MM;
 /// Most holes.
 pub const MAX_HOLES: usize = 64;
-/// Most drives.
-pub const MAX_DRIVES: usize = 1000;
 /// Most samples that share a load cell.
 pub const MAX_SAMPLES_IN_PARALLEL: u32 = 64;
 /// Most kinds of samples beside the first one: each is a model of its own.
 pub const MAX_OTHER_SAMPLES: usize = 7;
 /// Longest name, characters.
 pub const MAX_NAME_LENGTH: usize = 200;
-/// Largest supported shear strain, drive / thickness.
-pub const MAX_SHEAR_STRAIN: f64 = 1.5;
-/// Largest supported nominal stretch in a uniaxial test.
-pub const MAX_NOMINAL_STRETCH: f64 = 3.0;
-/// Rounding that a drive at the very limit may have, relative.
-const LIMIT_SLACK: f64 = 1e-9;
 /// How far a dumb-bell's block may be off the standard, mm: rounding only.
 const STANDARD_TOLERANCE_MM: f64 = 1e-6;
 
@@ -206,52 +198,6 @@ impl Specimen {
             (length_mm < limit_mm).then_some(SpecimenError::LigamentTooThin { between, length_mm, limit_mm })
         };
         self.ligaments().into_iter().filter_map(check).collect()
-    }
-
-    fn check_drives(&self, problems: &mut Vec<SpecimenError>) {
-        if self.drive_mm.is_empty() {
-            problems.push(SpecimenError::NoDrives { limit: MAX_DRIVES });
-        }
-        if self.drive_mm.len() > MAX_DRIVES {
-            problems.push(SpecimenError::TooManyDrives { count: self.drive_mm.len(), limit: MAX_DRIVES });
-            return;
-        }
-        let limit_mm = self.max_supported_drive_mm();
-        let mut previous_mm = 0.0;
-        for (index, &value_mm) in self.drive_mm.iter().enumerate() {
-            problems.extend(self.check_drive(index, value_mm, previous_mm, limit_mm));
-            previous_mm = value_mm;
-        }
-    }
-
-    fn check_drive(&self, index: usize, value_mm: f64, previous_mm: f64, limit_mm: f64) -> Option<SpecimenError> {
-        if !value_mm.is_finite() {
-            let field = FieldPath::of("drive_mm").index(index);
-            return Some(SpecimenError::NotFinite { field, value: value_mm });
-        }
-        if value_mm <= 0.0 {
-            return Some(SpecimenError::DriveNotPositive { index, value_mm });
-        }
-        if value_mm <= previous_mm {
-            return Some(SpecimenError::DrivesNotIncreasing { index, value_mm, previous_mm });
-        }
-        if value_mm > limit_mm * (1.0 + LIMIT_SLACK) {
-            let (measure, limit, dimension) = match self.test {
-                TestKind::DoubleLapShear => ("shear strain", MAX_SHEAR_STRAIN, "thicker"),
-                TestKind::Uniaxial => ("stretch", MAX_NOMINAL_STRETCH, "longer"),
-            };
-            let deformation = self.nominal_deformation(value_mm);
-            return Some(SpecimenError::DriveTooLarge {
-                index,
-                value_mm,
-                measure,
-                deformation,
-                limit,
-                limit_mm,
-                dimension,
-            });
-        }
-        None
     }
 }
 

@@ -128,25 +128,37 @@ pub enum SpecimenError {
         /// Most.
         limit: usize,
     },
-    /// A drive is zero or negative.
-    #[error("drive_mm[{index}] is {value_mm} mm; drives must be positive")]
-    DriveNotPositive {
+    /// A drive is zero.
+    #[error("drive_mm[{index}] is 0 mm; a drive moves a plate: give one above or below 0, or leave it out")]
+    DriveZero {
         /// Which.
         index: usize,
-        /// Its value, mm.
-        value_mm: f64,
     },
-    /// A drive is not larger than the one before.
+    /// A drive does not lead on from the one before.
     #[error(
-        "drive_mm[{index}] is {value_mm} mm, not above {previous_mm} mm before it; list the drives in increasing order, each once"
+        "drive_mm[{index}] is {value_mm} mm after {previous_mm} mm; the drives of a specimen lead away from rest in one direction: list them all positive and rising, or all negative and falling, each once, and give another direction a specimen of its own"
     )]
-    DrivesNotIncreasing {
+    DrivesNotLeadingOn {
         /// Which.
         index: usize,
         /// Its value, mm.
         value_mm: f64,
         /// The one before, mm.
         previous_mm: f64,
+    },
+    /// A bar is driven at an angle.
+    #[error("drive_angle_deg is {value_deg}° in a uniaxial test; grips move along x: set it to 0 or leave it out")]
+    AngleOfPull {
+        /// The angle, degrees.
+        value_deg: f64,
+    },
+    /// A dumb-bell is pushed together.
+    #[error(
+        "the drive is {drive_mm} mm; a dumb-bell bends as soon as it is pushed: give positive drives, or test a block"
+    )]
+    DumbbellCompressed {
+        /// The largest drive, mm.
+        drive_mm: f64,
     },
     /// A drive goes beyond the deformation that is supported.
     #[error(
@@ -161,9 +173,9 @@ pub enum SpecimenError {
         measure: &'static str,
         /// Nominal deformation that it means.
         deformation: f64,
-        /// Largest supported nominal deformation.
+        /// Supported nominal deformation that lies furthest in that direction.
         limit: f64,
-        /// Largest supported drive of this specimen, mm.
+        /// Supported drive of this specimen that lies furthest in that direction, mm.
         limit_mm: f64,
         /// `thicker` or `longer`.
         dimension: &'static str,
@@ -278,13 +290,21 @@ impl SpecimenError {
             E::TooManyDrives { count, limit } => {
                 FieldError::new("/drive_mm", format!("a list of {count}"), format!("a list of at most {limit} drives"))
             }
-            E::DriveNotPositive { index, value_mm } => FieldError::new(of_drive(*index), value_mm, "above 0 mm"),
-            E::DrivesNotIncreasing { index, value_mm, previous_mm } => {
-                FieldError::new(of_drive(*index), value_mm, format!("above the {previous_mm} mm before it"))
-                    .remedy("list the drives in increasing order, each once")
+            E::DriveZero { index } => FieldError::new(of_drive(*index), 0, "above or below 0 mm"),
+            E::DrivesNotLeadingOn { index, value_mm, previous_mm } => {
+                let beyond = if *previous_mm < 0.0 { "below" } else { "above" };
+                FieldError::new(of_drive(*index), value_mm, format!("{beyond} the {previous_mm} mm before it"))
+                    .remedy("list the drives all positive and rising, or all negative and falling, each once")
             }
+            E::AngleOfPull { value_deg } => FieldError::new("/drive_angle_deg", value_deg, "0 in a uniaxial test")
+                .remedy("grips move along x; leave the angle out"),
+            E::DumbbellCompressed { drive_mm } => FieldError::new("/drive_mm", drive_mm, "above 0 mm for a dumb-bell")
+                .remedy("a dumb-bell bends as soon as it is pushed; pull it, or test a block"),
             E::DriveTooLarge { index, value_mm, measure, limit, limit_mm, dimension, .. } => {
-                let allowed = format!("at most {limit_mm:.4} mm, a nominal {measure} of {limit}");
+                let allowed = format!(
+                    "{} {limit_mm:.4} mm, a nominal {measure} of {limit}",
+                    if *limit_mm < 0.0 { "at least" } else { "at most" }
+                );
                 FieldError::new(of_drive(*index), value_mm, allowed)
                     .remedy(format!("drive less, or make the specimen {dimension}"))
             }

@@ -144,7 +144,7 @@ mod tests {
         // The thinnest sample limits the drive.
         let mut specimen = unlike();
         specimen.other_samples[0] = Sample { block: Block { thickness_mm: 3.0, ..specimen.block }, holes: Vec::new() };
-        assert!((specimen.max_supported_drive_mm() - 4.5).abs() < 1e-12);
+        assert!((specimen.drive_limit_mm() - 4.5).abs() < 1e-12);
         assert_eq!(pointers(&specimen), ["/drive_mm/1", "/drive_mm/2"]);
         let pulled = Specimen { test: TestKind::Uniaxial, ..unlike() };
         assert!(pulled.field_errors().iter().any(|e| e.pointer == "/other_samples"));

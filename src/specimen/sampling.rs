@@ -24,6 +24,7 @@ pub(crate) fn any_layout() -> impl Strategy<Value = Specimen> {
                 outline: Outline::Block,
                 holes: holes.into_iter().map(place).collect(),
                 drive_mm: vec![0.3 * thickness_mm, thickness_mm],
+                drive_angle_deg: 0.0,
                 samples_in_parallel: 2,
                 other_samples: Vec::new(),
             }
@@ -36,7 +37,7 @@ pub(crate) fn valid_specimen() -> impl Strategy<Value = Specimen> {
     any_layout().prop_map(|layout| {
         let mut specimen = Specimen { holes: Vec::new(), ..layout.clone() };
         // A uniaxial block shorter than half its drive would exceed the stretch limit.
-        specimen.drive_mm = vec![0.3 * specimen.max_supported_drive_mm()];
+        specimen.drive_mm = vec![0.3 * specimen.drive_limit_mm()];
         for hole in layout.holes {
             specimen.holes.push(hole);
             if specimen.validate().is_err() {
@@ -60,6 +61,7 @@ pub(crate) fn dumbbell_with_hole() -> impl Strategy<Value = Specimen> {
         outline: Outline::Iso37Type4,
         holes: vec![Hole::circle(HoleAxis::Thickness, [x, z], diameter_mm)],
         drive_mm: vec![5.0],
+        drive_angle_deg: 0.0,
         samples_in_parallel: 1,
         other_samples: Vec::new(),
     })

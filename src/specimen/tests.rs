@@ -72,10 +72,13 @@ fn refuses_bad_numbers_and_names() {
     assert!(matches!(refused(|s| s.block.length_mm = 1e4), E::SizeOutOfRange { .. }));
     assert!(matches!(refused(|s| s.drive_mm.clear()), E::NoDrives { .. }));
     assert!(matches!(refused(|s| s.drive_mm = vec![1.0; 1001]), E::TooManyDrives { .. }));
-    assert!(matches!(refused(|s| s.drive_mm = vec![0.0]), E::DriveNotPositive { .. }));
-    assert!(matches!(refused(|s| s.drive_mm = vec![-1.0]), E::DriveNotPositive { .. }));
-    assert!(matches!(refused(|s| s.drive_mm = vec![2.0, 2.0]), E::DrivesNotIncreasing { index: 1, .. }));
+    assert!(matches!(refused(|s| s.drive_mm = vec![0.0]), E::DriveZero { index: 0 }));
+    assert!(matches!(refused(|s| s.drive_mm = vec![2.0, 2.0]), E::DrivesNotLeadingOn { index: 1, .. }));
     assert!(matches!(refused(|s| s.drive_mm = vec![f64::NAN]), E::NotFinite { .. }));
+    assert!(matches!(refused(|s| s.drive_mm = vec![-1.0, 1.5]), E::DrivesNotLeadingOn { index: 1, .. }));
+    assert!(matches!(refused(|s| s.drive_mm = vec![-2.0, -1.0]), E::DrivesNotLeadingOn { index: 1, .. }));
+    let back = refused(|s| s.drive_mm = vec![-5.0, -9.7]);
+    assert!(matches!(back, E::DriveTooLarge { index: 1, limit_mm, .. } if (limit_mm + 9.6).abs() < 1e-9));
     let far = refused(|s| s.drive_mm = vec![5.0, 9.7]);
     assert!(matches!(far, E::DriveTooLarge { index: 1, limit_mm, .. } if (limit_mm - 9.6).abs() < 1e-9));
     assert!(matches!(refused(|s| s.samples_in_parallel = 0), E::SamplesOutOfRange { value: 0, .. }));
@@ -84,6 +87,15 @@ fn refuses_bad_numbers_and_names() {
     assert_eq!(bar.validate(), Ok(()));
     bar.drive_mm = vec![81.0];
     assert!(matches!(bar.validate(), Err(E::DriveTooLarge { measure: "stretch", .. })));
+    bar.drive_mm = vec![-10.0, -20.0];
+    assert_eq!(bar.validate(), Ok(()));
+    assert!(bar.is_compressed() && bar.supports_drive(-20.0) && !bar.supports_drive(-20.1));
+    assert!(!bar.supports_drive(5.0) && !bar.supports_drive(0.0) && !bar.supports_drive(f64::NAN));
+    bar.drive_mm = vec![-20.1];
+    assert!(matches!(bar.validate(), Err(E::DriveTooLarge { measure: "stretch", .. })));
+    let mut dumbbell = shipped("iso37-type4.json");
+    dumbbell.drive_mm = vec![-1.0];
+    assert!(matches!(dumbbell.validate(), Err(E::DumbbellCompressed { .. })));
 }
 
 #[test]

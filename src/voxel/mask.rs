@@ -132,6 +132,7 @@ pub(crate) mod tests {
             outline: Outline::Block,
             holes: vec![],
             drive_mm: vec![5.0],
+            drive_angle_deg: 0.0,
             samples_in_parallel: 2,
             other_samples: Vec::new(),
         }

@@ -54,7 +54,7 @@ fn problems_point_at_fields() {
         (MISFIT, "/specimen/block/length_mm", json!("long")),
         (MISFIT, "/specimen/block/length_mm", json!(-1.0)),
         (MISFIT, "/material/bulk_kpa", json!(null)),
-        (UNFIT, "/drive_mm/0", json!(-3.0)),
+        (UNFIT, "/drive_mm/0", json!(0.0)),
         (UNFIT, "/mesh", json!("finest")),
     ] {
         with(pointer, value).is_refused(refusal, pointer);

@@ -57,7 +57,7 @@ fn a_sample_of_ranges_follows_its_seed() {
         (
             UNFIT,
             "/vary/0/values/1",
-            json!({ "base": small_evaluation(1.0), "vary": [{ "pointer": "/drive_mm/0", "values": [1.0, -2.0] }] }),
+            json!({ "base": small_evaluation(1.0), "vary": [{ "pointer": "/drive_mm/0", "values": [1.0, 0.0] }] }),
         ),
         (MISFIT, "/base/material/bulk_kpa", {
             let mut wrong = body(2, 1);

@@ -31,7 +31,7 @@ pub struct Law {
 impl Law {
     /// Of a specimen: the reach is (x + y)/2 of the homogeneous state at its largest drive.
     pub fn of(specimen: &Specimen) -> Law {
-        let drive_mm = specimen.drive_mm.iter().fold(0.0, |s: f64, d| s.max(d.abs()));
+        let drive_mm = specimen.largest_drive_mm();
         let reach = match specimen.test {
             // In simple shear γ both invariants are 3 + γ².
             TestKind::DoubleLapShear => (drive_mm / specimen.block.thickness_mm).powi(2),

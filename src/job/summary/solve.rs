@@ -25,6 +25,9 @@ pub(in crate::job) fn solve(name: &str, result: &SolveResult) -> String {
             let forces: Vec<String> = step.force_by_kind_n.iter().map(|f| num(*f, 5)).collect();
             text += &format!("           each kind of sample: {} N\n", forces.join(", "));
         }
+        if !step.contact.is_none() {
+            text += &format!("           beyond contact, which is not modelled: {}\n", step.contact.in_words());
+        }
     }
     text
 }

@@ -60,8 +60,8 @@ fn first_volume() -> usize {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SeriesStep {
-    /// Drive in mm.
-    #[schema(exclusive_minimum = 0.0, maximum = 100000.0)]
+    /// Drive in mm; not 0, and in the direction of the specimen's drives.
+    #[schema(minimum = -100000.0, maximum = 100000.0)]
     pub drive_mm: f64,
     /// Mean force in N while it was scanned, all samples together.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -16,6 +16,7 @@ pub(crate) fn block(name: &str) -> Specimen {
         outline: Outline::Block,
         holes: vec![],
         drive_mm: vec![2.0],
+        drive_angle_deg: 0.0,
         samples_in_parallel: 1,
         other_samples: Vec::new(),
     }

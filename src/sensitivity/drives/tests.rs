@@ -5,15 +5,21 @@ use super::*;
 
 #[test]
 fn drives_are_checked() {
-    let check = |d: &[f64]| check_drives(&DriveSelection::DriveMm(d.to_vec()));
+    let (there, back) = (block("shear"), block("shear").at_drives(&[-1.0]));
+    let check = |d: &[f64]| check_drives(&there, &DriveSelection::DriveMm(d.to_vec()));
+    let check_back = |d: &[f64]| check_drives(&back, &DriveSelection::DriveMm(d.to_vec()));
+    assert!(check_back(&[-2.5, -5.0]).is_ok());
+    assert!(matches!(check_back(&[-5.0, -2.5]), Err(EvaluationError::InvalidDrive { .. })));
+    assert!(matches!(check_back(&[2.5]), Err(EvaluationError::OtherWay { .. })));
+    assert!(matches!(check(&[-1.0]), Err(EvaluationError::OtherWay { .. })));
     assert!(check(&[2.5, 5.0, 7.0]).is_ok());
     assert!(matches!(check(&[]), Err(EvaluationError::NoDrive)));
-    for bad in [vec![0.0], vec![-1.0], vec![f64::NAN], vec![2.0, 2.0], vec![1.0, f64::INFINITY]] {
+    for bad in [vec![0.0], vec![1.0, -2.0], vec![f64::NAN], vec![2.0, 2.0], vec![1.0, f64::INFINITY]] {
         assert!(matches!(check(&bad), Err(EvaluationError::InvalidDrive { .. })), "{bad:?}");
     }
     for bad in [1.0, 0.5, f64::NAN, 100.0] {
         assert!(matches!(
-            check_drives(&DriveSelection::MedianStretch(bad)),
+            check_drives(&there, &DriveSelection::MedianStretch(bad)),
             Err(EvaluationError::InvalidMedianStretch { .. })
         ));
     }
@@ -46,6 +52,11 @@ fn drive_search_converges() {
     let start = homogeneous_drive_mm(&block("shear"), 1.2);
     // Closed form: 4 mm × (1.2 − 1/1.2).
     assert!((start - 4.0 * (1.2 - 1.0 / 1.2)).abs() < 1e-12);
+    let back = homogeneous_drive_mm(&block("shear").at_drives(&[-1.0]), 1.2);
+    assert!((back + start).abs() < 1e-12);
+    // The other way the same search goes: magnitudes are sought.
+    let found = find_drive(-3.0, 1.2, |d| Ok(shear(-d))).unwrap();
+    assert!(found < 0.0 && (shear(-found) - 1.2).abs() <= MEDIAN_TOLERANCE);
 }
 
 #[test]

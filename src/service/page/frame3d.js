@@ -27,42 +27,52 @@ const halves = (reference) =>
     return most;
   });
 
-/** An arrow along x from `start`. */
-function arrow([x, y, z], length) {
+/** An arrow in the plane of x and z from `start`, along the unit vector `way`. */
+function arrow([x, y, z], [dx, , dz], length) {
   const tip = 0.18 * length;
-  const end = [x + length, y, z];
-  return [[x, y, z], end, end, [end[0] - tip, y, z + tip / 2], end, [end[0] - tip, y, z - tip / 2]];
+  const at = (along, across) => [x + along * dx - across * dz, y, z + along * dz + across * dx];
+  const end = at(length, 0);
+  return [[x, y, z], end, end, at(length - tip, tip / 2), end, at(length - tip, -tip / 2)];
 }
 
-/** The axis along which a surface is held: where one of its ends has moved by the drive and the other has not. */
+/**
+ * The axis along which a surface is held, and how its moved end went: where all of one of its ends has moved alike, by
+ * the drive, and the other has not.
+ */
 function heldAxis(surface, half) {
   const { reference_mm: at, displacement_mm: moved, drive_mm: drive } = surface;
-  const isHeld = (k) => {
-    let [kept, worst] = [0, 0];
+  const held = (k) => {
+    let [kept, worst, way] = [0, 0, null];
     for (let i = 0; i < at.length; i += 3) {
       const side = at[i + k] / half[k];
       if (Math.abs(side) < 0.999) continue;
       kept += 1;
-      worst = Math.max(worst, Math.abs(moved[i] - (side > 0 ? drive : 0)));
+      const own = [moved[i], moved[i + 1], moved[i + 2]];
+      if (side > 0) way ??= own;
+      const expected = side > 0 ? way : [0, 0, 0];
+      worst = Math.max(worst, ...own.map((u, c) => Math.abs(u - expected[c])));
     }
-    return kept > 0 && worst < 0.02 * Math.abs(drive);
+    if (way === null) return null;
+    worst = Math.max(worst, Math.abs(Math.hypot(...way) - Math.abs(drive)));
+    return kept > 0 && worst < 0.02 * Math.abs(drive) ? { axis: k, way } : null;
   };
-  return [1, 0].find(isHeld);
+  return held(1) ?? held(0);
 }
 
 /** Lines of the frame: places at rest and their displacement, mm; nothing where it is not seen how it is held. */
 export function frameOf(surface) {
   const half = halves(surface.reference_mm);
-  const axis = heldAxis(surface, half);
-  if (axis === undefined) return null;
+  const held = heldAxis(surface, half);
+  if (held === null) return null;
+  const { axis, way: drive } = held;
   const others = [0, 1, 2].filter((k) => k !== axis).map((k) => 1.12 * half[k]);
   const fixed = closed(rectangle(axis, -1.01 * half[axis], others));
   const moving = closed(rectangle(axis, 1.01 * half[axis], others));
   const start = axis === 1 ? [0, 1.01 * half[1], 1.25 * half[2]] : [0.75 * half[0], 0, 1.4 * half[2]];
-  const drive = [surface.drive_mm, 0, 0];
+  const unit = drive.map((u) => u / Math.hypot(...drive));
   const lines = [
     ...fixed.map((p) => [p, [0, 0, 0]]),
-    ...[...moving, ...arrow(start, 0.3 * half[0])].map((p) => [p, drive]),
+    ...[...moving, ...arrow(start, unit, 0.3 * half[0])].map((p) => [p, drive]),
   ];
   return { at: new Float32Array(lines.flatMap((l) => l[0])), moved: new Float32Array(lines.flatMap((l) => l[1])) };
 }

@@ -60,6 +60,9 @@ export function isHardlyKnown(value, ends) {
 /** A part as per cent. */
 export const percent = (v, count = 3) => (v === null || v === undefined ? "–" : `${digits(100 * v, count)} %`);
 
+/** The value of largest magnitude, with its sign: drives may lead either way. */
+export const farthest = (values) => values.reduce((a, b) => (Math.abs(b) > Math.abs(a) ? b : a), 0);
+
 /** A count with separators. */
 export const many = (count) => count.toLocaleString("en");
 

@@ -54,10 +54,27 @@ export function specimenForm(model, library, edited) {
       ],
       put: (v) => {
         sp.test = v;
-        if (v !== "uniaxial") delete sp.outline;
+        if (v === "uniaxial") delete sp.drive_angle_deg;
+        else delete sp.outline;
       },
       changed: edited,
     }),
+    ...(sp.test === "uniaxial"
+      ? []
+      : [
+          field({
+            label: "Angle of the drive, °",
+            kind: "number",
+            value: sp.drive_angle_deg ?? 0,
+            example: "0",
+            pointer: "/specimen/drive_angle_deg",
+            put: (v) => {
+              sp.drive_angle_deg = v;
+            },
+            meaning: "From x towards z, in the plane of the plates. Forces are along the drive.",
+            changed: edited,
+          }),
+        ]),
     choice({
       label: "Holes run along",
       value: sectionOf(sp).axis,
@@ -96,7 +113,8 @@ export function specimenForm(model, library, edited) {
       put: (v) => {
         sp.drive_mm = v;
       },
-      meaning: "How far the plate or grip is moved when a scan is taken, from the least to the most.",
+      meaning:
+        "How far the plate or grip is moved when a scan is taken, from the least to the most. Negative numbers, all of them, shear the other way or push the grips together.",
       changed: edited,
     }),
   );

@@ -1,7 +1,7 @@
 // How far a job is: the whole of it, what it does now, and how long it will take.
 
 import { fill, h } from "./dom.js";
-import { digits, duration, plain } from "./numbers.js";
+import { digits, duration, farthest, plain } from "./numbers.js";
 import { sectionPicture } from "./section_drawing.js";
 
 /** Stages of a design search in their order: words, and how much work each is by the study's budget. */
@@ -146,7 +146,7 @@ export function progressView(request, usual) {
     if (p.best_specimen && best !== drawn) {
       drawn = best;
       const specimen = p.best_specimen;
-      const drive = plain(Math.max(...specimen.drive_mm), 3);
+      const drive = plain(farthest(specimen.drive_mm), 3);
       const holes = `${specimen.holes.length} ${specimen.holes.length === 1 ? "hole" : "holes"}`;
       const words = `The best design so far: ${holes}, drive ${drive} mm`;
       fill(picture, h("figure", { class: "best" }, sectionPicture(specimen, words), h("figcaption", {}, words)));

@@ -3,7 +3,7 @@
 import { s } from "./dom.js";
 import { holeShape, reachOf } from "./hole.js";
 import { brokenLigaments } from "./ligaments.js";
-import { digits, plain } from "./numbers.js";
+import { digits, farthest, plain } from "./numbers.js";
 import { outlinePath, sectionOf } from "./outline.js";
 
 /** Sizes of a drawing, mm of the specimen: `text` is the height of letters, `margin` the room for dimensions. */
@@ -43,14 +43,16 @@ function dimension(size, from, to, text) {
 }
 
 /** An arrow to the right with words above it. */
-function arrow(size, [x, y], length, text, isWrong) {
+/** An arrow along x from its middle line's start, or towards that start where it points back. */
+function arrow(size, [x, y], length, text, isWrong, isBack) {
   const cls = isWrong ? "drive wrong" : "drive";
-  const tip = 0.6 * size;
+  const tip = (isBack ? -0.6 : 0.6) * size;
+  const end = isBack ? x : x + length;
   return [
     line(cls, [x, y], [x + length, y]),
     s("path", {
       class: cls,
-      d: `M${x + length - tip} ${y - tip / 2}L${x + length} ${y}L${x + length - tip} ${y + tip / 2}`,
+      d: `M${end - tip} ${y - tip / 2}L${end} ${y}L${end - tip} ${y + tip / 2}`,
     }),
     words(size, x + length / 2, y - 0.5 * size, text, { class: isWrong ? "wrong" : "strong" }),
   ];
@@ -74,7 +76,9 @@ const plates = (section, center, height, thick) =>
 function held(model, section, at) {
   const { text, side } = at;
   const thick = 0.7 * text;
-  const drive = `drive ${plain(Math.max(...model.specimen.drive_mm))} mm`;
+  const farthestDrive = farthest(model.specimen.drive_mm);
+  const angle = model.specimen.drive_angle_deg ? ` at ${plain(model.specimen.drive_angle_deg)}° from x to z` : "";
+  const drive = `drive ${plain(farthestDrive)} mm${angle}`;
   const isWrong = (model.brokenLimits ?? []).some((name) =>
     ["max_drive_mm", "max_force_n", "max_local_stretch"].includes(name),
   );
@@ -82,7 +86,7 @@ function held(model, section, at) {
     return [
       grips(section, 0, section.height, thick),
       grips(section, side, section.depth, thick),
-      arrow(text, [section.length / 2 + 1.4 * thick, -0.9 * text], 2.6 * text, "", isWrong),
+      arrow(text, [section.length / 2 + 1.4 * thick, -0.9 * text], 2.6 * text, "", isWrong, farthestDrive < 0),
       words(text, section.length / 2, -section.height / 2 - 0.6 * text, drive, {
         "text-anchor": "end",
         class: isWrong ? "wrong" : "strong",
@@ -102,6 +106,7 @@ function held(model, section, at) {
       reach,
       `moved plate, ${drive}`,
       isWrong,
+      farthestDrive < 0,
     ),
     words(text, -section.length / 2, center + height / 2 + thick + 1.1 * text, "fixed plate", {
       "text-anchor": "start",

@@ -124,7 +124,7 @@ pub(super) struct Checked {
 
 /// Adds the limits on what the test does: the drive always, force and local stretch where they can be solved at once.
 fn check_response(request: &CheckRequest, limits: &ManufacturingLimits, checked: &mut Checked) {
-    let drive_mm = request.specimen.drive_mm.iter().copied().fold(0.0, f64::max);
+    let drive_mm = request.specimen.largest_drive_mm().abs();
     if let Some(limit) = limits.max_drive_mm {
         checked.margins.push(LimitMargin::at_most("max_drive_mm", drive_mm, limit).into());
     }
