@@ -57,9 +57,9 @@ impl Guide {
 
     /// Takes `fine` to a drive (mm) in one load step from the coarse equilibrium there; `None` where either fails.
     ///
-    /// With an equilibrium of the fine mesh at another drive of the same direction as `start`, what the coarse mesh gets
-    /// wrong there is taken off in proportion to the drive: the error of a mesh changes far more slowly than what it is
-    /// the error of. Two factorisations are left of four or five.
+    /// With an equilibrium of the fine mesh at another drive of the same direction as `start`, what the coarse mesh
+    /// gets wrong there is taken off in proportion to the drive: the error of a mesh changes far more slowly than what
+    /// it is the error of. Two factorisations are left of four or five.
     pub(super) fn lead(
         &mut self,
         fine: &mut Newton,
