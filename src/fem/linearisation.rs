@@ -16,6 +16,8 @@ pub(super) struct Linearisation {
     pub(super) condensation: Vec<Condensation>,
     /// Whether the tangent is that of the state whose residual this is, and not of an earlier one.
     pub(super) has_tangent: bool,
+    /// Relative residual of the state whose tangent was last factorised by Newton's method.
+    pub(super) factorised_at: f64,
     /// The equilibrium whose residual this is, if it is that of one.
     pub(super) stands_at: Option<Serial>,
 }
@@ -29,6 +31,7 @@ impl Linearisation {
             spring_forces: Vec::new(),
             condensation: Vec::new(),
             has_tangent: false,
+            factorised_at: f64::INFINITY,
             stands_at: None,
         }
     }

@@ -6,7 +6,7 @@ use super::equilibrium::Equilibrium;
 use super::error::SolveError;
 use super::linear::LinearSystem;
 use super::linearisation::Linearisation;
-use super::newton::Newton;
+use super::newton::{KEEP_TANGENT_BELOW, Newton};
 use super::options::{SolveOptions, Statistics};
 use super::tangent::Tangent;
 use crate::material::Ogden;
@@ -80,8 +80,9 @@ impl MeshModel {
     ) -> Result<Tangent<'a>, SolveError> {
         let there = &mut self.linearisation;
         let stands_there = equilibrium.serial.is_some() && there.stands_at == equilibrium.serial;
-        // A solve that ended with a kept tangent has a factor near enough to be a preconditioner.
-        let has_factor = stands_there && there.system.has_factor();
+        // A solve that ended with a kept tangent has a factor near enough to be a preconditioner. With one from farther
+        // away conjugate gradients stop at the same residual with a larger error.
+        let has_factor = stands_there && there.system.has_factor() && there.factorised_at < KEEP_TANGENT_BELOW;
         if !(has_factor && there.has_tangent) {
             self.assembler
                 .linearise(material, equilibrium, there)

@@ -22,7 +22,7 @@ const REUSE_ITERATIONS: usize = 10;
 
 /// Relative residual below which the tangent at hand is kept for the steps that follow (the chord method): it hardly
 /// changes any more, and a residual alone costs an eighth of residual and tangent.
-const KEEP_TANGENT_BELOW: f64 = 1e-2;
+pub(super) const KEEP_TANGENT_BELOW: f64 = 1e-2;
 
 /// A step with a kept tangent must bring the residual down to this part of what it was; else a new one is assembled.
 const KEPT_TANGENT_GAINS: f64 = 0.1;
@@ -200,6 +200,8 @@ impl Newton<'_> {
             Some(x) => x,
             None => {
                 system.factorise().map_err(StepFailure::Linear)?;
+                self.linearisation.factorised_at = residual;
+                let system = &mut self.linearisation.system;
                 system.solve(&right, of_step.clamp(1e-9, 1e-3)).map_err(StepFailure::Linear)?
             }
         };
