@@ -14,7 +14,7 @@
 //!
 //! * *evidence*: T > 30 + p ln n with 90 % probability ([`noncentrality_to_exceed`]);
 //! * *allowance*: s e is large enough in displacement or force to be more than a mesh's
-//!   ([`times_to_large`]), and so is what the nominal fit leaves by its means over boxes. Below that, the
+//!   ([`times_to_large_of`]), and so is what the nominal fit leaves by its means over boxes. Below that, the
 //!   diagnosis looks for causes of the image alone, with ten times the evidence;
 //! * *rivals*: no other cause that is tested explains so much of s e, for fewer parameters, that it would be named in
 //!   this one's place. Where another explains the part ρ of λ, the difference of the two gains is near Gaussian, with
