@@ -216,8 +216,8 @@ impl ForwardModel {
         self.solve(material, drive_mm, state.as_ref(), options, is_cancelled)
     }
 
-    /// The tangent of an equilibrium of `material` of this mesh, with the departures of this model. Just after the
-    /// solve that found the equilibrium it costs one assembly at most; else one assembly and one factorisation.
+    /// The tangent of an equilibrium of `material` of this mesh, with the departures of this model. It
+    /// costs one assembly and one factorisation; just after the solve that found the equilibrium mostly less.
     ///
     /// # Errors
     /// [`SolveError::Diverged`] where the state inverts an element, [`SolveError::Linear`] if the tangent is not

@@ -69,7 +69,7 @@ impl MeshModel {
     }
 
     /// The tangent of an equilibrium of `material`: the one just solved with where it is that equilibrium's, else
-    /// assembled, and factorised unless the equilibrium was just found.
+    /// assembled, and factorised unless the equilibrium was just found with a factor from nearby.
     ///
     /// # Errors
     /// [`SolveError::Diverged`] where an element is inverted, [`SolveError::Linear`] where there is no factor.
@@ -89,6 +89,7 @@ impl MeshModel {
                 .map_err(|cause| SolveError::diverged_at(equilibrium.drive_mm, cause))?;
             if !has_factor {
                 there.system.factorise()?;
+                there.factorised_at = 0.0;
             }
             there.stands_at = equilibrium.serial;
         }
