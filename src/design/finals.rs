@@ -28,6 +28,7 @@ const REPAIR_EVALUATIONS: usize = 6;
 type Confirmation = Option<Result<Confirmed, EvaluationFailure>>;
 
 impl SearchRun<'_> {
+    /// A design's confirmation: from the checkpoint where it is known.
     fn confirmed(&self, specimen: &Specimen) -> Confirmation {
         let key = input_hash(&serde_json::json!({ "specimen": specimen, "kind": "confirm" }));
         self.checkpoint.get_or(&key, || match confirm(self.study, specimen, &|| (self.is_cancelled)()) {
@@ -36,14 +37,25 @@ impl SearchRun<'_> {
         })
     }
 
-    /// The base and the ranked designs, best first, those within every limit before others.
+    /// The base, confirmed and compared with itself.
+    pub(super) fn confirm_base(&self, base: &Specimen, state: &State) -> Result<Confirmed, SearchError> {
+        match self.confirmed(base) {
+            None => Err(state.stopped(self.study, "base")),
+            Some(Err(cause)) => Err(SearchError::Base { cause }),
+            Some(Ok(mut base)) => {
+                base.compare(self.study, &base.clone());
+                Ok(base)
+            }
+        }
+    }
+
+    /// The ranked designs, best first, those within every limit before others.
     pub(super) fn confirm_all(
         &self,
-        base: &Specimen,
+        base: &Confirmed,
         spaces: &[Subspace],
         state: &mut State,
-    ) -> Result<(Confirmed, Vec<Confirmed>), SearchError> {
-        let base_specimen = base;
+    ) -> Result<Vec<Confirmed>, SearchError> {
         let study = self.study;
         let mut finalists: Vec<Finalist> = Vec::new();
         for finalist in state.finalists(study).into_iter().map(|f| self.in_steps(f)) {
@@ -52,27 +64,17 @@ impl SearchRun<'_> {
                 finalists.push(finalist);
             }
         }
-        let specimens: Vec<&Specimen> = std::iter::once(base).chain(finalists.iter().map(|f| &f.specimen)).collect();
-        let (total, done) = (specimens.len(), AtomicUsize::new(0));
+        let (total, done) = (finalists.len(), AtomicUsize::new(0));
         let (best, leader) = (state.history.last().copied(), state.leader());
-        let results: Vec<Confirmation> = specimens
+        let results: Vec<Confirmation> = finalists
             .par_iter()
-            .map(|specimen| {
-                let result = self.confirmed(specimen);
+            .map(|finalist| {
+                let result = self.confirmed(&finalist.specimen);
                 let done = done.fetch_add(1, Ordering::Relaxed) + 1;
                 (self.progress)(&Progress { stage: "confirm", done, total, best, leader: leader.clone() });
                 result
             })
             .collect();
-        let mut results = results.into_iter();
-        let base = match results.next().flatten() {
-            None => return Err(state.stopped(study, "confirm")),
-            Some(Err(cause)) => return Err(SearchError::Base { cause }),
-            Some(Ok(mut base)) => {
-                base.compare(study, &base.clone());
-                base
-            }
-        };
         let samples = sample_materials(&study.materials);
         let fine = Reference::new(study, &samples, &base.responses);
         let mut ranked = Vec::new();
@@ -82,7 +84,7 @@ impl SearchRun<'_> {
                 None => return Err(state.stopped(study, "confirm")),
                 Some(Err(cause)) => state.fail(&finalist.specimen, &cause),
                 Some(Ok(mut confirmed)) => {
-                    confirmed.compare(study, &base);
+                    confirmed.compare(study, base);
                     if !confirmed.is_within_limits && finalist.is_within_limits {
                         confirmed.remark = Some(broken_limits(&fine, &confirmed));
                         broken.push((finalist, confirmed.judged(&fine).worst_margins, confirmed.objective));
@@ -101,12 +103,12 @@ impl SearchRun<'_> {
         broken.truncate(if has_gradients { MAX_REPAIRS } else { 0 });
         let in_integrals = match broken.is_empty() {
             true => None,
-            false => Some(self.reference_from(self.evaluated(base_specimen, None), state)?),
+            false => Some(self.in_integrals(&base.specimen, state)?),
         };
         for (finalist, margins, objective) in broken {
             let Some(in_integrals) = &in_integrals else { break };
             if let Some(mut repaired) = self.repair(finalist, &margins, in_integrals, spaces, state)? {
-                repaired.compare(study, &base);
+                repaired.compare(study, base);
                 repaired.remark = Some(format!(
                     "Repaired: a design with a gain of {objective:.3} kept every limit on the coarse mesh of the search and broke \
                      one at confirmation; this is the design nearby that keeps it."
@@ -126,7 +128,7 @@ impl SearchRun<'_> {
         if !ranked.first().is_some_and(|best| best.is_within_limits) {
             return Err(SearchError::NothingFeasible { tried: state.candidates.len() });
         }
-        Ok((base, ranked))
+        Ok(ranked)
     }
 
     /// The finalist as a mould maker would make it, where it can be made so.
@@ -150,7 +152,7 @@ impl SearchRun<'_> {
             Some(Err(_)) => return Ok(None),
             Some(Ok(evaluated)) => in_integrals.judge(&evaluated).worst_margins,
         };
-        let shifted = in_integrals.with_shifts(shifts(confirmed, &searched));
+        let shifted = in_integrals.lowered(confirmed, &searched);
         let (index, start) = &finalist.point;
         let (done, best, leader) = (AtomicUsize::new(0), state.history.last().copied(), state.leader());
         let on_evaluation = || {
@@ -175,13 +177,6 @@ impl SearchRun<'_> {
             Some(Ok(confirmed)) => Ok(Some(confirmed)),
         }
     }
-}
-
-/// Confirmed less searched margin of each limit, `[prior][limit]`, where it is smaller: the search's error, as seen at
-/// one design.
-fn shifts(confirmed: &[Vec<f64>], searched: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let of_prior = |(f, c): (&Vec<f64>, &Vec<f64>)| f.iter().zip(c).map(|(f, c)| (f - c).min(0.0)).collect();
-    confirmed.iter().zip(searched).map(of_prior).collect()
 }
 
 /// Which response limits break at confirmation, in words.

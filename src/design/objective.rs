@@ -41,8 +41,16 @@ impl<'a> Reference<'a> {
         Reference { study, samples, base: base.to_vec(), shifts: Vec::new() }
     }
 
-    /// The same with `shifts[prior][limit]` added to the margins.
-    pub fn with_shifts(&self, shifts: Vec<Vec<f64>>) -> Reference<'a> {
+    /// What the base itself is judged.
+    pub fn of_base(&self) -> Judged {
+        self.judge(&Evaluated { responses: self.base.clone(), gradients: Vec::new() })
+    }
+
+    /// The same with each margin lowered by as much as the confirmation of one design found it below what the search
+    /// found there: `[prior][limit]` both, as in [`Judged::worst_margins`].
+    pub fn lowered(&self, confirmed: &[Vec<f64>], searched: &[Vec<f64>]) -> Reference<'a> {
+        let of_prior = |(c, s): (&Vec<f64>, &Vec<f64>)| c.iter().zip(s).map(|(c, s)| (c - s).min(0.0)).collect();
+        let shifts = confirmed.iter().zip(searched).map(of_prior).collect();
         Reference { study: self.study, samples: self.samples, base: self.base.clone(), shifts }
     }
 

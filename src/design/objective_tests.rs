@@ -58,6 +58,28 @@ fn gains_are_averaged_and_limits_are_the_worst() {
     assert_eq!(judged.margins.len(), 3 * 4);
 }
 
+/// A search at the central value sees 4 N at the base; its confirmation, which knows the variants, 4.5 N. A design of
+/// 4.6 N in the search is then known to break 5 N, one of 4.4 N to keep it. What the confirmation finds smaller (the
+/// stretch) loosens nothing.
+#[test]
+fn limits_are_lowered_by_what_the_confirmation_of_the_base_shows() {
+    let mut study = study();
+    let all = sample_materials(&study.materials);
+    study.materials[0].relative_sd = 0.0;
+    let central = sample_materials(&study.materials);
+    let of = |force, stretch| response([1.0, 1.0], [0.1, 0.1], force, stretch);
+    let confirmed = Reference::new(&study, &all, &[of(3.9, 1.4), of(4.5, 1.4), of(3.5, 1.4)]).of_base();
+    let searched = Reference::new(&study, &central, &[of(4.0, 1.5)]);
+    let lowered = searched.lowered(&confirmed.worst_margins, &searched.of_base().worst_margins);
+    let margins = |force| lowered.judge(&Evaluated { responses: vec![of(force, 1.5)], gradients: Vec::new() }).margins;
+    let [force, stretch] = [2, 3];
+    for (in_search, expected) in [(4.4, 4.95), (4.6, 5.175)] {
+        let expected: f64 = 5.0 / expected;
+        assert!((margins(in_search)[force] - expected.ln()).abs() < 1e-12, "{in_search} N");
+    }
+    assert!((margins(4.0)[stretch] - (2.0f64 / 1.5).ln()).abs() < 1e-12);
+}
+
 #[test]
 fn weights_and_kinds_combine_as_written() {
     let own = [0, 1, 2].map(|_| response([4.0, 9.0], [0.2, 0.025], 1.0, 1.5));

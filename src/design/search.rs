@@ -10,6 +10,7 @@ use super::evaluator::Evaluator;
 use super::explore::{is_makeable, sample};
 use super::fidelity::Fidelity;
 use super::local::{LocalSettings, improve};
+use super::material_samples::sample_materials;
 use super::objective::Reference;
 use super::propose::RaceRules;
 use super::search_error::SearchError;
@@ -89,19 +90,25 @@ impl SearchRun<'_> {
         (self.progress)(&Progress { stage: "base", done: 0, total: 1, best: None, leader: None });
         let base_specimen = base_at_drive(study);
         let mut state = State::default();
-        let coarse = self.judge(&base_specimen, Fidelity::Coarse, &state)?;
-        let fine = self.judge(&base_specimen, Fidelity::Fine, &state)?;
+        let (base, (coarse, fine)) = rayon::join(
+            || self.confirm_base(&base_specimen, &state),
+            || (self.estimated(&base_specimen, Fidelity::Coarse), self.estimated(&base_specimen, Fidelity::Fine)),
+        );
+        let base = base?;
+        let coarse = self.judge(&base, Fidelity::Coarse, coarse, &state)?;
+        let fine = self.judge(&base, Fidelity::Fine, fine, &state)?;
         let spaces = subspaces(study);
         self.explore(&coarse, &spaces, &base_specimen, &mut state)?;
         if study.budget.refine > 0 {
-            let in_integrals = self.reference_from(self.evaluated(&base_specimen, None), &state)?;
+            let in_integrals = self.in_integrals(&base_specimen, &state)?;
+            let in_integrals = self.as_confirmed(&base, &in_integrals);
             self.refine(&fine, &in_integrals, &spaces, &mut state)?;
         }
         self.race(&RaceRules::of_proposals(study.budget.propose), &fine, &spaces, &mut state)?;
         if spaces.iter().any(|s| s.structure.num_holes() > 0) {
             self.race(&RaceRules::of_solid(study.budget.propose, &spaces), &fine, &spaces, &mut state)?;
         }
-        let (base, ranked) = self.confirm_all(&base_specimen, &spaces, &mut state)?;
+        let ranked = self.confirm_all(&base, &spaces, &mut state)?;
         Ok(Found {
             base,
             ranked,
@@ -112,18 +119,39 @@ impl SearchRun<'_> {
         })
     }
 
-    /// Gains over the base at a fidelity.
-    fn judge(&self, base: &Specimen, fidelity: Fidelity, state: &State) -> Result<Judge<'_>, SearchError> {
-        Ok(Judge { fidelity, reference: self.reference_from(self.estimated(base, fidelity), state)? })
+    /// Gains over the base at a fidelity, at which the base gave `estimated`; limits as at the confirmation.
+    fn judge(
+        &self,
+        base: &Confirmed,
+        fidelity: Fidelity,
+        estimated: Option<Attempt>,
+        state: &State,
+    ) -> Result<Judge<'_>, SearchError> {
+        let reference = self.reference_from(estimated, state)?;
+        Ok(Judge { fidelity, reference: self.as_confirmed(base, &reference) })
+    }
+
+    /// Gains over the base in integrals in place of voxels.
+    pub(super) fn in_integrals(&self, base: &Specimen, state: &State) -> Result<Reference<'_>, SearchError> {
+        self.reference_from(self.evaluated(base, None), state)
     }
 
     /// Gains over a base with this evaluation.
-    pub(super) fn reference_from(&self, base: Option<Attempt>, state: &State) -> Result<Reference<'_>, SearchError> {
+    fn reference_from(&self, base: Option<Attempt>, state: &State) -> Result<Reference<'_>, SearchError> {
         match base {
             None => Err(state.stopped(self.study, "base")),
             Some(Err(cause)) => Err(SearchError::Base { cause }),
             Some(Ok(base)) => Ok(Reference::new(self.study, self.evaluator.samples(), &base.responses)),
         }
+    }
+
+    /// The same with the limits of the confirmation, as far as the base shows the difference: there they must hold for
+    /// every material that the priors leave possible, in the search for the central ones alone, unless the study's
+    /// budget says otherwise.
+    fn as_confirmed<'a>(&self, base: &Confirmed, reference: &Reference<'a>) -> Reference<'a> {
+        let samples = sample_materials(&self.study.materials);
+        let confirmed = Reference::new(self.study, &samples, &base.responses).of_base();
+        reference.lowered(&confirmed.worst_margins, &reference.of_base().worst_margins)
     }
 
     fn explore(

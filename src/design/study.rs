@@ -165,8 +165,8 @@ pub struct Budget {
     #[schema(value_type = Count)]
     pub confirm: usize,
     /// Whether the search judges every design at the priors' stiffer and softer variants too. If not, it is judged at
-    /// the central values, three times as many designs are seen in the same time, and the variants enter at
-    /// confirmation.
+    /// the central values, three times as many designs are seen in the same time, limits are lowered by what the
+    /// confirmation of the base shows for the variants, and the variants themselves enter at confirmation.
     pub variants_in_search: bool,
 }
 
