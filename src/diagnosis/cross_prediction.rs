@@ -2,6 +2,7 @@
 
 use super::case::Case;
 use super::cause::{Category, Cause, CauseIdentity};
+use super::causes::Travel;
 use super::error::DiagnosisError;
 use super::fit::{derivatives, normal_system};
 use super::laboratory::Prediction;
@@ -9,9 +10,11 @@ use super::leftover::leftover;
 use super::registry::Registry;
 use super::supposed::{Supposed, scene_of};
 use super::trace::Trace;
+use crate::calibration::Observed;
 use crate::material::Ogden;
 use crate::rate::BeforeAfter;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 use utoipa::ToSchema;
 
 /// Steps of the fit of a recording's own motions: Gauss and Newton's on a nearly quadratic form.
@@ -33,8 +36,11 @@ pub struct CrossPrediction {
     /// χ² of the displacement per datum, as `displacement_rms_mm`.
     #[serde(default)]
     pub chi2_per_datum: Option<BeforeAfter>,
-    /// The same with the rigid motions of the plates at each step fitted, which no other recording tells, and nothing
-    /// else; null where the parts of a set-up are not looked for.
+    /// The same with the plates' shifts at each step fitted (how far they went, and where zero is), which no other
+    /// recording tells, and nothing else; null where the parts of a set-up are not looked for.
+    #[serde(default)]
+    pub chi2_per_datum_with_own_shifts: Option<BeforeAfter>,
+    /// The same with the plates' rotations at each step fitted as well.
     #[serde(default)]
     pub chi2_per_datum_with_own_motions: Option<BeforeAfter>,
 }
@@ -72,12 +78,13 @@ impl Predictor<'_> {
         case.laboratory.forget();
         let models: [(&Ogden, &[Supposed]); 2] =
             [(&teacher.nominal.material, &[]), (&teacher.corrected.material, &causes)];
-        let mut plain = Vec::new();
-        let mut moved = Vec::new();
+        let own = if from == to { None } else { own_motions(&case.found.observed) };
+        let (mut plain, mut shifted, mut moved) = (Vec::new(), Vec::new(), Vec::new());
         for (material, causes) in models {
             plain.push(self.misfit(case, material, causes)?);
-            if from != to {
-                moved.push(self.with_own_motions(case, material, causes)?);
+            if let Some([shifts, motions]) = &own {
+                shifted.push(self.with_own(shifts, case, material, causes)?);
+                moved.push(self.with_own(motions, case, material, causes)?);
             }
         }
         let pair = |found: &[Option<Misfit>], of: &dyn Fn(&Misfit) -> Option<f64>| {
@@ -90,6 +97,7 @@ impl Predictor<'_> {
             displacement_rms_mm: pair(&plain, &|m| Some(m.rms_mm)),
             force_relative: pair(&plain, &|m| m.force_relative),
             chi2_per_datum: pair(&plain, &|m| Some(m.chi2_per_datum)),
+            chi2_per_datum_with_own_shifts: pair(&shifted, &|m| Some(m.chi2_per_datum)),
             chi2_per_datum_with_own_motions: pair(&moved, &|m| Some(m.chi2_per_datum)),
         })
     }
@@ -151,18 +159,16 @@ impl Predictor<'_> {
         Ok(self.predict(case, material, causes)?.map(|p| misfit(case, &p.trace)))
     }
 
-    /// The misfit with the plates' motions at each step fitted so that χ² is smallest, material and causes as they are.
-    fn with_own_motions(
+    /// The misfit with `own` motions of the plates fitted so that χ² is smallest, material and causes as they are.
+    fn with_own(
         &self,
+        own: &Arc<dyn Cause>,
         case: &mut Case,
         material: &Ogden,
         causes: &[Supposed],
     ) -> Result<Option<Misfit>, DiagnosisError> {
-        let is_of_steps = |c: &dyn Cause| c.moves_only_plates() && c.parameters().iter().all(|p| p.only_step.is_some());
-        let parts = Registry::standard().set_up(case.laboratory.observed());
-        let Some(motions) = parts.into_iter().find(|c| is_of_steps(c.as_ref())) else { return Ok(None) };
         let mut all = causes.to_vec();
-        all.push(Supposed { values: motions.start(), cause: motions });
+        all.push(Supposed { values: own.start(), cause: own.clone() });
         for _ in 0..NUM_STEPS {
             let Some(prediction) = self.predict(case, material, &all)? else { return Ok(None) };
             let Ok(columns) = derivatives(&mut case.laboratory, material, &all, &prediction) else { return Ok(None) };
@@ -180,6 +186,13 @@ impl Predictor<'_> {
         }
         self.misfit(case, material, &all)
     }
+}
+
+/// The plates' shifts at each step, and their shifts and rotations; `None` where the parts of a set-up are not looked for.
+fn own_motions(observed: &Observed) -> Option<[Arc<dyn Cause>; 2]> {
+    let is_of_steps = |c: &dyn Cause| c.moves_only_plates() && c.parameters().iter().all(|p| p.only_step.is_some());
+    let motions = Registry::standard().set_up(observed).into_iter().find(|c| is_of_steps(c.as_ref()))?;
+    Some([Arc::new(Travel::shifts_of(observed)), motions])
 }
 
 /// Displacement misfit, the largest relative misfit of a force, and χ².

@@ -97,7 +97,8 @@ pub fn together_report(t: &TogetherResult, all: &[&DiagnosisResult], specimen: &
             Column::numbers("mm rms, nominal to with causes", ""),
             Column::numbers("force, %", ""),
             Column::numbers("χ² per datum", ""),
-            Column::numbers("χ², plates' motions fitted", ""),
+            Column::numbers("χ², plates' shifts fitted", ""),
+            Column::numbers("χ², shifts and rotations fitted", ""),
         ],
         rows: t
             .predictions
@@ -109,6 +110,7 @@ pub fn together_report(t: &TogetherResult, all: &[&DiagnosisResult], specimen: &
                     pair(p.displacement_rms_mm, 1.0, "no equilibrium"),
                     pair(p.force_relative, 100.0, "none"),
                     pair(p.chi2_per_datum, 1.0, "no equilibrium"),
+                    pair(p.chi2_per_datum_with_own_shifts, 1.0, "not asked"),
                     pair(p.chi2_per_datum_with_own_motions, 1.0, "not asked"),
                 ]
             })

@@ -31,6 +31,8 @@ mod tilt;
 mod travel;
 mod wrap;
 
+pub(super) use travel::Travel;
+
 use super::cause::CauseName;
 use super::entry::Entry;
 

@@ -41,12 +41,19 @@ const AT_REST_MM: f64 = 1e-6;
 /// plate, then of the moved one.
 pub struct Travel {
     drives_mm: Vec<f64>,
+    /// Whether the plates may turn too.
+    turns: bool,
 }
 
 impl Travel {
     /// The travel at the drives of a recording.
     pub fn of(observed: &Observed) -> Travel {
-        Travel { drives_mm: observed.steps.iter().map(|s| s.drive_mm).collect() }
+        Travel { drives_mm: observed.steps.iter().map(|s| s.drive_mm).collect(), turns: true }
+    }
+
+    /// The same without rotations: how far the plates went, and where zero is.
+    pub fn shifts_of(observed: &Observed) -> Travel {
+        Travel { turns: false, ..Travel::of(observed) }
     }
 }
 
@@ -71,7 +78,7 @@ impl Cause for Travel {
                     let name = format!("step_{}_{plate}_{axis}_mm", step + 1);
                     all.push(CauseParameter::new(name, 0.1, [-5.0, 5.0]).believed(BELIEVED_MM).of_step(step));
                 }
-                for axis in ["x", "y", "z"] {
+                for axis in ["x", "y", "z"].iter().filter(|_| self.turns) {
                     let name = format!("step_{}_{plate}_degrees_about_{axis}", step + 1);
                     all.push(CauseParameter::new(name, 0.5, [-20.0, 20.0]).believed(BELIEVED_DEGREES).of_step(step));
                 }
@@ -81,10 +88,11 @@ impl Cause for Travel {
     }
 
     fn apply(&self, values: &[f64], scene: &mut Scene) {
-        for ((step, drive_mm), own) in self.drives_mm.iter().enumerate().zip(values.chunks(12)) {
-            for (motion, values) in scene.plates_at_mut(step).iter_mut().zip(own.chunks(6)) {
+        let of_plate = if self.turns { 6 } else { 3 };
+        for ((step, drive_mm), own) in self.drives_mm.iter().enumerate().zip(values.chunks(2 * of_plate)) {
+            for (motion, values) in scene.plates_at_mut(step).iter_mut().zip(own.chunks(of_plate)) {
                 for a in 0..3 {
-                    let (shift, turn) = (values[a], values[3 + a].to_radians());
+                    let (shift, turn) = (values[a], values.get(3 + a).map_or(0.0, |degrees| degrees.to_radians()));
                     // In proportion to the drive, so that a solve from rest comes there by and by.
                     if drive_mm.abs() > AT_REST_MM {
                         motion.translation_per_mm[a] += shift / drive_mm;

@@ -122,10 +122,12 @@ pub(in crate::job) fn together(results: &[&DiagnosisResult], found: Option<&Toge
         text += &format!("  {:<18} by {:<18} {displacement}; {force}\n", p.to, p.from);
         let chi2 = |b: BeforeAfter| format!("{} -> {}", num(b.before, 4), num(b.after, 4));
         if let Some(plain) = p.chi2_per_datum {
-            let own = p
-                .chi2_per_datum_with_own_motions
-                .map_or(String::new(), |b| format!("; with the plates' motions at each step fitted {}", chi2(b)));
-            text += &format!("  {:<18}    chi2 per datum {}{own}\n", "", chi2(plain));
+            let with = |own: &str, b: Option<BeforeAfter>| {
+                b.map_or(String::new(), |b| format!("; with the plates' {own} at each step fitted {}", chi2(b)))
+            };
+            let shifts = with("shifts", p.chi2_per_datum_with_own_shifts);
+            let motions = with("shifts and rotations", p.chi2_per_datum_with_own_motions);
+            text += &format!("  {:<18}    chi2 per datum {}{shifts}{motions}\n", "", chi2(plain));
         }
     }
     text
