@@ -99,6 +99,9 @@ class Formats:
             words = " and ".join(w for w in words if w)
             return f"list{f' ({words})' if words else ''} of: {items}"
         if kind == "object" and "properties" in schema:
+            if name is None:
+                fields = (f"`{field}`: {self.value(inner)}" for field, inner in schema["properties"].items())
+                return f"object with {', '.join(fields)}"
             return self.link(name)
         if kind == "object":
             return "object with a number for each name"

@@ -2,7 +2,10 @@
 
 mod common;
 
-use common::{bar, ellipse_and_slot, model, never, norm, norm_of_sum, off_axis, solve, tight, two_holes, two_terms};
+use common::{
+    bar, ellipse_and_slot, model, never, norm, norm_of_sum, off_axis, short_dumbbell, solve, tight, two_holes,
+    two_terms,
+};
 use lambdak::fem::{Equilibrium, ForwardModel, ParameterSensitivity};
 use lambdak::material::Ogden;
 use lambdak::mesh::{DesignVariable, morphed, shape_velocity};
@@ -137,7 +140,8 @@ fn drive_derivatives_are_of_second_order() {
 #[test]
 fn shape_derivatives_are_of_second_order() {
     use DesignVariable::{
-        BlockLength, BlockThickness, BlockWidth, HoleAngle, HoleDiameter, HoleLength, HoleOther, HoleX,
+        BlockLength, BlockThickness, BlockWidth, FilletRadius, GaugeLength, GaugeWidth, HoleAngle, HoleDiameter,
+        HoleLength, HoleOther, HoleX,
     };
     let mut failures = Vec::new();
     for variable in [HoleX(0), HoleOther(1), HoleDiameter(0), BlockLength, BlockThickness, BlockWidth] {
@@ -157,6 +161,10 @@ fn shape_derivatives_are_of_second_order() {
     }
     for variable in [HoleDiameter(0), BlockThickness] {
         check_path(&format!("bar, {variable:?}"), &bar(), 20.0, Some(variable), 0.02, &mut failures);
+    }
+    let dumbbell = short_dumbbell();
+    for variable in [GaugeWidth, GaugeLength, FilletRadius, BlockWidth, BlockLength] {
+        check_path(&format!("dumb-bell, {variable:?}"), &dumbbell, 10.0, Some(variable), 0.02, &mut failures);
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }

@@ -69,6 +69,28 @@ fn gradients_of_outlines_pass_the_taylor_test() {
     }
 }
 
+/// The same of a dumb-bell's gauge and block.
+#[test]
+fn gradients_of_a_gauge_pass_the_taylor_test() {
+    let mut study = study();
+    study.base = Specimen::from_json(include_str!("../../geometries/short-dumbbell.json")).expect("shipped");
+    study.base.drive_mm = vec![5.0];
+    study.vary.tests = vec![crate::specimen::TestKind::Uniaxial];
+    study.vary.hole_count = crate::design::study::CountRange { min: 0, max: 0 };
+    study.vary.length_mm = Some(Range { min: 35.0, max: 45.0 });
+    study.vary.width_mm = Some(Range { min: 10.0, max: 14.0 });
+    study.vary.thickness_mm = None;
+    study.vary.gauge_width_mm = Some(Range { min: 4.0, max: 8.0 });
+    study.vary.gauge_length_mm = Some(Range { min: 4.0, max: 12.0 });
+    study.vary.fillet_radius_mm = Some(Range { min: 4.0, max: 8.0 });
+    assert_eq!(study.validate().map_err(|e| e.to_string()), Ok(()));
+    let all = subspaces(&study);
+    assert_eq!(all.len(), 1);
+    let vector = all[0].vector_of(&study.base, 5.0).expect("within the ranges");
+    assert_eq!(all[0].specimen(&vector).outline, study.base.outline);
+    check_gradients(&study, &study.base.clone(), &all[0], &all[0].variables);
+}
+
 /// See the tests that call it.
 fn check_gradients(study: &Study, specimen: &Specimen, space: &Subspace, variables: &[Variable]) {
     let mut evaluator = Evaluator::new(study).with_coarseness(1.5);

@@ -1,7 +1,7 @@
 //! Sampling of makeable designs: stratified in every variable (Latin hypercube), shrunk until the geometry limits hold.
 
 use super::space::{Subspace, Variable};
-use crate::specimen::{ManufacturingLimits, Specimen};
+use crate::specimen::{ManufacturingLimits, Outline, Specimen};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 const ATTEMPTS: usize = 60;
 
 /// Geometry margins of a specimen, mm (voxels for the voxel limit): ≥ 0 where the limits are kept. Their number depends
-/// on the number of holes alone.
+/// on the number of holes and the kind of outline alone.
 pub fn geometry_margins(specimen: &Specimen, limits: &ManufacturingLimits, voxel_mm: [f64; 3]) -> Vec<f64> {
     let mut margins = Vec::new();
     for sample in specimen.samples() {
@@ -20,6 +20,9 @@ pub fn geometry_margins(specimen: &Specimen, limits: &ManufacturingLimits, voxel
                     ManufacturingLimits::voxels_across(&sample, ligament.length_mm, ligament.direction, voxel_mm);
                 margins.push(across - fewest);
             }
+        }
+        if let Outline::Dumbbell(gauge) = &sample.outline {
+            margins.extend(gauge.slacks_mm(&sample.block));
         }
     }
     margins

@@ -14,6 +14,13 @@ pub(super) fn in_steps(specimen: &Specimen, limits: &ManufacturingLimits, voxel_
     let nearest = |value: f64| multiple(step, (value / step).round());
     let mut rounded = specimen.clone();
     rounded.drive_mm.iter_mut().for_each(|d| *d = nearest(*d));
+    if let Some(gauge) = rounded.outline.free_gauge_mut() {
+        for length in [&mut gauge.gauge_width_mm, &mut gauge.gauge_length_mm] {
+            *length = nearest(*length);
+        }
+        // Rounded up, the sides stay no steeper than they may be.
+        gauge.fillet_radius_mm = multiple(step, (gauge.fillet_radius_mm / step - 1e-9).ceil());
+    }
     for (block, holes) in shapes_of(&mut rounded) {
         for length in [&mut block.length_mm, &mut block.thickness_mm, &mut block.width_mm] {
             *length = nearest(*length);

@@ -3,7 +3,7 @@
 use super::structure::{Orbit, Structure, structures};
 use super::study::{Range, Study};
 use crate::mesh::DesignVariable;
-use crate::specimen::{Block, Hole, HoleAxis, HoleKind, HoleShape, MIRROR_TOLERANCE_MM, Specimen, TestKind};
+use crate::specimen::{Block, Dumbbell, Hole, HoleAxis, HoleKind, HoleShape, MIRROR_TOLERANCE_MM, Specimen, TestKind};
 
 /// One component of the continuous vector.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,6 +28,12 @@ pub enum Variable {
     Thickness,
     /// Width of the block.
     Width,
+    /// Width of the gauge.
+    GaugeWidth,
+    /// Length of the gauge.
+    GaugeLength,
+    /// Radius of the arcs between gauge and ends.
+    FilletRadius,
     /// Length of a further sample's block.
     OtherLength(usize),
     /// Thickness of a further sample's block.
@@ -115,6 +121,9 @@ impl Subspace {
             (Variable::Length, vary.length_mm),
             (Variable::Thickness, vary.thickness_mm),
             (Variable::Width, vary.width_mm),
+            (Variable::GaugeWidth, vary.gauge_width_mm),
+            (Variable::GaugeLength, vary.gauge_length_mm),
+            (Variable::FilletRadius, vary.fillet_radius_mm),
         ] {
             if let Some(interval) = interval {
                 variables.push(variable);
@@ -158,6 +167,9 @@ impl Subspace {
                 Variable::Length => specimen.block.length_mm = value,
                 Variable::Thickness => specimen.block.thickness_mm = value,
                 Variable::Width => specimen.block.width_mm = value,
+                Variable::GaugeWidth => set_gauge(&mut specimen, |gauge| &mut gauge.gauge_width_mm, value),
+                Variable::GaugeLength => set_gauge(&mut specimen, |gauge| &mut gauge.gauge_length_mm, value),
+                Variable::FilletRadius => set_gauge(&mut specimen, |gauge| &mut gauge.fillet_radius_mm, value),
                 Variable::OtherLength(i) => specimen.other_samples[i].block.length_mm = value,
                 Variable::OtherThickness(i) => specimen.other_samples[i].block.thickness_mm = value,
                 Variable::OtherWidth(i) => specimen.other_samples[i].block.width_mm = value,
@@ -280,6 +292,9 @@ impl Subspace {
             Variable::Length => vec![(DesignVariable::BlockLength, 1.0)],
             Variable::Thickness => vec![(DesignVariable::BlockThickness, 1.0)],
             Variable::Width => vec![(DesignVariable::BlockWidth, 1.0)],
+            Variable::GaugeWidth => vec![(DesignVariable::GaugeWidth, 1.0)],
+            Variable::GaugeLength => vec![(DesignVariable::GaugeLength, 1.0)],
+            Variable::FilletRadius => vec![(DesignVariable::FilletRadius, 1.0)],
         }
     }
 
@@ -316,6 +331,9 @@ impl Subspace {
                 Variable::Length => specimen.block.length_mm,
                 Variable::Thickness => specimen.block.thickness_mm,
                 Variable::Width => specimen.block.width_mm,
+                Variable::GaugeWidth => specimen.outline.dumbbell()?.gauge_width_mm,
+                Variable::GaugeLength => specimen.outline.dumbbell()?.gauge_length_mm,
+                Variable::FilletRadius => specimen.outline.dumbbell()?.fillet_radius_mm,
                 Variable::OtherLength(i) => specimen.other_samples[i].block.length_mm,
                 Variable::OtherThickness(i) => specimen.other_samples[i].block.thickness_mm,
                 Variable::OtherWidth(i) => specimen.other_samples[i].block.width_mm,
@@ -357,6 +375,13 @@ impl Subspace {
             found.push(hole);
         }
         left.is_empty().then_some(found)
+    }
+}
+
+/// Gives a dumb-bell of free gauge another dimension; what has no such gauge stays.
+fn set_gauge(specimen: &mut Specimen, dimension: fn(&mut Dumbbell) -> &mut f64, value_mm: f64) {
+    if let Some(gauge) = specimen.outline.free_gauge_mut() {
+        *dimension(gauge) = value_mm;
     }
 }
 

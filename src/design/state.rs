@@ -175,8 +175,12 @@ pub(super) fn is_same(a: &Specimen, b: &Specimen) -> bool {
     let near = |a: f64, b: f64| (a - b).abs() <= TOLERANCE_MM;
     let is_same_sample = |a: &Specimen, b: &Specimen| {
         let lengths = |s: &Specimen| [s.block.length_mm, s.block.thickness_mm, s.block.width_mm];
+        let gauge = |s: &Specimen| {
+            s.outline.dumbbell().map_or([0.0; 3], |d| [d.gauge_width_mm, d.gauge_length_mm, d.fillet_radius_mm])
+        };
         a.holes.len() == b.holes.len()
             && lengths(a).iter().zip(lengths(b)).all(|(a, b)| near(*a, b))
+            && gauge(a).iter().zip(gauge(b)).all(|(a, b)| near(*a, b))
             && a.holes.iter().zip(&b.holes).all(|(a, b)| {
                 a.axis == b.axis
                     && near(a.diameter_mm, b.diameter_mm)

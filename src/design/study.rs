@@ -102,6 +102,18 @@ pub struct Vary {
     /// Width of the block, mm.
     #[serde(default)]
     pub width_mm: Option<Range>,
+    /// Width of the gauge, mm, where the base is a dumb-bell of free gauge.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub gauge_width_mm: Option<Range>,
+    /// Length of the gauge between the arcs, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub gauge_length_mm: Option<Range>,
+    /// Radius of the arcs between gauge and ends, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub fillet_radius_mm: Option<Range>,
     /// Drive of a further scan before the last one, mm: the two share the time of one scan in the way that is best for
     /// all materials together. The base has one scan in all of the time.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -8,7 +8,7 @@ use super::study_limits::{
     MAX_COUNT, MAX_HOLES_TO_TRY, MAX_LENGTH_MM, MAX_RELATIVE_SD, MAX_WEIGHT, MIN_LENGTH_MM, MIN_WEIGHT,
 };
 use crate::field::{FieldError, FieldPath};
-use crate::specimen::{MAX_HOLE_ANGLE_DEG, MAX_NAME_LENGTH, Symmetry, TestKind};
+use crate::specimen::{MAX_HOLE_ANGLE_DEG, MAX_NAME_LENGTH, Outline, Symmetry, TestKind};
 
 impl Study {
     /// Checks a study and all of its parts. Call it on a study that was not read by this program's readers.
@@ -177,6 +177,7 @@ impl Study {
                 check_range(|| FieldPath::of("vary").name(name), range, problems);
             }
         }
+        self.check_gauge(problems);
         if let Some(shapes) = &vary.hole_shapes {
             let path = || FieldPath::of("vary").name("hole_shapes").name("elongation_mm");
             check_range(path, shapes.elongation_mm, problems);
@@ -191,6 +192,26 @@ impl Study {
 }
 
 impl Study {
+    /// Whether there is a gauge where one is to vary, and a dumb-bell is pulled.
+    fn check_gauge(&self, problems: &mut Vec<StudyError>) {
+        let vary = &self.vary;
+        let outline = &self.base.outline;
+        for (field, interval) in [
+            ("gauge_width_mm", vary.gauge_width_mm),
+            ("gauge_length_mm", vary.gauge_length_mm),
+            ("fillet_radius_mm", vary.fillet_radius_mm),
+        ] {
+            let Some(range) = interval else { continue };
+            check_range(|| FieldPath::of("vary").name(field), range, problems);
+            if !matches!(outline, Outline::Dumbbell(_)) {
+                problems.push(StudyError::NoGauge { field, outline: outline.name() });
+            }
+        }
+        if outline.dumbbell().is_some() && self.vary.tests.contains(&TestKind::DoubleLapShear) {
+            problems.push(StudyError::DumbbellInShear);
+        }
+    }
+
     /// Whether designs can be searched for: besides what makes it a study, its base is driven as designs are. (A study
     /// may stand for more than a search, so that its base may be driven either way.)
     ///

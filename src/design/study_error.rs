@@ -96,6 +96,19 @@ pub enum StudyError {
         /// Largest number of holes.
         max_holes: usize,
     },
+    /// A gauge is to vary, and the base has none that is free.
+    #[error(
+        "vary.{field} varies, and the base's outline is {outline}; give the base an outline \"dumbbell\", or leave it out"
+    )]
+    NoGauge {
+        /// Which dimension.
+        field: &'static str,
+        /// The base's outline.
+        outline: &'static str,
+    },
+    /// A dumb-bell cannot be bonded between plates.
+    #[error("vary.tests has double_lap_shear and the base is a dumb-bell; only a block may be sheared")]
+    DumbbellInShear,
     /// Every drive to try is above the actuator's travel.
     #[error("vary.drive_mm.min is {min_mm} mm and limits.max_drive_mm {limit_mm} mm; no drive keeps both")]
     NoDrive {
@@ -232,6 +245,14 @@ impl StudyError {
             E::NoAxes { max_holes } => {
                 FieldError::new("/vary/axes", "[]", format!("a list of directions, as up to {max_holes} holes are asked for"))
                     .remedy("or leave it out to keep the base's direction")
+            }
+            E::NoGauge { field, outline } => {
+                let pointer = FieldPath::of("vary").name(field).pointer();
+                FieldError::new(pointer, "given", format!("left out where the base's outline is {outline}"))
+                    .remedy("only an outline \"dumbbell\" has a gauge that may vary")
+            }
+            E::DumbbellInShear => {
+                FieldError::new("/vary/tests", "a list with double_lap_shear", "uniaxial where the base is a dumb-bell")
             }
             E::NoDrive { min_mm, limit_mm } => {
                 FieldError::new("/vary/drive_mm/min", min_mm, format!("at most limits.max_drive_mm, {limit_mm} mm"))

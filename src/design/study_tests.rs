@@ -121,6 +121,22 @@ fn all_errors_come_at_once() {
     assert_eq!(found, ["/base/samples_in_parallel", "/scan/voxel_mm/0", "/materials/1/name", "/vary/axes"]);
 }
 
+/// Only a dumb-bell of free gauge has one that may vary, and no dumb-bell is sheared.
+#[test]
+fn a_gauge_that_varies_is_there() {
+    let range = json!({ "min": 4.0, "max": 8.0 });
+    assert_eq!(pointers(&[("/vary/gauge_width_mm", range.clone())]), ["/vary/gauge_width_mm"]);
+    let base: serde_json::Value =
+        serde_json::from_str(include_str!("../../geometries/short-dumbbell.json")).expect("shipped");
+    let pulled = [("/base", base), ("/vary/tests", json!(["uniaxial"])), ("/vary/gauge_width_mm", range)];
+    // Nothing is wrong with them but what is wrong beside them.
+    let mut changes = pulled.to_vec();
+    changes.push(("/vary/gauge_length_mm", json!({ "min": 4.0, "max": 3.0 })));
+    assert_eq!(pointers(&changes), ["/vary/gauge_length_mm/max"]);
+    changes[1] = ("/vary/tests", json!(["uniaxial", "double_lap_shear"]));
+    assert_eq!(pointers(&changes), ["/vary/gauge_length_mm/max", "/vary/tests"]);
+}
+
 /// What of a fixture does not fit together is told where it stands.
 #[test]
 fn blocks_and_what_varies_of_them_fit_together() {

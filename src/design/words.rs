@@ -58,7 +58,15 @@ pub fn block_in_brief(specimen: &Specimen) -> String {
 
 /// One sample in words: a block of … mm without holes, or with these.
 pub fn sample_in_words(specimen: &Specimen) -> String {
-    let block = format!("a block of {} mm (length × thickness × width)", block_in_brief(specimen));
+    let kind = if specimen.outline.dumbbell().is_some() { "dumb-bell" } else { "block" };
+    let mut block = format!("a {kind} of {} mm (length × thickness × width)", block_in_brief(specimen));
+    if let Some(gauge) = specimen.outline.dumbbell() {
+        let [width, length] = [gauge.gauge_width_mm, gauge.gauge_length_mm];
+        block += &format!(
+            ", its gauge {width:.1} mm wide and {length:.1} mm long, with radii of {:.1} mm,",
+            gauge.fillet_radius_mm
+        );
+    }
     if specimen.holes.is_empty() {
         return format!("{block} without holes");
     }

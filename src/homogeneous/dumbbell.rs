@@ -14,11 +14,12 @@ use super::table::{ForceTable, TableError};
 use crate::fem::{ForwardModel, PrepareError, SolveError, SolveOptions};
 use crate::material::Ogden;
 use crate::mesh::MeshOptions;
-use crate::specimen::{Outline, Specimen, dumbbell};
+use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
 
-/// Half of the gauge's length, mm: well inside the narrow portion (6 mm), where an extensometer would sit.
-const HALF_GAUGE_MM: f64 = 3.0;
+/// The part of the gauge about its middle over which stretches are averaged: well inside it, where an extensometer would
+/// sit.
+const MEASURED_PART: f64 = 0.5;
 /// Displacements at which the finite elements are solved.
 const NUM_DRIVES: usize = 8;
 
@@ -77,7 +78,9 @@ pub struct DumbbellFit {
 #[non_exhaustive]
 pub enum DumbbellError {
     /// Not a uniaxial dumb-bell.
-    #[error("specimen {name:?} has no dumb-bell outline; give an ISO 37 type 4 specimen without holes")]
+    #[error(
+        "specimen {name:?} has no dumb-bell outline; give one with outline iso37_type4 or dumbbell, and without holes"
+    )]
     NotADumbbell {
         /// The specimen's name.
         name: String,
@@ -107,23 +110,26 @@ pub enum DumbbellError {
     Table(#[from] TableError),
 }
 
-/// Gauge stretch and force of a dumb-bell of this material at each displacement (mm), by finite elements.
+/// Gauge stretch and force of a dumb-bell of this material at each displacement (mm), by finite elements. `gauge_mm`
+/// is the length of its gauge, of which the middle half counts.
 ///
 /// # Errors
 /// [`DumbbellError::Solve`].
 pub fn gauge_stretches(
     model: &mut ForwardModel,
     material: &Ogden,
+    gauge_mm: f64,
     displacement_mm: &[f64],
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Vec<GaugePoint>, SolveError> {
+    let half_mm = 0.5 * MEASURED_PART * gauge_mm;
     let path = model.solve_path(material, displacement_mm, &SolveOptions::default(), is_cancelled)?;
     Ok(path
         .iter()
         .map(|state| {
             let (mut sum, mut volume) = (0.0, 0.0);
             for q in model.quadrature_fields(material, state) {
-                if q.position[0].abs() <= HALF_GAUGE_MM {
+                if q.position[0].abs() <= half_mm {
                     sum += q.volume_mm3 * q.deformation_gradient[0][0];
                     volume += q.volume_mm3;
                 }
@@ -144,21 +150,22 @@ pub fn fit_dumbbell(
     options: &DumbbellOptions,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<DumbbellFit, DumbbellError> {
-    if specimen.outline != Outline::Iso37Type4 || !specimen.holes.is_empty() {
+    let drawn = specimen.outline.dumbbell().zip(specimen.profile()).filter(|_| specimen.holes.is_empty());
+    let Some((gauge, profile)) = drawn else {
         return Err(DumbbellError::NotADumbbell { name: specimen.name.clone() });
-    }
+    };
     let largest = displacement_mm.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b));
     let smallest = displacement_mm.iter().fold(f64::INFINITY, |a, b| a.min(*b));
     if !(largest > 0.0 && largest.is_finite() && smallest > -0.01 * largest) {
         return Err(DumbbellError::Displacement { largest_mm: largest });
     }
-    let area = dumbbell::NARROW_WIDTH_MM * specimen.block.thickness_mm;
+    let area = gauge.gauge_width_mm * specimen.block.thickness_mm;
     let samples = f64::from(specimen.samples_in_parallel);
     let stress: Vec<f64> = force_n.iter().map(|f| 1e3 * f / (area * samples)).collect();
     let mut model = ForwardModel::of_specimen(specimen, &options.mesh)?;
     // Denser where the conversion curves: towards small displacements.
     let drives: Vec<f64> = (1..=NUM_DRIVES).map(|i| largest * (i as f64 / NUM_DRIVES as f64).powf(1.5)).collect();
-    let length = dumbbell::effective_length_mm();
+    let length = profile.effective_length_mm();
     let mut stretch: Vec<f64> = displacement_mm.iter().map(|d| 1.0 + d / length).collect();
     let mut round = 0;
     loop {
@@ -167,7 +174,8 @@ pub fn fit_dumbbell(
         let sequence = fit_curves(&[curve], &options.fit)?;
         let chosen = sequence.chosen();
         let bulk_kpa = options.fit.bulk_kpa.unwrap_or(BULK_OVER_SHEAR * chosen.initial_shear_modulus_kpa.value);
-        let conversion = gauge_stretches(&mut model, &chosen.fitted_law().material(bulk_kpa), &drives, is_cancelled)?;
+        let material = chosen.fitted_law().material(bulk_kpa);
+        let conversion = gauge_stretches(&mut model, &material, gauge.gauge_length_mm, &drives, is_cancelled)?;
         let at: Vec<f64> = std::iter::once(0.0).chain(conversion.iter().map(|c| c.displacement_mm)).collect();
         let gauge: Vec<f64> = std::iter::once(1.0).chain(conversion.iter().map(|c| c.gauge_stretch)).collect();
         let table = ForceTable::new(&at, &gauge)?;

@@ -10,7 +10,7 @@ use super::result::{CurveFit, fit_curves};
 use crate::fem::ForwardModel;
 use crate::material::{ShearTerm, initial_shear_modulus_kpa};
 use crate::mesh::MeshOptions;
-use crate::specimen::{Specimen, dumbbell};
+use crate::specimen::Specimen;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -91,7 +91,11 @@ pub fn uniaxial_stand_in(
     let truth = OgdenTerms::free(&TRUTH).material(BULK_RATIO * modulus);
     let truth_mesh = MeshOptions::scaled(specimen, options.truth_factor);
     let mut model = ForwardModel::of_specimen(specimen, &truth_mesh)?;
-    let largest = LARGEST_PULL * dumbbell::effective_length_mm();
+    let drawn = specimen.outline.dumbbell().zip(specimen.profile());
+    let Some((gauge, profile)) = drawn else {
+        return Err(DumbbellError::NotADumbbell { name: specimen.name.clone() });
+    };
+    let largest = LARGEST_PULL * profile.effective_length_mm();
     let drives: Vec<f64> = (1..=NUM_POINTS).map(|n| largest * n as f64 / NUM_POINTS as f64).collect();
     let mut recorded = Vec::new();
     // One after another: the pull ends at the gauge stretch, not at the displacement.
@@ -99,7 +103,7 @@ pub fn uniaxial_stand_in(
         if recorded.last().is_some_and(|p: &super::dumbbell::GaugePoint| p.gauge_stretch > GAUGE_STRETCHES[1]) {
             break;
         }
-        recorded.extend(gauge_stretches(&mut model, &truth, chunk, is_cancelled)?);
+        recorded.extend(gauge_stretches(&mut model, &truth, gauge.gauge_length_mm, chunk, is_cancelled)?);
     }
     recorded.retain(|p| p.gauge_stretch <= GAUGE_STRETCHES[1]);
     let top = recorded.iter().fold(0.0f64, |a, p| a.max(p.force_n));

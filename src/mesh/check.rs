@@ -10,6 +10,7 @@ use super::node_sets::{nodes_on_plane, pull_axis};
 use super::options::MeshOptions;
 use super::section::{Section, scaled_jacobian};
 use super::{ElementKind, Mesh};
+use crate::specimen::dumbbell::Profile;
 use crate::specimen::{HoleWall, Specimen};
 
 /// Relative error allowed in a hole's or an arc's area: a parabola through three points of a 60° arc has 0.14 %.
@@ -68,7 +69,7 @@ impl Mesh {
         self.check_jacobians()?;
         self.check_faces(&domain)?;
         let volume = self.volume();
-        let curved = if domain.holes.is_empty() && !domain.is_dumbbell {
+        let curved = if domain.holes.is_empty() && domain.profile.is_none() {
             0.0
         } else {
             let of_wall = |wall: &HoleWall| {
@@ -76,7 +77,8 @@ impl Mesh {
                 tolerance * wall.area_mm2()
             };
             let holes: f64 = domain.holes.iter().map(|d| of_wall(&d.wall)).sum();
-            domain.depth() * (holes + if domain.is_dumbbell { 8.0 * ARC_AREA_TOLERANCE } else { 0.0 })
+            let of_sides = |profile: Profile| 8.0 * ARC_AREA_TOLERANCE * profile.curved_area_mm2();
+            domain.depth() * (holes + domain.profile.map_or(0.0, of_sides))
         };
         let (expected_mm3, tolerance_mm3) = (domain.area() * domain.depth(), curved + 1e-9 * volume.abs());
         let difference = (volume - expected_mm3).abs();

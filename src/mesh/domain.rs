@@ -3,6 +3,7 @@
 use super::Mirror;
 use super::error::{LigamentEnd, MeshError};
 use super::options::{MeshOptions, in_range};
+use crate::specimen::dumbbell::{ISO37_WIDTH_MM, Profile};
 use crate::specimen::{HoleAxis, HoleWall, Outline, Specimen, TestKind};
 
 /// Lengths outside this range, mm, are refused: they are certainly errors of unit.
@@ -13,15 +14,6 @@ const MIN_LIGAMENT_RATIO: f64 = 0.02;
 const WALL_POINTS: usize = 96;
 /// Two positions closer than this fraction of the block's size are the same.
 pub(super) const COINCIDENT: f64 = 1e-9;
-
-/// ISO 37 type 4 (S3): half of the narrow part's length, mm.
-const NARROW_HALF_LENGTH_MM: f64 = 6.0;
-/// Half of the narrow part's width, mm.
-const NARROW_HALF_WIDTH_MM: f64 = 1.0;
-/// Half of the ends' width, mm.
-const END_HALF_WIDTH_MM: f64 = 3.0;
-/// Both transition radii, mm.
-const TRANSITION_RADIUS_MM: f64 = 3.0;
 
 /// A hole in section coordinates.
 #[derive(Clone, Copy, Debug)]
@@ -64,7 +56,8 @@ pub(super) struct Domain {
     pub half: [f64; 2],
     /// −half₁, or 0 if the section is mirrored at b = 0.
     pub bottom: f64,
-    pub is_dumbbell: bool,
+    /// The side of a dumb-bell; none of a block.
+    pub profile: Option<Profile>,
     pub holes: Vec<SectionHole>,
     /// Straight lines inside the section that element edges follow; each may end on the outline.
     pub lines: Vec<[[f64; 2]; 2]>,
@@ -112,13 +105,11 @@ impl Domain {
                 return Err(MeshError::MixedHoleAxes { hole });
             }
         }
-        let is_dumbbell = specimen.outline == Outline::Iso37Type4;
         let along_width = specimen.holes.first().is_some_and(|h| h.axis == HoleAxis::Width);
-        if is_dumbbell {
-            check_dumbbell(block.length_mm, block.width_mm)?;
-            if along_width {
-                return Err(MeshError::UnsupportedHoleAxis { hole: 0 });
-            }
+        check_dumbbell(specimen)?;
+        let profile = specimen.profile();
+        if profile.is_some() && along_width {
+            return Err(MeshError::UnsupportedHoleAxis { hole: 0 });
         }
         let (b_axis, extrusion_axis) = if along_width { (1, 2) } else { (2, 1) };
         let extents = [block.length_mm, block.thickness_mm, block.width_mm];
@@ -150,7 +141,7 @@ impl Domain {
         let domain = Domain {
             half: domain_half,
             bottom: if section_mirrored { 0.0 } else { -domain_half[1] },
-            is_dumbbell,
+            profile,
             holes: Vec::new(),
             lines: Vec::new(),
             b_axis,
@@ -185,13 +176,7 @@ impl Domain {
 
     /// Half-width of the section's outline at `a`.
     pub fn half_width(&self, a: f64) -> f64 {
-        if self.is_dumbbell { dumbbell_half_width(a) } else { self.half[1] }
-    }
-
-    /// Positions a > 0 at which the dumb-bell's outline changes its curve.
-    pub fn arc_ends(&self) -> [f64; 3] {
-        let arc = transition_arc_length_mm();
-        [NARROW_HALF_LENGTH_MM, NARROW_HALF_LENGTH_MM + arc, NARROW_HALF_LENGTH_MM + 2.0 * arc]
+        self.profile.map_or(self.half[1], |profile| profile.half_width_mm(a))
     }
 
     /// Largest extent of the section.
@@ -203,7 +188,7 @@ impl Domain {
     /// and the distance to the nearest sampled outline point for the dumb-bell.
     pub fn outline_distance(&self, p: [f64; 2]) -> f64 {
         let ends = self.half[0] - p[0].abs();
-        if !self.is_dumbbell {
+        if self.profile.is_none() {
             return ends.min(self.half[1] - p[1].abs());
         }
         let inside = self.half_width(p[0]) - p[1].abs();
@@ -223,7 +208,7 @@ impl Domain {
         if wall.is_circle() {
             return self.outline_distance(center) - wall.half_mm()[1];
         }
-        if !self.is_dumbbell {
+        if self.profile.is_none() {
             let reach = wall.half_extents_mm();
             return (0..2).map(|c| self.half[c] - center[c].abs() - reach[c]).fold(f64::INFINITY, f64::min);
         }
@@ -252,10 +237,7 @@ impl Domain {
     /// Area of the meshed part of the section, mm², in closed form.
     pub fn area(&self) -> f64 {
         let [a, b] = self.half;
-        let mut whole = 4.0 * a * b;
-        if self.is_dumbbell {
-            whole -= 4.0 * dumbbell_missing_area();
-        }
+        let whole = self.profile.map_or(4.0 * a * b, |profile| profile.area_mm2());
         let mirrored = self.bottom > -self.half[1];
         let holes: f64 = self.holes.iter().map(|d| d.wall.area_mm2() * if d.is_half { 0.5 } else { 1.0 }).sum();
         whole * if mirrored { 0.5 } else { 1.0 } - holes
@@ -267,62 +249,21 @@ impl Domain {
     }
 }
 
-fn check_dumbbell(length_mm: f64, width_mm: f64) -> Result<(), MeshError> {
-    let width = 2.0 * END_HALF_WIDTH_MM;
-    if (width_mm - width).abs() > 1e-6 * width {
-        return Err(MeshError::OutlineMismatch {
-            name: "width_mm",
-            value_mm: width_mm,
-            relation: "equal to",
-            limit_mm: width,
-        });
+/// Whether a specimen's dumb-bell can be drawn.
+fn check_dumbbell(specimen: &Specimen) -> Result<(), MeshError> {
+    let Some(dumbbell) = specimen.outline.dumbbell() else { return Ok(()) };
+    let (value_mm, standard_mm) = (specimen.block.width_mm, ISO37_WIDTH_MM);
+    if specimen.outline == Outline::Iso37Type4 && (value_mm - standard_mm).abs() > 1e-6 * standard_mm {
+        let (name, relation) = ("width_mm", "equal to");
+        return Err(MeshError::OutlineMismatch { name, value_mm, relation, limit_mm: standard_mm });
     }
-    let shortest = 2.0 * transition_end_mm();
-    if length_mm < 1.01 * shortest {
-        return Err(MeshError::OutlineMismatch {
-            name: "length_mm",
-            value_mm: length_mm,
-            relation: "at least",
-            limit_mm: 1.01 * shortest,
-        });
+    match dumbbell.misfits(&specimen.block).into_iter().next() {
+        None => Ok(()),
+        Some(misfit) => {
+            let (name, value_mm) = (misfit.dimension.name(), misfit.value_mm);
+            let is_above = value_mm > misfit.max_mm;
+            let (relation, limit_mm) = if is_above { ("at most", misfit.max_mm) } else { ("at least", misfit.min_mm) };
+            Err(MeshError::OutlineMismatch { name, value_mm, relation, limit_mm })
+        }
     }
-    Ok(())
-}
-
-/// cos θ of the slope where the two transition arcs meet: together they rise 2 r (1 − cos θ).
-fn transition_cosine() -> f64 {
-    1.0 - (END_HALF_WIDTH_MM - NARROW_HALF_WIDTH_MM) / (2.0 * TRANSITION_RADIUS_MM)
-}
-
-/// Length of each transition arc along x, mm.
-fn transition_arc_length_mm() -> f64 {
-    TRANSITION_RADIUS_MM * (1.0 - transition_cosine().powi(2)).sqrt()
-}
-
-/// Half-width of the ISO 37 type 4 outline at x, mm.
-pub(super) fn dumbbell_half_width(x: f64) -> f64 {
-    let (r, arc) = (TRANSITION_RADIUS_MM, transition_arc_length_mm());
-    let s = x.abs() - NARROW_HALF_LENGTH_MM;
-    if s <= 0.0 {
-        NARROW_HALF_WIDTH_MM
-    } else if s <= arc {
-        NARROW_HALF_WIDTH_MM + r - (r * r - s * s).sqrt()
-    } else if s < 2.0 * arc {
-        let t = 2.0 * arc - s;
-        END_HALF_WIDTH_MM - r + (r * r - t * t).sqrt()
-    } else {
-        END_HALF_WIDTH_MM
-    }
-}
-
-/// |x| at which the transition to the ends is complete, mm.
-pub(super) fn transition_end_mm() -> f64 {
-    NARROW_HALF_LENGTH_MM + 2.0 * transition_arc_length_mm()
-}
-
-/// Area between the outline and the block in one quarter: over the transition the outline is point-symmetric about its
-/// middle, so its mean is the mean of the two half-widths.
-fn dumbbell_missing_area() -> f64 {
-    let rise = END_HALF_WIDTH_MM - NARROW_HALF_WIDTH_MM;
-    NARROW_HALF_LENGTH_MM * rise + 2.0 * transition_arc_length_mm() * 0.5 * rise
 }

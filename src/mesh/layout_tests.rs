@@ -1,8 +1,8 @@
 //! Whole meshes: every layout conforms, is well shaped and fills the specimen.
 
-use super::test_specimens::{Random, bar, dumbbell, off_axis, solid, specimen, two_holes, width_holes};
+use super::test_specimens::{Random, bar, dumbbell, free_dumbbell, off_axis, solid, specimen, two_holes, width_holes};
 use super::{ElementKind, LigamentEnd, MeshError, MeshOptions, mesh_specimen};
-use crate::specimen::{HoleAxis, Outline, Specimen, TestKind};
+use crate::specimen::{Dumbbell, HoleAxis, Outline, Specimen, TestKind};
 
 /// Up to eight holes of random size, thrown until they keep `ligament` mm; sometimes symmetric about b = 0.
 fn random_layout(random: &mut Random) -> Specimen {
@@ -130,7 +130,10 @@ fn volume_converges_to_the_closed_form() {
 fn dumbbells_follow_their_outline() {
     let mut holed = dumbbell();
     holed.holes = specimen(TestKind::Uniaxial, [35.0, 2.0, 6.0], HoleAxis::Thickness, &[[-13.0, 0.0, 2.0]]).holes;
-    for specimen in [dumbbell(), holed] {
+    let mut free_holed = free_dumbbell();
+    free_holed.holes = bar().holes;
+    free_holed.holes[0].diameter_mm = 3.0;
+    for specimen in [dumbbell(), holed, free_dumbbell(), free_holed] {
         for use_mirror in [true, false] {
             for force_prisms in [true, false] {
                 for factor in [1.8, 1.0] {
@@ -141,6 +144,28 @@ fn dumbbells_follow_their_outline() {
             }
         }
     }
+}
+
+/// Every dumb-bell that can be drawn is meshed, with the volume of the closed form (in the mesh's check), and its worst
+/// element is no worse than the limit that a block's holes are held to.
+#[test]
+fn any_free_dumbbell_is_meshed() {
+    use crate::specimen::sampling::free_dumbbell;
+    use proptest::prelude::*;
+    let settings = ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() };
+    let checked = proptest::test_runner::TestRunner::new(settings).run(&free_dumbbell(), |specimen| {
+        prop_assert_eq!(specimen.validate(), Ok(()));
+        for factor in [1.8, 1.0] {
+            let options = MeshOptions::scaled(&specimen, factor);
+            let mesh = mesh_specimen(&specimen, &options).map_err(|e| TestCaseError::fail(e.to_string()))?;
+            prop_assert_eq!(mesh.check(&specimen), Ok(()));
+            let quality = mesh.quality();
+            prop_assert!(quality.min_scaled_jacobian >= options.min_scaled_jacobian, "{:?}", quality);
+            prop_assert!(quality.max_aspect_ratio < 25.0, "{:?}", quality);
+        }
+        Ok(())
+    });
+    assert!(checked.is_ok(), "{checked:?}");
 }
 
 #[test]
@@ -292,6 +317,7 @@ fn nonsense_never_panics() {
         };
         let extents = [pick(25.0), pick(6.0), pick(18.0)];
         let holes: Vec<[f64; 3]> = (0..4).map(|_| [pick(10.0) - 10.0, pick(4.0) - 4.0, pick(2.0)]).collect();
+        let [gauge_width_mm, gauge_length_mm, fillet_radius_mm] = [pick(6.0), pick(6.0), pick(6.0)];
         let count = random.below(5);
         let axis = [HoleAxis::Thickness, HoleAxis::Width][random.below(2)];
         let test = [TestKind::DoubleLapShear, TestKind::Uniaxial][random.below(2)];
@@ -299,6 +325,8 @@ fn nonsense_never_panics() {
         if random.below(4) == 0 {
             s.outline = Outline::Iso37Type4;
             (s.block.length_mm, s.block.width_mm) = (35.0, 6.0);
+        } else if random.below(4) == 0 {
+            s.outline = Outline::Dumbbell(Dumbbell { gauge_width_mm, gauge_length_mm, fillet_radius_mm });
         }
         let mut options = MeshOptions::search(&s);
         options.max_elements = 3000;

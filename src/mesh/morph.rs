@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::Mesh;
-use super::domain::{dumbbell_half_width, transition_end_mm};
 use super::locator::extrusion_axis;
+use crate::specimen::dumbbell::{DumbbellDimension, Profile};
 use crate::specimen::{HoleAxis, HoleWall, Outline, Specimen};
 
 /// One geometric quantity of a specimen.
@@ -27,6 +27,12 @@ pub enum DesignVariable {
     BlockThickness,
     /// Extent of the block along z, mm.
     BlockWidth,
+    /// Width of the gauge of a dumb-bell of free gauge, mm.
+    GaugeWidth,
+    /// Length of its gauge between the arcs, mm.
+    GaugeLength,
+    /// Radius of its arcs, mm.
+    FilletRadius,
 }
 
 /// d(node position)/d(variable), dimensionless, per node of `mesh` (of `specimen`).
@@ -42,8 +48,9 @@ pub enum DesignVariable {
 /// zero. [`DesignVariable::HoleOther`] of a hole centred on the mirror plane gives zero: by symmetry it changes
 /// symmetric results (forces, integrals) in second order only. The same holds for [`DesignVariable::HoleAngle`].
 ///
-/// A dumb-bell keeps its standard outline: length moves its ends, width gives zero. An index of a hole that does not
-/// exist gives zero.
+/// Of a dumb-bell of free gauge, gauge, arcs and ends each stretch in themselves along x, and across it every section
+/// stretches with its width ([`Profile::rate`]). A dumb-bell of a standard keeps its outline: length moves its ends, its
+/// other dimensions give zero, as those of a gauge do in a block. An index of a hole that does not exist gives zero.
 pub fn shape_velocity(mesh: &Mesh, specimen: &Specimen, variable: DesignVariable) -> Vec<[f64; 3]> {
     let field = Field::new(mesh, specimen);
     mesh.nodes.iter().map(|&p| field.velocity(p, variable)).collect()
@@ -63,6 +70,8 @@ pub fn morphed(mesh: &Mesh, velocity: &[[f64; 3]], step: f64) -> Mesh {
 
 struct Field<'a> {
     specimen: &'a Specimen,
+    /// The side of a dumb-bell.
+    profile: Option<Profile>,
     walls: Vec<HoleWall>,
     half: [f64; 3],
     /// Coordinate index of the section's second direction and of the extrusion.
@@ -85,6 +94,7 @@ impl<'a> Field<'a> {
         let half = [0.5 * b.length_mm, 0.5 * b.thickness_mm, 0.5 * b.width_mm];
         Field {
             specimen,
+            profile: specimen.profile(),
             walls: specimen.holes.iter().map(|hole| hole.wall()).collect(),
             half,
             b_axis,
@@ -102,14 +112,9 @@ impl<'a> Field<'a> {
 
     /// Smooth minimum of the distances to the outline's sides: 0 on it.
     fn outline_distance(&self, p: [f64; 2]) -> f64 {
-        let sides = if self.specimen.outline == Outline::Iso37Type4 {
-            // Distances along the coordinates are enough: the weight only has to vanish on the outline.
-            let width = dumbbell_half_width(p[0]);
-            [self.half[0] - p[0], self.half[0] + p[0], width - p[1], width + p[1]]
-        } else {
-            let b = self.half[self.b_axis];
-            [self.half[0] - p[0], self.half[0] + p[0], b - p[1], b + p[1]]
-        };
+        // Distances along the coordinates are enough: the weight only has to vanish on the outline.
+        let b = self.profile.map_or(self.half[self.b_axis], |profile| profile.half_width_mm(p[0]));
+        let sides = [self.half[0] - p[0], self.half[0] + p[0], b - p[1], b + p[1]];
         smooth_minimum(sides.into_iter().map(|d| if d < self.tolerance { 0.0 } else { d }))
     }
 
@@ -130,9 +135,18 @@ impl<'a> Field<'a> {
                     self.add_wall_motion(&mut v, hole, p, HoleWall::motion_with_angle);
                 }
             }
-            DesignVariable::BlockLength => v[0] = self.outline_weight(p) * self.length_rate(p[0]),
+            DesignVariable::BlockLength => match self.profile {
+                Some(profile) => self.add_side_motion(&mut v, profile, p, DumbbellDimension::Length),
+                None => v[0] = self.outline_weight(p) * (0.5 * p[0] / self.half[0]),
+            },
             DesignVariable::BlockThickness => v[1] = self.block_rate(node, p, 1),
-            DesignVariable::BlockWidth => v[2] = self.block_rate(node, p, 2),
+            DesignVariable::BlockWidth => match self.profile {
+                Some(_) => self.add_gauge_motion(&mut v, p, DumbbellDimension::Width),
+                None => v[2] = self.block_rate(node, p, 2),
+            },
+            DesignVariable::GaugeWidth => self.add_gauge_motion(&mut v, p, DumbbellDimension::GaugeWidth),
+            DesignVariable::GaugeLength => self.add_gauge_motion(&mut v, p, DumbbellDimension::GaugeLength),
+            DesignVariable::FilletRadius => self.add_gauge_motion(&mut v, p, DumbbellDimension::FilletRadius),
         }
         v
     }
@@ -145,6 +159,21 @@ impl<'a> Field<'a> {
             v[0] = weight * along;
             v[self.b_axis] = weight * across;
         }
+    }
+
+    /// The motion of the sides of a dumb-bell of free gauge; a standard's does not change.
+    fn add_gauge_motion(&self, v: &mut [f64; 3], p: [f64; 2], dimension: DumbbellDimension) {
+        if let (Some(profile), Outline::Dumbbell(_)) = (self.profile, &self.specimen.outline) {
+            self.add_side_motion(v, profile, p, dimension);
+        }
+    }
+
+    /// The motion of a dumb-bell's sides, in proportion to the distance from the middle line, fading towards holes.
+    fn add_side_motion(&self, v: &mut [f64; 3], profile: Profile, p: [f64; 2], dimension: DumbbellDimension) {
+        let weight = self.outline_weight(p);
+        let [along, across] = profile.rate(p[0], dimension);
+        v[0] = weight * (p[0].signum() * along);
+        v[self.b_axis] = weight * (p[1] / profile.half_width_mm(p[0]) * across);
     }
 
     /// 1 at the hole's wall, 0 at the outline, the other walls and (for holes off it) the mirror line.
@@ -175,25 +204,9 @@ impl<'a> Field<'a> {
         if holes.is_infinite() { 1.0 } else { holes / (holes + self.outline_distance(p)) }
     }
 
-    fn length_rate(&self, x: f64) -> f64 {
-        if self.specimen.outline == Outline::Iso37Type4 {
-            // The narrow part and the arcs stay; the ends stretch.
-            let start = transition_end_mm();
-            0.5 * x.signum() * ((x.abs() - start) / (self.half[0] - start)).max(0.0)
-        } else {
-            0.5 * x / self.half[0]
-        }
-    }
-
     fn block_rate(&self, node: [f64; 3], p: [f64; 2], axis: usize) -> f64 {
         let affine = 0.5 * node[axis] / self.half[axis];
-        if axis == self.extrusion_axis {
-            affine
-        } else if self.specimen.outline == Outline::Iso37Type4 {
-            0.0
-        } else {
-            affine * self.outline_weight(p)
-        }
+        if axis == self.extrusion_axis { affine } else { affine * self.outline_weight(p) }
     }
 }
 
@@ -212,7 +225,9 @@ fn smooth_minimum(distances: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::test_specimens::{bar, changed, dumbbell, off_axis, solid, specimen, two_holes, width_holes};
+    use crate::mesh::test_specimens::{
+        bar, changed, dumbbell, free_dumbbell, off_axis, solid, specimen, two_holes, width_holes,
+    };
     use crate::mesh::{MeshOptions, mesh_specimen};
     use std::f64::consts::PI;
 
@@ -305,6 +320,55 @@ mod tests {
         let (_, rate) = volume_rate(&s, DesignVariable::HoleDiameter(1));
         let expected = -0.5 * PI * s.holes[1].diameter_mm * 0.5 * s.block.width_mm;
         assert!((rate - expected).abs() < 3e-4 * expected.abs());
+    }
+
+    /// The same of every dimension of a dumb-bell of free gauge, with and without a hole. Its sides follow to first
+    /// order: a step of 0.5 µm per mm leaves them far within the check's tolerance.
+    #[test]
+    fn a_free_gauge_moves_its_sides() {
+        use DesignVariable::*;
+        let mut holed = free_dumbbell();
+        holed.holes = bar().holes;
+        holed.holes[0].diameter_mm = 3.0;
+        for specimen in [free_dumbbell(), holed] {
+            let mesh = mesh_specimen(&specimen, &MeshOptions::standard(&specimen)).unwrap();
+            for variable in [BlockLength, BlockThickness, BlockWidth, GaugeWidth, GaugeLength, FilletRadius] {
+                let step = 5e-4;
+                let velocity = shape_velocity(&mesh, &specimen, variable);
+                for step in [step, -step] {
+                    let result = morphed(&mesh, &velocity, step).check(&changed(&specimen, variable, step));
+                    assert!(result.is_ok(), "{variable:?} of {}: {result:?}", specimen.name);
+                }
+                let volume = |step: f64| morphed(&mesh, &velocity, step).volume();
+                let rate = (volume(step) - volume(-step)) / (2.0 * step);
+                let closed = |step: f64| changed(&specimen, variable, step).volume_mm3();
+                // A quarter is meshed.
+                let expected = 0.25 * (closed(step) - closed(-step)) / (2.0 * step);
+                // Parabolas in place of arcs miss up to 1e-3 of the curved parts' share.
+                assert!((rate - expected).abs() < 1e-3 * expected.abs(), "{variable:?}: {rate} {expected}");
+            }
+        }
+        // Without a hole the moved mesh is, to first order, the mesh that the changed dumb-bell is given.
+        let free = free_dumbbell();
+        let options = MeshOptions::standard(&free);
+        let mesh = mesh_specimen(&free, &options).unwrap();
+        for variable in [BlockLength, BlockWidth, GaugeWidth, GaugeLength, FilletRadius] {
+            let velocity = shape_velocity(&mesh, &free, variable);
+            let farthest = |step: f64| {
+                let moved = morphed(&mesh, &velocity, step);
+                let meshed = mesh_specimen(&changed(&free, variable, step), &options).unwrap();
+                assert_eq!(moved.connectivity, meshed.connectivity);
+                let apart = moved.nodes.iter().flatten().zip(meshed.nodes.iter().flatten());
+                apart.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+            };
+            let [large, small] = [1e-2, 5e-3].map(farthest);
+            assert!(large < 1e-4 && (large < 1e-12 || large / small > 3.5), "{variable:?}: {large:e} {small:e}");
+        }
+        let standard = dumbbell();
+        let mesh = mesh_specimen(&standard, &MeshOptions::standard(&standard)).unwrap();
+        for variable in [GaugeWidth, GaugeLength, FilletRadius] {
+            assert!(shape_velocity(&mesh, &standard, variable).iter().flatten().all(|v| *v == 0.0));
+        }
     }
 
     #[test]

@@ -20,7 +20,7 @@ pub(super) fn quad_section(domain: &Domain, options: &MeshOptions) -> Result<Opt
     if domain.holes.is_empty() {
         return structured_section(domain, options).map(Some);
     }
-    if domain.is_dumbbell {
+    if domain.profile.is_some() {
         return Ok(None);
     }
     let area = domain.area();
@@ -78,15 +78,22 @@ fn styles(domain: &Domain, size: f64) -> Vec<Style> {
     weights.iter().flat_map(of_weight).collect()
 }
 
+/// How much shorter than in a dumb-bell whose ends are three times as wide as its gauge elements are made: at least
+/// where the ends are hardly wider, and at most where they are far wider.
+const LEAST_SHORTER: f64 = 0.75;
+const MOST_SHORTER: f64 = 2.0;
+
 /// Block or dumb-bell without holes.
 fn structured_section(domain: &Domain, options: &MeshOptions) -> Result<Section, MeshError> {
     let [a, b] = domain.half;
     let grading = domain.grading;
-    let along = if domain.is_dumbbell {
-        let [x0, x1, x2] = domain.arc_ends();
-        // The narrow part is a third as wide as the ends: its elements are made shorter.
-        let n = |length: f64, factor: f64| count(length * factor, options);
-        let end = line(x2, a, n(a - x2, 1.0)?, 1.0, grading.ends);
+    let along = if let Some(profile) = domain.profile {
+        let [x0, x1, x2] = profile.knots_mm();
+        // The narrow part's elements are narrow: they are made shorter. The factors are those of ends three times as
+        // wide as the gauge.
+        let shorter = (profile.widening() / 3.0).clamp(LEAST_SHORTER, MOST_SHORTER);
+        let n = |length: f64, factor: f64| count(length * factor * shorter, options);
+        let end = line(x2, a, count(a - x2, options)?, 1.0, grading.ends);
         let outer = line(x1, x2, n(x2 - x1, 1.2)?.max(2), 1.0, 1.0);
         let inner = line(x0, x1, n(x1 - x0, 1.4)?.max(2), 1.0, 1.0);
         let narrow = line(-x0, x0, 2 * n(x0, 1.4)?, 1.0, 1.0);
@@ -102,7 +109,7 @@ fn structured_section(domain: &Domain, options: &MeshOptions) -> Result<Section,
     };
     let lower = if domain.bottom < 0.0 { grading.sides } else { 1.0 };
     let width = b - domain.bottom;
-    let across_count = if domain.is_dumbbell { count(width, options)?.max(2) } else { count(width, options)? };
+    let across_count = if domain.profile.is_some() { count(width, options)?.max(2) } else { count(width, options)? };
     let across = line(domain.bottom / b, 1.0, across_count, lower, grading.sides);
     limit_cells((along.len() / 2) * (across.len() / 2), options)?;
     let mut builder = Builder::new(domain);

@@ -1,7 +1,7 @@
 //! Specimens and random numbers for the mesh tests.
 
 use super::DesignVariable;
-use crate::specimen::{Block, Hole, HoleAxis, Outline, Specimen, TestKind};
+use crate::specimen::{Block, Dumbbell, Hole, HoleAxis, Outline, Specimen, TestKind};
 
 /// A block with holes (first, second coordinate, diameter).
 pub(super) fn specimen(test: TestKind, extents: [f64; 3], axis: HoleAxis, holes: &[[f64; 3]]) -> Specimen {
@@ -50,6 +50,14 @@ pub(super) fn dumbbell() -> Specimen {
     dumbbell
 }
 
+/// A dumb-bell with a short gauge.
+pub(super) fn free_dumbbell() -> Specimen {
+    let mut free = specimen(TestKind::Uniaxial, [40.0, 4.0, 12.0], HoleAxis::Thickness, &[]);
+    let gauge = Dumbbell { gauge_width_mm: 6.0, gauge_length_mm: 8.0, fillet_radius_mm: 5.0 };
+    free.outline = Outline::Dumbbell(gauge);
+    free
+}
+
 /// SplitMix64: a fixed sequence per seed.
 pub(super) struct Random(u64);
 
@@ -87,6 +95,15 @@ pub(super) fn changed(specimen: &Specimen, variable: DesignVariable, step: f64) 
         DesignVariable::BlockLength => s.block.length_mm += step,
         DesignVariable::BlockThickness => s.block.thickness_mm += step,
         DesignVariable::BlockWidth => s.block.width_mm += step,
+        DesignVariable::GaugeWidth | DesignVariable::GaugeLength | DesignVariable::FilletRadius => {
+            if let Some(gauge) = s.outline.free_gauge_mut() {
+                match variable {
+                    DesignVariable::GaugeWidth => gauge.gauge_width_mm += step,
+                    DesignVariable::GaugeLength => gauge.gauge_length_mm += step,
+                    _ => gauge.fillet_radius_mm += step,
+                }
+            }
+        }
     }
     s
 }

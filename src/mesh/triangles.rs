@@ -32,7 +32,7 @@ enum Curve {
         from: f64,
         to: f64,
     },
-    /// The dumb-bell's outline b = ±half-width between two positions a.
+    /// A dumb-bell's side b = ±half-width between two positions a.
     Profile {
         upper: bool,
         from: f64,
@@ -46,9 +46,11 @@ impl Curve {
             Curve::Line(..) => true,
             Curve::Wall { .. } => false,
             Curve::Profile { from, to, .. } => {
-                let [start, _, end] = domain.arc_ends();
                 let middle = 0.5 * (from + to).abs();
-                middle < start || middle > end
+                domain.profile.is_none_or(|profile| {
+                    let [start, _, end] = profile.knots_mm();
+                    middle < start || middle > end
+                })
             }
         }
     }
@@ -203,12 +205,10 @@ fn boundary_loops(domain: &Domain) -> Vec<Vec<Curve>> {
         found.dedup_by(|x, y| (*x - *y).abs() < tolerance);
         found
     };
-    let knots = if domain.is_dumbbell {
-        let [x0, x1, x2] = domain.arc_ends();
+    let knots = domain.profile.map_or(vec![-a, a], |profile| {
+        let [x0, x1, x2] = profile.knots_mm();
         vec![-a, -x2, -x1, -x0, x0, x1, x2, a]
-    } else {
-        vec![-a, a]
-    };
+    });
     let with_ends = |ends: Vec<f64>| -> Vec<f64> {
         let mut all: Vec<f64> = knots.iter().copied().chain(ends).collect();
         all.sort_by(f64::total_cmp);
@@ -254,7 +254,7 @@ fn wall_curves(domain: &Domain, hole: usize, knots: &[f64]) -> Vec<Curve> {
 }
 
 fn side(domain: &Domain, upper: bool, from: f64, to: f64) -> Curve {
-    if domain.is_dumbbell {
+    if domain.profile.is_some() {
         Curve::Profile { upper, from, to }
     } else {
         let b = if upper { domain.half[1] } else { -domain.half[1] };

@@ -1,6 +1,6 @@
 //! Clearances between solids by parry3d, independent of the closed forms in `geometry`.
 
-use super::{LigamentKind, Outline, SectionEdge, Specimen};
+use super::{LigamentKind, SectionEdge, Specimen};
 use parry3d_f64::math::{Pose, Vector};
 use parry3d_f64::query;
 use parry3d_f64::shape::{Cuboid, Cylinder};
@@ -29,7 +29,7 @@ impl Specimen {
             }
             LigamentKind::HoleEdge(i, edge) => {
                 let is_end = matches!(edge, SectionEdge::MinusX | SectionEdge::PlusX);
-                if self.outline != Outline::Block && !is_end {
+                if self.outline.dumbbell().is_some() && !is_end {
                     return None;
                 }
                 let (place, hole) = cylinder_of(i)?;

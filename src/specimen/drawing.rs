@@ -7,7 +7,7 @@
 use super::drawing_labels::spread;
 use super::drawing_sheet::{Anchor, CHARACTER_WIDTH, Drawing, Layer, Shape, TEXT_HEIGHT, format_mm};
 use super::drawing_table::{ROW_HEIGHT, table_width};
-use super::{HoleAxis, Outline, Specimen, TestKind, dumbbell};
+use super::{HoleAxis, Outline, Specimen, TestKind};
 
 const MARGIN: f64 = 10.0;
 /// Width of the title, mm.
@@ -70,11 +70,11 @@ impl Drawing {
         let [hx, hy, hz] =
             [specimen.block.length_mm, specimen.block.thickness_mm, specimen.block.width_mm].map(|c| 0.5 * s * c);
         self.rectangle(Layer::Outline, [side[0] - hx, side[1] - hy], [side[0] + hx, side[1] + hy]);
-        if specimen.outline == Outline::Block {
+        let Some(profile) = specimen.profile() else {
             self.rectangle(Layer::Outline, [front[0] - hx, front[1] - hz], [front[0] + hx, front[1] + hz]);
             return;
-        }
-        let arcs = dumbbell::arcs();
+        };
+        let arcs = profile.arcs();
         let [narrow, settled] = [arcs[0].start_mm, arcs[1].end_mm];
         let at = |x: f64, z: f64| [front[0] + s * x, front[1] + s * z];
         for side in [-1.0, 1.0] {
@@ -92,14 +92,14 @@ impl Drawing {
                     // Each mirror reverses the sense: take the way round that is the shorter one.
                     let (from, to) = if (b - a).rem_euclid(360.0) < 180.0 { (a, b) } else { (b, a) };
                     let center = at(end * arc.center_mm[0], side * arc.center_mm[1]);
-                    self.push(Layer::Outline, Shape::Arc(center, s * dumbbell::TRANSITION_RADIUS_MM, from, to));
+                    self.push(Layer::Outline, Shape::Arc(center, s * profile.radius_mm(), from, to));
                 }
             }
         }
-        // The narrow portion's length, between the view and the overall dimension.
+        // The gauge's length, between the view and the overall dimension.
         let above = front[1] + hz + 5.0;
         let ends = [at(-narrow[0], narrow[1]), at(narrow[0], narrow[1])];
-        self.dimension_x([ends[0], ends[1]], above, format_mm(dumbbell::NARROW_LENGTH_MM));
+        self.dimension_x([ends[0], ends[1]], above, format_mm(2.0 * narrow[0]));
     }
 
     /// Ordinates from the centre lines: x below the view, the lateral coordinate at its right.
@@ -148,15 +148,7 @@ impl Drawing {
         self.dimension_y(front, [hx, hz], format_mm(specimen.block.width_mm));
         self.dimension_y(side, [hx, hy], format_mm(specimen.block.thickness_mm));
         let title_x = front[0] - hx;
-        let outline = match specimen.outline {
-            Outline::Block => String::new(),
-            Outline::Iso37Type4 => format!(
-                ", ISO 37 type 4: narrow portion {} wide, radii R{}",
-                format_mm(dumbbell::NARROW_WIDTH_MM),
-                format_mm(dumbbell::TRANSITION_RADIUS_MM)
-            ),
-        };
-        let front_title = format!("Front view (x, z){outline}");
+        let front_title = format!("Front view (x, z){}", outline_in_words(specimen.outline));
         self.text(Layer::Dimensions, [title_x, top + 20.0], TEXT_HEIGHT, Anchor::Start, false, front_title);
         let side_title = "Side view (x, y)".to_string();
         let at = [title_x, side[1] + hy + 4.5];
@@ -207,6 +199,18 @@ impl Drawing {
             y -= 4.6;
         }
     }
+}
+
+/// What of an outline the views' dimensions do not tell.
+fn outline_in_words(outline: Outline) -> String {
+    let kind = match outline {
+        Outline::Block => return String::new(),
+        Outline::Iso37Type4 => "ISO 37 type 4: narrow portion",
+        Outline::Dumbbell(_) => "dumb-bell: gauge",
+    };
+    let [width, radius] =
+        outline.dumbbell().map_or([0.0; 2], |d| [d.gauge_width_mm, d.fillet_radius_mm]).map(format_mm);
+    format!(", {kind} {width} wide, radii R{radius}")
 }
 
 /// How angles of holes count, where there are any.

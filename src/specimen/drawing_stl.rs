@@ -3,7 +3,7 @@
 //! The section is triangulated (constrained Delaunay, spade) without adding points, capped at both ends and
 //! walled along its boundary. Curves are chords within [`CHORD_ERROR_MM`] of the curve.
 
-use super::{HoleAxis, Outline, Specimen, dumbbell};
+use super::{HoleAxis, Specimen};
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -79,13 +79,13 @@ fn num_chords(radius: f64, angle: f64) -> usize {
 fn outline_points(specimen: &Specimen) -> Vec<[f64; 2]> {
     let [length, lateral] = specimen.section_size();
     let (x, b) = (0.5 * length, 0.5 * lateral);
-    match specimen.outline {
-        Outline::Block => vec![[-x, -b], [x, -b], [x, b], [-x, b]],
-        Outline::Iso37Type4 => {
-            // The quarter x > 0, z > 0 from the narrow part to the end.
+    match specimen.profile() {
+        None => vec![[-x, -b], [x, -b], [x, b], [-x, b]],
+        Some(profile) => {
+            // The quarter x > 0, z > 0 from the gauge to the end.
             let mut quarter = vec![];
-            for arc in dumbbell::arcs() {
-                let radius = dumbbell::TRANSITION_RADIUS_MM;
+            let (arcs, radius) = (profile.arcs(), profile.radius_mm());
+            for arc in arcs {
                 let chord = (arc.end_mm[0] - arc.start_mm[0]).hypot(arc.end_mm[1] - arc.start_mm[1]);
                 let angle = 2.0 * (0.5 * chord / radius).asin();
                 let n = num_chords(radius, angle);
@@ -97,7 +97,7 @@ fn outline_points(specimen: &Specimen) -> Vec<[f64; 2]> {
                     quarter.push([arc.center_mm[0] + radius * at.cos(), arc.center_mm[1] + radius * at.sin()]);
                 }
             }
-            quarter.push(dumbbell::arcs()[1].end_mm);
+            quarter.push(arcs[1].end_mm);
             quarter.push([x, b]);
             let mirrored = |sx: f64, sz: f64| quarter.iter().map(move |p| [sx * p[0], sz * p[1]]);
             let lower_right = mirrored(1.0, -1.0);

@@ -1,7 +1,7 @@
 //! What drives a specimen may have: in which order, and how far.
 
 use super::read_error::SpecimenError;
-use super::{Outline, Specimen, TestKind};
+use super::{Specimen, TestKind};
 use crate::field::FieldPath;
 
 /// Most drives.
@@ -62,8 +62,8 @@ impl Specimen {
 
     /// Elongation or slip at which the test reaches a nominal deformation, as a fraction of `drive_mm`: shear strain
     /// drive/thickness (of the thinnest sample), or stretch 1 + drive/length. For a dumb-bell the length is the one
-    /// over which the narrow portion's strain would give the whole elongation
-    /// ([`super::dumbbell::effective_length_mm`]).
+    /// over which the gauge's strain would give the whole elongation
+    /// ([`super::dumbbell::Profile::effective_length_mm`]).
     pub fn nominal_deformation(&self, drive_mm: f64) -> f64 {
         match self.test {
             TestKind::DoubleLapShear => drive_mm / self.thinnest_mm(),
@@ -104,10 +104,7 @@ impl Specimen {
     }
 
     fn nominal_length_mm(&self) -> f64 {
-        match self.outline {
-            Outline::Block => self.block.length_mm,
-            Outline::Iso37Type4 => super::dumbbell::effective_length_mm(),
-        }
+        self.profile().map_or(self.block.length_mm, |profile| profile.effective_length_mm())
     }
 
     pub(super) fn check_drives(&self, problems: &mut Vec<SpecimenError>) {
@@ -133,7 +130,7 @@ impl Specimen {
         } else if self.test == TestKind::Uniaxial && !self.is_driven_along_x() {
             problems.push(SpecimenError::AngleOfPull { value_deg });
         }
-        if self.outline == Outline::Iso37Type4 && self.is_compressed() {
+        if self.outline.dumbbell().is_some() && self.is_compressed() {
             problems.push(SpecimenError::DumbbellCompressed { drive_mm: self.largest_drive_mm() });
         }
     }

@@ -6,7 +6,7 @@ use super::read::SCHEMA;
 #[cfg(feature = "schema")]
 use super::read::{
     MAX_DIAMETER_MM, MAX_HOLES, MAX_NAME_LENGTH, MAX_OTHER_SAMPLES, MAX_SAMPLES_IN_PARALLEL, MAX_SIZE_MM,
-    MIN_DIAMETER_MM, MIN_SIZE_MM,
+    MIN_DIAMETER_MM, MIN_FILLET_MM, MIN_SIZE_MM,
 };
 use super::{Block, Hole, Outline, Sample, Specimen, TestKind};
 use crate::field::file_tag;
@@ -24,6 +24,8 @@ schema_type! {
     pub(super) ExtentMm = number_within(MIN_SIZE_MM..=MAX_SIZE_MM);
     /// The diameter of a hole, mm.
     pub(super) DiameterMm = number_within(MIN_DIAMETER_MM..=MAX_DIAMETER_MM);
+    /// The radius of a dumb-bell's arcs, mm.
+    pub(super) FilletMm = number_within(MIN_FILLET_MM..=MAX_SIZE_MM);
     /// A free name.
     pub(crate) Name = text(MAX_NAME_LENGTH);
     /// Holes, all with the same axis.

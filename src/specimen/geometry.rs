@@ -1,8 +1,9 @@
 //! Closed forms of a specimen's geometry: section, outline, containment, ligaments, mirrors, volume.
 
+use super::dumbbell::Profile;
 use super::hole_gap::largest_between;
 use super::ligament::{Ligament, LigamentKind, SectionEdge};
-use super::{HoleAxis, HoleWall, Outline, Specimen, TestKind, dumbbell};
+use super::{HoleAxis, HoleWall, Specimen, TestKind};
 use std::f64::consts::TAU;
 
 /// How far a hole may lie from its partner's mirror image, in place and in diameter, for the specimen to count
@@ -12,12 +13,14 @@ pub const MIRROR_TOLERANCE_MM: f64 = 1e-6;
 const WALL_POINTS: usize = 128;
 
 impl Specimen {
-    /// Half the extent along z at `x_mm`, mm: width/2 of a block, the standard's profile of a dumb-bell.
+    /// The side of a dumb-bell; `None` of a block.
+    pub fn profile(&self) -> Option<Profile> {
+        self.outline.dumbbell().map(|dumbbell| Profile::new(&dumbbell, &self.block))
+    }
+
+    /// Half the extent along z at `x_mm`, mm: width/2 of a block, the profile of a dumb-bell.
     pub fn half_width_mm(&self, x_mm: f64) -> f64 {
-        match self.outline {
-            Outline::Block => 0.5 * self.block.width_mm,
-            Outline::Iso37Type4 => dumbbell::half_width_mm(x_mm),
-        }
+        self.profile().map_or(0.5 * self.block.width_mm, |profile| profile.half_width_mm(x_mm))
     }
 
     /// Whether a reference position (x, y, z), mm, lies in the material, boundary included.
@@ -94,13 +97,8 @@ impl Specimen {
 
     /// Volume of one sample (of the first kind), mm³: area of the outline less the holes', times the extrusion.
     pub fn volume_mm3(&self) -> f64 {
-        let outline_area = match self.outline {
-            Outline::Block => {
-                let [length, lateral] = self.section_size();
-                length * lateral
-            }
-            Outline::Iso37Type4 => dumbbell::area_mm2(),
-        };
+        let [length, lateral] = self.section_size();
+        let outline_area = self.profile().map_or(length * lateral, |profile| profile.area_mm2());
         let hole_area: f64 = self.holes.iter().map(|hole| hole.wall().area_mm2()).sum();
         (outline_area - hole_area) * self.extrusion_mm()
     }
@@ -127,7 +125,8 @@ impl Specimen {
     /// nearest of many points of the wall is sought.
     fn wall_to_edge(&self, wall: &HoleWall, edge: SectionEdge) -> (f64, [f64; 2]) {
         let (distance, direction) = self.distance_to_edge(wall.center_mm(), edge);
-        let is_straight = self.outline == Outline::Block || matches!(edge, SectionEdge::MinusX | SectionEdge::PlusX);
+        let is_end = matches!(edge, SectionEdge::MinusX | SectionEdge::PlusX);
+        let is_straight = is_end || self.outline.dumbbell().is_none();
         if wall.is_circle() || is_straight {
             return (distance - wall.reach_mm(direction), direction);
         }
@@ -142,14 +141,14 @@ impl Specimen {
     /// Signed distance (positive inside) from a point of the section to a side, mm, and the unit vector to it.
     fn distance_to_edge(&self, point: [f64; 2], edge: SectionEdge) -> (f64, [f64; 2]) {
         let [length, lateral] = self.section_size();
-        match (edge, self.outline) {
+        match (edge, self.profile()) {
             (SectionEdge::MinusX, _) => (0.5 * length + point[0], [-1.0, 0.0]),
             (SectionEdge::PlusX, _) => (0.5 * length - point[0], [1.0, 0.0]),
-            (SectionEdge::MinusLateral, Outline::Block) => (0.5 * lateral + point[1], [0.0, -1.0]),
-            (SectionEdge::PlusLateral, Outline::Block) => (0.5 * lateral - point[1], [0.0, 1.0]),
-            (SectionEdge::PlusLateral, Outline::Iso37Type4) => dumbbell::distance_to_upper_side(point),
-            (SectionEdge::MinusLateral, Outline::Iso37Type4) => {
-                let (distance, direction) = dumbbell::distance_to_upper_side([point[0], -point[1]]);
+            (SectionEdge::MinusLateral, None) => (0.5 * lateral + point[1], [0.0, -1.0]),
+            (SectionEdge::PlusLateral, None) => (0.5 * lateral - point[1], [0.0, 1.0]),
+            (SectionEdge::PlusLateral, Some(profile)) => profile.distance_to_upper_side(point),
+            (SectionEdge::MinusLateral, Some(profile)) => {
+                let (distance, direction) = profile.distance_to_upper_side([point[0], -point[1]]);
                 (distance, [direction[0], -direction[1]])
             }
         }

@@ -3,7 +3,7 @@
 //! Frame (reference): origin at the centre of the undeformed block; x along its length (the pull direction),
 //! y along its thickness, z along its width. Lengths in mm.
 //!
-//! What is supported: a plain block or one standard dumb-bell, with holes that all share one axis: circles, ellipses
+//! What is supported: a plain block or a dumb-bell ([`Outline`]), with holes that all share one axis: circles, ellipses
 //! and slots ([`HoleShape`]); in a double-lap test further blocks beside it ([`Specimen::samples`]). The mesh is a
 //! section extruded along that axis, so holes of two directions in one specimen are refused. Parsing and validation:
 //! [`Specimen::from_json`]. Limits of what can be made: [`ManufacturingLimits`]. Drawings for the mould maker:
@@ -38,7 +38,7 @@ mod read;
 mod read_error;
 mod samples;
 #[cfg(test)]
-mod sampling;
+pub(crate) mod sampling;
 #[cfg(test)]
 mod tests;
 
@@ -53,6 +53,7 @@ pub use drives::{
     MAX_DRIVE_ANGLE_DEG, MAX_DRIVES, MAX_NOMINAL_STRETCH, MAX_SHEAR_STRAIN, MIN_NOMINAL_STRETCH, farthest_from_zero,
     leads_on,
 };
+pub use dumbbell::Dumbbell;
 pub use geometry::MIRROR_TOLERANCE_MM;
 pub use hole_shape::{HoleKind, HoleShape, MAX_HOLE_ANGLE_DEG, MAX_HOLE_ASPECT};
 pub use hole_wall::HoleWall;
@@ -155,7 +156,7 @@ impl Hole {
 }
 
 /// The outline in the (x, z) section, extruded along the thickness.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = OutlineSchema))]
 pub enum Outline {
     /// The plain block.
@@ -165,6 +166,9 @@ pub enum Outline {
     /// ISO 37 type 4 dumb-bell.
     #[serde(rename = "iso37_type4")]
     Iso37Type4,
+    /// A dumb-bell with a gauge of its own.
+    #[serde(rename = "dumbbell")]
+    Dumbbell(Dumbbell),
 }
 
 impl Outline {
@@ -173,6 +177,24 @@ impl Outline {
         match self {
             Outline::Block => "block",
             Outline::Iso37Type4 => "iso37_type4",
+            Outline::Dumbbell(_) => "dumbbell",
+        }
+    }
+
+    /// The gauge and arcs of a dumb-bell; `None` of a block.
+    pub fn dumbbell(&self) -> Option<Dumbbell> {
+        match self {
+            Outline::Block => None,
+            Outline::Iso37Type4 => Some(dumbbell::ISO37_TYPE4),
+            Outline::Dumbbell(dumbbell) => Some(*dumbbell),
+        }
+    }
+
+    /// The gauge of a dumb-bell of free gauge, to be changed; a standard's and a block have none.
+    pub fn free_gauge_mut(&mut self) -> Option<&mut Dumbbell> {
+        match self {
+            Outline::Dumbbell(dumbbell) => Some(dumbbell),
+            Outline::Block | Outline::Iso37Type4 => None,
         }
     }
 }

@@ -1,9 +1,10 @@
 //! Reading, writing and validating a specimen (`specimen/1`).
 
+use super::dumbbell::{DumbbellDimension, ISO37_LENGTH_MM, ISO37_THICKNESS_MM, ISO37_WIDTH_MM};
 use super::json::{JsonProblem, schema_of};
 use super::{
-    Block, Hole, HoleAxis, HoleShape, Ligament, LigamentKind, MAX_HOLE_ANGLE_DEG, MAX_HOLE_ASPECT, Outline, Specimen,
-    SpecimenError, TestKind, dumbbell,
+    Block, Dumbbell, Hole, HoleAxis, HoleShape, Ligament, LigamentKind, MAX_HOLE_ANGLE_DEG, MAX_HOLE_ASPECT, Outline,
+    Specimen, SpecimenError, TestKind,
 };
 use crate::field::{FieldError, FieldPath};
 
@@ -17,6 +18,8 @@ pub const MAX_SIZE_MM: f64 = 1000.0;
 pub const MIN_DIAMETER_MM: f64 = 0.1;
 /// Largest diameter of a hole, mm.
 pub const MAX_DIAMETER_MM: f64 = MAX_SIZE_MM;
+/// Smallest radius of a dumb-bell's arcs, mm.
+pub const MIN_FILLET_MM: f64 = 0.1;
 /// Most holes.
 pub const MAX_HOLES: usize = 64;
 /// Most samples that share a load cell.
@@ -134,21 +137,46 @@ impl Specimen {
     }
 
     fn check_outline(&self, problems: &mut Vec<SpecimenError>) {
-        if self.outline == Outline::Block {
-            return;
+        match &self.outline {
+            Outline::Block => return,
+            Outline::Iso37Type4 => {
+                let standards_mm = [ISO37_LENGTH_MM, ISO37_THICKNESS_MM, ISO37_WIDTH_MM];
+                for ((name, value_mm), standard_mm) in self.extents().into_iter().zip(standards_mm) {
+                    if (value_mm - standard_mm).abs() > STANDARD_TOLERANCE_MM {
+                        let field = FieldPath::of("block").name(name);
+                        problems.push(SpecimenError::NotTheStandardsBlock { field, value_mm, standard_mm });
+                    }
+                }
+            }
+            Outline::Dumbbell(dumbbell) => self.check_dumbbell(dumbbell, problems),
         }
         if self.test == TestKind::DoubleLapShear {
-            problems.push(SpecimenError::DumbbellInShear);
-        }
-        let standards_mm = [dumbbell::LENGTH_MM, dumbbell::THICKNESS_MM, dumbbell::END_WIDTH_MM];
-        for ((name, value_mm), standard_mm) in self.extents().into_iter().zip(standards_mm) {
-            if (value_mm - standard_mm).abs() > STANDARD_TOLERANCE_MM {
-                let field = FieldPath::of("block").name(name);
-                problems.push(SpecimenError::NotTheStandardsBlock { field, value_mm, standard_mm });
-            }
+            problems.push(SpecimenError::DumbbellInShear { outline: self.outline.name() });
         }
         if let Some(hole) = self.holes.iter().position(|hole| hole.axis == HoleAxis::Width) {
             problems.push(SpecimenError::DumbbellHoleAlongWidth { hole });
+        }
+    }
+
+    /// Each dimension on its own, and whether they go together and with the block.
+    fn check_dumbbell(&self, dumbbell: &Dumbbell, problems: &mut Vec<SpecimenError>) {
+        use DumbbellDimension as D;
+        let num_before = problems.len();
+        for (dimension, value_mm, min_mm) in [
+            (D::GaugeWidth, dumbbell.gauge_width_mm, MIN_SIZE_MM),
+            (D::GaugeLength, dumbbell.gauge_length_mm, MIN_SIZE_MM),
+            (D::FilletRadius, dumbbell.fillet_radius_mm, MIN_FILLET_MM),
+        ] {
+            problems.extend(check_size(|| path_of(dimension), value_mm, min_mm, MAX_SIZE_MM));
+        }
+        let has_block = self.extents().iter().all(|(_, extent_mm)| extent_mm.is_finite() && *extent_mm > 0.0);
+        // How they go together means something only where each of them does.
+        if problems.len() == num_before && has_block {
+            problems.extend(dumbbell.misfits(&self.block).into_iter().map(|misfit| {
+                let field = path_of(misfit.dimension);
+                let max_mm = misfit.max_mm.min(MAX_SIZE_MM);
+                SpecimenError::DumbbellMisfit { field, value_mm: misfit.value_mm, min_mm: misfit.min_mm, max_mm }
+            }));
         }
     }
 
@@ -198,6 +226,16 @@ impl Specimen {
             (length_mm < limit_mm).then_some(SpecimenError::LigamentTooThin { between, length_mm, limit_mm })
         };
         self.ligaments().into_iter().filter_map(check).collect()
+    }
+}
+
+/// Where a dimension of a dumb-bell stands in a specimen.
+fn path_of(dimension: DumbbellDimension) -> FieldPath {
+    match dimension {
+        DumbbellDimension::GaugeWidth | DumbbellDimension::GaugeLength | DumbbellDimension::FilletRadius => {
+            FieldPath::of("outline").name("dumbbell").name(dimension.name())
+        }
+        DumbbellDimension::Width | DumbbellDimension::Length => FieldPath::of("block").name(dimension.name()),
     }
 }
 

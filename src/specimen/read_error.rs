@@ -1,6 +1,6 @@
 //! What can be wrong with a specimen.
 
-use super::{HoleAxis, JsonProblem, LigamentKind, Outline};
+use super::{HoleAxis, JsonProblem, LigamentKind};
 use crate::field::{FieldError, FieldPath};
 
 /// Why a specimen is refused. Every variant carries the value, the limit and what to change.
@@ -225,12 +225,29 @@ pub enum SpecimenError {
         /// The standard's, mm.
         standard_mm: f64,
     },
+    /// A dimension of a dumb-bell does not go with its others.
+    #[error(
+        "{field} is {value_mm} mm; with the other dimensions of the dumb-bell it must be from {min_mm:.4} to {max_mm:.4} mm"
+    )]
+    DumbbellMisfit {
+        /// Path of the field.
+        field: FieldPath,
+        /// Its value, mm.
+        value_mm: f64,
+        /// The smallest that goes with the others, mm.
+        min_mm: f64,
+        /// The largest, mm.
+        max_mm: f64,
+    },
     /// A dumb-bell cannot be bonded between plates.
-    #[error("outline iso37_type4 is tested in uniaxial tension only; set test to uniaxial, or leave out the outline")]
-    DumbbellInShear,
+    #[error("outline {outline} is tested in uniaxial tension only; set test to uniaxial, or leave out the outline")]
+    DumbbellInShear {
+        /// Its outline's name.
+        outline: &'static str,
+    },
     /// A dumb-bell's section is (x, z), so its holes run along the thickness.
     #[error(
-        "holes[{hole}] runs along the width; in outline iso37_type4 holes must run along the thickness, because the mesh is extruded along it"
+        "holes[{hole}] runs along the width; in a dumb-bell holes must run along the thickness, because the mesh is extruded along it"
     )]
     DumbbellHoleAlongWidth {
         /// Which hole.
@@ -323,7 +340,11 @@ impl SpecimenError {
                 FieldError::new(field.pointer(), value_mm, format!("{standard_mm} mm, as the standard has it"))
                     .remedy("set it, or leave out the outline")
             }
-            E::DumbbellInShear => FieldError::new("/outline", Outline::Iso37Type4.name(), "block in a shear test")
+            E::DumbbellMisfit { field, value_mm, min_mm, max_mm } => {
+                FieldError::new(field.pointer(), value_mm, format!("from {min_mm:.4} to {max_mm:.4} mm"))
+                    .remedy("gauge, arcs and straight ends must have room in the block: change it, or the others")
+            }
+            E::DumbbellInShear { outline } => FieldError::new("/outline", outline, "block in a shear test")
                 .remedy("set test to uniaxial, or leave out the outline"),
             E::DumbbellHoleAlongWidth { hole } => {
                 let pointer = of_hole(*hole).name("axis").pointer();

@@ -1,6 +1,7 @@
 //! Random specimens for tests.
 
-use super::{Block, Hole, HoleAxis, HoleKind, HoleShape, Outline, Specimen, TestKind, dumbbell};
+use super::dumbbell::{ISO37_LENGTH_MM, ISO37_THICKNESS_MM, ISO37_WIDTH_MM};
+use super::{Block, Dumbbell, Hole, HoleAxis, HoleKind, HoleShape, Outline, Specimen, TestKind};
 use proptest::prelude::*;
 
 /// Any arrangement of up to seven holes in a block, valid or not.
@@ -48,21 +49,45 @@ pub(crate) fn valid_specimen() -> impl Strategy<Value = Specimen> {
     })
 }
 
-/// A dumb-bell with one hole that may lie anywhere.
+/// A dumb-bell, the standard's or one with a gauge of its own, with one hole that may lie anywhere.
 pub(crate) fn dumbbell_with_hole() -> impl Strategy<Value = Specimen> {
-    (-17.0..17.0, -2.5..2.5, 0.1..1.5).prop_map(|(x, z, diameter_mm): (f64, f64, f64)| Specimen {
-        name: "dumb-bell".into(),
-        test: TestKind::Uniaxial,
-        block: Block {
-            length_mm: dumbbell::LENGTH_MM,
-            thickness_mm: dumbbell::THICKNESS_MM,
-            width_mm: dumbbell::END_WIDTH_MM,
+    (free_dumbbell(), any::<bool>(), -0.5..0.5, -0.4..0.4, 0.02..0.25).prop_map(
+        |(free, is_standard, x, z, diameter): (Specimen, bool, f64, f64, f64)| {
+            let standard =
+                Block { length_mm: ISO37_LENGTH_MM, thickness_mm: ISO37_THICKNESS_MM, width_mm: ISO37_WIDTH_MM };
+            let (block, outline) =
+                if is_standard { (standard, Outline::Iso37Type4) } else { (free.block, free.outline) };
+            let center_mm = [x * block.length_mm, z * block.width_mm];
+            let diameter_mm = (diameter * block.width_mm).max(0.1);
+            let holes = vec![Hole::circle(HoleAxis::Thickness, center_mm, diameter_mm)];
+            Specimen { block, outline, holes, ..free }
         },
-        outline: Outline::Iso37Type4,
-        holes: vec![Hole::circle(HoleAxis::Thickness, [x, z], diameter_mm)],
-        drive_mm: vec![5.0],
-        drive_angle_deg: 0.0,
-        samples_in_parallel: 1,
-        other_samples: Vec::new(),
+    )
+}
+
+/// Any dumb-bell that can be drawn, without holes.
+pub(crate) fn free_dumbbell() -> impl Strategy<Value = Specimen> {
+    let sizes = (4.0..30.0, 1.0..8.0, 0.0..1.0, 0.0..1.0);
+    (sizes, 0.0..1.0, 0.0..1.0).prop_map(|((width_mm, thickness_mm, width, radius), gauge, tabs)| {
+        let gauge_width_mm = (0.13_f64 + 0.84 * width) * width_mm;
+        let steepest_mm: f64 = 0.5 * (width_mm - gauge_width_mm);
+        let fillet_radius_mm = f64::max(steepest_mm * (1.0 + 6.0 * radius * radius), 0.1);
+        let gauge_length_mm = 0.2 + 0.1 * gauge_width_mm + 2.0_f64 * gauge * width_mm;
+        let dumbbell = Dumbbell { gauge_width_mm, gauge_length_mm, fillet_radius_mm };
+        let mut specimen = Specimen {
+            name: "dumb-bell".into(),
+            test: TestKind::Uniaxial,
+            block: Block { length_mm: 1.0, thickness_mm, width_mm },
+            outline: Outline::Dumbbell(dumbbell),
+            holes: Vec::new(),
+            drive_mm: vec![1.0],
+            drive_angle_deg: 0.0,
+            samples_in_parallel: 1,
+            other_samples: Vec::new(),
+        };
+        // The shortest block that it fits in, or one with longer ends.
+        let shortest_mm = dumbbell.misfits(&specimen.block).iter().map(|m| m.min_mm).fold(0.0, f64::max);
+        specimen.block.length_mm = shortest_mm.max(1.0) + 2.0 * tabs * width_mm;
+        specimen
     })
 }

@@ -110,7 +110,7 @@ fn refuses_bad_dumbbells() {
     let wide = refused(&|s| s.block.width_mm = 7.0);
     assert!(matches!(wide, E::NotTheStandardsBlock { .. }));
     assert_eq!(wide.field_error().pointer, "/block/width_mm");
-    assert!(matches!(refused(&|s| s.test = TestKind::DoubleLapShear), E::DumbbellInShear));
+    assert!(matches!(refused(&|s| s.test = TestKind::DoubleLapShear), E::DumbbellInShear { .. }));
     let hole = |axis, x, z, d| Hole::circle(axis, [x, z], d);
     assert!(matches!(
         refused(&|s| s.holes = vec![hole(HoleAxis::Width, 0.0, 0.0, 1.0)]),
@@ -121,6 +121,65 @@ fn refuses_bad_dumbbells() {
     let mut valid = dumbbell.clone();
     valid.holes = vec![hole(HoleAxis::Thickness, 14.0, 0.0, 3.0)];
     assert_eq!(valid.validate(), Ok(()));
+}
+
+#[test]
+fn a_dumbbell_has_a_gauge_of_its_own() {
+    use SpecimenError as E;
+    let text = r#"{ "schema": "specimen/1", "name": "necked", "test": "uniaxial",
+        "block": { "length_mm": 40.0, "thickness_mm": 4.0, "width_mm": 12.0 },
+        "outline": { "dumbbell": { "gauge_width_mm": 6.0, "gauge_length_mm": 8.0, "fillet_radius_mm": 5.0 } },
+        "drive_mm": [4.0] }"#;
+    let specimen = Specimen::from_json(text).unwrap();
+    assert_eq!(Specimen::from_json(&specimen.to_json()), Ok(specimen.clone()));
+    assert_eq!(specimen.half_width_mm(0.0), 3.0);
+    assert!(specimen.contains([0.0, 0.0, 2.9]) && !specimen.contains([0.0, 0.0, 3.1]));
+    assert!(specimen.is_mirror_y() && specimen.is_mirror_z() && specimen.is_geometry_mirror_x());
+    let unknown = text.replace("gauge_width_mm", "neck_mm");
+    let Err(E::Json(problem)) = Specimen::from_json(&unknown) else { panic!("an unknown field is read") };
+    assert_eq!(problem.field, "outline.dumbbell.neck_mm");
+    let pointers = |change: &dyn Fn(&mut Specimen)| {
+        let mut changed = specimen.clone();
+        change(&mut changed);
+        changed.field_errors().into_iter().map(|e| e.pointer).collect::<Vec<_>>()
+    };
+    let gauge = |change: fn(&mut Dumbbell)| {
+        pointers(&|s| {
+            if let Some(gauge) = s.outline.free_gauge_mut() {
+                change(gauge);
+            }
+        })
+    };
+    assert_eq!(gauge(|d| d.gauge_width_mm = 11.95), ["/outline/dumbbell/gauge_width_mm"]);
+    assert_eq!(gauge(|d| d.gauge_length_mm = f64::NAN), ["/outline/dumbbell/gauge_length_mm"]);
+    assert_eq!(gauge(|d| d.fillet_radius_mm = 2.0), ["/outline/dumbbell/fillet_radius_mm"]);
+    assert_eq!(pointers(&|s| s.block.length_mm = 20.0), ["/block/length_mm"]);
+    assert_eq!(pointers(&|s| s.test = TestKind::DoubleLapShear), ["/outline"]);
+    assert_eq!(pointers(&|s| s.drive_mm = vec![-1.0]), ["/drive_mm"]);
+}
+
+/// The standard's dumb-bell is one of free gauge: the same sides, volume and drives, under another name.
+#[test]
+fn the_standards_dumbbell_is_a_case_of_the_free_one() {
+    let standard = shipped("iso37-type4.json");
+    let free = Specimen { outline: Outline::Dumbbell(super::dumbbell::ISO37_TYPE4), ..standard.clone() };
+    assert_eq!(free.validate(), Ok(()));
+    assert_eq!((free.profile(), free.volume_mm3()), (standard.profile(), standard.volume_mm3()));
+    assert_eq!(free.drive_limit_mm(), standard.drive_limit_mm());
+    assert_ne!(free.to_json(), standard.to_json());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn dumbbells_that_can_be_drawn_are_valid(specimen in super::sampling::free_dumbbell()) {
+        prop_assert_eq!(specimen.validate(), Ok(()));
+        prop_assert_eq!(Specimen::from_json(&specimen.to_json()), Ok(specimen.clone()));
+        // Narrower than its block, by what its volume says.
+        let block = specimen.block.length_mm * specimen.block.thickness_mm * specimen.block.width_mm;
+        prop_assert!(specimen.volume_mm3() < block && specimen.volume_mm3() > 0.0);
+    }
 }
 
 #[test]

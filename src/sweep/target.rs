@@ -20,6 +20,9 @@ enum Place {
     Length,
     Thickness,
     Width,
+    GaugeWidth,
+    GaugeLength,
+    FilletRadius,
     HoleX(usize),
     HoleOther(usize),
     HoleDiameter(usize),
@@ -35,7 +38,8 @@ enum Place {
 }
 
 impl Target {
-    /// Reads `drive_mm`, `block.length_mm`, `block.thickness_mm`, `block.width_mm`, `holes[i].x_mm`,
+    /// Reads `drive_mm`, `block.length_mm`, `block.thickness_mm`, `block.width_mm`, `outline.dumbbell.gauge_width_mm`,
+    /// `outline.dumbbell.gauge_length_mm`, `outline.dumbbell.fillet_radius_mm`, `holes[i].x_mm`,
     /// `holes[i].other_mm` (z of a hole along the thickness, y of one along the width), `holes[i].diameter_mm`,
     /// `holes[i].length_mm` and `holes[i].angle_deg` (of a hole with an outline of its own), `material.bulk_kpa`,
     /// `material.mu_1_kpa`, `material.alpha_1` (of a law `material.c_1_kpa`, `material.mu_kpa`, `material.j_m`,
@@ -52,6 +56,9 @@ impl Target {
             "block.length_mm" => Place::Length,
             "block.thickness_mm" => Place::Thickness,
             "block.width_mm" => Place::Width,
+            "outline.dumbbell.gauge_width_mm" => Place::GaugeWidth,
+            "outline.dumbbell.gauge_length_mm" => Place::GaugeLength,
+            "outline.dumbbell.fillet_radius_mm" => Place::FilletRadius,
             "material.bulk_kpa" => Place::Bulk,
             "scan.force_sd_n" => Place::ForceSd,
             "material.mu_kpa" => Place::Law(LawParameter::Modulus),
@@ -123,7 +130,7 @@ impl Target {
         if self.is_negated { -value } else { value }
     }
 
-    /// Sets `value`; false where there is no such hole, outline or term.
+    /// Sets `value`; false where there is no such hole, outline, gauge or term.
     pub fn set(&self, value: f64, specimen: &mut Specimen, material: &mut Ogden, scan: &mut ScanSettings) -> bool {
         let value = self.signed(value);
         let slot = match self.place {
@@ -139,6 +146,9 @@ impl Target {
             Place::Length => Some(&mut specimen.block.length_mm),
             Place::Thickness => Some(&mut specimen.block.thickness_mm),
             Place::Width => Some(&mut specimen.block.width_mm),
+            Place::GaugeWidth => specimen.outline.free_gauge_mut().map(|gauge| &mut gauge.gauge_width_mm),
+            Place::GaugeLength => specimen.outline.free_gauge_mut().map(|gauge| &mut gauge.gauge_length_mm),
+            Place::FilletRadius => specimen.outline.free_gauge_mut().map(|gauge| &mut gauge.fillet_radius_mm),
             Place::HoleX(i) => specimen.holes.get_mut(i).map(|h| &mut h.center_mm[0]),
             Place::HoleOther(i) => specimen.holes.get_mut(i).map(|h| &mut h.center_mm[1]),
             Place::HoleDiameter(i) => specimen.holes.get_mut(i).map(|h| &mut h.diameter_mm),

@@ -75,6 +75,11 @@ pub fn bar() -> Specimen {
     specimen(TestKind::Uniaxial, [40.0, 4.0, 12.0], HoleAxis::Thickness, &[[0.0, 0.0, 4.0]])
 }
 
+/// A dumb-bell with a gauge of its own.
+pub fn short_dumbbell() -> Specimen {
+    Specimen::from_json(include_str!("../../geometries/short-dumbbell.json")).unwrap()
+}
+
 /// Model of a specimen with elements `factor` times the standard size.
 pub fn model(specimen: &Specimen, factor: f64) -> ForwardModel {
     let mesh = mesh_specimen(specimen, &MeshOptions::scaled(specimen, factor)).unwrap();

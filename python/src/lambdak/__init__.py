@@ -62,7 +62,7 @@ from ._results import (
     Solution,
     SolveStep,
 )
-from ._specimen import Hole, HoleShape, Law, Material, Sample, ScanSettings, Specimen, Term
+from ._specimen import Dumbbell, Hole, HoleShape, Law, Material, Sample, ScanSettings, Specimen, Term
 
 try:
     __version__ = version("lambdak")
@@ -80,6 +80,7 @@ __all__ = [
     "DetectableSize",
     "Diagnoses",
     "Diagnosis",
+    "Dumbbell",
     "Estimate",
     "Evaluation",
     "EvaluationStep",

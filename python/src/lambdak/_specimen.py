@@ -30,6 +30,8 @@ _CHECKS: Dict[str, Tuple[str, Dict[str, Any]]] = {
 
 # Extents of a block.
 _EXTENTS = ("length_mm", "thickness_mm", "width_mm")
+# Dimensions of a dumb-bell of free gauge.
+_GAUGE = ("gauge_width_mm", "gauge_length_mm", "fillet_radius_mm")
 
 
 def _check(part: str, value: Dict[str, Any]) -> None:
@@ -107,6 +109,33 @@ class Hole:
 
 
 @dataclass(frozen=True)
+class Dumbbell:
+    """The outline of a dumb-bell of free gauge: the specimen's length and width are those of the whole.
+
+    The gauge is joined to the ends by two arcs of `fillet_radius_mm` each, the first tangent to the gauge, the second
+    to the end.
+    """
+
+    gauge_width_mm: float
+    gauge_length_mm: float
+    fillet_radius_mm: float
+
+    def __post_init__(self) -> None:
+        for name in _GAUGE:
+            object.__setattr__(self, name, plain(getattr(self, name)))
+
+    def to_dict(self) -> Dict[str, Any]:
+        """As `specimen/1` holds it."""
+        return {"dumbbell": {name: getattr(self, name) for name in _GAUGE}}
+
+    @classmethod
+    def _of_program(cls, found: Dict[str, Any]) -> "Dumbbell":
+        only_known(found, ("dumbbell",), "the outline")
+        only_known(found["dumbbell"], _GAUGE, "the outline's dumb-bell")
+        return cls(**found["dumbbell"])
+
+
+@dataclass(frozen=True)
 class Sample:
     """A further sample of a double-lap test: a block of its own that shares drive and load cell with the others."""
 
@@ -146,7 +175,8 @@ class Specimen:
 
     Lengths are in mm. The frame has its origin at the block's centre: x along the length (the pull direction), y along
     the thickness, z along the width. `test` is `double_lap_shear` or `uniaxial`. A double-lap test may hold further
-    samples, unlike the first; their forces add.
+    samples, unlike the first; their forces add. `outline` is `block`, `iso37_type4` or a `Dumbbell`, the last two in
+    a uniaxial test.
     """
 
     length_mm: float
@@ -156,7 +186,7 @@ class Specimen:
     drive_mm: Tuple[float, ...]
     holes: Tuple[Hole, ...] = ()
     samples_in_parallel: Optional[int] = None
-    outline: Optional[str] = None
+    outline: Union[None, str, Dumbbell] = None
     name: str = "specimen"
     other_samples: Tuple[Sample, ...] = ()
     drive_angle_deg: Optional[float] = None
@@ -171,7 +201,7 @@ class Specimen:
         drive_mm: Numbers,
         holes: Sequence[Hole] = (),
         samples_in_parallel: Optional[int] = None,
-        outline: Optional[str] = None,
+        outline: Union[None, str, Dumbbell] = None,
         name: str = "specimen",
         other_samples: Sequence[Sample] = (),
         drive_angle_deg: Optional[float] = None,
@@ -203,6 +233,8 @@ class Specimen:
         specimen._set(samples_in_parallel=None, outline=None, drive_angle_deg=None, other_samples=others)
         specimen._set(holes=_holes(found), **_block(found), **{name: found[name] for name in own if name in found})
         specimen._set(drive_mm=tuple(found["drive_mm"]))
+        if isinstance(found.get("outline"), dict):
+            specimen._set(outline=Dumbbell._of_program(found["outline"]))
         return specimen
 
     def replace(self, **changes: Any) -> "Specimen":
@@ -212,7 +244,7 @@ class Specimen:
     def to_dict(self) -> Dict[str, Any]:
         """The object of a `specimen/1`."""
         optional = given(
-            outline=self.outline,
+            outline=self.outline.to_dict() if isinstance(self.outline, Dumbbell) else self.outline,
             samples_in_parallel=self.samples_in_parallel,
             drive_angle_deg=self.drive_angle_deg,
         )

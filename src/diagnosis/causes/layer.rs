@@ -21,7 +21,7 @@ pub(super) const ENTRY: Entry =
 fn suspects(observed: &Observed) -> Vec<Arc<dyn Cause>> {
     match observed.specimen.outline {
         Outline::Block => vec![Arc::new(Layer::of(&observed.specimen))],
-        Outline::Iso37Type4 => Vec::new(),
+        Outline::Iso37Type4 | Outline::Dumbbell(_) => Vec::new(),
     }
 }
 

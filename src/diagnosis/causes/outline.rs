@@ -25,11 +25,11 @@ pub(super) const OF_SET_UP: Entry = Entry {
     },
 };
 
-/// A dumb-bell keeps its standard outline.
+/// A dumb-bell is punched, and keeps the outline of its punch.
 fn suspects(specimen: &Specimen, form: FaceForm) -> Vec<Arc<dyn Cause>> {
     match specimen.outline {
         Outline::Block => vec![Arc::new(Block::of(specimen, form))],
-        Outline::Iso37Type4 => Vec::new(),
+        Outline::Iso37Type4 | Outline::Dumbbell(_) => Vec::new(),
     }
 }
 

@@ -15,28 +15,61 @@ export function sectionOf(specimen) {
   };
 }
 
-const isDumbbell = (specimen, section) => specimen.outline === "iso37_type4" && section.up === "z";
+/** What an outline may be, and what it is called. */
+export const KINDS_OF_OUTLINES = [
+  ["block", "block"],
+  ["iso37_type4", "dumb-bell, ISO 37 type 4"],
+  ["dumbbell", "dumb-bell"],
+];
 
-/** ISO 37 type 4, mm: half of the narrow length, half-widths, radius of both arcs of a transition, and their length. */
-const NARROW = 6;
-const [HALF_NARROW, HALF_END, RADIUS] = [1, 3, 3];
-const ARC = Math.sqrt(RADIUS ** 2 - (RADIUS - (HALF_END - HALF_NARROW) / 2) ** 2);
+/** The gauge and the block of ISO 37 type 4, mm. */
+const ISO37_TYPE4 = { gauge_width_mm: 2, gauge_length_mm: 12, fillet_radius_mm: 3 };
+const ISO37_BLOCK = { length_mm: 35, thickness_mm: 2, width_mm: 6 };
 
-function dumbbell(x) {
-  const on = Math.abs(x) - NARROW;
-  if (on <= 0) return HALF_NARROW;
-  if (on <= ARC) return HALF_NARROW + RADIUS - Math.sqrt(RADIUS ** 2 - on ** 2);
-  if (on < 2 * ARC) return HALF_END - RADIUS + Math.sqrt(RADIUS ** 2 - (2 * ARC - on) ** 2);
-  return HALF_END;
+export const kindOfOutline = ({ outline }) => (typeof outline === "object" ? "dumbbell" : (outline ?? "block"));
+
+/** Gives a specimen another outline; a new gauge is half as wide as the block. */
+export function giveOutline(specimen, kind) {
+  if (kind === "block") delete specimen.outline;
+  else if (kind === "iso37_type4") {
+    specimen.outline = kind;
+    specimen.block = { ...ISO37_BLOCK };
+  } else {
+    const { length_mm: length, width_mm: width } = specimen.block;
+    specimen.outline = {
+      dumbbell: { gauge_width_mm: width / 2, gauge_length_mm: length / 5, fillet_radius_mm: width / 2 },
+    };
+  }
+}
+
+/** The gauge of a dumb-bell that the section shows; none of a block. */
+function gaugeOf(specimen, section) {
+  const kind = kindOfOutline(specimen);
+  if (kind === "block" || section.up !== "z") return null;
+  return kind === "dumbbell" ? specimen.outline.dumbbell : ISO37_TYPE4;
+}
+
+/** Half of a dumb-bell's width at x: the gauge's, two arcs of one radius, the end's. */
+function dumbbell(gauge, end, x) {
+  const [narrow, radius] = [gauge.gauge_width_mm / 2, gauge.fillet_radius_mm];
+  const arc = Math.sqrt(Math.max(0, radius ** 2 - (radius - (end - narrow) / 2) ** 2));
+  const on = Math.abs(x) - gauge.gauge_length_mm / 2;
+  if (on <= 0) return narrow;
+  if (on <= arc) return narrow + radius - Math.sqrt(radius ** 2 - on ** 2);
+  if (on < 2 * arc) return end - radius + Math.sqrt(radius ** 2 - (2 * arc - on) ** 2);
+  return end;
 }
 
 /** Half of the section's height at x, mm. */
-export const outlineAt = (specimen, section, x) => (isDumbbell(specimen, section) ? dumbbell(x) : section.height / 2);
+export function outlineAt(specimen, section, x) {
+  const gauge = gaugeOf(specimen, section);
+  return gauge ? dumbbell(gauge, section.height / 2, x) : section.height / 2;
+}
 
 /** The outline as a path, y down. */
 export function outlinePath(specimen, section) {
   const half = section.length / 2;
-  const count = isDumbbell(specimen, section) ? 140 : 1;
+  const count = gaugeOf(specimen, section) ? 140 : 1;
   const upper = Array.from({ length: count + 1 }, (_, i) => {
     const x = -half + (section.length * i) / count;
     return [x, outlineAt(specimen, section, x)];

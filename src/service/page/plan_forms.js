@@ -3,10 +3,36 @@
 import { h } from "./dom.js";
 import { choice, field, fields } from "./field.js";
 import { lawNumbers } from "./law.js";
-import { sectionOf } from "./outline.js";
+import { giveOutline, KINDS_OF_OUTLINES, kindOfOutline, sectionOf } from "./outline.js";
 import { GLOSSARY } from "./words.js";
 
 const copy = (value) => structuredClone(value);
+
+/** A dumb-bell's outline: which, and of its own gauge the dimensions. */
+function outlineFields(sp, changed) {
+  const kind = kindOfOutline(sp);
+  const dimension = (name, label, meaning) =>
+    field({
+      label,
+      value: sp.outline.dumbbell[name],
+      put: (v) => {
+        sp.outline.dumbbell[name] = v;
+      },
+      pointer: `/specimen/outline/dumbbell/${name}`,
+      meaning,
+      changed,
+    });
+  return [
+    choice({ label: "Outline", value: kind, options: KINDS_OF_OUTLINES, put: (v) => giveOutline(sp, v), changed }),
+    ...(kind === "dumbbell"
+      ? [
+          dimension("gauge_width_mm", "Width of the gauge, mm"),
+          dimension("gauge_length_mm", "Length of the gauge, mm", "The straight narrow part, between the arcs."),
+          dimension("fillet_radius_mm", "Radius of the arcs, mm", "Of both arcs between gauge and end."),
+        ]
+      : []),
+  ];
+}
 
 /** The specimen's own fields. */
 export function specimenForm(model, library, edited) {
@@ -60,7 +86,7 @@ export function specimenForm(model, library, edited) {
       changed: edited,
     }),
     ...(sp.test === "uniaxial"
-      ? []
+      ? outlineFields(sp, edited)
       : [
           field({
             label: "Angle of the drive, °",
