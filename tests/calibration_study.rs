@@ -49,6 +49,7 @@ fn published_scan() {
                 noise_sd_mm: [0.05; 3],
                 force_sd_n: 0.02,
                 partial_voxels: PartialVoxels::Uniform,
+                surface: None,
             },
             options: CalibrateOptions {
                 terms: TermCount::Auto { max: num_terms + 1 },

@@ -3,6 +3,7 @@
 
 use lambdak::homogeneous::{CsvOptions, HomogeneousTest, read_csv};
 use lambdak::recording::{LoadCurve, read_points};
+use lambdak::voxel::{Face, MeasuredComponents, Surface};
 use lambdak_fuzz::memory;
 use libfuzzer_sys::fuzz_target;
 use std::path::Path;
@@ -20,5 +21,8 @@ fuzz_target!(|data: &[u8]| {
         }
     }
     let _ = LoadCurve::from_csv(text, path);
-    let _ = read_points(text, path, &memory());
+    for face in [None, Some(Face::PlusZ)] {
+        let surface = face.map(|face| Surface { face, components: MeasuredComponents::InPlane });
+        let _ = read_points(text, path, surface, &memory());
+    }
 });

@@ -1,4 +1,4 @@
-//! The scanner: from a field of displacement to complex images, and back.
+//! The scanner: from a field of displacement to complex images, and back. Cameras that see a face: [`film()`].
 //!
 //! Forward: the finite elements' displacement u(X) is seen by each voxel as the mean of exp(i uₐ/sₐ) over its material
 //! (sₐ: mm per radian of direction a), so that a strong gradient inside a voxel lowers the magnitude; complex Gaussian
@@ -10,6 +10,8 @@
 //! certain are left out and counted ([`reconstruct()`]).
 
 mod anchor;
+mod cameras;
+mod driven;
 mod error;
 mod filter;
 mod kspace;
@@ -25,12 +27,13 @@ pub mod unwrap;
 mod scan_tests;
 
 pub use anchor::{Anchor, AnchorReport};
+pub use cameras::{CameraOptions, Filmed, film};
 pub use error::AcquisitionError;
 pub use filter::{FilteredField, hamming_filtered};
 pub use kspace::{KSpace, Window};
 pub use loading::{LoadProgram, loading_history};
 pub use noise::{NoiseEstimate, NoiseSource};
 pub use reconstruct::{ComponentReport, ReconstructOptions, Reconstruction, StepReport, reconstruct};
-pub use result::{ErrorReport, ScanResult, ScanStep};
+pub use result::{ErrorReport, ScanResult, ScanStep, SettingsOfScan};
 pub use scan::{Scan, ScanOptions, noisy_images, scan};
 pub use signal::{Complex, signal_images};

@@ -1,6 +1,6 @@
 //! The result of a scan (`scan/1`).
 
-use super::{AcquisitionError, Reconstruction, Scan, ScanOptions, StepReport, hamming_filtered};
+use super::{AcquisitionError, CameraOptions, Filmed, Reconstruction, Scan, ScanOptions, StepReport, hamming_filtered};
 use crate::provenance::VERSION;
 use crate::recording::Filter;
 use serde::Serialize;
@@ -22,17 +22,28 @@ pub struct ScanResult {
     /// Filter on the displacements.
     pub filter: Filter,
     /// The settings.
-    pub options: ScanOptions,
+    pub options: SettingsOfScan,
     /// Voxels of the mask.
     pub num_voxels: usize,
     /// Unknowns of the forward solution.
     pub num_unknowns: usize,
     /// Noise of a displacement at full signal, mm (before any filter).
     pub noise_at_full_signal_mm: Option<[f64; 3]>,
-    /// Noise of the displacements as given, mm: estimated from the magnitude. Null for raw scans.
-    pub noise_sd_mm: Option<[f64; 3]>,
+    /// Noise of the displacements as given, mm: estimated from the magnitude, of cameras as they were told, with null
+    /// for a component that they do not measure. Null for raw scans.
+    pub noise_sd_mm: Option<[Option<f64>; 3]>,
     /// Per drive.
     pub steps: Vec<ScanStep>,
+}
+
+/// The settings of a scanner, or those of cameras.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum SettingsOfScan {
+    /// Of a scanner.
+    Scanner(ScanOptions),
+    /// Of cameras.
+    Cameras(CameraOptions),
 }
 
 /// One drive of a [`ScanResult`].
@@ -46,9 +57,10 @@ pub struct ScanStep {
     pub true_force_n: f64,
     /// When the scan was made, s.
     pub window_s: Option<[f64; 2]>,
-    /// What became of the voxels; null for raw scans.
+    /// What became of the voxels; null for raw scans and for cameras.
     pub reconstruction: Option<StepReport>,
-    /// Displacements found less those scanned, per direction; null for raw scans.
+    /// Displacements found less those scanned, per direction; null for raw scans and for cameras, whose noise is the one
+    /// they were told.
     pub error: Option<[ErrorReport; 3]>,
 }
 
@@ -96,13 +108,39 @@ impl ScanResult {
             seed: options.seed,
             is_raw: reconstruction.is_none(),
             filter: reconstruction.map_or(Filter::None, |r| r.recording.filter),
-            options: options.clone(),
+            options: SettingsOfScan::Scanner(options.clone()),
             num_voxels: scan.mask.num_voxels(),
             num_unknowns: scan.num_unknowns,
             noise_at_full_signal_mm: scan.raw.noise_sd_mm,
-            noise_sd_mm: reconstruction.and_then(|r| r.recording.noise_sd_mm),
+            noise_sd_mm: reconstruction.and_then(|r| r.recording.noise_sd_mm).map(|sd| sd.map(Some)),
             steps,
         })
+    }
+
+    /// Gathers the result of cameras.
+    pub fn of_cameras(filmed: &Filmed, options: &CameraOptions, input_hash: String) -> ScanResult {
+        let steps = filmed.recording.steps.iter().zip(&filmed.forces_n).map(|(step, true_force_n)| ScanStep {
+            drive_mm: step.drive_mm,
+            force_n: step.force_n,
+            true_force_n: *true_force_n,
+            window_s: step.window_s,
+            reconstruction: None,
+            error: None,
+        });
+        ScanResult {
+            schema: "scan/1",
+            version: VERSION,
+            input_hash,
+            seed: options.seed,
+            is_raw: false,
+            filter: Filter::None,
+            options: SettingsOfScan::Cameras(options.clone()),
+            num_voxels: filmed.mask.num_voxels(),
+            num_unknowns: filmed.num_unknowns,
+            noise_at_full_signal_mm: None,
+            noise_sd_mm: filmed.recording.stated_noise_sd_mm(),
+            steps: steps.collect(),
+        }
     }
 }
 

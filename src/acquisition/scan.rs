@@ -1,13 +1,14 @@
 //! The synthetic scanner.
 
+use super::driven::DrivenSample;
 use super::loading::{LoadProgram, loading_history};
 use super::{AcquisitionError, Complex, KSpace, signal_images};
-use crate::fem::{ForwardModel, SolveOptions};
+use crate::fem::SolveOptions;
 use crate::material::Ogden;
 use crate::mesh::MeshOptions;
 use crate::recording::{RawRecording, RawStep};
 use crate::specimen::Specimen;
-use crate::voxel::{Sampling, VoxelGrid, VoxelMask, VoxelOperator};
+use crate::voxel::{VoxelGrid, VoxelMask};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -104,24 +105,10 @@ pub fn scan(
     is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Scan, AcquisitionError> {
     options.check()?;
-    let samples = specimen.samples();
-    let (Some(sample), Some(recorded)) = (samples.get(options.sample), specimen.with_first(options.sample)) else {
-        let requirement = "the number of a kind of the specimen's samples, from 0";
-        return Err(AcquisitionError::Value { name: "the sample", value: options.sample as f64, requirement });
-    };
-    let mask = VoxelMask::of_specimen(sample, options.grid.clone())?;
-    let mut model = ForwardModel::of_specimen(sample, &mesh.carried(specimen, sample))?;
-    let path = model.solve_path(material, &sample.drive_mm, solve, &|| is_cancelled())?;
+    let driven = DrivenSample::new(specimen, options.sample, material, mesh, solve, &options.grid, is_cancelled)?;
+    let DrivenSample { sample, recorded, model, path, mask, truth, forces_n } = driven;
     let states: Vec<&[[f64; 3]]> = path.iter().map(|state| &state.displacement[..]).collect();
-    let images = signal_images(sample, model.mesh(), &states, &options.grid, options.mm_per_radian, is_cancelled)?;
-    let operator = VoxelOperator::new(sample, model.mesh(), &mask, Sampling::default())?;
-    let truth = states.iter().map(|u| operator.average(u)).collect::<Result<Vec<_>, _>>()?;
-    let mut forces_n: Vec<f64> = path.iter().map(|state| state.force_n).collect();
-    for (_, other) in samples.iter().enumerate().filter(|(n, _)| *n != options.sample) {
-        let mut model = ForwardModel::of_specimen(other, &mesh.carried(specimen, other))?;
-        let path = model.solve_path(material, &other.drive_mm, solve, &|| is_cancelled())?;
-        forces_n.iter_mut().zip(path).for_each(|(sum, state)| *sum += state.force_n);
-    }
+    let images = signal_images(&sample, model.mesh(), &states, &options.grid, options.mm_per_radian, is_cancelled)?;
     let has_force = options.sample == 0;
     let (load, windows) = loading_history(&specimen.drive_mm, &forces_n, &options.load, options.seed)?;
     let mut steps = Vec::with_capacity(images.len());

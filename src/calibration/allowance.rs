@@ -45,7 +45,7 @@ impl Allowance {
                         // The estimates have taken up what looks like a change of the material.
                         let left = theirs.displacements[d][v][c] - ours.displacements[d][v][c];
                         objective += step.precision[v][c] * left * left;
-                        if is_largest {
+                        if is_largest && step.precision[v][c] > 0.0 {
                             let moved: f64 = fields.iter().zip(&change).map(|(f, x)| f[v][c] * x).sum();
                             squares += (left + moved).powi(2);
                             count += 1;

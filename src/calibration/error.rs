@@ -47,6 +47,14 @@ pub enum CalibrationError {
         /// [`super::FitOptions::min_alpha_gap`].
         min_gap: f64,
     },
+    /// Displacements of a face were given to what needs those of the volume.
+    #[error("{what} needs displacements of the volume, and the recording is of the face {face} alone; scan the volume")]
+    NeedsVolume {
+        /// What was asked for.
+        what: &'static str,
+        /// The face.
+        face: &'static str,
+    },
     /// What was measured at the boundary cannot be imposed.
     #[error("the measured boundary cannot be imposed: {reason}; take the plates as commanded")]
     NoMeasuredBoundary {

@@ -46,12 +46,14 @@ impl Observed {
     ///
     /// # Errors
     /// [`CalibrationError::NoMeasuredBoundary`] where the sample is no block, the values are filtered, or too few
-    /// voxels lie beside the planes; [`CalibrationError::Voxel`] where none lies between them.
+    /// voxels lie beside the planes; [`CalibrationError::Voxel`] where none lies between them;
+    /// [`CalibrationError::NeedsVolume`] where cameras measured a face.
     pub fn between_measured_planes(&self, cut_part: f64) -> Result<Observed, CalibrationError> {
         let axis = match self.specimen.test {
             TestKind::DoubleLapShear => 1,
             TestKind::Uniaxial => 0,
         };
+        self.check_volume("a boundary measured inside the sample")?;
         if self.specimen.outline != Outline::Block {
             return Err(CalibrationError::NoMeasuredBoundary { reason: "the sample is no block" });
         }

@@ -32,6 +32,8 @@ mod starts;
 mod step;
 mod stress_path;
 mod study;
+#[cfg(test)]
+mod surface_tests;
 mod synthetic;
 mod system;
 mod target;

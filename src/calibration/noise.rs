@@ -2,7 +2,7 @@
 
 use super::error::CalibrationError;
 use crate::recording::Filter;
-use crate::voxel::VoxelGrid;
+use crate::voxel::{VoxelGrid, unbounded_where_unmeasured};
 
 /// Fewest differences from which a standard deviation is estimated.
 const MIN_DIFFERENCES: usize = 100;
@@ -16,7 +16,7 @@ pub(super) const THIRD_DIFFERENCE: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
 /// grid.
 ///
 /// Third differences of independent noise have the variance Σ w² σ² = 20 σ²; after the 2×2×2 filter neighbours are
-/// correlated by ½ and it is 5 σ².
+/// correlated by ½ and it is 5 σ². Of components that are not measured, the noise is infinite.
 ///
 /// # Errors
 /// [`CalibrationError::InvalidValue`] where there are too few runs of four neighbours, or no noise at all.
@@ -26,7 +26,8 @@ pub fn estimate_noise_sd_mm(
     fields: &[&[[f64; 3]]],
     filter: Filter,
 ) -> Result<[f64; 3], CalibrationError> {
-    let axis = (0..3).min_by(|&a, &b| grid.voxel_mm[a].total_cmp(&grid.voxel_mm[b])).unwrap_or(0);
+    let axes = (0..3).filter(|&a| grid.normal_axis() != Some(a));
+    let axis = axes.min_by(|&a, &b| grid.voxel_mm[a].total_cmp(&grid.voxel_mm[b])).unwrap_or(0);
     let stride = grid.stride(axis);
     let variance = match filter {
         Filter::None => 20.0f64,
@@ -50,8 +51,10 @@ pub fn estimate_noise_sd_mm(
             }
         }
     }
-    let mut sd = [0.0; 3];
-    for (sd, d) in sd.iter_mut().zip(&mut differences) {
+    let measured = grid.measured();
+    let mut sd = unbounded_where_unmeasured(measured, [0.0; 3]);
+    let all = sd.iter_mut().zip(&mut differences).zip(measured);
+    for ((sd, d), _) in all.filter(|(_, is_measured)| *is_measured) {
         if d.len() < MIN_DIFFERENCES {
             return Err(CalibrationError::InvalidValue {
                 name: "the number of voxel differences for the noise",

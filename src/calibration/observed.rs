@@ -11,7 +11,7 @@ use crate::mesh::{BlockShape, Mesh, half_extents_mm};
 use crate::recording::{Filter, Recording};
 use crate::sensitivity::Protocol;
 use crate::specimen::Specimen;
-use crate::voxel::{HammingFilter, Sampling, VoxelGrid, VoxelMask, VoxelOperator};
+use crate::voxel::{HammingFilter, Sampling, VoxelGrid, VoxelMask, VoxelOperator, unbounded_where_unmeasured};
 
 /// Least filled part of a voxel that is compared: the average over a sliver is that of a place on the wall, where the
 /// made sample may differ from the drawing.
@@ -24,7 +24,8 @@ pub struct ObservedStep {
     pub drive_mm: f64,
     /// The force, where it was recorded.
     pub force: Option<ObservedForce>,
-    /// u of the compared voxels, mm, in the mask's order; NaN where missing.
+    /// u of the compared voxels, mm, in the mask's order; NaN where missing. Components that cameras do not measure have
+    /// no weight, and what stands there does not count.
     pub displacement: Vec<[f64; 3]>,
     /// The noise of each of them in multiples of [`Observed::noise_sd_mm`], in the mask's order; `None` where it is
     /// alike everywhere.
@@ -48,7 +49,7 @@ pub struct Observed {
     /// What is unknown of the load cell.
     pub load_cell: LoadCell,
     /// Noise of a value as given or estimated, per component, mm: that of a typical voxel, where it differs from place
-    /// to place.
+    /// to place. Infinite of a component that cameras do not measure.
     pub noise_sd_mm: [f64; 3],
     /// Whether the noise was estimated because the recording does not state it.
     pub is_noise_estimated: bool,
@@ -78,10 +79,11 @@ impl Observed {
             }
         };
         let flags = mask.spread(&vec![true; mask.num_voxels()], false);
+        let stated_sd_mm = recording.noise_sd_mm.map(|sd| unbounded_where_unmeasured(recording.grid.measured(), sd));
         let cleaned: Vec<Cleaned> = recording
             .steps
             .iter()
-            .map(|s| Cleaned::of(&recording.grid, &flags, &s.displacement, recording.noise_sd_mm))
+            .map(|s| Cleaned::of(&recording.grid, &flags, &s.displacement, stated_sd_mm))
             .collect();
         let num_outliers = cleaned.iter().map(|c| c.num_outliers).max().unwrap_or(0);
         let steps: Vec<ObservedStep> = recording
@@ -94,12 +96,12 @@ impl Observed {
                     .force_n
                     .map(|value_n| ObservedForce { value_n, sd_n: step.force_sd_n.unwrap_or(force_sd_n) }),
                 displacement: mask.voxels.iter().map(|&v| cleaned.field[v as usize]).collect(),
-                relative_noise: relative_noise(&recording.grid, &flags, &cleaned.field, recording.noise_sd_mm)
+                relative_noise: relative_noise(&recording.grid, &flags, &cleaned.field, stated_sd_mm)
                     .map(|all| mask.voxels.iter().map(|&v| all[v as usize]).collect()),
                 faces_per_mm: [None, None],
             })
             .collect();
-        let noise_sd_mm = match recording.noise_sd_mm {
+        let noise_sd_mm = match stated_sd_mm {
             Some(sd) => sd,
             None => {
                 let fields: Vec<&[[f64; 3]]> = cleaned.iter().map(|c| &c.field[..]).collect();
@@ -163,6 +165,17 @@ impl Observed {
             [0.1, 0.9].map(|part| all[((all.len() - 1) as f64 * part).round() as usize])
         };
         (!varying.is_empty()).then(|| [0, 1, 2].map(of_component))
+    }
+
+    /// Whether the volume was scanned, as `what` needs.
+    ///
+    /// # Errors
+    /// [`CalibrationError::NeedsVolume`] where cameras measured a face.
+    pub fn check_volume(&self, what: &'static str) -> Result<(), CalibrationError> {
+        match self.mask.grid.surface {
+            None => Ok(()),
+            Some(surface) => Err(CalibrationError::NeedsVolume { what, face: surface.face.name() }),
+        }
     }
 
     /// The same recording with other steps.
@@ -254,8 +267,9 @@ struct Cleaned {
 
 impl Cleaned {
     fn of(grid: &VoxelGrid, flags: &[bool], field: &[[f64; 3]], noise_sd_mm: Option<[f64; 3]>) -> Cleaned {
-        let outliers = outlying_voxels(grid, flags, field, noise_sd_mm);
         let mut field = field.to_vec();
+        grid.fill_unmeasured(&mut field, 0.0);
+        let outliers = outlying_voxels(grid, flags, &field, noise_sd_mm);
         for &v in &outliers {
             field[v] = [f64::NAN; 3];
         }

@@ -162,7 +162,7 @@ mod tests {
     /// there, and none elsewhere.
     #[test]
     fn lost_signal_is_told_from_kinks() {
-        let grid = VoxelGrid { origin_mm: [0.0; 3], voxel_mm: [1.0, 0.2, 1.0], shape: [14, 20, 10] };
+        let grid = VoxelGrid { origin_mm: [0.0; 3], voxel_mm: [1.0, 0.2, 1.0], shape: [14, 20, 10], surface: None };
         let num = grid.num_voxels();
         let mut state = 1u64;
         let mut uniform = || {
@@ -194,7 +194,7 @@ mod tests {
     /// the rest are not.
     #[test]
     fn noise_is_told_from_displacement() {
-        let grid = VoxelGrid { origin_mm: [0.0; 3], voxel_mm: [1.0, 0.5, 1.0], shape: [12, 10, 9] };
+        let grid = VoxelGrid { origin_mm: [0.0; 3], voxel_mm: [1.0, 0.5, 1.0], shape: [12, 10, 9], surface: None };
         let num = grid.num_voxels();
         let mut field: Vec<[f64; 3]> = (0..num)
             .map(|v| {

@@ -147,8 +147,8 @@ pub struct StepResult {
     pub drive_mm: f64,
     /// Voxels compared.
     pub num_voxels: usize,
-    /// Root mean square of model − data per component, mm.
-    pub rms_mm: [f64; 3],
+    /// Root mean square of model − data per component, mm; null of a component that cameras do not measure.
+    pub rms_mm: [Option<f64>; 3],
     /// Recorded force, N.
     pub force_n: Option<f64>,
     /// Force of the model, N; null where no force determines it.
@@ -199,11 +199,12 @@ impl CalibrationResult {
         for (r, recording) in observed.iter().enumerate() {
             for (s, step) in recording.steps.iter().enumerate() {
                 let (rms_mm, num_voxels) = rms_misfit_mm(fit.predicted(r, s), &step.displacement);
+                let measured = recording.mask.grid.measured();
                 steps.push(StepResult {
                     recording: names.get(r).cloned().unwrap_or_default(),
                     drive_mm: step.drive_mm,
                     num_voxels,
-                    rms_mm,
+                    rms_mm: [0, 1, 2].map(|c| measured[c].then_some(rms_mm[c])),
                     force_n: step.force.map(|f| f.value_n),
                     model_force_n: calibration.has_force.then(|| fit.force_n(r, s)),
                 });

@@ -143,7 +143,7 @@ impl SyntheticScan {
                 masks.push(None);
                 continue;
             }
-            let mask = VoxelMask::covering(sample, scan.voxel_mm)?;
+            let mask = scan.mask(sample)?;
             let operator = VoxelOperator::new(sample, model.mesh(), &mask, Sampling::default())?;
             for (voxels, state) in truth.displacements.iter_mut().zip(&path) {
                 voxels.extend(operator.average(&state.displacement)?);
@@ -174,7 +174,7 @@ impl SyntheticScan {
     /// filter the noise stated is that of a mean of eight.
     ///
     /// # Errors
-    /// [`CalibrationError::Voxel`] where the filter has nothing to average.
+    /// [`CalibrationError::Voxel`] where the filter has nothing to average, or a surface is seen.
     pub fn recording(
         &self,
         id: &str,
@@ -193,15 +193,18 @@ impl SyntheticScan {
                 None => data.displacements[d].clone(),
                 Some(filter) => filter.apply(&data.displacements[d])?,
             };
+            let mut displacement = mask.spread(&values, [f64::NAN; 3]);
+            mask.grid.fill_unmeasured(&mut displacement, f64::NAN);
             steps.push(RecordedStep {
                 drive_mm,
                 force_n: Some(data.forces_n[d]),
                 force_sd_n: Some(self.scan.force_sd_n),
                 window_s: None,
-                displacement: mask.spread(&values, [f64::NAN; 3]),
+                displacement,
             });
         }
-        let noise = self.scan.noise_sd_mm.map(|sd| if hamming.is_some() { sd / 8f64.sqrt() } else { sd });
+        let noise =
+            self.scan.noise().displacement_sd_mm.map(|sd| if hamming.is_some() { sd / 8f64.sqrt() } else { sd });
         Ok(Recording {
             id: id.into(),
             specimen: specimen.clone(),
@@ -248,9 +251,10 @@ impl SyntheticScan {
         let mut noisy = self.truth.clone();
         for (drive, displacements) in noisy.displacements.iter_mut().enumerate() {
             for (u, weight) in displacements.iter_mut().zip(self.truth.weights_of(drive)) {
-                for (value, sd) in u.iter_mut().zip(self.scan.noise_sd_mm) {
-                    // A voxel without weight is not measured; what stands there does not count.
-                    *value += if weight > 0.0 { normal(sd / weight.sqrt()) } else { 0.0 };
+                for (value, sd) in u.iter_mut().zip(self.scan.noise().displacement_sd_mm) {
+                    // A voxel without weight, or a component without bound to its noise, is not measured; what stands
+                    // there does not count.
+                    *value += if weight > 0.0 && sd.is_finite() { normal(sd / weight.sqrt()) } else { 0.0 };
                 }
             }
         }

@@ -148,8 +148,10 @@ impl Sums {
                 let (model, measured) = (prediction.displacements[d][v], step.measured[v]);
                 let weights = step.precision[v];
                 let misfit = [0, 1, 2].map(|c| measured[c] - model[c]);
-                for c in 0..3 {
+                let mut size = 0.0;
+                for c in (0..3).filter(|&c| weights[c] > 0.0) {
                     squares += misfit[c] * misfit[c];
+                    size += measured[c] * measured[c];
                     self.chi2 += weights[c] * misfit[c] * misfit[c];
                 }
                 for i in 0..n {
@@ -161,7 +163,7 @@ impl Sums {
                         self.matrix[(i, j)] += weighted[0] * t[0] + weighted[1] * t[1] + weighted[2] * t[2];
                     }
                 }
-                largest = largest.max(measured.iter().map(|x| x * x).sum());
+                largest = largest.max(size);
                 num_voxels += 1;
             }
             if step.is_scanned() {

@@ -42,11 +42,22 @@ pub(super) struct TargetForce {
 #[derive(Clone, Debug)]
 pub(super) struct TargetStep<'a> {
     pub(super) measured: &'a [[f64; 3]],
-    /// p of each voxel and component, mm⁻²: zero where missing.
+    /// p of each voxel and component, mm⁻²: zero where missing or not measured.
     pub(super) precision: Vec<[f64; 3]>,
-    /// Variance of the noise of each voxel and component, mm²; of filtered values as of a mean of eight.
+    /// Variance of the noise of each voxel and component, mm²; of filtered values as of a mean of eight; zero where it
+    /// has no bound, as of what is not measured, so that its products with a weight of zero are numbers.
     noise_mm2: Vec<[f64; 3]>,
     pub(super) force: Option<TargetForce>,
+}
+
+/// Whether any component counts.
+fn has_weight(precision: &[f64; 3]) -> bool {
+    precision.iter().any(|p| *p > 0.0)
+}
+
+/// The variance in products with weights, which are zero where it has no bound.
+fn where_bounded(noise_mm2: [f64; 3]) -> [f64; 3] {
+    noise_mm2.map(|variance| if variance.is_finite() { variance } else { 0.0 })
 }
 
 impl<'a> TargetStep<'a> {
@@ -64,7 +75,7 @@ impl<'a> TargetStep<'a> {
 
     /// Places of the voxels that count.
     pub(super) fn used(&self) -> impl Iterator<Item = usize> {
-        self.precision.iter().enumerate().filter(|(_, p)| p[0] > 0.0).map(|(v, _)| v)
+        self.precision.iter().enumerate().filter(|(_, p)| has_weight(p)).map(|(v, _)| v)
     }
 
     /// Gives the force the weight of the paper's loss.
@@ -92,11 +103,12 @@ impl<'a> Target<'a> {
     pub(super) fn of_measurement(data: &'a Measurement, scan: &ScanSettings) -> Target<'a> {
         let weight = 1.0 / (scan.force_sd_n * scan.force_sd_n);
         // The variance of a voxel of weight w is σ²/w.
-        let noise_of = |w: &f64| scan.noise_sd_mm.map(|sd| if *w > 0.0 { sd * sd / w } else { 0.0 });
+        let sd_mm = scan.noise().displacement_sd_mm;
+        let noise_of = |w: &f64| where_bounded(sd_mm.map(|sd| if *w > 0.0 { sd * sd / w } else { 0.0 }));
         let steps = (0..data.drives_mm.len())
             .map(|d| TargetStep {
                 measured: &data.displacements[d],
-                precision: data.weights_of(d).iter().map(|w| scan.noise_sd_mm.map(|sd| w / (sd * sd))).collect(),
+                precision: data.weights_of(d).iter().map(|w| sd_mm.map(|sd| w / (sd * sd))).collect(),
                 noise_mm2: data.weights_of(d).iter().map(noise_of).collect(),
                 force: Some(TargetForce { value_n: data.forces_n[d], sd_n: scan.force_sd_n, weight }),
             })
@@ -130,7 +142,7 @@ impl<'a> Target<'a> {
                 steps.push(TargetStep {
                     measured: &step.displacement,
                     precision: step.displacement.iter().zip(&noise_mm2).map(weigh).collect(),
-                    noise_mm2,
+                    noise_mm2: noise_mm2.into_iter().map(where_bounded).collect(),
                     force: step.force.map(|f| TargetForce {
                         value_n: f.value_n,
                         sd_n: f.sd_n,
@@ -148,7 +160,8 @@ impl<'a> Target<'a> {
             // ℓ × scale is χ² where the noise is the mean one and |u|_max that of the first step.
             let mut scale = None;
             for (target, recording) in targets.iter_mut().zip(observed) {
-                let precision = recording.noise_sd_mm.iter().map(|sd| 1.0 / (sd * sd)).sum::<f64>() / 3.0;
+                let num_measured = recording.mask.grid.measured().into_iter().filter(|m| *m).count() as f64;
+                let precision = recording.noise_sd_mm.iter().map(|sd| 1.0 / (sd * sd)).sum::<f64>() / num_measured;
                 target.is_weighed_by_noise = false;
                 for step in &mut target.steps {
                     if !step.is_scanned() {
@@ -161,8 +174,8 @@ impl<'a> Target<'a> {
                     let squares = step.measured.iter().filter(|u| is_whole(u)).map(|u| u.iter().map(|x| x * x).sum());
                     let largest: f64 = squares.fold(f64::MIN_POSITIVE, f64::max);
                     let scale = *scale.get_or_insert(precision * used * largest * num_steps as f64);
-                    for precision in step.precision.iter_mut().filter(|p| p[0] > 0.0) {
-                        *precision = [scale / (used * largest * num_steps as f64); 3];
+                    for precision in step.precision.iter_mut().flatten().filter(|p| **p > 0.0) {
+                        *precision = scale / (used * largest * num_steps as f64);
                     }
                     step.weigh_force_by_paper(scale * beta / num_forces as f64);
                 }
@@ -231,7 +244,7 @@ impl<'a> Target<'a> {
                 for c in 0..3 {
                     sum += step.precision[v][c] * share * step.noise_mm2[v][c];
                 }
-                count += 3;
+                count += step.precision[v].iter().filter(|p| **p > 0.0).count();
             }
             if let Some(force) = step.force {
                 sum += force.weight * force.sd_n * force.sd_n;

@@ -39,6 +39,7 @@ pub(super) fn scan() -> ScanSettings {
         noise_sd_mm: [0.02, 0.03, 0.04],
         force_sd_n: 0.01,
         partial_voxels: PartialVoxels::Uniform,
+        surface: None,
     }
 }
 

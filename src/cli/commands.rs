@@ -10,7 +10,7 @@ use clap::{Arg, ArgAction, ArgMatches, Command};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-use Written::{JsonFile, MeshFactor, Off, OrAuto, TextFile};
+use Written::{FaceSeen, JsonFile, MeshFactor, Off, OrAuto, TextFile};
 
 /// The commands.
 pub(super) static COMMANDS: &[JobCommand] = &[
@@ -59,6 +59,7 @@ const EVALUATE: &[Flag] = &[
     Flag::of("full", "is_whole"),
     Flag::of("median-stretch", "median_stretch"),
     Flag::of("voxel", "scan/voxel_mm"),
+    Flag::read("surface", "scan/surface", FaceSeen),
     Flag::of("noise", "scan/noise_sd_mm"),
     Flag::of("force-sd", "scan/force_sd_n"),
     Flag::of("force-drives", "protocol/force_drive_mm"),
@@ -76,6 +77,7 @@ const SCAN: &[Flag] = &[
     Flag::of("mesh", "mesh"),
     Flag::of("full", "is_whole"),
     Flag::of("voxel", "voxel_mm"),
+    Flag::read("surface", "surface", FaceSeen),
     Flag::of("offset", "offset_voxels"),
     Flag::of("snr", "snr"),
     Flag::of("noise", "noise_sd_mm"),
@@ -99,6 +101,7 @@ const IMPORT: &[Flag] = &[
     Flag::of("components", "components"),
     Flag::of("origin", "origin"),
     Flag::of("vectors", "vectors"),
+    Flag::read("surface", "surface", FaceSeen),
     Flag::of("voxel", "voxel_mm"),
     Flag::of("region", "region"),
     Flag::of("filter", "filter"),

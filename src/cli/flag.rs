@@ -5,6 +5,7 @@ use super::error::CliError;
 use super::input;
 use crate::job::{FieldForm, RequestField};
 use crate::mesh::MeshSize;
+use crate::voxel::Surface;
 use clap::{Arg, ArgAction, ArgMatches};
 use serde_json::{Map, Value};
 use std::path::Path;
@@ -20,6 +21,8 @@ pub(super) enum Written {
     TextFile,
     /// The flag turns the field off.
     Off,
+    /// A face, and after a comma which components are seen of it: `+z`, `+z,all`.
+    FaceSeen,
     /// A named element size or a factor, for a field that holds the factor.
     MeshFactor,
     /// `auto` leaves the field out.
@@ -76,6 +79,7 @@ impl Flag {
         let name = match (self.written, &field.form) {
             (Written::JsonFile | Written::TextFile, _) => "FILE",
             (Written::MeshFactor, _) => "SIZE",
+            (Written::FaceSeen, _) => "FACE",
             (_, FieldForm::Tuple(2)) => "LOW,HIGH",
             (_, FieldForm::Tuple(_)) => "X,Y,Z",
             (_, FieldForm::Numbers | FieldForm::Texts | FieldForm::Choices(_)) => "LIST",
@@ -109,6 +113,10 @@ impl Flag {
                 let size: MeshSize =
                     text.parse().map_err(|e: crate::field::FieldError| self.wrong(text, &e.allowed))?;
                 size.factor().into()
+            }
+            Written::FaceSeen => {
+                let seen: Surface = text.parse().map_err(|e: crate::field::FieldError| self.wrong(text, &e.allowed))?;
+                serde_json::to_value(seen).map_err(|e| self.wrong(text, &e.to_string()))?
             }
             _ => self.value(field, text)?,
         };

@@ -65,6 +65,11 @@ fn conditions_of(e: &Evaluation) -> Vec<(String, String)> {
     let forces_mm: Vec<f64> = e.force_steps.iter().map(|s| s.drive_mm).collect();
     let parameters: Vec<&str> = e.promised_sd.iter().map(|p| p.parameter.as_str()).collect();
     [
+        (
+            "what is seen",
+            scan.surface
+                .map_or_else(|| "the volume".into(), |s| format!("the face {}, {:?}", s.face.name(), s.components)),
+        ),
         ("voxel size in mm", format!("{:?}", scan.voxel_mm)),
         ("noise of the displacement in mm", format!("{:?}", scan.noise_sd_mm)),
         ("noise of the force in N", format!("{}", scan.force_sd_n)),
@@ -123,7 +128,10 @@ fn figures_of(prefix: &str, e: &Evaluation, figures: &mut Vec<Figure>) {
             let of = |what: &str| format!("{at}: integrated sensitivity to {p}, {what}");
             add(of("sum"), Some(s.sum), Direction::LargerIsBetter);
             add(of("mean per voxel"), Some(s.mean_per_voxel), Direction::LargerIsBetter);
-            add(of("volume integral"), Some(s.volume_integral), Direction::LargerIsBetter);
+            match s.surface_integral {
+                Some(integral) => add(of("surface integral"), Some(integral), Direction::LargerIsBetter),
+                None => add(of("volume integral"), Some(s.volume_integral), Direction::LargerIsBetter),
+            }
         }
         for p in &step.promised_sd {
             add(format!("{at}: promised sd of {}", p.parameter), p.value, Direction::SmallerIsBetter);

@@ -39,6 +39,8 @@ impl Study {
         problems.extend(self.base.validate().err().map(StudyError::Base));
         problems.extend(self.limits.validate().err().map(StudyError::Limits));
         problems.extend(self.scan.field_errors().into_iter().map(StudyError::Scan));
+        let remedy = "a design is judged by scans of the volume; evaluate designs for cameras one by one";
+        problems.extend(self.scan.needs_volume(remedy).err().map(StudyError::Scan));
         problems.extend(self.protocol.field_errors().into_iter().map(StudyError::Protocol));
         let length = self.name.chars().count();
         if length > MAX_NAME_LENGTH {

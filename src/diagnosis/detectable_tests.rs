@@ -13,6 +13,7 @@ fn scan() -> ScanSettings {
         noise_sd_mm: [NOISE_MM; 3],
         force_sd_n: FORCE_SD_N,
         partial_voxels: PartialVoxels::default(),
+        surface: None,
     }
 }
 

@@ -59,8 +59,9 @@ impl<'a> Laboratory<'a> {
     /// For `observed`, on a mesh of the whole specimen with `mesh`'s element sizes.
     ///
     /// # Errors
-    /// [`DiagnosisError`]: the specimen cannot be meshed.
+    /// [`DiagnosisError`]: the specimen cannot be meshed, or cameras measured a face.
     pub fn new(observed: &'a Observed, mesh: &MeshOptions) -> Result<Laboratory<'a>, DiagnosisError> {
+        observed.check_volume("a diagnosis")?;
         if !observed.specimen.is_driven_along_x() {
             return Err(DiagnosisError::DriveAngle { value_deg: observed.specimen.drive_angle_deg });
         }

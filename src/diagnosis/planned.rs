@@ -5,7 +5,6 @@ use crate::calibration::{CalibrationError, Observed};
 use crate::recording::{Filter, RecordedStep, Recording};
 use crate::sensitivity::ScanSettings;
 use crate::specimen::Specimen;
-use crate::voxel::VoxelMask;
 
 /// A scan that is planned: what is scanned, how, at which drives, and which forces are expected there.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +31,7 @@ impl PlannedScan<'_> {
     pub(super) fn observed(&self) -> Result<Observed, DiagnosisError> {
         let specimen =
             Specimen { drive_mm: self.drives_mm.to_vec(), other_samples: Vec::new(), ..self.specimen.clone() };
-        let mask = VoxelMask::covering(&specimen, self.scan.voxel_mm).map_err(CalibrationError::from)?;
+        let mask = self.scan.mask(&specimen).map_err(CalibrationError::from)?;
         let step = |(n, &drive_mm): (usize, &f64)| RecordedStep {
             drive_mm,
             force_n: self.forces_n.get(n).copied(),
@@ -46,7 +45,7 @@ impl PlannedScan<'_> {
             specimen,
             grid: mask.grid.clone(),
             mask: mask.spread(&vec![true; mask.num_voxels()], false),
-            noise_sd_mm: Some(self.scan.noise_sd_mm),
+            noise_sd_mm: Some(self.scan.noise().displacement_sd_mm),
             filter: Filter::None,
             load: None,
             notes: None,

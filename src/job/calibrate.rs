@@ -212,6 +212,10 @@ impl Run for CalibrationRequest {
         InputUse::of_list("/recordings", &self.recordings, InputForm::Displacements)
     }
 
+    fn takes_surfaces(&self) -> bool {
+        true
+    }
+
     fn check_size(&self, recordings: &[RecordingOutline], max_elements: usize) -> Result<(), FieldError> {
         let mesh = MeshSize::Factor(self.mesh_factor);
         recordings.iter().try_for_each(|r| check_mesh(&r.specimen, mesh, "/mesh_factor", max_elements))
@@ -252,10 +256,16 @@ fn add_fields(outcome: &mut Outcome, found: &Calibration, observed: &[Observed])
             let model = found.fit.predicted(r, s);
             let rest: Vec<[f64; 3]> =
                 step.displacement.iter().zip(model).map(|(u, m)| [0, 1, 2].map(|c| u[c] - m[c])).collect();
-            for (what, values) in [("measured", &step.displacement[..]), ("model", model), ("misfit", &rest[..])] {
+            let grid = &recording.mask.grid;
+            let images =
+                [("measured", &step.displacement[..], false), ("model", model, true), ("misfit", &rest[..], false)];
+            for (what, values, knows_all) in images {
                 let name = format!("{what}_{}_{}.nii.gz", r + 1, s + 1);
-                let spread = recording.mask.spread(values, [f64::NAN; 3]);
-                outcome.add_written(false, |folder| write_vectors(folder, &name, &recording.mask.grid, &spread))?;
+                let mut spread = recording.mask.spread(values, [f64::NAN; 3]);
+                if !knows_all {
+                    grid.fill_unmeasured(&mut spread, f64::NAN);
+                }
+                outcome.add_written(false, |folder| write_vectors(folder, &name, grid, &spread))?;
             }
         }
     }

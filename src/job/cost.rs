@@ -7,7 +7,7 @@
 use super::request::RecordingOutline;
 use crate::mesh::{MeshOptions, mesh_specimen};
 use crate::specimen::Specimen;
-use crate::voxel::VoxelGrid;
+use crate::voxel::{Surface, VoxelGrid};
 
 /// Equilibria per recorded drive of a calibration with one term: 3.5 to 9 on scans at two drives of the shipped solid
 /// and two-hole blocks, at the standard element size and twice that.
@@ -33,18 +33,18 @@ pub fn seconds_per_drive(num_nodes: usize, num_voxels: usize) -> f64 {
     2.28 * (num_nodes as f64 / 1e4).powf(1.4) + 2e-6 * num_voxels as f64
 }
 
-/// Processor seconds of `num_drives` drives of all samples of a specimen on a mesh, each seen by a scan of `voxel_mm`
-/// where there is one; none where a sample cannot be meshed or the scan has no grid. Meshes once.
+/// Processor seconds of `num_drives` drives of all samples of a specimen on a mesh, each seen by a scan with these
+/// voxels, of the volume or of a surface, where there is one; none where a sample cannot be meshed or the scan has no grid. Meshes once.
 pub(super) fn seconds(
     specimen: &Specimen,
     mesh: &MeshOptions,
-    voxel_mm: Option<[f64; 3]>,
+    scan: Option<([f64; 3], Option<Surface>)>,
     num_drives: usize,
 ) -> Option<f64> {
     let of_sample = |sample: &Specimen| {
         let num_nodes = mesh_specimen(sample, &mesh.carried(specimen, sample)).ok()?.nodes.len();
-        let num_voxels = match voxel_mm {
-            Some(voxel) => VoxelGrid::covering(sample, voxel).ok()?.num_voxels(),
+        let num_voxels = match scan {
+            Some((voxel_mm, surface)) => VoxelGrid::planned(sample, voxel_mm, surface).ok()?.num_voxels(),
             None => 0,
         };
         Some(seconds_per_drive(num_nodes, num_voxels) * num_drives as f64)

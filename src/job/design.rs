@@ -81,8 +81,8 @@ impl Run for CheckedStudy {
         let num_solves = if study.objective.kind == ObjectiveKind::Detect { 3 } else { 1 };
         let num_materials = num_solves * study.materials.len().max(1);
         let search = cost::seconds(&study.base, &MeshOptions::search(&study.base), None, num_materials)?;
-        let voxel_mm = Some(study.scan.voxel_mm);
-        let confirm = cost::seconds(&study.base, &MeshOptions::standard(&study.base), voxel_mm, num_materials)?;
+        let voxels = Some((study.scan.voxel_mm, None));
+        let confirm = cost::seconds(&study.base, &MeshOptions::standard(&study.base), voxels, num_materials)?;
         Some(num_searched as f64 * search + budget.confirm as f64 * confirm)
     }
 

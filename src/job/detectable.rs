@@ -23,6 +23,8 @@ pub(super) fn check_detectable(
     num_drives: usize,
 ) -> Result<(), FieldError> {
     let refused = |allowed: &str| FieldError::new("/has_detectable", true, allowed);
+    scan.needs_volume("a diagnosis, whose errors are told, is of scans of the volume: leave out has_detectable")
+        .map_err(|e| e.below("/scan"))?;
     if !specimen.other_samples.is_empty() || protocol.blocks_scanned > 1 {
         let allowed = "false where the specimen has other_samples or several blocks are scanned";
         return Err(refused(allowed).remedy("a diagnosis is of one block alone: evaluate that one by itself"));
@@ -44,7 +46,7 @@ pub(super) fn check_detectable(
 pub(super) fn detection_seconds(specimen: &Specimen, scan: &ScanSettings, num_drives: usize) -> Option<f64> {
     let factor = DiagnosisOptions::default().mesh_factor;
     let mesh = MeshOptions { use_mirror: false, ..MeshOptions::scaled(specimen, factor) };
-    Some(EQUILIBRIA * cost::seconds(specimen, &mesh, Some(scan.voxel_mm), num_drives)?)
+    Some(EQUILIBRIA * cost::seconds(specimen, &mesh, Some((scan.voxel_mm, scan.surface)), num_drives)?)
 }
 
 /// The smallest errors that a diagnosis of an evaluated scan would name, by its default settings.

@@ -12,7 +12,7 @@ use crate::sensitivity::{
     evaluate_fixture,
 };
 use crate::specimen::Specimen;
-use crate::voxel::VoxelGrid;
+use crate::voxel::VoxelError;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -112,8 +112,14 @@ impl EvaluationRequest {
 fn check_grid(specimen: &Specimen, scan: &ScanSettings) -> Result<(), FieldError> {
     let mut num_voxels = 0;
     for sample in specimen.samples() {
-        let grid = VoxelGrid::covering(&sample, scan.voxel_mm).map_err(|e| {
-            FieldError::new("/scan/voxel_mm", format!("{:?}", scan.voxel_mm), "usable").remedy(e.to_string())
+        let grid = scan.grid(&sample).map_err(|e| {
+            let error = match (&e, scan.surface) {
+                (VoxelError::HiddenFace { .. }, Some(surface)) => {
+                    FieldError::new("/scan/surface/face", surface.face.name(), "a plane face that cameras can see")
+                }
+                _ => FieldError::new("/scan/voxel_mm", format!("{:?}", scan.voxel_mm), "usable"),
+            };
+            error.remedy(e.to_string())
         })?;
         num_voxels += grid.num_voxels();
     }
@@ -177,7 +183,8 @@ impl Run for CheckedEvaluation {
             DriveSelection::MedianStretch(_) => MEDIAN_STRETCH_SOLVES,
         };
         let EvaluationRequest { specimen, scan, has_detectable, .. } = &self.request;
-        let evaluation = cost::seconds(specimen, &self.options().mesh, Some(scan.voxel_mm), num_drives)?;
+        let evaluation =
+            cost::seconds(specimen, &self.options().mesh, Some((scan.voxel_mm, scan.surface)), num_drives)?;
         let detection = if *has_detectable { detection_seconds(specimen, scan, self.drives.count())? } else { 0.0 };
         Some(evaluation + detection)
     }

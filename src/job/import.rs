@@ -17,6 +17,7 @@ use crate::recording::{
 };
 use crate::report::{displacement_picture, raw_picture};
 use crate::specimen::Specimen;
+use crate::voxel::Surface;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use utoipa::ToSchema;
@@ -137,6 +138,11 @@ pub struct ImportRequest {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(min_items = 3, max_items = 3)]
     pub voxel_mm: Option<[f64; 3]>,
+    /// The face on which the points of a point cloud lie, where cameras measured a surface. The position along its
+    /// normal may then be left out of the tables, and for in_plane components the displacement along it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub surface: Option<Surface>,
     /// Which of several separate regions of the mask, counted along the thickness from 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1, maximum = 1000)]
@@ -197,6 +203,19 @@ impl ImportRequest {
             if is_given && !is_of_scanner {
                 let error = FieldError::new(format!("/{name}"), "given", "left out");
                 errors.push(error.remedy("only the files of a scanner have series (form dicom or paravision)"));
+            }
+        }
+        if let Some(surface) = self.surface {
+            let error = |allowed: &str| FieldError::new("/surface", surface.face.name(), allowed);
+            if self.form != Some(FileForm::Points) {
+                let remedy = "tables of points alone can be of a face (form points)";
+                errors.push(error("left out where the files hold no points").remedy(remedy));
+            }
+            if self.filter != Filter::None {
+                errors.push(error("left out where the values went through a filter of voxels"));
+            }
+            if let Some(Err(hidden)) = self.specimen.as_ref().map(|specimen| surface.check(specimen)) {
+                errors.push(error("a plane face that cameras can see").remedy(hidden.to_string()));
             }
         }
         if is_of_scanner && !self.drive_mm.is_empty() {
@@ -381,11 +400,11 @@ impl CheckedImport {
                     let num_bytes = std::fs::metadata(path).map_err(|e| fail(&e))?.len();
                     memory.take("a table of points", num_bytes).map_err(|e| fail(&e))?;
                     let text = crate::file::read_text_limited(path, num_bytes).map_err(|e| fail(&e))?;
-                    steps.push(read_points(&text, path, &memory).map_err(|e| fail(&e))?);
+                    steps.push(read_points(&text, path, self.request.surface, &memory).map_err(|e| fail(&e))?);
                     memory.give_back(num_bytes);
                 }
                 let voxel = options.voxel_mm_by_index;
-                recording_from_points(&steps, specimen, voxel, &options, &memory)
+                recording_from_points(&steps, specimen, voxel, self.request.surface, &options, &memory)
                     .map_err(|e| unfit("/files", first, &e))
             }
         }
@@ -408,7 +427,8 @@ impl CheckedImport {
             id: raw.id.clone(),
             is_raw: true,
             num_voxels: raw.num_voxels(),
-            noise_sd_mm: raw.noise_sd_mm,
+            noise_sd_mm: raw.noise_sd_mm.map(|sd| sd.map(Some)),
+            surface: None,
             steps: steps.collect(),
         };
         let mut outcome = Outcome { summary: summary::import(&result), ..Outcome::default() };
@@ -463,7 +483,7 @@ impl Run for CheckedImport {
             }
         }
         let mut reports = reports.into_iter();
-        let is_complete = |u: &&[f64; 3]| u.iter().all(|x| x.is_finite());
+        let is_complete = |u: &&[f64; 3]| recording.is_complete(u);
         let steps = recording.steps.iter().map(|s| ImportStep {
             drive_mm: s.drive_mm,
             force_n: s.force_n,
@@ -477,7 +497,8 @@ impl Run for CheckedImport {
             id: recording.id.clone(),
             is_raw: false,
             num_voxels: recording.num_voxels(),
-            noise_sd_mm: recording.noise_sd_mm,
+            noise_sd_mm: recording.stated_noise_sd_mm(),
+            surface: recording.grid.surface,
             steps: steps.collect(),
         };
         let mut outcome = Outcome { summary: summary::import(&result), ..Outcome::default() };

@@ -1,6 +1,7 @@
 //! The result of an import (`import/1`).
 
 use crate::acquisition::StepReport;
+use crate::voxel::Surface;
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -13,7 +14,11 @@ pub(super) struct ImportResult {
     pub id: String,
     pub is_raw: bool,
     pub num_voxels: usize,
-    pub noise_sd_mm: Option<[f64; 3]>,
+    /// Null of a component that cameras do not measure.
+    pub noise_sd_mm: Option<[Option<f64>; 3]>,
+    /// The face that cameras saw; absent where the volume was scanned.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub surface: Option<Surface>,
     pub steps: Vec<ImportStep>,
 }
 

@@ -187,10 +187,11 @@ impl Run for NextRequest {
         };
         let fit = cost::of_calibration(recordings, self.mesh_factor, effort)?;
         let num_drives = self.drive_mm.as_ref().map_or(self.num_drives, Vec::len);
-        let voxel_mm = Some(self.study.scan.voxel_mm);
-        let candidates = self.bodies().into_iter().filter_map(|body| {
-            cost::seconds(&body, &MeshOptions::scaled(&body, self.mesh_factor), voxel_mm, num_drives)
-        });
+        let voxels = Some((self.study.scan.voxel_mm, None));
+        let candidates = self
+            .bodies()
+            .into_iter()
+            .filter_map(|body| cost::seconds(&body, &MeshOptions::scaled(&body, self.mesh_factor), voxels, num_drives));
         Some(fit + candidates.sum::<f64>())
     }
 

@@ -65,6 +65,11 @@ pub trait Run: Send + Sync {
         Vec::new()
     }
 
+    /// Whether it takes recordings of a face that cameras saw, beside those of the volume.
+    fn takes_surfaces(&self) -> bool {
+        false
+    }
+
     /// Whether its meshes have at most `max_elements` elements, given what is known of its recordings. Meshes once.
     ///
     /// # Errors

@@ -4,17 +4,19 @@ use super::outcome::{RECORDING_FIELD, WithRecording, recording_identifier, to_js
 use super::subject::{check_meshes, driven, name_of_sample};
 use super::{Context, JobError, Outcome, RecordingOutline, Request, ResultSchema, Run, cost, defaults, summary};
 use crate::acquisition::{
-    KSpace, LoadProgram, ReconstructOptions, Reconstruction, Scan, ScanOptions, ScanResult, Window, reconstruct, scan,
+    CameraOptions, KSpace, LoadProgram, ReconstructOptions, Reconstruction, Scan, ScanOptions, ScanResult, Window,
+    film, reconstruct, scan,
 };
 use crate::fem::SolveOptions;
 use crate::field::FieldError;
 use crate::field::schema::Seed;
 use crate::material::Ogden;
-use crate::mesh::MeshSize;
+use crate::mesh::{MeshOptions, MeshSize};
 use crate::provenance::VERSION;
 use crate::recording::{Filter, write_vectors};
 use crate::report::{displacement_picture, raw_picture};
 use crate::specimen::Specimen;
+use crate::voxel::{Surface, VoxelError, VoxelGrid};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
@@ -73,10 +75,15 @@ pub struct ScanRequest {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(max_length = 200)]
     pub name: Option<String>,
-    /// Edges of a voxel, mm.
+    /// Edges of a voxel, mm; where cameras see a surface, the two in the face are those of a subset.
     #[serde(default = "defaults::voxel_mm")]
     #[schema(min_items = 3, max_items = 3, default = defaults::voxel_mm)]
     pub voxel_mm: [f64; 3],
+    /// The face that cameras see (digital image correlation), in place of a scan of the volume: displacements of its
+    /// subsets with noise, and no phases.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub surface: Option<Surface>,
     /// Offset of the grid from the specimen's centre in voxels, each from −1 to 1.
     #[serde(default)]
     #[schema(min_items = 3, max_items = 3, default = no_offset)]
@@ -129,16 +136,94 @@ fn seed() -> u64 {
     1
 }
 
+/// What records the specimen.
+enum Recorder {
+    Scanner(ScanOptions),
+    Cameras(CameraOptions),
+}
+
 struct CheckedScan {
     request: ScanRequest,
     /// At the drives that are asked for.
     specimen: Specimen,
-    options: ScanOptions,
+    recorder: Recorder,
 }
 
 impl ScanRequest {
-    /// The scanner's settings; what is wrong is added to `errors`.
-    fn options(&self, specimen: &Specimen, errors: &mut Vec<FieldError>) -> Option<ScanOptions> {
+    /// The settings of scanner or cameras; what is wrong is added to `errors`.
+    fn recorder(&self, specimen: &Specimen, errors: &mut Vec<FieldError>) -> Option<Recorder> {
+        match self.surface {
+            Some(surface) => self.cameras(surface, specimen, errors).map(Recorder::Cameras),
+            None => self.scanner(specimen, errors).map(Recorder::Scanner),
+        }
+    }
+
+    /// The sample that is recorded.
+    fn recorded(&self, specimen: &Specimen, errors: &mut Vec<FieldError>) -> Option<Specimen> {
+        let samples = specimen.samples();
+        let sample = samples.get(self.sample.wrapping_sub(1));
+        if sample.is_none() {
+            let allowed = format!("from 1 to {}, the specimen's kinds of samples", samples.len());
+            errors.push(FieldError::new("/sample", self.sample, allowed));
+        }
+        sample.cloned()
+    }
+
+    fn load(&self) -> LoadProgram {
+        LoadProgram { drift_sd_n: self.force_sd_n, ..LoadProgram::default() }
+    }
+
+    /// A grid of at most so many voxels.
+    fn limited(&self, grid: Result<VoxelGrid, String>, errors: &mut Vec<FieldError>) -> Option<VoxelGrid> {
+        let unfit = |allowed: String| FieldError::new("/voxel_mm", format!("{:?}", self.voxel_mm), allowed);
+        match grid {
+            Ok(grid) if grid.num_voxels() <= MAX_VOXELS => return Some(grid),
+            Ok(grid) => {
+                let error = unfit(format!("large enough for at most {MAX_VOXELS} voxels"));
+                errors.push(error.remedy(format!("these make {}: use larger voxels", grid.num_voxels())));
+            }
+            Err(error) => errors.push(unfit("usable".into()).remedy(error)),
+        }
+        None
+    }
+
+    /// The cameras' settings.
+    fn cameras(&self, surface: Surface, specimen: &Specimen, errors: &mut Vec<FieldError>) -> Option<CameraOptions> {
+        let of_scanner = [
+            ("snr", self.snr.is_some()),
+            ("kspace", self.kspace.is_some()),
+            ("is_raw", self.is_raw),
+            ("filter", self.filter != Filter::None),
+            ("mm_per_radian", self.mm_per_radian != mm_per_radian()),
+            ("offset_voxels", self.offset_voxels != no_offset()),
+        ];
+        for (name, _) in of_scanner.into_iter().filter(|(_, is_given)| *is_given) {
+            let error = FieldError::new(format!("/{name}"), "given", "left out where a surface is seen");
+            errors.push(
+                error.remedy("cameras have neither phases nor a grid that lies anywhere; noise_sd_mm is their noise"),
+            );
+        }
+        for (axis, value) in self.noise_sd_mm.into_iter().flatten().enumerate() {
+            if !(value > 1e-100 && value <= 1e100) {
+                errors.push(FieldError::new(format!("/noise_sd_mm/{axis}"), value, "above 0 and finite"));
+            }
+        }
+        let sample = self.recorded(specimen, errors)?;
+        let grid = match VoxelGrid::planned(&sample, self.voxel_mm, Some(surface)) {
+            Err(error @ VoxelError::HiddenFace { .. }) => {
+                let allowed = "a plane face that cameras can see";
+                let unfit = FieldError::new("/surface/face", surface.face.name(), allowed);
+                errors.push(unfit.remedy(error.to_string()));
+                return None;
+            }
+            other => self.limited(other.map_err(|e| e.to_string()), errors)?,
+        };
+        let noise_sd_mm = self.noise_sd_mm.unwrap_or(NOISE_SD_MM);
+        Some(CameraOptions { grid, noise_sd_mm, load: self.load(), seed: self.seed, sample: self.sample - 1 })
+    }
+
+    /// The scanner's settings.
+    fn scanner(&self, specimen: &Specimen, errors: &mut Vec<FieldError>) -> Option<ScanOptions> {
         if let (Some(snr), Some(_)) = (self.snr, self.noise_sd_mm) {
             let error = FieldError::new("/snr", format!("{snr:?}"), "left out where noise_sd_mm is given");
             errors.push(error.remedy("give one of the two"));
@@ -162,32 +247,15 @@ impl ScanRequest {
             let allowed = "above 0 and at most 1 along each axis";
             errors.push(FieldError::new("/kspace/keep", format!("{keep:?}"), allowed).remedy(error.to_string()));
         }
-        let samples = specimen.samples();
-        let sample = samples.get(self.sample.wrapping_sub(1));
-        if sample.is_none() {
-            let allowed = format!("from 1 to {}, the specimen's kinds of samples", samples.len());
-            errors.push(FieldError::new("/sample", self.sample, allowed));
-        }
+        let sample = self.recorded(specimen, errors);
         if !errors.is_empty() {
             return None;
         }
-        let unfit = |allowed: String| FieldError::new("/voxel_mm", format!("{:?}", self.voxel_mm), allowed);
-        let grid = match ScanOptions::grid_around(sample?, self.voxel_mm, MARGIN_VOXELS, self.offset_voxels) {
-            Ok(grid) if grid.num_voxels() <= MAX_VOXELS => grid,
-            Ok(grid) => {
-                let error = unfit(format!("large enough for at most {MAX_VOXELS} voxels"));
-                errors.push(error.remedy(format!("these make {}: use larger voxels", grid.num_voxels())));
-                return None;
-            }
-            Err(error) => {
-                errors.push(unfit("usable".into()).remedy(error.to_string()));
-                return None;
-            }
-        };
+        let around = ScanOptions::grid_around(&sample?, self.voxel_mm, MARGIN_VOXELS, self.offset_voxels);
+        let grid = self.limited(around.map_err(|e| e.to_string()), errors)?;
         let noise = self.noise_sd_mm.unwrap_or(NOISE_SD_MM);
         let snr = self.snr.unwrap_or([0, 1, 2].map(|axis| self.mm_per_radian[axis] / noise[axis]));
-        let load = LoadProgram { drift_sd_n: self.force_sd_n, ..LoadProgram::default() };
-        let sample = self.sample - 1;
+        let (load, sample) = (self.load(), self.sample - 1);
         Some(ScanOptions { grid, mm_per_radian: self.mm_per_radian, snr, kspace, load, seed: self.seed, sample })
     }
 }
@@ -214,8 +282,8 @@ impl Request for ScanRequest {
             let error = FieldError::new("/filter", json!(self.filter), "none where raw phases are asked for");
             errors.push(error.remedy("the filter belongs to displacements; leave out one of the two"));
         }
-        match self.options(&specimen, &mut errors) {
-            Some(options) if errors.is_empty() => Ok(Box::new(CheckedScan { request: self, specimen, options })),
+        match self.recorder(&specimen, &mut errors) {
+            Some(recorder) if errors.is_empty() => Ok(Box::new(CheckedScan { request: self, specimen, recorder })),
             _ => Err(errors),
         }
     }
@@ -233,24 +301,59 @@ impl Run for CheckedScan {
     fn estimated_seconds(&self, _: &[RecordingOutline]) -> Option<f64> {
         let mut mesh = self.request.mesh.options(&self.specimen);
         mesh.use_mirror &= !self.request.is_whole;
-        cost::seconds(&self.specimen, &mesh, Some(self.request.voxel_mm), self.specimen.drive_mm.len())
+        cost::seconds(
+            &self.specimen,
+            &mesh,
+            Some((self.request.voxel_mm, self.request.surface)),
+            self.specimen.drive_mm.len(),
+        )
     }
 
     fn run(&self, context: &Context) -> Result<Outcome, JobError> {
-        let (specimen, material, options) = (&self.specimen, &self.request.material, &self.options);
-        let hash = context.input_hash.clone();
-        let mut mesh = self.request.mesh.options(specimen);
+        context.step(&format!("scanning at {} drives", self.specimen.drive_mm.len()), 0, 3);
+        let (result, mut outcome) = match &self.recorder {
+            Recorder::Scanner(options) => self.scanned(options, context)?,
+            Recorder::Cameras(options) => self.filmed(options, context)?,
+        };
+        outcome.summary = summary::scan(&self.specimen.name, &result);
+        let named = WithRecording { result: &result, recording: recording_identifier(&outcome.recording()) };
+        (outcome.result, outcome.result_name) = (to_json(&named)?, "scan-result.json");
+        let truth = json!({ "material": self.request.material, "scan": result });
+        outcome.add("scan.json", to_json(&truth)?);
+        outcome.add("material.json", self.request.material.to_json());
+        Ok(outcome)
+    }
+}
+
+impl CheckedScan {
+    fn mesh(&self, context: &Context) -> MeshOptions {
+        let mut mesh = self.request.mesh.options(&self.specimen);
         mesh.use_mirror &= !self.request.is_whole;
         mesh.max_elements = mesh.max_elements.min(context.surroundings.max_elements());
-        context.step(&format!("scanning at {} drives", specimen.drive_mm.len()), 0, 3);
-        let name = self.request.name.as_ref().unwrap_or(&specimen.name);
-        let id = name_of_sample(&format!("{}-seed-{}", plain(name), options.seed), options.sample);
-        let cancelled = || context.is_cancelled();
-        let mut made = scan(&id, specimen, material, &mesh, &SolveOptions::default(), options, &cancelled)
+        mesh
+    }
+
+    /// The recording's name.
+    fn id(&self) -> String {
+        let name = self.request.name.as_ref().unwrap_or(&self.specimen.name);
+        name_of_sample(&format!("{}-seed-{}", plain(name), self.request.seed), self.request.sample - 1)
+    }
+
+    /// What the recording says of its making.
+    fn notes(&self, context: &Context) -> Option<serde_json::Value> {
+        let (hash, seed) = (&context.input_hash, self.request.seed);
+        Some(json!({
+            "synthetic": { "program": format!("lambdak {VERSION}"), "input_hash": hash, "seed": seed },
+        }))
+    }
+
+    /// The result and the files of a scanner.
+    fn scanned(&self, options: &ScanOptions, context: &Context) -> Result<(ScanResult, Outcome), JobError> {
+        let (mesh, solve, cancelled) = (self.mesh(context), SolveOptions::default(), || context.is_cancelled());
+        let material = &self.request.material;
+        let mut made = scan(&self.id(), &self.specimen, material, &mesh, &solve, options, &cancelled)
             .map_err(|e| context.failed(&e))?;
-        made.raw.notes = Some(json!({
-            "synthetic": { "program": format!("lambdak {VERSION}"), "input_hash": hash, "seed": options.seed },
-        }));
+        made.raw.notes = self.notes(context);
         context.step("reconstruct", 1, 3);
         let found = if self.request.is_raw {
             None
@@ -259,16 +362,27 @@ impl Run for CheckedScan {
             Some(reconstruct(&made.raw, &settings).map_err(|e| context.failed(&e))?)
         };
         context.step("files", 2, 3);
+        let hash = context.input_hash.clone();
         let result = ScanResult::new(&made, options, found.as_ref(), hash).map_err(|e| context.failed(&e))?;
-        let text = summary::scan(&specimen.name, &result);
-        let mut outcome = Outcome { summary: text, ..Outcome::default() };
+        let mut outcome = Outcome::default();
         add_files(&mut outcome, &made, found.as_ref())?;
-        let named = WithRecording { result: &result, recording: recording_identifier(&outcome.recording()) };
-        (outcome.result, outcome.result_name) = (to_json(&named)?, "scan-result.json");
-        let truth = json!({ "material": material, "scan": result });
-        outcome.add("scan.json", to_json(&truth)?);
-        outcome.add("material.json", material.to_json());
-        Ok(outcome)
+        Ok((result, outcome))
+    }
+
+    /// The result and the files of cameras.
+    fn filmed(&self, options: &CameraOptions, context: &Context) -> Result<(ScanResult, Outcome), JobError> {
+        let (mesh, solve, cancelled) = (self.mesh(context), SolveOptions::default(), || context.is_cancelled());
+        let material = &self.request.material;
+        let mut made = film(&self.id(), &self.specimen, material, &mesh, &solve, options, &cancelled)
+            .map_err(|e| context.failed(&e))?;
+        made.recording.notes = self.notes(context);
+        context.step("files", 2, 3);
+        let mut outcome = Outcome::default();
+        outcome.add_written(true, |folder| made.recording.write(folder))?;
+        for n in 0..made.recording.steps.len() {
+            outcome.add(format!("displacement_{}.svg", n + 1), displacement_picture(&made.recording, n));
+        }
+        Ok((ScanResult::of_cameras(&made, options, context.input_hash.clone()), outcome))
     }
 }
 

@@ -58,7 +58,7 @@ impl Run for CheckedSweep {
         let (study, all) = (&self.0, tasks(&self.0));
         let of = |index: usize| {
             let TaskInputs { specimen, scan, mesh, .. } = all.get(index)?.inputs(study);
-            cost::seconds(&specimen, &mesh.options(&specimen), Some(scan.voxel_mm), specimen.drive_mm.len())
+            cost::seconds(&specimen, &mesh.options(&specimen), Some((scan.voxel_mm, None)), specimen.drive_mm.len())
         };
         cost::of_many(all.len(), of)
     }

@@ -6,7 +6,7 @@ use super::scanner::ScannerError;
 use super::{Filter, RecordedStep, Recording, RecordingError};
 use crate::file::MemoryError;
 use crate::specimen::Specimen;
-use crate::voxel::{VoxelError, VoxelGrid};
+use crate::voxel::{VoxelError, VoxelGrid, unbounded_where_unmeasured};
 use std::path::PathBuf;
 
 /// The measured box may be this much smaller or larger than the drawn block, as a factor, before its unit or its axes
@@ -93,6 +93,24 @@ pub enum ImportError {
         line: usize,
         /// What is wrong.
         message: String,
+    },
+    /// A point that should lie on a face does not.
+    #[error(
+        "{axis} = {found_mm} mm is {:.3} mm off the face {face}, which lies at {expected_mm} mm, and at most {allowed_mm:.3} mm \
+         are allowed: check face, unit (--unit) and origin, which is the centre of the block",
+        (found_mm - expected_mm).abs()
+    )]
+    OffFace {
+        /// The axis of the face's normal.
+        axis: &'static str,
+        /// Where the point lies along it, mm.
+        found_mm: f64,
+        /// The face.
+        face: &'static str,
+        /// Where the face lies, mm.
+        expected_mm: f64,
+        /// How far off a point may be: half the smaller edge of a subset.
+        allowed_mm: f64,
     },
     /// Points do not lie on a regular grid.
     #[error(
@@ -200,7 +218,11 @@ pub(super) fn check_extent(specimen: &Specimen, grid: &VoxelGrid) -> Result<(), 
         let ratio = found_mm[a] / expected_mm[a];
         (1.0 / LARGEST_MISFIT..=LARGEST_MISFIT).contains(&ratio)
     };
-    if (0..3).all(fits) { Ok(()) } else { Err(ImportError::Extent { found_mm, expected_mm }) }
+    if (0..3).all(|a| grid.normal_axis() == Some(a) || fits(a)) {
+        Ok(())
+    } else {
+        Err(ImportError::Extent { found_mm, expected_mm })
+    }
 }
 
 /// Last checks and the recording.
@@ -219,17 +241,18 @@ pub(super) fn finish(
     }
     check_position(specimen, &grid, &mask)?;
     for (n, step) in steps.iter().enumerate() {
-        if !step.displacement.iter().any(|u| u.iter().all(|x| x.is_finite())) {
+        if !step.displacement.iter().any(|u| grid.is_complete(u)) {
             return Err(RecordingError::NoDisplacement { step: n + 1, num_voxels }.into());
         }
     }
+    let noise_sd_mm = options.noise_sd_mm.map(|sd| unbounded_where_unmeasured(grid.measured(), sd));
     let recording = Recording {
         id: options.id.clone(),
         specimen: specimen.clone(),
         grid,
         mask,
         steps,
-        noise_sd_mm: options.noise_sd_mm,
+        noise_sd_mm,
         filter: options.filter,
         load: None,
         notes: Some(notes),

@@ -55,7 +55,8 @@ pub struct Recording {
     pub mask: Vec<bool>,
     /// One step per drive.
     pub steps: Vec<RecordedStep>,
-    /// Noise of a displacement as given, per component, mm; `None` where unknown.
+    /// Noise of a displacement as given, per component, mm, infinite of a component that cameras do not measure; `None`
+    /// where unknown.
     pub noise_sd_mm: Option<[f64; 3]>,
     /// The filter that the displacements went through.
     pub filter: Filter,
@@ -76,7 +77,7 @@ pub struct RecordedStep {
     pub force_sd_n: Option<f64>,
     /// When the scan was made, s: start and end.
     pub window_s: Option<[f64; 2]>,
-    /// u at each voxel, mm, in the grid's order; NaN where missing.
+    /// u at each voxel, mm, in the grid's order; NaN where missing, and in components that are not measured.
     pub displacement: Vec<[f64; 3]>,
 }
 
@@ -92,6 +93,11 @@ pub enum Filter {
     Hamming2,
 }
 
+/// Standard deviations as a file states them: nothing where there is no bound.
+fn stated_noise(sd_mm: [f64; 3]) -> [Option<f64>; 3] {
+    sd_mm.map(|sd| Some(sd).filter(|sd| sd.is_finite()))
+}
+
 impl Recording {
     /// Whether its displacements can be those of the specimen that its drives move: at the plates and in the volume.
     ///
@@ -101,6 +107,16 @@ impl Recording {
     pub fn check_motion(&self) -> Result<(), RecordingError> {
         self.check_plate_motion()?;
         self.check_volume()
+    }
+
+    /// The noise as a file states it: nothing of a component that is not measured.
+    pub fn stated_noise_sd_mm(&self) -> Option<[Option<f64>; 3]> {
+        self.noise_sd_mm.map(stated_noise)
+    }
+
+    /// Whether every component that is measured has a value there.
+    pub fn is_complete(&self, displacement: &[f64; 3]) -> bool {
+        self.grid.is_complete(displacement)
     }
 
     /// Number of voxels in the mask.

@@ -49,7 +49,7 @@ impl Recording {
         for start in (0..grid.num_voxels()).filter(|v| (v / stride).is_multiple_of(n)) {
             let is_measured = |i: &usize| {
                 let v = start + i * stride;
-                self.mask[v] && displacement[v].iter().all(|u| u.is_finite())
+                self.mask[v] && self.is_complete(&displacement[v])
             };
             let (Some(first), Some(last)) = ((0..n).find(is_measured), (0..n).rfind(is_measured)) else { continue };
             let place = |i: usize| (grid.origin_mm[axis] + i as f64 * grid.voxel_mm[axis]) / extent;

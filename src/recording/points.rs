@@ -1,11 +1,12 @@
 //! Point clouds as CSV: `x,y,z,ux,uy,uz` with optional `w` (weight) and `sd`, in the specimen's frame; one file per
-//! step.
+//! step. Points of digital volume correlation are voxels; those of a face that cameras saw are subsets of that face, and
+//! need no column of what is not measured: the place along the normal, and with one camera the displacement along it.
 
 use super::import::{ImportError, ImportOptions, finish};
 use super::{RecordedStep, Recording};
 use crate::file::ReadingMemory;
 use crate::specimen::Specimen;
-use crate::voxel::VoxelGrid;
+use crate::voxel::{Surface, VoxelGrid};
 use std::path::Path;
 
 /// Positions of one grid plane agree to this part of the spacing.
@@ -22,9 +23,9 @@ const SPARSEST: f64 = 20.0;
 /// A point with its displacement; lengths in the file's unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DisplacementPoint {
-    /// Reference position.
+    /// Reference position; NaN along the normal of a face where the file does not say it.
     pub position: [f64; 3],
-    /// Displacement; NaN where missing.
+    /// Displacement; NaN where missing or not measured.
     pub displacement: [f64; 3],
     /// Weight in a voxel's mean, one where the file has none.
     pub weight: f64,
@@ -32,11 +33,17 @@ pub struct DisplacementPoint {
     pub sd: Option<f64>,
 }
 
-/// Reads a table with a header. Column names may carry a unit (`x_mm`, `ux_mm`); their order is free.
+/// Reads a table with a header. Column names may carry a unit (`x_mm`, `ux_mm`); their order is free. Of points on a
+/// `surface`, the position along its normal may be left out, and the displacement along it where it is not measured.
 ///
 /// # Errors
 /// [`ImportError::Table`].
-pub fn read_points(text: &str, path: &Path, memory: &ReadingMemory) -> Result<Vec<DisplacementPoint>, ImportError> {
+pub fn read_points(
+    text: &str,
+    path: &Path,
+    surface: Option<Surface>,
+    memory: &ReadingMemory,
+) -> Result<Vec<DisplacementPoint>, ImportError> {
     let fail = |line: usize, message: String| ImportError::Table { path: path.into(), line, message };
     let mut lines = text.lines().enumerate();
     let header = lines.next().map_or("", |(_, l)| l.trim().trim_start_matches('\u{feff}'));
@@ -51,12 +58,14 @@ pub fn read_points(text: &str, path: &Path, memory: &ReadingMemory) -> Result<Ve
         })
         .collect();
     let column = |name: &str| names.iter().position(|n| n == name);
-    let required = |name: &str| {
-        column(name).ok_or_else(|| fail(1, format!("there is no column {name}; x,y,z,ux,uy,uz are needed")))
-    };
-    let mut columns = [0; 6];
-    for (slot, name) in columns.iter_mut().zip(["x", "y", "z", "ux", "uy", "uz"]) {
-        *slot = required(name)?;
+    let needed = needed_columns(surface);
+    let mut columns = [None; 6];
+    for ((slot, name), is_needed) in columns.iter_mut().zip(COLUMNS).zip(needed) {
+        *slot = column(name);
+        if slot.is_none() && is_needed {
+            let needed: Vec<&str> = COLUMNS.into_iter().zip(needed).filter(|(_, n)| *n).map(|(name, _)| name).collect();
+            return Err(fail(1, format!("there is no column {name}; {} are needed", needed.join(","))));
+        }
     }
     if let Some(unknown) = names.iter().find(|n| !["x", "y", "z", "ux", "uy", "uz", "w", "sd"].contains(&n.as_str())) {
         return Err(fail(1, format!("column '{unknown}' is not one of x,y,z,ux,uy,uz,w,sd")));
@@ -79,10 +88,10 @@ pub fn read_points(text: &str, path: &Path, memory: &ReadingMemory) -> Result<Ve
         };
         let mut values = [0.0; 6];
         for (value, &column) in values.iter_mut().zip(&columns) {
-            *value = number(column)?;
+            *value = column.map_or(Ok(f64::NAN), number)?;
         }
         let [x, y, z, ux, uy, uz] = values;
-        if ![x, y, z].iter().all(|p| p.is_finite()) {
+        if [x, y, z].iter().zip(columns).any(|(p, column)| column.is_some() && !p.is_finite()) {
             return Err(fail(n + 1, "a position is not finite".into()));
         }
         let weight = weight.map_or(Ok(1.0), number)?;
@@ -98,8 +107,19 @@ pub fn read_points(text: &str, path: &Path, memory: &ReadingMemory) -> Result<Ve
     Ok(points)
 }
 
+/// The columns of positions and displacements.
+const COLUMNS: [&str; 6] = ["x", "y", "z", "ux", "uy", "uz"];
+
+/// Which of them a table must have.
+fn needed_columns(surface: Option<Surface>) -> [bool; 6] {
+    let Some(surface) = surface else { return [true; 6] };
+    let (measured, normal) = (surface.measured(), surface.face.axis());
+    std::array::from_fn(|n| if n < 3 { n != normal } else { measured[n - 3] })
+}
+
 /// A recording from one point cloud per step. Points on a regular grid become its voxels; others are averaged, by
-/// weight, in voxels of `voxel_mm` on the grid that covers the specimen.
+/// weight, in voxels of `voxel_mm` on the grid that covers the specimen. With a `surface`, the points lie on that face,
+/// and voxels are its subsets.
 ///
 /// # Errors
 /// [`ImportError`].
@@ -107,6 +127,7 @@ pub fn recording_from_points(
     steps: &[Vec<DisplacementPoint>],
     specimen: &Specimen,
     voxel_mm: Option<[f64; 3]>,
+    surface: Option<Surface>,
     options: &ImportOptions,
     memory: &ReadingMemory,
 ) -> Result<Recording, ImportError> {
@@ -117,18 +138,19 @@ pub fn recording_from_points(
     };
     let all = || steps.iter().flatten().map(|p| p.position.map(|x| x * options.unit_mm));
     let grid = match voxel_mm {
-        Some(voxel) => VoxelGrid::covering(specimen, voxel)?,
+        Some(voxel) => VoxelGrid::planned(specimen, voxel, surface)?,
         None => {
             let num_points = steps.iter().map(Vec::len).sum::<usize>();
             memory.take_values::<f64>("the points' planes", num_points as u64)?;
-            regular_grid(all)?
+            regular_grid(all, specimen, surface)?
         }
     };
+    check_on_face(all(), specimen, &grid)?;
     let bytes = VOXEL_BYTES + 24 * steps.len() as u64;
     memory.take("the recording", (grid.num_voxels() as u64).saturating_mul(bytes))?;
     let index = |position: [f64; 3]| -> Option<usize> {
         let mut n = [0; 3];
-        for a in 0..3 {
+        for a in (0..3).filter(|&a| grid.normal_axis() != Some(a)) {
             let at = ((position[a] - grid.origin_mm[a]) / grid.voxel_mm[a]).round();
             if !(at >= 0.0 && at < grid.shape[a] as f64) {
                 return None;
@@ -148,7 +170,7 @@ pub fn recording_from_points(
                 continue;
             };
             mask[v] = true;
-            if p.displacement.iter().all(|u| u.is_finite()) {
+            if grid.is_complete(&p.displacement) {
                 for a in 0..3 {
                     sums[v][a] += p.weight * p.displacement[a] * options.unit_mm;
                 }
@@ -160,13 +182,9 @@ pub fn recording_from_points(
             }
         }
         let mean = |s: &[f64; 4]| if s[3] > 0.0 { [s[0] / s[3], s[1] / s[3], s[2] / s[3]] } else { [f64::NAN; 3] };
-        recorded.push(RecordedStep {
-            drive_mm,
-            force_n: None,
-            force_sd_n: None,
-            window_s: None,
-            displacement: sums.iter().map(mean).collect(),
-        });
+        let mut displacement: Vec<[f64; 3]> = sums.iter().map(mean).collect();
+        grid.fill_unmeasured(&mut displacement, f64::NAN);
+        recorded.push(RecordedStep { drive_mm, force_n: None, force_sd_n: None, window_s: None, displacement });
     }
     // A standard deviation of single points is that of a voxel only where each voxel is one point.
     let from_file = (num_sd > 0.0 && voxel_mm.is_none()).then(|| [f64::sqrt(variance / num_sd); 3]);
@@ -175,11 +193,36 @@ pub fn recording_from_points(
     finish(specimen, grid, mask, recorded, &options, notes)
 }
 
+/// Whether all points lie on the face of the grid, where it has one.
+fn check_on_face(
+    mut points: impl Iterator<Item = [f64; 3]>,
+    specimen: &Specimen,
+    grid: &VoxelGrid,
+) -> Result<(), ImportError> {
+    let Some(Surface { face, .. }) = grid.surface else { return Ok(()) };
+    let (axis, expected_mm) = (face.axis(), face.position_mm(specimen));
+    let in_face = (0..3).filter(|&a| a != axis).map(|a| grid.voxel_mm[a]);
+    let allowed_mm = 0.5 * in_face.fold(f64::INFINITY, f64::min);
+    // A place that is not said is on the face.
+    match points.find(|p| (p[axis] - expected_mm).abs() > allowed_mm) {
+        None => Ok(()),
+        Some(p) => {
+            let (axis, found_mm) = (["x", "y", "z"][axis], p[axis]);
+            Err(ImportError::OffFace { axis, found_mm, face: face.name(), expected_mm, allowed_mm })
+        }
+    }
+}
+
 /// The grid on which all points lie.
-fn regular_grid<I: Iterator<Item = [f64; 3]>>(points: impl Fn() -> I) -> Result<VoxelGrid, ImportError> {
+fn regular_grid<I: Iterator<Item = [f64; 3]>>(
+    points: impl Fn() -> I,
+    specimen: &Specimen,
+    surface: Option<Surface>,
+) -> Result<VoxelGrid, ImportError> {
     let fail = |message: String| ImportError::NoGrid { message };
     let (mut origin, mut voxel, mut shape) = ([0.0; 3], [1.0; 3], [1; 3]);
-    for a in 0..3 {
+    let normal = surface.map(|s| s.face.axis());
+    for a in (0..3).filter(|&a| normal != Some(a)) {
         let name = ["x", "y", "z"][a];
         let mut values: Vec<f64> = points().map(|p| p[a]).collect();
         values.sort_by(f64::total_cmp);
@@ -205,7 +248,11 @@ fn regular_grid<I: Iterator<Item = [f64; 3]>>(points: impl Fn() -> I) -> Result<
     if shape.iter().map(|&n| n as f64).product::<f64>() > SPARSEST * num_points as f64 {
         return Err(fail(format!("{shape:?} planes for {num_points} points")));
     }
-    Ok(VoxelGrid::new(origin, voxel, shape)?)
+    let Some(surface) = surface else { return Ok(VoxelGrid::new(origin, voxel, shape)?) };
+    let normal = surface.face.axis();
+    origin[normal] = surface.face.position_mm(specimen);
+    voxel[normal] = (0..3).filter(|&a| a != normal).map(|a| voxel[a]).fold(f64::INFINITY, f64::min);
+    Ok(VoxelGrid::new(origin, voxel, shape)?.on_surface(specimen, surface)?)
 }
 
 #[cfg(test)]

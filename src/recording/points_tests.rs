@@ -1,4 +1,5 @@
 use super::*;
+use crate::voxel::{Face, MeasuredComponents};
 
 fn memory(bytes: u64) -> crate::file::ReadingMemory {
     crate::file::MemoryLimit::body(bytes).begin()
@@ -31,9 +32,10 @@ fn points_on_a_grid_become_voxels() {
     }
     lines.rotate_left(117);
     let text = format!("x_mm,y_mm,z_mm,ux_mm,uy_mm,uz_mm,sd\n{}\n", lines.join("\n"));
-    let points = read_points(&text, path(), &memory(1 << 20)).unwrap();
+    let points = read_points(&text, path(), None, &memory(1 << 20)).unwrap();
     assert_eq!(points.len(), 319);
-    let r = recording_from_points(&[points], &specimen(), None, &ImportOptions::default(), &memory(1 << 26)).unwrap();
+    let r =
+        recording_from_points(&[points], &specimen(), None, None, &ImportOptions::default(), &memory(1 << 26)).unwrap();
     assert_eq!(r.grid.shape, [10, 8, 4]);
     assert_eq!(r.num_voxels(), 319);
     // A root mean square of 319 equal numbers.
@@ -55,12 +57,13 @@ fn scattered_points_are_averaged() {
         text +=
             &format!("{x},{y},{z},{},0,0,{}\n", if n % 2 == 0 { 1.0 } else { 4.0 }, if n % 2 == 0 { 2.0 } else { 1.0 });
     }
-    let points = read_points(&text, path(), &memory(1 << 23)).unwrap();
+    let points = read_points(&text, path(), None, &memory(1 << 23)).unwrap();
     let read = |voxel| {
         recording_from_points(
             std::slice::from_ref(&points),
             &specimen(),
             voxel,
+            None,
             &ImportOptions::default(),
             &memory(1 << 26),
         )
@@ -71,6 +74,49 @@ fn scattered_points_are_averaged() {
     // Half of the points carry 1 with weight two, half 4 with weight one: 2; some 250 points per voxel,
     // spread 1.4: 0.09.
     assert!(r.steps[0].displacement.iter().all(|u| (u[0] - 2.0).abs() < 0.4));
+}
+
+/// Points of a face that one camera saw: neither the place along the normal nor the displacement along it is needed, and
+/// where the place is given, the points must lie on the face.
+#[test]
+fn points_of_a_face_are_its_subsets() {
+    let mut with_place = String::from("x,y,z,ux,uy\n");
+    let mut plain = String::from("x,y,ux,uy\n");
+    for j in 0..8 {
+        for i in 0..10 {
+            let (x, y) = (-11.43 + 2.54 * f64::from(i), -2.8 + 0.8 * f64::from(j));
+            plain += &format!("{x},{y},{},0.5\n", 0.7 * y);
+            with_place += &format!("{x},{y},9.55,{},0.5\n", 0.7 * y);
+        }
+    }
+    let seen = |face, components| Some(Surface { face, components });
+    let of_one = seen(Face::PlusZ, MeasuredComponents::InPlane);
+    let read = |text: &str, surface, unit_mm| {
+        let options = ImportOptions { unit_mm, ..ImportOptions::default() };
+        let points = read_points(text, path(), surface, &memory(1 << 20))?;
+        recording_from_points(&[points], &specimen(), None, surface, &options, &memory(1 << 26))
+    };
+    for text in [&plain, &with_place] {
+        let r = read(text, of_one, 1.0).unwrap();
+        assert_eq!((r.grid.shape, r.grid.surface, r.num_voxels()), ([10, 8, 1], of_one, 80));
+        for (v, u) in r.steps[0].displacement.iter().enumerate() {
+            let x = r.grid.center_mm(v);
+            assert!((u[0] - 0.7 * x[1]).abs() < 1e-12 && u[1] == 0.5 && u[2].is_nan());
+            assert!((x[2] - 9.55).abs() < 1e-12);
+        }
+    }
+    // Averaged in subsets of 5.08 × 1.6 mm: means of linear fields.
+    let points = read_points(&plain, path(), of_one, &memory(1 << 20)).unwrap();
+    let options = ImportOptions::default();
+    let voxel = Some([5.08, 1.6, 1.0]);
+    let r = recording_from_points(&[points], &specimen(), voxel, of_one, &options, &memory(1 << 26)).unwrap();
+    assert_eq!((r.grid.shape, r.num_voxels()), ([5, 4, 1], 20));
+    let error = read(&with_place, seen(Face::MinusZ, MeasuredComponents::InPlane), 1.0).unwrap_err();
+    assert!(matches!(error, ImportError::OffFace { face: "-z", .. }), "{error}");
+    let error = read(&plain, seen(Face::PlusZ, MeasuredComponents::All), 1.0).unwrap_err();
+    assert!(error.to_string().contains("there is no column uz; x,y,ux,uy,uz are needed"), "{error}");
+    // The frame's origin is the block's centre, also in the face.
+    assert!(read(&plain, of_one, 10.0).is_err());
 }
 
 #[test]
@@ -85,13 +131,13 @@ fn poor_tables_are_typed_errors() {
         "x,y,z,ux,uy,uz\nnan,2,3,4,5,6\n",
         "x,y,z,ux,uy,uz,w\n1,2,3,4,5,6,-1\n",
     ] {
-        assert!(matches!(read_points(text, path(), &memory(2000)), Err(ImportError::Table { .. })), "{text}");
+        assert!(matches!(read_points(text, path(), None, &memory(2000)), Err(ImportError::Table { .. })), "{text}");
     }
     let many = "x,y,z,ux,uy,uz\n".to_string() + &"1,2,3,4,5,6\n".repeat(11);
-    assert!(matches!(read_points(&many, path(), &memory(1000)), Err(ImportError::Memory(_))));
-    let one = read_points("x,y,z,ux,uy,uz\n1,2,3,4,5,6\n", path(), &memory(2000)).unwrap();
+    assert!(matches!(read_points(&many, path(), None, &memory(1000)), Err(ImportError::Memory(_))));
+    let one = read_points("x,y,z,ux,uy,uz\n1,2,3,4,5,6\n", path(), None, &memory(2000)).unwrap();
     let read = |steps: &[Vec<DisplacementPoint>]| {
-        recording_from_points(steps, &specimen(), None, &ImportOptions::default(), &memory(1 << 26)).unwrap_err()
+        recording_from_points(steps, &specimen(), None, None, &ImportOptions::default(), &memory(1 << 26)).unwrap_err()
     };
     assert!(matches!(read(std::slice::from_ref(&one)), ImportError::NoGrid { .. }));
     assert!(matches!(read(&[one.clone(), one]), ImportError::Drives { .. }));

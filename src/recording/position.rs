@@ -19,7 +19,9 @@ pub(super) fn check_position(specimen: &Specimen, grid: &VoxelGrid, mask: &[bool
     for voxel in (0..grid.num_voxels()).filter(|v| mask[*v]) {
         let center = grid.center_mm(voxel);
         num_voxels += 1;
-        num_inside += usize::from((0..3).all(|a| center[a].abs() <= 0.5 * extent_mm[a]));
+        // Along the normal, the grid of a surface lies on the face.
+        let mut axes = (0..3).filter(|&a| grid.normal_axis() != Some(a));
+        num_inside += usize::from(axes.all(|a| center[a].abs() <= 0.5 * extent_mm[a]));
         for a in 0..3 {
             box_mm[0][a] = box_mm[0][a].min(center[a] - 0.5 * grid.voxel_mm[a]);
             box_mm[1][a] = box_mm[1][a].max(center[a] + 0.5 * grid.voxel_mm[a]);

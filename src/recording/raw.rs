@@ -72,6 +72,10 @@ impl RawRecording {
                 "acquisition.filter: raw phases are not filtered; it must be none".into(),
             ));
         }
+        if head.grid.surface.is_some() {
+            let told = "acquisition.surface: cameras measure displacements and no phases; leave it out";
+            return Err(RecordingError::Json(told.into()));
+        }
         for (n, step) in head.json.steps.iter().enumerate() {
             check_step(n, step, &head.specimen)?;
             let Some(raw) = &step.raw else {
@@ -116,7 +120,7 @@ impl RawRecording {
             grid: head.grid,
             mask: head.mask,
             steps,
-            noise_sd_mm: head.json.acquisition.noise_sd_mm,
+            noise_sd_mm: head.noise_sd_mm,
             load: head.load,
             notes: head.json.notes,
         };

@@ -6,7 +6,7 @@ use super::position::check_position;
 use super::{Filter, LoadCurve, ReadLimits, RecordedStep, Recording, RecordingError};
 use crate::file::ReadingMemory;
 use crate::specimen::Specimen;
-use crate::voxel::VoxelGrid;
+use crate::voxel::{Surface, VoxelError, VoxelGrid, unbounded_where_unmeasured};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
@@ -59,10 +59,27 @@ pub(super) struct RawJson {
 #[serde(deny_unknown_fields)]
 pub(super) struct AcquisitionJson {
     pub(super) voxel_mm: [f64; 3],
+    /// Null of a component that is not measured.
     #[serde(default)]
-    pub(super) noise_sd_mm: Option<[f64; 3]>,
+    pub(super) noise_sd_mm: Option<[Option<f64>; 3]>,
     #[serde(default)]
     pub(super) filter: Filter,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) surface: Option<Surface>,
+}
+
+impl AcquisitionJson {
+    /// The noise, where it is stated: of every component that is measured.
+    fn noise_sd_mm(&self) -> Result<Option<[f64; 3]>, RecordingError> {
+        let measured = self.surface.map_or([true; 3], Surface::measured);
+        let Some(stated) = self.noise_sd_mm else { return Ok(None) };
+        let mut sd_mm = [0.0; 3];
+        for ((sd, value), _) in sd_mm.iter_mut().zip(stated).zip(measured).filter(|(_, is_measured)| *is_measured) {
+            *sd = value.unwrap_or(f64::NAN);
+            positive("acquisition.noise_sd_mm", *sd)?;
+        }
+        Ok(Some(unbounded_where_unmeasured(measured, sd_mm)))
+    }
 }
 
 /// A recording with a digest of the files that it was read from.
@@ -100,8 +117,9 @@ impl Recording {
             let Some(name) = &step.displacement else {
                 return Err(RecordingError::Raw { step: n + 1 });
             };
-            let displacement = read_displacement(&mut head.files, name, &head.grid)?;
-            let is_measured = |(m, u): (&bool, &[f64; 3])| *m && u.iter().all(|x| x.is_finite());
+            let mut displacement = read_displacement(&mut head.files, name, &head.grid)?;
+            head.grid.fill_unmeasured(&mut displacement, f64::NAN);
+            let is_measured = |(m, u): (&bool, &[f64; 3])| *m && head.grid.is_complete(u);
             if !head.mask.iter().zip(&displacement).any(is_measured) {
                 return Err(RecordingError::NoDisplacement { step: n + 1, num_voxels });
             }
@@ -119,7 +137,7 @@ impl Recording {
             grid: head.grid,
             mask: head.mask,
             steps,
-            noise_sd_mm: head.json.acquisition.noise_sd_mm,
+            noise_sd_mm: head.noise_sd_mm,
             filter: head.json.acquisition.filter,
             load: head.load,
             notes: head.json.notes,
@@ -137,6 +155,7 @@ pub(super) struct Head<'a> {
     pub(super) specimen: Specimen,
     pub(super) grid: VoxelGrid,
     pub(super) mask: Vec<bool>,
+    pub(super) noise_sd_mm: Option<[f64; 3]>,
     pub(super) load: Option<LoadCurve>,
 }
 
@@ -168,6 +187,11 @@ impl<'a> Head<'a> {
             Ok(grid) => grid?,
             Err(source) => return Err(RecordingError::Image { path: files.path(&json.mask)?, source }),
         };
+        let grid = match json.acquisition.surface {
+            Some(_) if json.acquisition.filter != Filter::None => return Err(VoxelError::FilteredSurface.into()),
+            Some(surface) => grid.on_surface(&specimen, surface)?,
+            None => grid,
+        };
         let (stated_mm, found_mm) = (json.acquisition.voxel_mm, grid.voxel_mm);
         if (0..3).any(|a| !((stated_mm[a] / found_mm[a] - 1.0).abs() <= GRID_TOLERANCE)) {
             return Err(RecordingError::VoxelMismatch { stated_mm, found_mm });
@@ -180,11 +204,7 @@ impl<'a> Head<'a> {
             return Err(RecordingError::EmptyMask);
         }
         check_position(&specimen, &grid, &mask)?;
-        if let Some(sd) = json.acquisition.noise_sd_mm {
-            for value in sd {
-                positive("acquisition.noise_sd_mm", value)?;
-            }
-        }
+        let noise_sd_mm = json.acquisition.noise_sd_mm()?;
         let load = match &json.load {
             None => None,
             Some(name) => {
@@ -194,7 +214,7 @@ impl<'a> Head<'a> {
                 Some(LoadCurve::from_csv(&text, &files.path(name)?)?)
             }
         };
-        Ok(Head { files, json, specimen, grid, mask, load })
+        Ok(Head { files, json, specimen, grid, mask, noise_sd_mm, load })
     }
 }
 

@@ -1,6 +1,7 @@
 use super::*;
 use crate::file::{MemoryError, MemoryLimit};
 use crate::recording::{RawRecording, RawStep, Samples};
+use crate::voxel::{Face, MeasuredComponents};
 
 /// Memory for so many numbers.
 fn numbers(count: u64) -> crate::file::ReadingMemory {
@@ -60,6 +61,46 @@ fn what_is_written_is_read() {
         assert!(a == b || (a[0].is_nan() && b[0].is_nan()), "{a:?} {b:?}");
     }
     assert_eq!(again.num_voxels(), 23);
+}
+
+/// Two layers of the grid as cameras at +z would have it, with one camera.
+fn of_a_face() -> Recording {
+    let surface = Surface { face: Face::PlusZ, components: MeasuredComponents::InPlane };
+    let grid = VoxelGrid::planned(&specimen(), [2.0, 0.8, 1.0], Some(surface)).unwrap();
+    let n = grid.num_voxels();
+    let moved = |v: usize| [2.5 * (grid.center_mm(v)[1] / 6.4 + 0.5), 0.01, f64::NAN];
+    let step = RecordedStep { displacement: (0..n).map(moved).collect(), ..small().steps.remove(0) };
+    let noise_sd_mm = Some([0.005, 0.005, f64::INFINITY]);
+    Recording { grid, mask: vec![true; n], steps: vec![step], noise_sd_mm, ..small() }
+}
+
+/// What cameras saw of a face comes back with its face, and with nothing of the component that they do not measure.
+#[test]
+fn recordings_of_a_face_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = of_a_face();
+    recording.write(folder.path()).unwrap();
+    let again = read(folder.path()).unwrap();
+    assert_eq!((again.grid.surface, again.grid.shape), (recording.grid.surface, [13, 8, 1]));
+    assert_eq!(again.noise_sd_mm, recording.noise_sd_mm);
+    assert!(again.steps[0].displacement.iter().all(|u| again.is_complete(u) && u[2].is_nan()));
+    let path = folder.path().join("recording.json");
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert!(text.contains("null"), "{text}");
+    let edit = |from: &str, to: &str| {
+        assert!(text.contains(from), "{from}");
+        std::fs::write(&path, text.replace(from, to)).unwrap();
+        read(folder.path()).unwrap_err()
+    };
+    let off = edit("\"+z\"", "\"-z\"");
+    assert!(matches!(off, RecordingError::Voxel(VoxelError::OffFace { .. })), "{off}");
+    let bonded = edit("\"+z\"", "\"+y\"");
+    assert!(matches!(bonded, RecordingError::Voxel(VoxelError::HiddenFace { .. })), "{bonded}");
+    let filtered = edit("\"none\"", "\"hamming2\"");
+    assert!(matches!(filtered, RecordingError::Voxel(VoxelError::FilteredSurface)), "{filtered}");
+    // With heights, their noise must be stated, and there must be some.
+    let heights = edit("\"in_plane\"", "\"all\"");
+    assert!(matches!(heights, RecordingError::Value { .. } | RecordingError::NoDisplacement { .. }), "{heights}");
 }
 
 #[test]

@@ -38,6 +38,10 @@ impl Recording {
     /// # Errors
     /// [`RecordingError::Components`] where another reading explains the volume far better.
     pub(super) fn check_volume(&self) -> Result<(), RecordingError> {
+        if self.grid.surface.is_some() {
+            // A change of volume shows in the volume alone.
+            return Ok(());
+        }
         for (n, step) in self.steps.iter().enumerate() {
             let changes = VolumeChanges::of(self, &step.displacement, MAX_CELLS.div_ceil(self.steps.len()));
             let Some((fault, square)) = changes.better_reading() else { continue };

@@ -2,7 +2,7 @@
 
 use super::nifti::{INTENT_DISPLACEMENT, Image, Samples};
 use super::read::{AcquisitionJson, RawJson, RecordingJson, SCHEMA, StepJson};
-use super::{Filter, LoadCurve, RawRecording, Recording, RecordingError};
+use super::{Filter, LoadCurve, RawRecording, Recording, RecordingError, stated_noise};
 use crate::specimen::Specimen;
 use crate::voxel::VoxelGrid;
 use std::fs;
@@ -109,8 +109,9 @@ impl Rest<'_> {
             mask: "mask.nii.gz".into(),
             acquisition: AcquisitionJson {
                 voxel_mm: self.grid.voxel_mm,
-                noise_sd_mm: self.noise_sd_mm,
+                noise_sd_mm: self.noise_sd_mm.map(stated_noise),
                 filter: self.filter,
+                surface: self.grid.surface,
             },
             load: self.load.is_some().then(|| "load.csv".into()),
             notes: self.notes.cloned(),

@@ -224,7 +224,7 @@ fn residual_maps(found: &Calibration, recording: &Observed, index: usize, step: 
         range,
     };
     let mut fields = Vec::new();
-    for (c, name) in ["x", "y", "z"].iter().enumerate() {
+    for (c, name) in ["x", "y", "z"].iter().enumerate().filter(|(c, _)| grid.measured()[*c]) {
         let from = |u: &dyn Fn(usize) -> f64| {
             (0..model.len())
                 .map(u)
@@ -255,7 +255,8 @@ fn whitened(found: &Calibration, observed: &[Observed]) -> Vec<(String, Vec<f64>
         .map(|(c, name)| {
             let mut values = Vec::new();
             for (r, recording) in observed.iter().enumerate() {
-                for (s, step) in recording.steps.iter().enumerate() {
+                // What is not measured leaves no residual.
+                for (s, step) in recording.steps.iter().enumerate().filter(|_| recording.mask.grid.measured()[c]) {
                     let model = found.fit.predicted(r, s);
                     let of = |(m, u): (&[f64; 3], &[f64; 3])| (m[c] - u[c]) / recording.noise_sd_mm[c];
                     values.extend(step.displacement.iter().zip(model).map(of));
@@ -263,6 +264,7 @@ fn whitened(found: &Calibration, observed: &[Observed]) -> Vec<(String, Vec<f64>
             }
             (name.to_string(), values)
         })
+        .filter(|(_, values)| !values.is_empty())
         .collect()
 }
 

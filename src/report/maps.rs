@@ -23,7 +23,7 @@ pub struct VoxelField {
 }
 
 /// Maps of several fields on one grid. Each field has four maps: the slice through the middle voxel and the mean over
-/// the third direction, in x–z (above) and x–y (below).
+/// the third direction, in x–z (above) and x–y (below). A grid of one layer along y or z has one map, of that layer.
 #[derive(Clone, Debug, Default)]
 pub struct VoxelMaps {
     /// Voxels along x, y, z.
@@ -43,6 +43,8 @@ const TOP: f64 = 46.0;
 const GAP: f64 = 14.0;
 const BAR: f64 = 76.0;
 const BETWEEN: f64 = 30.0;
+/// Between a map and the one below it.
+const GAP_BELOW: f64 = 22.0;
 
 impl VoxelMaps {
     /// The picture.
@@ -66,36 +68,60 @@ impl VoxelMaps {
             return Svg::placeholder(name, "no voxels to show");
         }
         let extent = [0, 1, 2].map(|a| self.shape[a] as f64 * self.voxel_mm[a]);
-        let scale = (MAP_WIDTH / extent[0]).min(LARGEST_HEIGHT / extent[1].max(extent[2]));
-        let [w, hy, hz] = extent.map(|e| e * scale);
-        let block = [LEFT + maps_width(kinds, w) + BAR, TOP + hz + 22.0 + hy + 46.0];
+        let views = self.views();
+        // The mean over one layer is that layer.
+        let kinds = if views.len() == 1 { &[false] } else { kinds };
+        let highest = views.iter().map(|view| extent[view.vertical]).fold(0.0, f64::max);
+        let scale = (MAP_WIDTH / extent[0]).min(LARGEST_HEIGHT / highest);
+        let size = extent.map(|e| e * scale);
+        let block = [LEFT + maps_width(kinds, size[0]) + BAR, TOP + views_height(&views, size) + 46.0];
         let columns = self.fields.len().min(2);
         let rows = self.fields.len().div_ceil(2);
         let width = columns as f64 * (block[0] + BETWEEN) - BETWEEN;
         let mut svg = Svg::new(width.max(300.0), rows as f64 * block[1]);
         for (index, field) in self.fields.iter().enumerate() {
             let corner = [(index % 2) as f64 * (block[0] + BETWEEN), (index / 2) as f64 * block[1]];
-            self.draw_field(&mut svg, field, corner, [w, hy, hz], kinds);
+            self.draw_field(&mut svg, field, corner, size, (&views, kinds));
         }
         svg.finish(name)
     }
 
-    fn draw_field(&self, svg: &mut Svg, field: &VoxelField, [x0, y0]: [f64; 2], [w, hy, hz]: [f64; 3], kinds: &[bool]) {
+    /// x–z above x–y; of one layer along y or z, the one of the two that shows it.
+    fn views(&self) -> Vec<View> {
+        let (xz, xy) = (View { vertical: 2, third: 1 }, View { vertical: 1, third: 2 });
+        match self.shape {
+            [_, 1, nz] if nz > 1 => vec![xz],
+            [_, ny, 1] if ny > 1 => vec![xy],
+            _ => vec![xz, xy],
+        }
+    }
+
+    /// Draws the maps of a field, which are `size` large along x, y and z, at the corner.
+    fn draw_field(
+        &self,
+        svg: &mut Svg,
+        field: &VoxelField,
+        [x0, y0]: [f64; 2],
+        size: [f64; 3],
+        (views, kinds): (&[View], &[bool]),
+    ) {
+        let w = size[0];
         let title_width = maps_width(kinds, w);
         svg.text([x0 + LEFT, y0 + 16.0], &shortened(&field.title, TITLE, title_width), &TextStyle::title());
         let Some((range, is_clipped)) = color_range(field) else {
             svg.text([x0 + LEFT, y0 + TOP + 20.0], "no voxel has a value", &TextStyle::note());
             return;
         };
-        // Vertical direction of the map (2 = z, 1 = y), direction that is cut or averaged, height, top.
-        for (vertical, third, height, top) in [(2, 1, hz, y0 + TOP), (1, 2, hy, y0 + TOP + hz + 22.0)] {
+        for (number, &View { vertical, third }) in views.iter().enumerate() {
+            let (height, top) =
+                (size[vertical], y0 + TOP + views_height(&views[..number], size) + GAP_BELOW * number.min(1) as f64);
             for (column, &is_mean) in kinds.iter().enumerate() {
                 let left = x0 + LEFT + column as f64 * (w + GAP);
                 let values = self.section(field, vertical, third, is_mean);
-                let size = [self.shape[0], self.shape[vertical]];
+                let cells = [self.shape[0], self.shape[vertical]];
                 svg.rect([left, top, w, height], EMPTY);
-                svg.cells([left, top, w, height], size, |i, j| {
-                    let v = values[i + size[0] * (size[1] - 1 - j)];
+                svg.cells([left, top, w, height], cells, |i, j| {
+                    let v = values[i + cells[0] * (cells[1] - 1 - j)];
                     let step = |t: f64| (64.0 * t.clamp(0.0, 1.0)).round() / 64.0;
                     v.is_finite().then(|| field.map.hex(step((v - range[0]) / (range[1] - range[0]))))
                 });
@@ -110,7 +136,7 @@ impl VoxelMaps {
                     format!("slice {third_name} = {} mm", trimmed(fixed(middle, 2)))
                 };
                 svg.text([left, top - 5.0], &caption, &TextStyle::note());
-                if vertical == 1 {
+                if number + 1 == views.len() {
                     frame.draw_bottom(svg, "", 5);
                     svg.text([left + w, top + height + 30.0], "x / mm", &TextStyle::note().end());
                 }
@@ -123,7 +149,7 @@ impl VoxelMaps {
                 }
             }
         }
-        let bar = [x0 + LEFT + maps_width(kinds, w) + 14.0, y0 + TOP, 11.0, hz + 22.0 + hy];
+        let bar = [x0 + LEFT + maps_width(kinds, w) + 14.0, y0 + TOP, 11.0, views_height(views, size)];
         draw_color_bar(svg, bar, field.map, range, is_clipped, &field.unit);
     }
 
@@ -153,6 +179,18 @@ impl VoxelMaps {
         }
         out
     }
+}
+
+/// A map: its vertical direction (1 for y, 2 for z), and the one that is cut or averaged.
+#[derive(Clone, Copy)]
+struct View {
+    vertical: usize,
+    third: usize,
+}
+
+/// Height of maps above each other.
+fn views_height(views: &[View], size: [f64; 3]) -> f64 {
+    views.iter().map(|view| size[view.vertical]).sum::<f64>() + GAP_BELOW * views.len().saturating_sub(1) as f64
 }
 
 /// Width of the maps of one field beside each other.

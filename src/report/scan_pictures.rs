@@ -32,13 +32,17 @@ pub fn raw_picture(raw: &RawRecording, step: usize) -> String {
     VoxelMaps { shape: grid.shape, origin_mm: grid.origin_mm, voxel_mm: grid.voxel_mm, fields }.slices_to_svg()
 }
 
-/// Slices of the three displacements of one step (index from 0) and of how many of them are there.
+/// Slices of the displacements of one step (index from 0) that are measured, and of how many of them are there. Of a
+/// face there is one slice, the face itself.
 pub fn displacement_picture(recording: &Recording, step: usize) -> String {
     let Some(step) = recording.steps.get(step) else {
         return VoxelMaps::default().to_svg();
     };
-    let mut fields: Vec<VoxelField> = (0..3)
-        .map(|a| VoxelField {
+    let grid = &recording.grid;
+    let measured: Vec<usize> = (0..3).filter(|&a| grid.measured()[a]).collect();
+    let mut fields: Vec<VoxelField> = measured
+        .iter()
+        .map(|&a| VoxelField {
             title: format!("u along {}, drive {:.2} mm", AXES[a], step.drive_mm),
             unit: "mm".into(),
             values: step.displacement.iter().map(|u| u[a]).collect(),
@@ -50,13 +54,12 @@ pub fn displacement_picture(recording: &Recording, step: usize) -> String {
         if *is_in { u.iter().filter(|x| x.is_finite()).count() as f64 } else { f64::NAN }
     };
     fields.push(VoxelField {
-        title: "components known (of three)".into(),
+        title: format!("components known (of {})", if measured.len() == 3 { "three" } else { "two" }),
         unit: String::new(),
         values: recording.mask.iter().zip(&step.displacement).map(present).collect(),
         map: ColorMap::Magma,
-        range: Some([0.0, 3.0]),
+        range: Some([0.0, measured.len() as f64]),
     });
-    let grid = &recording.grid;
     VoxelMaps { shape: grid.shape, origin_mm: grid.origin_mm, voxel_mm: grid.voxel_mm, fields }.slices_to_svg()
 }
 

@@ -44,6 +44,7 @@ pub fn integrate_over_quadrature(
                 sum: integral / voxel_volume_mm3,
                 mean_per_voxel: integral / volume,
                 volume_integral: integral,
+                surface_integral: None,
             }
         })
         .collect()
@@ -63,10 +64,9 @@ pub fn integrate_over_blocks(
         let own = integrate_over_quadrature(material, block.points, mirror, voxel_volume_mm3);
         for (index, own) in own.into_iter().enumerate() {
             if all.len() <= index {
-                all.push(IntegratedSensitivity { sum: 0.0, volume_integral: 0.0, ..own.clone() });
+                all.push(IntegratedSensitivity::zero_like(&own));
             }
-            all[index].sum += count * own.sum;
-            all[index].volume_integral += count * own.volume_integral;
+            all[index].add_blocks(count, &own);
         }
     }
     all.iter_mut().for_each(|s| s.mean_per_voxel = s.volume_integral / volume_mm3);

@@ -131,8 +131,9 @@ pub fn evaluate_fixture(
         scan_share: Vec::new(),
         best_scan_share: None,
         voxel_material_volume_mm3: scanned_volume_mm3(fixture),
+        subset_material_area_mm2: seen_area_mm2(fixture),
         scan: *fixture.scan(),
-        notes: EvaluationNotes::default(),
+        notes: EvaluationNotes::of(fixture.scan()),
         statistics: EvaluationStatistics::of(fixture, num_equilibria),
         version: env!("CARGO_PKG_VERSION").into(),
         input_hash: hash_of_inputs(fixture.specimen(), material, fixture.scan(), drives, options),
@@ -186,6 +187,12 @@ fn scanned_volume_mm3(fixture: &Fixture) -> f64 {
         f64::from(p.num_scanned) * volume
     };
     fixture.parts().iter().map(of_part).sum()
+}
+
+/// Material area of the subsets of all blocks that are looked at, mm²; `None` where the volume is scanned.
+fn seen_area_mm2(fixture: &Fixture) -> Option<f64> {
+    let scanned = fixture.parts().iter().filter_map(|p| Some((p, p.scanner.as_ref()?)));
+    scanned.map(|(part, scanner)| Some(f64::from(part.num_scanned) * scanner.mask.material_area_mm2()?)).sum()
 }
 
 impl EvaluationStatistics {

@@ -41,8 +41,11 @@ pub struct Evaluation {
     pub detectable: Vec<DetectableSize>,
     /// Largest principal stretch at any drive.
     pub largest_principal_stretch: f64,
-    /// Material volume of the masks of all scanned blocks, mm³.
+    /// Material volume of the masks of all scanned blocks, mm³; zero where a surface is seen.
     pub voxel_material_volume_mm3: f64,
+    /// Where a surface is seen: material area of the subsets of all blocks that are looked at, mm².
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub subset_material_area_mm2: Option<f64>,
     /// The scan.
     pub scan: ScanSettings,
     /// What the numbers mean.
@@ -97,6 +100,21 @@ impl Default for EvaluationNotes {
                           data do not determine it"
                 .into(),
         }
+    }
+}
+
+impl EvaluationNotes {
+    /// Of the numbers of a scan: of a surface, what its voxels are.
+    pub(super) fn of(scan: &ScanSettings) -> EvaluationNotes {
+        let mut notes = EvaluationNotes::default();
+        if let Some(surface) = scan.surface {
+            notes.integrated_sensitivity += &format!(
+                "; voxels are subsets of the face {}, of the model's states there; they have no volume, and \
+                 surface_integral is weighted by their area (mm2)",
+                surface.face.name()
+            );
+        }
+        notes
     }
 }
 

@@ -61,7 +61,7 @@ pub enum InformationError {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MeasurementNoise {
-    /// Standard deviation of a voxel's displacement along x, y, z, mm.
+    /// Standard deviation of a voxel's displacement along x, y, z, mm; infinite of a component that is not measured.
     pub displacement_sd_mm: [f64; 3],
     /// Standard deviation of the load cell's force (all samples together), N.
     pub force_sd_n: f64,
@@ -69,17 +69,15 @@ pub struct MeasurementNoise {
 
 impl MeasurementNoise {
     pub(super) fn check(&self) -> Result<(), InformationError> {
-        let [x, y, z] = self.displacement_sd_mm;
-        let named = [
-            ("noise_sd_mm along x", x),
-            ("noise_sd_mm along y", y),
-            ("noise_sd_mm along z", z),
-            ("force_sd_n", self.force_sd_n),
-        ];
-        for (name, value) in named {
-            check_sd(name, value)?;
+        let names = ["noise_sd_mm along x", "noise_sd_mm along y", "noise_sd_mm along z"];
+        let has_measured = self.displacement_sd_mm.iter().any(|sd| sd.is_finite());
+        for (name, value) in names.into_iter().zip(self.displacement_sd_mm) {
+            let is_unmeasured = has_measured && value == f64::INFINITY;
+            if !is_unmeasured {
+                check_sd(name, value)?;
+            }
         }
-        Ok(())
+        check_sd("force_sd_n", self.force_sd_n)
     }
 }
 

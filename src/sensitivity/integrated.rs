@@ -18,8 +18,31 @@ pub struct IntegratedSensitivity {
     pub sum: f64,
     /// Mean of S over voxels.
     pub mean_per_voxel: f64,
-    /// ∫ S dV ≈ Σ S × material volume of the voxel, unit of S × mm³. Alone comparable across voxel sizes.
+    /// ∫ S dV ≈ Σ S × material volume of the voxel, unit of S × mm³. Alone comparable across voxel sizes. Zero where a
+    /// surface is seen, which has no volume.
     pub volume_integral: f64,
+    /// ∫ S dA ≈ Σ S × material area of the subset over the face that cameras see, unit of S × mm²; absent for a scan of
+    /// the volume.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub surface_integral: Option<f64>,
+}
+
+impl IntegratedSensitivity {
+    /// Nothing, of the same parameter and kind of scan as `like`.
+    pub(super) fn zero_like(like: &IntegratedSensitivity) -> IntegratedSensitivity {
+        let surface_integral = like.surface_integral.map(|_| 0.0);
+        let parameter = like.parameter.clone();
+        IntegratedSensitivity { parameter, sum: 0.0, mean_per_voxel: 0.0, volume_integral: 0.0, surface_integral }
+    }
+
+    /// Adds the sums and integrals of `count` blocks like `other`'s; means are left as they are.
+    pub(super) fn add_blocks(&mut self, count: f64, other: &IntegratedSensitivity) {
+        self.sum += count * other.sum;
+        self.volume_integral += count * other.volume_integral;
+        if let (Some(own), Some(theirs)) = (&mut self.surface_integral, other.surface_integral) {
+            *own += count * theirs;
+        }
+    }
 }
 
 /// S_ξ with its derivatives at a point. Zero for κ, and by continuity where the mode is missing (λ = 1).
@@ -63,7 +86,7 @@ pub fn integrate_over_voxels(
     states: &[Decomposition],
     mask: &VoxelMask,
 ) -> Vec<IntegratedSensitivity> {
-    let voxel_volume = mask.grid.voxel_volume_mm3();
+    let (voxel_volume, subset_area) = (mask.grid.voxel_volume_mm3(), mask.grid.subset_area_mm2());
     shear_parameters(material)
         .map(|parameter| {
             let (mut sum, mut integral) = (0.0, 0.0);
@@ -76,6 +99,7 @@ pub fn integrate_over_voxels(
                 sum,
                 mean_per_voxel: sum / states.len().max(1) as f64,
                 volume_integral: integral * voxel_volume,
+                surface_integral: subset_area.map(|area| integral * area),
             }
         })
         .collect()

@@ -129,7 +129,7 @@ impl Scanner {
     /// # Errors
     /// See [`VoxelError`].
     pub fn new(specimen: &Specimen, mesh: &Mesh, scan: &ScanSettings, sampling: Sampling) -> Result<Self, VoxelError> {
-        let mask = VoxelMask::covering(specimen, scan.voxel_mm)?;
+        let mask = scan.mask(specimen)?;
         let operator = VoxelOperator::new(specimen, mesh, &mask, sampling)?;
         let weights = scan.partial_voxels.weights(&mask);
         Ok(Scanner { mask, operator, noise: scan.noise(), weights })
@@ -205,10 +205,9 @@ impl SeenBlocks {
         for (count, seen) in &self.kinds {
             for (index, own) in seen.integrated_sensitivity.iter().enumerate() {
                 if all.len() <= index {
-                    all.push(IntegratedSensitivity { sum: 0.0, volume_integral: 0.0, ..own.clone() });
+                    all.push(IntegratedSensitivity::zero_like(own));
                 }
-                all[index].sum += f64::from(*count) * own.sum;
-                all[index].volume_integral += f64::from(*count) * own.volume_integral;
+                all[index].add_blocks(f64::from(*count), own);
             }
         }
         all.iter_mut().for_each(|s| s.mean_per_voxel = s.sum / num_voxels.max(1) as f64);
@@ -241,7 +240,8 @@ mod tests {
     use super::super::{PartialVoxels, largest_principal_stretch};
     use super::*;
     use crate::mesh::{MeshOptions, mesh_specimen};
-    use crate::voxel::Sampling;
+    use crate::specimen::TestKind;
+    use crate::voxel::{Face, MeasuredComponents, Sampling, Surface};
 
     /// Homogeneous shear observed through the whole chain.
     #[test]
@@ -253,6 +253,7 @@ mod tests {
             noise_sd_mm: [0.05; 3],
             force_sd_n: 0.02,
             partial_voxels: PartialVoxels::Uniform,
+            surface: None,
         };
         let scanner = Scanner::new(&specimen, &mesh, &scan, Sampling::default()).unwrap();
         let displacement: Vec<[f64; 3]> = mesh.nodes.iter().map(|x| [0.6 * x[1], 0.0, 0.0]).collect();
@@ -291,6 +292,51 @@ mod tests {
         let of_one = &alone.integrated_sensitivity[1];
         assert!((of_three.sum / of_one.sum - 3.0).abs() < 1e-12);
         assert!((of_three.mean_per_voxel / of_one.mean_per_voxel - 1.0).abs() < 1e-12);
+    }
+
+    /// A bar in homogeneous extension, whose displacement changes with every parameter by c (x, −y/2, −z/2): what cameras
+    /// at its face tell is a sum of squares of the subsets' centres, n (n² − 1) h²/12 for n centres h apart, and of the
+    /// height where that is measured.
+    #[test]
+    fn a_face_of_a_homogeneous_bar_tells_a_closed_form() {
+        let specimen = Specimen { test: TestKind::Uniaxial, ..block("bar") };
+        let mesh = mesh_specimen(&specimen, &MeshOptions::search(&specimen)).unwrap();
+        let field =
+            |c: f64| mesh.nodes.iter().map(|x| [c * x[0], -0.5 * c * x[1], -0.5 * c * x[2]]).collect::<Vec<_>>();
+        let size = [1e-6, 1e-3, 5e-3];
+        let sensitivities: Vec<ParameterSensitivity> = one_term()
+            .parameters()
+            .into_iter()
+            .zip(size)
+            .map(|(parameter, c)| ParameterSensitivity { parameter, displacement: field(c), force_n: 0.0 })
+            .collect();
+        let displacement = field(0.4);
+        let state =
+            DrivenState { drive_mm: 4.8, displacement: &displacement, sensitivities: &sensitivities, unknowns: &[] };
+        let (voxel_mm, noise_sd_mm) = ([1.0, 0.25, 0.75], [0.02, 0.01, 0.05]);
+        for components in [MeasuredComponents::InPlane, MeasuredComponents::All] {
+            let surface = Some(Surface { face: Face::PlusZ, components });
+            let scan = ScanSettings { voxel_mm, noise_sd_mm, surface, ..ScanSettings::default() };
+            let scanner = Scanner::new(&specimen, &mesh, &scan, Sampling::default()).unwrap();
+            let seen = scanner.observe(&one_term(), &state).unwrap();
+            // 12 × 4 mm in subsets of 1 × 0.25 mm, 4.5 mm above the middle.
+            let squares = |n: f64, h: f64| n * (n * n - 1.0) * h * h / 12.0;
+            let mut told = 16.0 * squares(12.0, 1.0) / 4e-4 + 12.0 * squares(16.0, 0.25) / 4e-4;
+            if components == MeasuredComponents::All {
+                told += 192.0 * (0.5f64 * 4.5).powi(2) / 25e-4;
+            }
+            let found = seen.joint.about_material(&one_term(), &[]).unwrap();
+            for (i, a) in size.iter().enumerate() {
+                for (j, b) in size.iter().enumerate() {
+                    // Means of linear fields are exact; rounding of 192 products.
+                    assert!((found.matrix()[(i, j)] / (a * b * told) - 1.0).abs() < 1e-11);
+                }
+            }
+            let step = SeenBlocks { kinds: vec![(1, seen)] }.step(4.8, &[1.0], 1.4);
+            let of_mu = &step.integrated_sensitivity[0];
+            assert_eq!((step.num_voxels, of_mu.volume_integral), (192, 0.0));
+            assert!((of_mu.surface_integral.unwrap() / (48.0 * of_mu.mean_per_voxel) - 1.0).abs() < 1e-12);
+        }
     }
 
     #[test]

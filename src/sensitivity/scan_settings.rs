@@ -4,7 +4,8 @@ use super::information::{LEAST_SD, MeasurementNoise};
 #[cfg(feature = "schema")]
 use crate::field::schema::{number_above, numbers, schema_type};
 use crate::field::{FieldError, FieldPath};
-use crate::voxel::VoxelMask;
+use crate::specimen::Specimen;
+use crate::voxel::{Surface, VoxelError, VoxelGrid, VoxelMask, unbounded_where_unmeasured};
 use serde::{Deserialize, Serialize};
 
 #[cfg(feature = "schema")]
@@ -46,10 +47,11 @@ impl PartialVoxels {
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = ScanSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ScanSettings {
-    /// Edges of a voxel, mm.
+    /// Edges of a voxel, mm. Where a surface is seen, the two in the face are those of a subset.
     #[cfg_attr(feature = "schema", schema(value_type = PositiveTripleMm))]
     pub voxel_mm: [f64; 3],
-    /// Standard deviation of a voxel's displacement along x, y, z, mm.
+    /// Standard deviation of a voxel's displacement along x, y, z, mm. That of a component which cameras do not measure
+    /// is not used.
     #[cfg_attr(feature = "schema", schema(value_type = PositiveTripleMm))]
     pub noise_sd_mm: [f64; 3],
     /// Standard deviation of the load cell's force (all samples together), N.
@@ -58,6 +60,10 @@ pub struct ScanSettings {
     /// Weight of partly filled voxels.
     #[serde(default)]
     pub partial_voxels: PartialVoxels,
+    /// The face whose displacements cameras measure (digital image correlation), in place of a scan of the volume.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schema(nullable = false))]
+    pub surface: Option<Surface>,
 }
 
 impl Default for ScanSettings {
@@ -68,14 +74,42 @@ impl Default for ScanSettings {
             noise_sd_mm: [0.05; 3],
             force_sd_n: 0.02,
             partial_voxels: PartialVoxels::default(),
+            surface: None,
         }
     }
 }
 
 impl ScanSettings {
-    /// The noise alone.
+    /// The noise alone: without bound in components that are not measured.
     pub fn noise(&self) -> MeasurementNoise {
-        MeasurementNoise { displacement_sd_mm: self.noise_sd_mm, force_sd_n: self.force_sd_n }
+        let measured = self.surface.map_or([true; 3], Surface::measured);
+        let displacement_sd_mm = unbounded_where_unmeasured(measured, self.noise_sd_mm);
+        MeasurementNoise { displacement_sd_mm, force_sd_n: self.force_sd_n }
+    }
+
+    /// Its grid on a specimen of one block.
+    ///
+    /// # Errors
+    /// As [`VoxelGrid::planned`].
+    pub fn grid(&self, specimen: &Specimen) -> Result<VoxelGrid, VoxelError> {
+        VoxelGrid::planned(specimen, self.voxel_mm, self.surface)
+    }
+
+    /// Its voxels on a specimen of one block.
+    ///
+    /// # Errors
+    /// As [`Self::grid`] and [`VoxelMask::of_specimen`].
+    pub fn mask(&self, specimen: &Specimen) -> Result<VoxelMask, VoxelError> {
+        VoxelMask::of_specimen(specimen, self.grid(specimen)?)
+    }
+
+    /// The error of work that only a scan of the volume can do, where a surface is seen; `remedy` says what to do.
+    ///
+    /// # Errors
+    /// A pointer to `surface`.
+    pub fn needs_volume(&self, remedy: &str) -> Result<(), FieldError> {
+        let Some(surface) = self.surface else { return Ok(()) };
+        Err(FieldError::new("/surface", surface.face.name(), "left out: a scan of the volume").remedy(remedy))
     }
 
     /// Every number that is not what it must be: edges of voxels and standard deviations are positive and finite.
@@ -93,6 +127,11 @@ impl ScanSettings {
             check(FieldPath::of("noise_sd_mm").index(axis), sd, LEAST_SD);
         }
         check(FieldPath::of("force_sd_n"), self.force_sd_n, LEAST_SD);
+        if self.surface.is_some() && self.partial_voxels == PartialVoxels::Signal {
+            let error = FieldError::new("/partial_voxels", "signal", "uniform where a surface is seen");
+            errors
+                .push(error.remedy("the noise of a subset of a camera's picture does not follow the signal of a coil"));
+        }
         errors
     }
 }
@@ -107,11 +146,29 @@ mod tests {
             voxel_mm: [0.0, 1.0, f64::NAN],
             noise_sd_mm: [0.05, -1.0, 0.05],
             force_sd_n: f64::INFINITY,
-            partial_voxels: PartialVoxels::default(),
+            ..ScanSettings::default()
         };
         let pointers: Vec<String> = scan.field_errors().into_iter().map(|e| e.pointer).collect();
         assert_eq!(pointers, ["/voxel_mm/0", "/voxel_mm/2", "/noise_sd_mm/1", "/force_sd_n"]);
         let fine = ScanSettings { voxel_mm: [1.0; 3], noise_sd_mm: [0.05; 3], force_sd_n: 0.02, ..scan };
         assert_eq!(fine.field_errors(), []);
+    }
+
+    /// Settings without a surface are read and written as before; with one, the component along its normal is not
+    /// measured by one camera.
+    #[test]
+    fn surfaces_stand_beside_the_voxels() {
+        let text =
+            r#"{"voxel_mm":[1.0,1.0,1.0],"noise_sd_mm":[0.1,0.2,0.3],"force_sd_n":0.02,"partial_voxels":"uniform"}"#;
+        let volume: ScanSettings = serde_json::from_str(text).expect("settings of a volume");
+        assert_eq!(serde_json::to_string(&volume).expect("JSON"), text);
+        assert_eq!(volume.noise().displacement_sd_mm, [0.1, 0.2, 0.3]);
+        volume.needs_volume("").expect("a volume");
+        let text = text.replace("\"uniform\"}", "\"signal\",\"surface\":{\"face\":\"+y\"}}");
+        let seen: ScanSettings = serde_json::from_str(&text).expect("settings of a surface");
+        assert_eq!(seen.noise().displacement_sd_mm, [0.1, f64::INFINITY, 0.3]);
+        assert_eq!(seen.needs_volume("").expect_err("a surface").pointer, "/surface");
+        let pointers: Vec<String> = seen.field_errors().into_iter().map(|e| e.pointer).collect();
+        assert_eq!(pointers, ["/partial_voxels"]);
     }
 }

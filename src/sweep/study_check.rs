@@ -39,6 +39,8 @@ impl SweepStudy {
         problems.extend(self.base.validate().err().map(|e| (root("base"), SweepStudyError::Base(e))));
         self.check_materials(&mut problems);
         problems.extend(self.scan.field_errors().into_iter().map(|e| (root("scan"), SweepStudyError::Scan(e))));
+        let remedy = "a sweep is of scans of the volume; give a list of evaluations for cameras";
+        problems.extend(self.scan.needs_volume(remedy).err().map(|e| (root("scan"), SweepStudyError::Scan(e))));
         if let MeshSize::Factor(value) = self.mesh
             && !SIZE_FACTORS.contains(&value)
         {

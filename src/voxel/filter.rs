@@ -17,17 +17,23 @@ pub struct HammingFilter {
     sources: Vec<u32>,
 }
 
+/// The filter is one of volumes.
+fn check_volume(grid: &VoxelGrid) -> Result<(), VoxelError> {
+    if grid.surface.is_none() { Ok(()) } else { Err(VoxelError::FilteredSurface) }
+}
+
 impl HammingFilter {
     /// All corners inside the acquired grid with at least half (four) of their eight voxels in the acquired mask. The
     /// filtered grid has one voxel less along each axis and lies half a voxel further.
     ///
     /// # Errors
-    /// [`VoxelError::EmptyMask`].
+    /// [`VoxelError::EmptyMask`]; [`VoxelError::FilteredSurface`].
     pub fn new(acquired: &VoxelMask) -> Result<Self, VoxelError> {
+        check_volume(&acquired.grid)?;
         let grid = VoxelGrid {
             origin_mm: [0, 1, 2].map(|a| acquired.grid.origin_mm[a] + 0.5 * acquired.grid.voxel_mm[a]),
-            voxel_mm: acquired.grid.voxel_mm,
             shape: acquired.grid.shape.map(|n| n.saturating_sub(1)),
+            ..acquired.grid
         };
         Self::build(acquired, grid, |_, num_present| num_present >= 4)
     }
@@ -37,12 +43,14 @@ impl HammingFilter {
     /// without any acquired voxel are left out.
     ///
     /// # Errors
-    /// [`VoxelError::LengthMismatch`], [`VoxelError::EmptyMask`], [`VoxelError::TooManyVoxels`].
+    /// [`VoxelError::LengthMismatch`], [`VoxelError::EmptyMask`], [`VoxelError::TooManyVoxels`],
+    /// [`VoxelError::FilteredSurface`].
     pub fn for_recording(
         specimen: &Specimen,
         filtered_grid: VoxelGrid,
         flags: &[bool],
     ) -> Result<(VoxelMask, Self), VoxelError> {
+        check_volume(&filtered_grid)?;
         if flags.len() != filtered_grid.num_voxels() {
             let expected = filtered_grid.num_voxels();
             return Err(VoxelError::LengthMismatch { what: "mask", found: flags.len(), expected });

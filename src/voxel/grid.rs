@@ -1,6 +1,6 @@
 //! The regular grid of a scan.
 
-use super::VoxelError;
+use super::{Surface, VoxelError};
 use crate::specimen::Specimen;
 use serde::Serialize;
 
@@ -16,6 +16,10 @@ pub struct VoxelGrid {
     pub voxel_mm: [f64; 3],
     /// Voxels along x, y, z.
     pub shape: [usize; 3],
+    /// The face on which the grid lies, where cameras measured a surface: its one layer of voxels has no thickness, and
+    /// the edge along the normal only says how pictures draw it. `None` for a scan of the volume.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub surface: Option<Surface>,
 }
 
 impl VoxelGrid {
@@ -29,7 +33,7 @@ impl VoxelGrid {
     pub fn new(origin_mm: [f64; 3], voxel_mm: [f64; 3], shape: [usize; 3]) -> Result<Self, VoxelError> {
         check_voxel(voxel_mm)?;
         check_size(shape.iter().map(|&n| n as f64).product())?;
-        Ok(VoxelGrid { origin_mm, voxel_mm, shape })
+        Ok(VoxelGrid { origin_mm, voxel_mm, shape, surface: None })
     }
 
     /// The grid centred on the specimen's block, with extent / edge voxels along each axis, rounded to the nearest
@@ -48,7 +52,65 @@ impl VoxelGrid {
         let count = [0, 1, 2].map(|a| (extent[a] / voxel_mm[a]).round().max(1.0));
         check_size(count.iter().product())?;
         let origin_mm = [0, 1, 2].map(|a| -0.5 * (count[a] - 1.0) * voxel_mm[a]);
-        Ok(VoxelGrid { origin_mm, voxel_mm, shape: count.map(|n| n as usize) })
+        Ok(VoxelGrid { origin_mm, voxel_mm, shape: count.map(|n| n as usize), surface: None })
+    }
+
+    /// The grid of a planned measurement: [`Self::covering`], of the volume or of a surface. The subsets of a surface
+    /// lie side by side and have the two edges of `voxel_mm` in the face.
+    ///
+    /// # Errors
+    /// As [`Self::covering`]; [`VoxelError::HiddenFace`].
+    pub fn planned(specimen: &Specimen, voxel_mm: [f64; 3], surface: Option<Surface>) -> Result<Self, VoxelError> {
+        let Some(surface) = surface else { return Self::covering(specimen, voxel_mm) };
+        check_voxel(voxel_mm)?;
+        // Along the normal a voxel as long as the block is one layer, which is then moved onto the face.
+        let axis = surface.face.axis();
+        let mut whole = voxel_mm;
+        whole[axis] = 2.0 * surface.face.position_mm(specimen).abs();
+        let mut grid = Self::covering(specimen, whole)?;
+        grid.voxel_mm[axis] = voxel_mm[axis];
+        grid.origin_mm[axis] = surface.face.position_mm(specimen);
+        grid.on_surface(specimen, surface)
+    }
+
+    /// This grid as one of a surface: it must be a layer on the face.
+    ///
+    /// # Errors
+    /// [`VoxelError::HiddenFace`], [`VoxelError::OffFace`].
+    pub fn on_surface(self, specimen: &Specimen, surface: Surface) -> Result<Self, VoxelError> {
+        surface.check(specimen)?;
+        let (axis, expected_mm) = (surface.face.axis(), surface.face.position_mm(specimen));
+        let (layers, found_mm) = (self.shape[axis], self.origin_mm[axis]);
+        // Affines are stored in single precision.
+        if layers != 1 || !((found_mm - expected_mm).abs() <= FACE_TOLERANCE * expected_mm.abs()) {
+            return Err(VoxelError::OffFace { face: surface.face.name(), layers, found_mm, expected_mm });
+        }
+        Ok(VoxelGrid { surface: Some(surface), ..self })
+    }
+
+    /// The axis of the normal of the face on which it lies.
+    pub fn normal_axis(&self) -> Option<usize> {
+        self.surface.map(|surface| surface.face.axis())
+    }
+
+    /// Whether the displacement along x, y, z is measured: all three in a volume.
+    pub fn measured(&self) -> [bool; 3] {
+        self.surface.map_or([true; 3], Surface::measured)
+    }
+
+    /// Whether every component that is measured has a value there.
+    pub fn is_complete(&self, displacement: &[f64; 3]) -> bool {
+        displacement.iter().zip(self.measured()).all(|(u, is_measured)| !is_measured || u.is_finite())
+    }
+
+    /// Puts `value` in the place of every component that is not measured.
+    pub fn fill_unmeasured(&self, displacement: &mut [[f64; 3]], value: f64) {
+        let measured = self.measured();
+        for u in displacement {
+            for (component, _) in u.iter_mut().zip(measured).filter(|(_, is_measured)| !is_measured) {
+                *component = value;
+            }
+        }
     }
 
     /// Number of voxels, in and out of the material.
@@ -56,9 +118,15 @@ impl VoxelGrid {
         self.shape.iter().product()
     }
 
-    /// Volume of a voxel, mm³.
+    /// Volume of a voxel, mm³: none where it lies on a face.
     pub fn voxel_volume_mm3(&self) -> f64 {
-        self.voxel_mm.iter().product()
+        if self.surface.is_some() { 0.0 } else { self.voxel_mm.iter().product() }
+    }
+
+    /// Area of a voxel on a face, mm²; `None` in a volume.
+    pub fn subset_area_mm2(&self) -> Option<f64> {
+        let normal = self.normal_axis()?;
+        Some((0..3).filter(|&a| a != normal).map(|a| self.voxel_mm[a]).product())
     }
 
     /// Linear index of voxel (i, j, k).
@@ -84,6 +152,10 @@ impl VoxelGrid {
     }
 }
 
+/// A grid lies on a face where it is this near to it, relative to the face's distance from the centre: ten times the
+/// rounding of a number in single precision.
+const FACE_TOLERANCE: f64 = 1e-6;
+
 fn check_voxel(voxel_mm: [f64; 3]) -> Result<(), VoxelError> {
     for (axis, value) in ['x', 'y', 'z'].into_iter().zip(voxel_mm) {
         if !(value.is_finite() && value > 0.0) {
@@ -104,6 +176,7 @@ fn check_size(num_voxels: f64) -> Result<(), VoxelError> {
 #[cfg(test)]
 mod tests {
     use super::super::mask::tests::{PUBLISHED_VOXEL, solid};
+    use super::super::{Face, MeasuredComponents};
     use super::*;
 
     #[test]
@@ -115,6 +188,21 @@ mod tests {
             // Rounding of coordinates of order ten.
             assert!((first[a] + last[a]).abs() < 1e-13);
         }
+    }
+
+    /// A surface's grid is one layer on the face with the subsets of a volume's grid in its plane.
+    #[test]
+    fn subsets_lie_on_the_face() {
+        let surface = Surface { face: Face::MinusZ, components: MeasuredComponents::InPlane };
+        let grid = VoxelGrid::planned(&solid(), PUBLISHED_VOXEL, Some(surface)).unwrap();
+        assert_eq!((grid.shape, grid.normal_axis()), ([25, 34, 1], Some(2)));
+        assert!((grid.center_mm(0)[2] + 9.55).abs() < 1e-12);
+        assert_eq!((grid.voxel_volume_mm3(), grid.subset_area_mm2()), (0.0, Some(0.1875)));
+        assert!(grid.is_complete(&[1.0, 2.0, f64::NAN]) && !grid.is_complete(&[f64::NAN, 2.0, 3.0]));
+        let off = VoxelGrid::new([0.0; 3], [1.0; 3], [2, 2, 2]).unwrap().on_surface(&solid(), surface);
+        assert!(matches!(off, Err(VoxelError::OffFace { layers: 2, .. })), "{off:?}");
+        let json = serde_json::to_string(&VoxelGrid::covering(&solid(), PUBLISHED_VOXEL).unwrap()).unwrap();
+        assert!(!json.contains("surface"), "a grid of the volume is written as ever: {json}");
     }
 
     #[test]

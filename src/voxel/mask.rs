@@ -62,8 +62,8 @@ impl VoxelMask {
         for b in 0..num_across {
             for i in 0..grid.shape[0] {
                 let (x, across) = (clipped(&grid, &section, 0, i), clipped(&grid, &section, section.across, b));
-                let area = match section.overlap(x, across) {
-                    Overlap::Full => (x[1] - x[0]) * (across[1] - across[0]),
+                let area = match section.overlap_on(&grid, x, across) {
+                    Overlap::Full => (x[1] - x[0]) * filled_mm(&grid, section.across, across),
                     Overlap::Cut => section.area(x, across, FRACTION_SLICES),
                     Overlap::None => 0.0,
                 };
@@ -72,8 +72,8 @@ impl VoxelMask {
         }
         let layer_fraction: Vec<f64> = (0..num_along)
             .map(|n| {
-                let [low, high] = clipped(&grid, &section, section.along, n);
-                (high - low).max(0.0) / grid.voxel_mm[section.along]
+                let along = clipped(&grid, &section, section.along, n);
+                filled_mm(&grid, section.along, along) / grid.voxel_mm[section.along]
             })
             .collect();
         let (mut voxels, mut material_fraction) = (Vec::new(), Vec::new());
@@ -96,6 +96,11 @@ impl VoxelMask {
         self.voxels.len()
     }
 
+    /// Material area of the voxels in the mask where they lie on a face, mm²; `None` in a volume.
+    pub fn material_area_mm2(&self) -> Option<f64> {
+        Some(self.material_fraction.iter().sum::<f64>() * self.grid.subset_area_mm2()?)
+    }
+
     /// Material volume of the voxels in the mask, mm³.
     pub fn material_volume_mm3(&self) -> f64 {
         self.material_fraction.iter().sum::<f64>() * self.grid.voxel_volume_mm3()
@@ -111,14 +116,25 @@ impl VoxelMask {
     }
 }
 
-/// Extent of the n-th voxel along an axis, cut to the block; empty (low ≥ high) outside it.
+/// How much of a voxel's edge along an axis lies in an interval, mm. Along the normal of a face, where a voxel has no
+/// thickness, it is there as a whole.
+fn filled_mm(grid: &VoxelGrid, axis: usize, [low, high]: [f64; 2]) -> f64 {
+    if grid.normal_axis() == Some(axis) { grid.voxel_mm[axis] } else { (high - low).max(0.0) }
+}
+
+/// Extent of the n-th voxel along an axis, cut to the block; empty (low ≥ high) outside it. Along the normal of a face
+/// it is the face's position twice.
 pub(super) fn clipped(grid: &VoxelGrid, section: &Section, axis: usize, n: usize) -> [f64; 2] {
+    if let Some(surface) = grid.surface.filter(|s| s.face.axis() == axis) {
+        return [surface.face.sign() * section.half[axis]; 2];
+    }
     let (center, edge) = (grid.origin_mm[axis] + n as f64 * grid.voxel_mm[axis], grid.voxel_mm[axis]);
     [(center - 0.5 * edge).max(-section.half[axis]), (center + 0.5 * edge).min(section.half[axis])]
 }
 
 #[cfg(test)]
 pub(crate) mod tests {
+    use super::super::{Face, MeasuredComponents, Surface};
     use super::*;
     use crate::specimen::{Block, Hole, HoleAxis, Outline, TestKind};
 
@@ -192,6 +208,38 @@ pub(crate) mod tests {
         let all = VoxelMask::from_flags(&specimen, grid.clone(), &vec![true; grid.num_voxels()], 0.0).unwrap();
         // As for holes: slices of the columns at the transition arcs.
         assert!((all.material_volume_mm3() / specimen.volume_mm3() - 1.0).abs() < 1e-4);
+    }
+
+    /// The subsets of every face add up to its area, also where holes open in it and where it is a dumb-bell's.
+    #[test]
+    fn filled_subsets_add_up_to_the_area() {
+        let bar = Specimen { test: TestKind::Uniaxial, ..two_hole() };
+        let dumbbell = Specimen {
+            test: TestKind::Uniaxial,
+            block: Block { length_mm: 35.0, thickness_mm: 2.0, width_mm: 6.0 },
+            outline: Outline::Iso37Type4,
+            ..solid()
+        };
+        for (specimen, face, exact) in [
+            (&solid(), Face::PlusZ, 25.4 * 6.4),
+            // Holes along the thickness open in the y faces alone.
+            (&bar, Face::MinusZ, 25.4 * 6.4),
+            (&bar, Face::PlusY, 25.4 * 19.1 - 12.5 * std::f64::consts::PI),
+            (&dumbbell, Face::MinusY, dumbbell.volume_mm3() / 2.0),
+        ] {
+            let surface = Surface { face, components: MeasuredComponents::All };
+            let mut grid = VoxelGrid::planned(specimen, [0.7, 0.3, 0.4], Some(surface)).unwrap();
+            for a in (0..3).filter(|a| *a != face.axis()) {
+                // Everything is covered, from anywhere.
+                grid.shape[a] += 3;
+                grid.origin_mm[a] -= 1.3 * grid.voxel_mm[a];
+            }
+            let flags = vec![true; grid.num_voxels()];
+            let all = VoxelMask::from_flags(specimen, grid, &flags, 0.0).unwrap();
+            // As for volumes: slices of the columns at walls and arcs.
+            assert!((all.material_area_mm2().unwrap() / exact - 1.0).abs() < 2e-4, "{face:?}");
+            assert!(all.material_volume_mm3().abs() < 1e-300);
+        }
     }
 
     #[test]

@@ -1,4 +1,7 @@
 //! The scan's grid: which voxels hold material, and what each of them measures.
+//!
+//! What cameras measure of a face ([`Surface`]) is the same with voxels of no thickness: a grid of one layer whose sample
+//! points lie on the face, and whose voxels are the subsets of a digital image correlation.
 
 mod filter;
 mod grid;
@@ -7,6 +10,7 @@ mod mask;
 mod operator;
 mod sampling;
 mod section;
+mod surface;
 
 pub use filter::HammingFilter;
 pub use grid::VoxelGrid;
@@ -14,6 +18,7 @@ pub use histogram::{Histogram2d, HistogramAxis};
 pub use mask::VoxelMask;
 pub use operator::VoxelOperator;
 pub use sampling::{MaterialPoints, Sampling};
+pub use surface::{Face, MeasuredComponents, Surface, unbounded_where_unmeasured};
 
 /// Why a grid, mask or operator was not made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -67,6 +72,32 @@ pub enum VoxelError {
         /// Centre, mm.
         center_mm: [f64; 3],
     },
+    /// A face that cameras cannot see, or that is no plane.
+    #[error("the face {face} is bonded or curved; the plane faces that cameras see are {}", free.join(", "))]
+    HiddenFace {
+        /// The face.
+        face: &'static str,
+        /// Those that can be seen.
+        free: Vec<&'static str>,
+    },
+    /// A grid that should lie on a face does not.
+    #[error(
+        "a grid of {layers} layers, the first at {found_mm} mm along the normal of the face {face}, is none of the face, \
+         which lies at {expected_mm} mm; it must be one layer there"
+    )]
+    OffFace {
+        /// The face.
+        face: &'static str,
+        /// Layers along its normal.
+        layers: usize,
+        /// Where the first of them lies, mm.
+        found_mm: f64,
+        /// Where the face lies, mm.
+        expected_mm: f64,
+    },
+    /// A filter over voxels of the volume was asked for where a surface was measured.
+    #[error("hamming2 averages 2×2×2 voxels of a volume; displacements of a surface are given without a filter")]
+    FilteredSurface,
     /// A histogram axis without extent or bins.
     #[error("histogram axis from {low} to {high} with {num_bins} bins; it needs low < high and at least one bin")]
     InvalidAxis {

@@ -49,8 +49,9 @@ impl Sampling {
         let n = grid.indices(voxel);
         let bounds = [0, 1, 2].map(|axis| clipped(grid, section, axis, n[axis]));
         let (across, along) = (section.across, section.along);
-        let rule = |axis: usize| gauss(self.gauss_points[axis]);
-        match section.overlap(bounds[0], bounds[across]) {
+        // A voxel on a face has no thickness.
+        let rule = |axis: usize| gauss(if grid.normal_axis() == Some(axis) { 1 } else { self.gauss_points[axis] });
+        match section.overlap_on(grid, bounds[0], bounds[across]) {
             Overlap::None => return,
             Overlap::Full => {
                 for &(x, wx) in rule(0) {

@@ -4,6 +4,7 @@
 //! constant x the material along the other section axis is the outline's interval less the chords of the holes, all in
 //! closed form. Areas and averages over cut voxels need only a rule along x.
 
+use super::VoxelGrid;
 use crate::specimen::{HoleAxis, HoleWall, Specimen};
 
 /// How a rectangle of the section lies to the material.
@@ -94,6 +95,21 @@ impl<'a> Section<'a> {
             }
         }
         overlap
+    }
+
+    /// As [`Self::overlap`], of a voxel of `grid`: on a face that is seen edge-on in the section, a straight line without
+    /// holes, it is all material between its ends.
+    pub fn overlap_on(&self, grid: &VoxelGrid, x: [f64; 2], b: [f64; 2]) -> Overlap {
+        match grid.normal_axis() {
+            Some(axis) if axis == self.across => {
+                if x[0] < x[1] {
+                    Overlap::Full
+                } else {
+                    Overlap::None
+                }
+            }
+            _ => self.overlap(x, b),
+        }
     }
 
     /// Material area in the rectangle, mm²: closed form along `across`, midpoint rule with `num_slices` along x.

@@ -149,6 +149,7 @@ def scan(
     *,
     drive_mm: Optional[Numbers] = None,
     voxel_mm: Optional[Vector] = None,
+    surface: Optional[Fields] = None,
     offset_voxels: Optional[Vector] = None,
     noise_sd_mm: Optional[Vector] = None,
     snr: Optional[Vector] = None,
@@ -166,12 +167,16 @@ def scan(
     threads: Optional[int] = None,
     on_progress: Optional[OnProgress] = None,
 ) -> Scan:
-    """A synthetic recording of a specimen, as the scanner and the load cell would give it: `scan(…).recording`."""
+    """A synthetic recording of a specimen, as the scanner and the load cell would give it: `scan(…).recording`.
+
+    With `surface`, such as `{"face": "+z", "components": "all"}`, as cameras would that see this face.
+    """
     request = given(
         specimen=specimen,
         material=material,
         drive_mm=_drives(drive_mm),
         voxel_mm=voxel_mm,
+        surface=surface,
         offset_voxels=offset_voxels,
         noise_sd_mm=noise_sd_mm,
         snr=snr,
@@ -205,6 +210,7 @@ def import_recording(
     vectors: Optional[str] = None,
     origin: Optional[str] = None,
     voxel_mm: Optional[Vector] = None,
+    surface: Optional[Fields] = None,
     region: Optional[int] = None,
     noise_sd_mm: Optional[Vector] = None,
     filter: Optional[str] = None,
@@ -219,7 +225,8 @@ def import_recording(
     """A recording from MATLAB files, point clouds or NIfTI images; where `files` is one folder, from raw phases.
 
     With `form="dicom"` or `form="paravision"`, `files` are files and folders of a scanner, and `series` (a mapping or a
-    JSON file) says which of them is what.
+    JSON file) says which of them is what. With `form="points"` and `surface`, such as `{"face": "+z"}`, the points are
+    those of a face that cameras saw.
     """
     listed = [files] if isinstance(files, (str, os.PathLike)) else list(files)
     paths = [str(Path(file).resolve()) for file in listed]
@@ -239,6 +246,7 @@ def import_recording(
         vectors=vectors,
         origin=origin,
         voxel_mm=voxel_mm,
+        surface=surface,
         region=region,
         noise_sd_mm=noise_sd_mm,
         filter=filter,

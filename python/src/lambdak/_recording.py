@@ -31,6 +31,12 @@ def centered_origin(mask: npt.ArrayLike, voxel_mm: Sequence[float]) -> Tuple[flo
     return (-float(middle[0]), -float(middle[1]), -float(middle[2]))
 
 
+def _measured(surface: Mapping[str, str]) -> List[int]:
+    """The components that are measured of a face."""
+    is_all = surface.get("components") == "all"
+    return [axis for axis, name in enumerate(AXES) if is_all or not surface["face"].endswith(name)]
+
+
 class Recording:
     """Displacements per voxel, one array for each drive, with the forces at them.
 
@@ -51,6 +57,8 @@ class Recording:
         force_sd_n: Its standard deviation, N, one for all or one for each drive.
         window_s: Beginning and end of each acquisition in the time of `load`, s.
         noise_sd_mm: Standard deviation of a voxel's displacement along x, y, z, mm; estimated where it is left out.
+        surface: The face that cameras saw, such as `{"face": "+z", "components": "in_plane"}`: the grid is then one layer on
+            it, and a component that is not measured holds NaN, in noise_sd_mm `None`.
         filter: `none`, or `hamming2` where displacements went through a 2 × 2 × 2 Hamming kernel.
         load: Shape (readings, 3): time in s, drive in mm, force in N over the whole loading.
         id: Name of the recording in results.
@@ -69,8 +77,9 @@ class Recording:
         force_n: Optional[MaybeNumbers] = None,
         force_sd_n: Optional[MaybeNumbers] = None,
         window_s: Optional[Sequence[Optional[Sequence[float]]]] = None,
-        noise_sd_mm: Optional[Sequence[float]] = None,
+        noise_sd_mm: Optional[Sequence[Optional[float]]] = None,
         filter: str = "none",
+        surface: Optional[Mapping[str, str]] = None,
         load: Optional[npt.ArrayLike] = None,
         id: str = "recording",
         notes: Optional[Mapping[str, Any]] = None,
@@ -84,7 +93,8 @@ class Recording:
         drives = np.atleast_1d(np.asarray(drive_mm, dtype=float))
         if drives.shape != (len(u),):
             raise InputError((f"drive_mm holds {drives.size} drives and displacement_mm {len(u)}; give one for each",))
-        inside = np.asarray(np.isfinite(u).all(axis=4).any(axis=0) if mask is None else np.asarray(mask) >= 0.5)
+        known = np.isfinite(u).all(axis=4) if surface is None else np.isfinite(u[..., _measured(surface)]).all(axis=4)
+        inside = np.asarray(known.any(axis=0) if mask is None else np.asarray(mask) >= 0.5)
         if inside.shape != u.shape[1:4]:
             raise InputError((f"mask has the shape {inside.shape}; that of a displacement is {u.shape[1:4]}",))
         u[:, ~inside] = np.nan
@@ -102,8 +112,11 @@ class Recording:
         )
         if len(self.window_s) != len(u):
             raise InputError((f"window_s holds {len(self.window_s)} windows; give one for each of {len(u)} drives",))
-        self.noise_sd_mm: Optional[Tuple[float, ...]] = None if noise_sd_mm is None else tuple(plain(list(noise_sd_mm)))
+        self.noise_sd_mm: Optional[Tuple[Optional[float], ...]] = (
+            None if noise_sd_mm is None else tuple(plain(list(noise_sd_mm)))
+        )
         self.filter = filter
+        self.surface: Optional[Dict[str, str]] = None if surface is None else dict(surface)
         self.load: Optional[npt.NDArray[np.float64]] = None if load is None else _frozen(np.array(load, dtype=float))
         if self.load is not None and (self.load.ndim != 2 or self.load.shape[1] != 3):
             raise InputError((f"load has the shape {self.load.shape}; (readings, 3) is needed: s, mm, N",))
@@ -139,7 +152,9 @@ class Recording:
             told = given(force_n=self.force_n[n], force_sd_n=self.force_sd_n[n], window_s=self.window_s[n])
             steps.append({"drive_mm": drive_mm, **told, "displacement": name})
         write_image(path / "mask.nii.gz", self.mask, self.affine)
-        acquisition = given(voxel_mm=self.voxel_mm, noise_sd_mm=self.noise_sd_mm, filter=self.filter)
+        acquisition = given(
+            voxel_mm=self.voxel_mm, noise_sd_mm=self.noise_sd_mm, filter=self.filter, surface=self.surface
+        )
         head: Dict[str, Any] = {
             "schema": "mru-recording/1",
             "id": self.id,
@@ -193,6 +208,7 @@ class Recording:
             window_s=[step.get("window_s") for step in steps],
             noise_sd_mm=acquisition.get("noise_sd_mm"),
             filter=acquisition.get("filter", "none"),
+            surface=acquisition.get("surface"),
             load=load,
             id=head["id"],
             notes=head.get("notes"),

@@ -143,6 +143,8 @@ class IntegratedSensitivity:
     sum: float
     mean_per_voxel: float
     volume_integral: float
+    surface_integral: Optional[float] = None
+    """Where cameras see a face: over its area in place of a volume."""
 
 
 @dataclass(frozen=True)
@@ -325,6 +327,7 @@ class CalibrationStep:
     drive_mm: float
     num_voxels: int
     rms_mm: Tuple[float, float, float]
+    """Along x, y, z; NaN of a component that cameras do not measure."""
     force_n: float
     model_force_n: float
 
@@ -348,7 +351,7 @@ class Calibration(Result):
                 s["recording"],
                 s["drive_mm"],
                 s["num_voxels"],
-                tuple(s["rms_mm"]),
+                (_number(s["rms_mm"][0]), _number(s["rms_mm"][1]), _number(s["rms_mm"][2])),
                 _number(s["force_n"]),
                 _number(s["model_force_n"]),
             )

@@ -12,7 +12,7 @@ import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Dict, Iterable, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, Iterable, Mapping, Optional, Sequence, Tuple, Union
 
 from ._errors import InputError
 from ._plain import JsonSource, given, only_known, plain, read_json
@@ -379,6 +379,8 @@ class ScanSettings:
     noise_sd_mm: Tuple[float, float, float]
     force_sd_n: float
     partial_voxels: Optional[str] = None
+    surface: Optional[Mapping[str, str]] = None
+    """The face that cameras see in place of a scan of the volume, such as `{"face": "+z", "components": "all"}`."""
 
     def to_dict(self) -> Dict[str, Any]:
         """As requests and studies hold it."""

@@ -78,15 +78,16 @@ fn add_estimates(text: &mut String, result: &CalibrationResult) {
         result.objective.beta,
         result.loss_f.map_or("(no force)".into(), |l| num(l, 5))
     );
+    let of_component = |mm: Option<f64>| mm.map_or_else(|| "-".into(), |mm| num(mm, 5));
     for s in &result.steps {
         *text += &format!(
             "  {} {} mm: {} voxels, misfit x, y, z {} {} {} mm{}\n",
             s.recording,
             s.drive_mm,
             s.num_voxels,
-            num(s.rms_mm[0], 5),
-            num(s.rms_mm[1], 5),
-            num(s.rms_mm[2], 5),
+            of_component(s.rms_mm[0]),
+            of_component(s.rms_mm[1]),
+            of_component(s.rms_mm[2]),
             match (s.force_n, s.model_force_n) {
                 (Some(f), Some(m)) => format!(", force {} N, model {} N", num(f, 5), num(m, 5)),
                 _ => String::new(),

@@ -7,12 +7,20 @@ use crate::sensitivity::{DetectableSize, Evaluation, PromisedSd};
 /// The evaluation as text.
 pub(in crate::job) fn evaluation(name: &str, evaluation: &Evaluation) -> String {
     let mut text = format!("{name}\n");
+    // What is seen, its extent and the unit of it.
+    let (seen, integral) = match evaluation.scan.surface {
+        Some(surface) => {
+            text += &format!("cameras at the face {}\n", surface.face.name());
+            ("subsets", "surface integral (mm²)")
+        }
+        None => ("voxels", "volume integral (mm³)"),
+    };
     if evaluation.blocks_scanned > 1 {
         text += &format!("{} blocks scanned together\n", evaluation.blocks_scanned);
     }
     for (index, step) in evaluation.steps.iter().enumerate() {
         text += &format!(
-            "\ndrive {} mm: force {} N, {} voxels, median stretch {}, largest {}\n",
+            "\ndrive {} mm: force {} N, {} {seen}, median stretch {}, largest {}\n",
             step.drive_mm,
             num(step.force_n, 4),
             step.num_voxels,
@@ -26,14 +34,14 @@ pub(in crate::job) fn evaluation(name: &str, evaluation: &Evaluation) -> String 
             let forces: Vec<String> = step.force_by_kind_n.iter().map(|f| num(*f, 4)).collect();
             text += &format!("  of this each kind of sample: {} N\n", forces.join(", "));
         }
-        text += "  parameter   integrated sensitivity: sum   mean per voxel   volume integral (mm³)\n";
+        text += &format!("  parameter   integrated sensitivity: sum   mean per voxel  {integral:>22}\n");
         for s in &step.integrated_sensitivity {
             text += &format!(
                 "  {:<10} {:>29} {:>16} {:>23}\n",
                 s.parameter,
                 num(s.sum, 4),
                 num(s.mean_per_voxel, 5),
-                num(s.volume_integral, 4)
+                num(s.surface_integral.unwrap_or(s.volume_integral), 4)
             );
         }
     }

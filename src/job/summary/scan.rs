@@ -1,8 +1,14 @@
 //! Scans and imports as text.
 
 use super::num;
-use crate::acquisition::ScanResult;
+use crate::acquisition::{ScanResult, SettingsOfScan};
 use crate::job::import_result::ImportResult;
+use crate::voxel::MeasuredComponents;
+
+/// One number per component; a dash where it is not measured.
+fn per_component(sd: [Option<f64>; 3]) -> String {
+    sd.map(|sd| sd.map_or_else(|| "-".into(), |sd| num(sd, 5))).join(", ")
+}
 
 pub(in crate::job) fn scan(name: &str, result: &ScanResult) -> String {
     let mut text = format!("{name}: {} voxels, seed {}\n", result.num_voxels, result.seed);
@@ -10,8 +16,18 @@ pub(in crate::job) fn scan(name: &str, result: &ScanResult) -> String {
     if let Some(sd) = result.noise_at_full_signal_mm {
         text += &format!("noise at full signal (x, y, z): {} mm\n", list(sd));
     }
+    let is_of_cameras = matches!(result.options, SettingsOfScan::Cameras(_));
     if let Some(sd) = result.noise_sd_mm {
-        text += &format!("noise of the displacements, estimated: {} mm\n", list(sd));
+        let how = if is_of_cameras { "as told" } else { "estimated" };
+        text += &format!("noise of the displacements, {how}: {} mm\n", per_component(sd));
+    }
+    if is_of_cameras {
+        text += "\n  drive mm   force N   true N\n";
+        for step in &result.steps {
+            let force = step.force_n.map_or("-".into(), |f| num(f, 5));
+            text += &format!("{:>10} {force:>9} {:>8}\n", num(step.drive_mm, 5), num(step.true_force_n, 5));
+        }
+        return text;
     }
     text += "\n  drive mm   force N   true N   axis    kept  low signal  disputed  inconsistent  unconnected   rms error mm\n";
     for step in &result.steps {
@@ -50,10 +66,14 @@ pub(in crate::job) fn scan(name: &str, result: &ScanResult) -> String {
 pub(in crate::job) fn import(result: &ImportResult) -> String {
     let mut text = format!("{}: {} voxels in the mask\n", result.id, result.num_voxels);
     if let Some(sd) = result.noise_sd_mm {
-        text += &format!("noise (x, y, z): {} mm\n", sd.map(|x| num(x, 5)).join(", "));
+        text += &format!("noise (x, y, z): {} mm\n", per_component(sd));
     }
     for step in &result.steps {
-        let what = if result.is_raw { "raw phases" } else { "all three components" };
+        let what = match (result.is_raw, result.surface.map(|s| s.components)) {
+            (true, _) => "raw phases",
+            (false, Some(MeasuredComponents::InPlane)) => "both components in the plane of the face",
+            (false, _) => "all three components",
+        };
         let force = step.force_n.map_or(String::new(), |f| format!("; force {} N", num(f, 5)));
         text += &format!("\ndrive {} mm: {} voxels with {what}{force}\n", step.drive_mm, step.num_complete);
         let Some(report) = &step.reconstruction else { continue };

@@ -82,7 +82,10 @@ export function sensitivities(step) {
       symbol(v.parameter),
       withUnit(digits(v.sum, 3), sensitivityUnit(v.parameter)),
       withUnit(digits(v.mean_per_voxel, 3), sensitivityUnit(v.parameter)),
-      withUnit(digits(v.volume_integral, 3), [sensitivityUnit(v.parameter), "mm³"].filter(Boolean).join(" ")),
+      withUnit(
+        digits(v.surface_integral ?? v.volume_integral, 3),
+        [sensitivityUnit(v.parameter), v.surface_integral === undefined ? "mm³" : "mm²"].filter(Boolean).join(" "),
+      ),
     ]),
   );
 }

@@ -1,10 +1,11 @@
 //! Closed forms on hand-made meshes: affine and polynomial fields, mirrors, the transpose, timing.
 
-use super::super::VoxelGrid;
 use super::super::mask::tests::{solid, two_hole};
+use super::super::{Face, MeasuredComponents, Surface, VoxelGrid};
 use super::*;
 use crate::kinematics::decompose;
 use crate::mesh::{ElementKind, MeshOptions, Mirror, mesh_specimen};
+use crate::specimen::TestKind;
 
 /// A structured mesh of hexahedra of the solid block (or its half z ≥ 0): a section in (x, y), its nodes moved by a
 /// smooth map so that the cells are curved while the block's faces stay in place, extruded along z.
@@ -56,6 +57,43 @@ const MIRROR_Z: Mirror = Mirror { y: false, z: true };
 /// u = (F − I) X at the nodes.
 fn affine(mesh: &Mesh, f: &Tensor) -> Vec<[f64; 3]> {
     mesh.nodes.iter().map(|x| [0, 1, 2].map(|i| (0..3).map(|j| f[i][j] * x[j]).sum::<f64>() - x[i])).collect()
+}
+
+/// Subsets of a face see an affine field at their centres on the face, also on the half that is mirrored and not
+/// meshed, and lose no sample point; where holes open in the face its gradient is exact, too.
+#[test]
+fn subsets_see_the_face() {
+    // Mirror symmetric in z.
+    let f = [[1.2, 0.5, 0.0], [0.02, 0.9, 0.0], [0.0, 0.0, 1.1]];
+    let (block, bar) = (solid(), Specimen { test: TestKind::Uniaxial, ..two_hole() });
+    for (specimen, face, mirror) in [
+        (&block, Face::PlusZ, NO_MIRROR),
+        (&block, Face::PlusZ, MIRROR_Z),
+        (&block, Face::MinusZ, MIRROR_Z),
+        (&bar, Face::MinusY, NO_MIRROR),
+    ] {
+        let mesh = block_mesh(specimen, [5, 3, 4], mirror, 0.4);
+        let surface = Surface { face, components: MeasuredComponents::All };
+        // The block's edges are whole multiples: no subset overhangs.
+        let grid = VoxelGrid::planned(specimen, [2.54, 0.64, 1.91], Some(surface)).unwrap();
+        let mask = VoxelMask::of_specimen(specimen, grid).unwrap();
+        let operator = VoxelOperator::new(specimen, &mesh, &mask, Sampling::default()).unwrap();
+        assert_eq!(operator.num_dropped_points(), 0);
+        let u = affine(&mesh, &f);
+        let averages = operator.average(&u).unwrap();
+        for ((found, voxel), part) in averages.iter().zip(&mask.voxels).zip(&mask.material_fraction) {
+            let x = mask.grid.center_mm(*voxel as usize);
+            assert!((x[face.axis()] - face.position_mm(specimen)).abs() < 1e-12);
+            for i in (0..3).filter(|_| *part > 1.0 - 1e-9) {
+                let exact = (0..3).map(|j| f[i][j] * x[j]).sum::<f64>() - x[i];
+                assert!((found[i] - exact).abs() < 1e-11, "{face:?} {found:?} {exact}");
+            }
+        }
+        for found in operator.deformation_gradients(&u).unwrap() {
+            // As for volumes: rounding of positions / element size.
+            assert!((0..9).all(|n| (found[n / 3][n % 3] - f[n / 3][n % 3]).abs() < 1e-11));
+        }
+    }
 }
 
 /// A homogeneous deformation is measured exactly: F, and u at the centroid of the material part.
