@@ -60,6 +60,13 @@ impl RecordingFit {
         Some(self.covariance.sd(index)? * self.misfit_factor.sqrt())
     }
 
+    /// Covariance of two parameters in their units, of which [`Self::sd`] is the diagonal's root; none where either is
+    /// undetermined or was held.
+    pub fn covariance_of(&self, one: Parameter, other: Parameter) -> Option<f64> {
+        let index_of = |p| self.information.index_of(p).ok().filter(|&i| !self.held.contains(i));
+        Some(self.covariance.covariance(index_of(one)?, index_of(other)?)? * self.misfit_factor)
+    }
+
     /// The largest shift of a parameter that a structured error as large as the structured misfit could make.
     pub fn possible_shift(&self, parameter: Parameter) -> Option<f64> {
         let index = self.information.index_of(parameter).ok()?;
@@ -89,6 +96,13 @@ impl RecordingFit {
     /// What the estimate predicts of a drive: displacements of the compared voxels, mm.
     pub fn predicted(&self, recording: usize, step: usize) -> &[[f64; 3]] {
         &self.predictions[recording].displacements[step]
+    }
+
+    /// What is left of a drive's `measured` displacements (of the compared voxels, mm): measured − predicted; NaN where
+    /// missing.
+    pub fn misfit(&self, recording: usize, step: usize, measured: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let rest = |(u, m): (&[f64; 3], &[f64; 3])| [0, 1, 2].map(|c| u[c] - m[c]);
+        measured.iter().zip(self.predicted(recording, step)).map(rest).collect()
     }
 
     /// How that changes with every parameter, in the order of [`Ogden::parameters`]: displacements of the compared

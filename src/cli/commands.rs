@@ -34,6 +34,15 @@ pub(super) static EXPORTS: &[(&str, JobCommand)] = &[
         JobCommand { name: "export-material", arguments: of_material, flags: EXPORT_MATERIAL, fill: exported_material },
     ),
     ("model", JobCommand { name: "export-model", arguments: of_specimen, flags: EXPORT_MODEL, fill: specimen }),
+    (
+        "recording",
+        JobCommand {
+            name: "export-recording",
+            arguments: of_recording,
+            flags: EXPORT_RECORDING,
+            fill: exported_recording,
+        },
+    ),
 ];
 const EXPORT_MODEL: &[Flag] = &[
     Flag::read("material", "material", JsonFile),
@@ -45,12 +54,14 @@ const EXPORT_MODEL: &[Flag] = &[
 
 const EXPORT_MATERIAL: &[Flag] =
     &[Flag::of("format", "formats"), Flag::of("stress-unit", "stress_unit"), Flag::of("name", "name")];
+const EXPORT_RECORDING: &[Flag] = &[Flag::of("raw", "is_raw"), Flag::of("format", "formats")];
 const SOLVE: &[Flag] = &[
     Flag::read("material", "material", JsonFile),
     Flag::of("drive", "drive_mm"),
     Flag::of("mesh", "mesh"),
     Flag::of("full", "is_whole"),
     Flag::of("fields", "fields"),
+    Flag::of("arrays", "arrays"),
 ];
 const EVALUATE: &[Flag] = &[
     Flag::read("material", "material", JsonFile),
@@ -69,6 +80,7 @@ const EVALUATE: &[Flag] = &[
     Flag::of("blocks-scanned", "protocol/blocks_scanned"),
     Flag::of("scan-shares", "protocol/scan_share"),
     Flag::of("detect", "has_detectable"),
+    Flag::of("arrays", "arrays"),
 ];
 const SCAN: &[Flag] = &[
     Flag::read("material", "material", JsonFile),
@@ -128,6 +140,7 @@ const CALIBRATE: &[Flag] = &[
     Flag::of("end-margin", "end_margin_mm"),
     Flag::of("profile", "has_profiles"),
     Flag::of("contours", "has_contours"),
+    Flag::of("arrays", "arrays"),
 ];
 const DIAGNOSE: &[Flag] = &[
     Flag::read("material", "material", JsonFile),
@@ -295,6 +308,16 @@ fn recordings(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliErr
     let first = PathBuf::from(names.first().cloned().unwrap_or_default());
     asked.set("recordings", names, "RECORDING");
     Ok(first)
+}
+
+fn of_recording(command: Command) -> Command {
+    command.arg(Arg::new("RECORDING").help("Folder of the recording (mru-recording/1)").required(true))
+}
+
+fn exported_recording(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliError> {
+    let name = value(matches, "RECORDING");
+    asked.set("recording", name.clone(), "RECORDING");
+    Ok(PathBuf::from(name))
 }
 
 fn of_campaign(command: Command) -> Command {

@@ -1,5 +1,6 @@
 //! Calibrate: the material from recordings, with its uncertainty and the number of terms.
 
+use super::array_files::add_arrays;
 use super::input_use::{InputForm, InputUse};
 use super::request::RecordingOutline;
 use super::subject::check_mesh;
@@ -8,6 +9,7 @@ use crate::calibration::{
     Boundary, CalibrateOptions, Calibration, CalibrationResult, ContourOptions, DECREMENT_THRESHOLD, Objective,
     Observed, PAPER_BETA, Rule, TermCount, calibrate,
 };
+use crate::export::{ArrayFormat, calibration_arrays};
 use crate::field::FieldError;
 use crate::material::LawKind;
 use crate::mesh::{MeshOptions, MeshSize};
@@ -90,6 +92,10 @@ pub struct CalibrationRequest {
     /// Contours of the losses around the estimate.
     #[serde(default)]
     pub has_contours: bool,
+    /// Further files with parameters, covariance and what was compared, voxel by voxel: arrays for MATLAB and Python.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 2)]
+    pub arrays: Vec<ArrayFormat>,
 }
 
 fn decrement() -> f64 {
@@ -245,6 +251,10 @@ impl Run for CalibrationRequest {
         outcome.add_pictures(pictures);
         outcome.add("report.html", report.to_html());
         outcome.add("material.json", result.material.to_json());
+        if !self.arrays.is_empty() {
+            let tree = calibration_arrays(&found, &observed, &names);
+            add_arrays(&mut outcome, "calibration", tree, &self.arrays, context)?;
+        }
         Ok(outcome)
     }
 }
@@ -254,8 +264,7 @@ fn add_fields(outcome: &mut Outcome, found: &Calibration, observed: &[Observed])
     for (r, recording) in observed.iter().enumerate() {
         for (s, step) in recording.steps.iter().enumerate() {
             let model = found.fit.predicted(r, s);
-            let rest: Vec<[f64; 3]> =
-                step.displacement.iter().zip(model).map(|(u, m)| [0, 1, 2].map(|c| u[c] - m[c])).collect();
+            let rest = found.fit.misfit(r, s, &step.displacement);
             let grid = &recording.mask.grid;
             let images =
                 [("measured", &step.displacement[..], false), ("model", model, true), ("misfit", &rest[..], false)];

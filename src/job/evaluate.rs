@@ -1,12 +1,17 @@
 //! Evaluate: what a scan of a specimen would see and what it would tell about the material.
 
+use super::array_files::{add_arrays, array_formats};
 use super::detectable::{check_detectable, detectable_sizes, detection_seconds};
 use super::subject::{add_drawings, check_meshes, driven, model_of, name_of_sample};
 use super::{Context, JobError, Outcome, RecordingOutline, Request, ResultSchema, Run, cost, defaults, summary};
+use crate::export::{FieldFormat, FieldSeries, evaluation_arrays, vtkhdf_file};
+use crate::fem::Equilibrium;
 use crate::field::FieldError;
 use crate::material::Ogden;
 use crate::mesh::MeshSize;
-use crate::report::{bar_pictures, detectable_picture, histogram_picture, map_pictures, surface_json, vtu_of};
+use crate::report::{
+    bar_pictures, detectable_picture, histogram_picture, map_pictures, solution_fields, surface_json, vtu_of,
+};
 use crate::sensitivity::{
     DriveSelection, Evaluation, EvaluationError, EvaluationMaps, EvaluationOptions, Fixture, Protocol, ScanSettings,
     evaluate_fixture,
@@ -63,6 +68,11 @@ pub struct EvaluationRequest {
     #[serde(default = "defaults::yes")]
     #[schema(default = defaults::yes)]
     pub has_files: bool,
+    /// Further files with the voxel fields and what they promise: arrays for MATLAB and Python, and the fields in the
+    /// mesh, all drives in one file for ParaView.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 3)]
+    pub arrays: Vec<FieldFormat>,
 }
 
 /// A checked evaluation.
@@ -86,6 +96,10 @@ impl EvaluationRequest {
         if let (Some(stretch), Some(_)) = (self.median_stretch, &self.drive_mm) {
             let error = FieldError::new("/median_stretch", stretch, "left out where drive_mm is given");
             errors.push(error.remedy("give one of the two"));
+        }
+        if !self.arrays.is_empty() && !self.has_files {
+            let error = FieldError::new("/arrays", "given", "left out where has_files is false");
+            errors.push(error.remedy("leave out one of the two"));
         }
         if errors.is_empty()
             && let Err(error) = check_grid(&self.specimen, &self.scan)
@@ -190,7 +204,11 @@ impl Run for CheckedEvaluation {
     }
 
     fn equal_work(&self) -> Option<(serde_json::Value, bool)> {
-        Some((self.content(), !self.request.has_files))
+        let mut content = self.content();
+        if !self.request.arrays.is_empty() {
+            content["arrays"] = serde_json::json!(self.request.arrays);
+        }
+        Some((content, !self.request.has_files))
     }
 
     fn run(&self, context: &Context) -> Result<Outcome, JobError> {
@@ -229,6 +247,10 @@ impl Run for CheckedEvaluation {
         }
         self.add_samples(&mut outcome, &fixture, &maps, context)?;
         add_drawings(&mut outcome, specimen, "specimen")?;
+        let formats = array_formats(&self.request.arrays);
+        if !formats.is_empty() {
+            add_arrays(&mut outcome, "evaluation", evaluation_arrays(&evaluation, &maps), &formats, context)?;
+        }
         Ok(outcome)
     }
 }
@@ -254,10 +276,17 @@ impl CheckedEvaluation {
             let name = |stem: &str| name_of_sample(stem, index);
             outcome.add_pictures(map_pictures(sample).into_iter().map(|(stem, svg)| (name(&stem), svg)));
             if let Some(state) = sample.equilibria.last() {
-                let vtu = vtu_of(&part.model, material, state).map_err(|e| context.failed(&e))?;
+                let fields = solution_fields(&part.model, material, state);
+                let vtu = vtu_of(part.model.mesh(), &fields).map_err(|e| context.failed(&e))?;
                 outcome.add(format!("{}.vtu", name("solution")), vtu);
                 let surface = surface_json(&part.model, material, state).map_err(|e| context.failed(&e))?;
                 outcome.add(format!("{}.json", name("surface")), surface);
+            }
+            if self.request.arrays.contains(&FieldFormat::Vtkhdf) {
+                let fields = |state: &Equilibrium| (state.drive_mm, solution_fields(&part.model, material, state));
+                let series: FieldSeries = sample.equilibria.iter().map(fields).collect();
+                let file = vtkhdf_file(part.model.mesh(), &series).map_err(|e| context.failed(&e))?;
+                outcome.add(format!("{}.vtkhdf", name("solution")), file);
             }
         }
         Ok(())

@@ -9,6 +9,7 @@
 //!
 //! A new kind of job is one file here, with a type that implements [`Request`], and one line in [`KINDS`].
 
+mod array_files;
 mod calibrate;
 mod compare;
 mod cost;
@@ -25,6 +26,7 @@ mod evaluation_list;
 mod evaluation_table;
 mod export_material;
 mod export_model;
+mod export_recording;
 mod export_result;
 mod import;
 mod import_result;

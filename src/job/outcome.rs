@@ -27,6 +27,12 @@ pub enum MediaType {
     Dxf,
     /// STL solid.
     Stl,
+    /// STEP solid.
+    Step,
+    /// HDF5: arrays for Python, fields for ParaView.
+    Hdf5,
+    /// MATLAB's variables.
+    Matlab,
     /// Plain text.
     Text,
     /// Markdown.
@@ -50,6 +56,9 @@ impl MediaType {
             MediaType::Vtu | MediaType::Xml => "application/xml",
             MediaType::Dxf => "image/vnd.dxf",
             MediaType::Stl => "model/stl",
+            MediaType::Step => "model/step",
+            MediaType::Hdf5 => "application/x-hdf5",
+            MediaType::Matlab => "application/x-matlab-data",
             MediaType::Text => "text/plain",
             MediaType::Markdown => "text/markdown",
             MediaType::Binary => "application/octet-stream",
@@ -69,6 +78,9 @@ impl MediaType {
             Some("xml" | "feb" | "pvd") => MediaType::Xml,
             Some("dxf") => MediaType::Dxf,
             Some("stl") => MediaType::Stl,
+            Some("step") => MediaType::Step,
+            Some("h5" | "vtkhdf") => MediaType::Hdf5,
+            Some("mat") => MediaType::Matlab,
             Some("inp" | "txt") => MediaType::Text,
             Some("md") => MediaType::Markdown,
             _ => MediaType::Binary,

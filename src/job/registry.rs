@@ -4,7 +4,7 @@ use super::kind::Kind;
 use super::part::PartKind;
 
 /// The kinds that this program runs.
-pub static KINDS: [Kind; 18] = [
+pub static KINDS: [Kind; 19] = [
     Kind::of::<super::solve::SolveRequest>(),
     Kind::of::<super::evaluate::EvaluationRequest>(),
     Kind::of::<super::evaluation_list::EvaluationListRequest>(),
@@ -18,6 +18,7 @@ pub static KINDS: [Kind; 18] = [
     Kind::of::<super::uniaxial::UniaxialRequest>(),
     Kind::of::<super::export_material::ExportMaterialRequest>(),
     Kind::of::<super::export_model::ExportModelRequest>(),
+    Kind::of::<super::export_recording::ExportRecordingRequest>(),
     Kind::of::<crate::design::Study>(),
     Kind::of::<crate::sweep::SweepStudy>(),
     Kind::of::<super::compare::CompareRequest>(),

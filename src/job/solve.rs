@@ -1,13 +1,15 @@
 //! Solve: forces and fields of a specimen at its drives.
 
+use super::array_files::{add_arrays, array_formats};
 use super::subject::{check_meshes, driven, model_of, name_of_sample};
 use super::{Context, JobError, Outcome, RecordingOutline, Request, ResultSchema, Run, cost, defaults, summary};
+use crate::export::{FieldFormat, FieldSeries, solution_arrays, vtkhdf_file};
 use crate::fem::{Equilibrium, QuadraturePoint, SolveOptions, SolveResult};
 use crate::field::FieldError;
 use crate::kinematics::decompose;
 use crate::material::Ogden;
-use crate::mesh::MeshSize;
-use crate::report::{deformed_picture, pvd, vtu_of};
+use crate::mesh::{Mesh, MeshSize};
+use crate::report::{deformed_picture, pvd, solution_fields, vtu_of};
 use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -50,6 +52,10 @@ pub struct SolveRequest {
     #[serde(default)]
     #[schema(default = FieldDrives::default)]
     pub fields: FieldDrives,
+    /// Further files with the forces and the fields: arrays for MATLAB and Python, all drives in one file for ParaView.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 3)]
+    pub arrays: Vec<FieldFormat>,
 }
 
 struct CheckedSolve {
@@ -103,31 +109,43 @@ impl Run for CheckedSolve {
     fn run(&self, context: &Context) -> Result<Outcome, JobError> {
         let samples = self.specimen.samples();
         let solved = samples.iter().map(|s| self.solve(s, samples.len(), context)).collect::<Result<Vec<_>, _>>()?;
-        let (results, files): (Vec<SolveResult>, Vec<SolvedFiles>) = solved.into_iter().unzip();
+        let (results, solved): (Vec<SolveResult>, Vec<Solved>) = solved.into_iter().unzip();
         let result = SolveResult::of_samples(results, &context.input_hash);
         let mut outcome = Outcome::new("solve.json", &result, summary::solve(&self.specimen.name, &result))?;
-        for (index, files) in files.into_iter().enumerate() {
+        for (index, sample) in solved.iter().enumerate() {
             let name = |stem: &str| name_of_sample(stem, index);
-            if let Some(deformed) = files.deformed {
-                outcome.add(format!("{}.svg", name("deformed")), deformed);
+            if let Some(deformed) = &sample.deformed {
+                outcome.add(format!("{}.svg", name("deformed")), deformed.as_str());
             }
-            let name_at = |step: usize| format!("{}.vtu", name(&format!("solution_{step}")));
-            let series: Vec<(f64, String)> = files.fields.iter().map(|(d, step, _)| (*d, name_at(*step))).collect();
-            outcome.add(format!("{}.pvd", name("solution")), pvd(&series));
-            for (_, step, vtu) in files.fields {
-                outcome.add(name_at(step), vtu);
+            let first = self.specimen.drive_mm.len() - sample.fields.len() + 1;
+            let name_at = |index: usize| format!("{}.vtu", name(&format!("solution_{}", first + index)));
+            let series = sample.fields.iter().enumerate().map(|(index, (drive, _))| (*drive, name_at(index)));
+            outcome.add(format!("{}.pvd", name("solution")), pvd(&series.collect::<Vec<_>>()));
+            for (index, (_, fields)) in sample.fields.iter().enumerate() {
+                outcome.add(name_at(index), vtu_of(&sample.mesh, fields).map_err(|e| context.failed(&e))?);
             }
+            if self.request.arrays.contains(&FieldFormat::Vtkhdf) {
+                let file = vtkhdf_file(&sample.mesh, &sample.fields).map_err(|e| context.failed(&e))?;
+                outcome.add(format!("{}.vtkhdf", name("solution")), file);
+            }
+        }
+        let formats = array_formats(&self.request.arrays);
+        if !formats.is_empty() {
+            let parts: Vec<_> = solved.iter().map(|s| (&s.mesh, &s.fields)).collect();
+            let tree = solution_arrays(&result, &parts).map_err(|e| context.failed(&e))?;
+            add_arrays(&mut outcome, "solve", tree, &formats, context)?;
         }
         Ok(outcome)
     }
 }
 
-/// Files of one solved sample.
-struct SolvedFiles {
-    /// The deformed sample at the last drive.
+/// One solved sample.
+struct Solved {
+    mesh: Mesh,
+    /// Picture of the deformed sample at the last drive.
     deformed: Option<String>,
-    /// Drive (mm), its number from 1, and the fields for ParaView.
-    fields: Vec<(f64, usize, String)>,
+    /// The fields at the drives at which they are written: every one, or the last.
+    fields: FieldSeries,
 }
 
 impl CheckedSolve {
@@ -137,7 +155,7 @@ impl CheckedSolve {
         sample: &Specimen,
         num_samples: usize,
         context: &Context,
-    ) -> Result<(SolveResult, SolvedFiles), JobError> {
+    ) -> Result<(SolveResult, Solved), JobError> {
         let material = &self.request.material;
         let mut options = self.request.mesh.options(sample);
         options.use_mirror &= !self.request.is_whole;
@@ -154,14 +172,13 @@ impl CheckedSolve {
             let fields = model.quadrature_fields(material, &found);
             result.push(&found, extremes(&fields), model.contact(sample, &found), model.statistics());
             if self.request.fields == FieldDrives::Every || index + 1 == num_drives {
-                let vtu = vtu_of(&model, material, &found).map_err(|e| context.failed(&e))?;
-                fields_of_drives.push((drive, index + 1, vtu));
+                fields_of_drives.push((drive, solution_fields(&model, material, &found)));
             }
             last = Some(found);
         }
         let deformed = last.map(|state| deformed_picture(&model, material, &state)).transpose();
         let deformed = deformed.map_err(|e| context.failed(&e))?;
-        Ok((result, SolvedFiles { deformed, fields: fields_of_drives }))
+        Ok((result, Solved { mesh: model.mesh().clone(), deformed, fields: fields_of_drives }))
     }
 }
 

@@ -4,7 +4,7 @@ use super::{Context, JobError, Outcome};
 use crate::fem::{ForwardModel, PrepareError};
 use crate::field::FieldError;
 use crate::mesh::{MeshOptions, MeshSize, mesh_specimen};
-use crate::specimen::{Specimen, to_dxf, to_stl, to_svg};
+use crate::specimen::{Specimen, mould_to_step, to_dxf, to_step, to_stl, to_svg};
 
 /// The specimen driven to `drive_mm`, where given, with everything that is wrong with it added to `errors`.
 pub fn driven(specimen: &Specimen, drive_mm: Option<&Vec<f64>>, errors: &mut Vec<FieldError>) -> Specimen {
@@ -94,12 +94,15 @@ pub fn check_count(count: usize, pointer: &str, max_elements: usize) -> Result<(
 /// [`JobError::NoSolution`] where the solid cannot be drawn.
 pub fn add_drawings(outcome: &mut Outcome, specimen: &Specimen, stem: &str) -> Result<(), JobError> {
     outcome.add(format!("{stem}.json"), specimen.to_json());
+    let no_drawing = |e: &dyn std::fmt::Display| JobError::NoSolution(e.to_string());
     for (index, sample) in specimen.samples().iter().enumerate() {
+        let mould = name_of_sample(&format!("{stem}-mould"), index);
         let stem = name_of_sample(stem, index);
         outcome.add(format!("{stem}.svg"), to_svg(sample));
         outcome.add(format!("{stem}.dxf"), to_dxf(sample));
-        let stl = to_stl(sample).map_err(|e| JobError::NoSolution(e.to_string()))?;
-        outcome.add(format!("{stem}.stl"), stl);
+        outcome.add(format!("{stem}.stl"), to_stl(sample).map_err(|e| no_drawing(&e))?);
+        outcome.add(format!("{stem}.step"), to_step(sample).map_err(|e| no_drawing(&e))?);
+        outcome.add(format!("{mould}.step"), mould_to_step(sample).map_err(|e| no_drawing(&e))?);
     }
     Ok(())
 }

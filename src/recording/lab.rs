@@ -4,7 +4,8 @@
 //! index); `mask` is one in material, zero or NaN elsewhere; `X` holds three arrays of positions, `osc` the voxel's
 //! edges along the array's three indices; `prescribedU` the drives. Which index runs along which axis is the
 //! laboratory's choice ([`ImportOptions::axes`]); component i of the displacement is the one along the array's index i
-//! unless [`ImportOptions::components`] says otherwise.
+//! unless [`ImportOptions::components`] says otherwise. An exported recording is read, too: `displacement_mm`, `mask`,
+//! `voxel_mm`, `drive_mm`.
 
 use super::import::{GridOrigin, ImportError, ImportOptions, IndexAxis, finish};
 use super::mat::MatValue;
@@ -14,7 +15,11 @@ use crate::file::ReadingMemory;
 use crate::specimen::Specimen;
 
 /// Names under which a field is looked for, first first.
-const FIELD_NAMES: [&str; 5] = ["U_t", "uicorr", "ui", "U", "u"];
+const FIELD_NAMES: [&str; 6] = ["U_t", "uicorr", "ui", "U", "u", "displacement_mm"];
+/// Names under which the voxel's edges are looked for.
+const EDGE_NAMES: [&str; 2] = ["osc", "voxel_mm"];
+/// Names under which the drives are looked for.
+const DRIVE_NAMES: [&str; 2] = ["prescribedU", "drive_mm"];
 
 /// An array of a file: sizes and numbers, first index fastest.
 struct Array<'a> {
@@ -60,7 +65,7 @@ pub fn recording_from_mat(
         }
         None => (0..num_voxels).map(is_measured).collect(),
     };
-    let edges = match (options.voxel_mm_by_index, find("osc"), find("X")) {
+    let edges = match (options.voxel_mm_by_index, EDGE_NAMES.into_iter().find_map(find), find("X")) {
         (Some(edges), _, _) => edges,
         (None, Some(osc), _) => spacing_from_osc(osc)?.map(|e| e * options.unit_mm),
         (None, None, Some(x)) => spacing_from_positions(x, dims)?.map(|e| e * options.unit_mm),
@@ -80,7 +85,7 @@ pub fn recording_from_mat(
         (GridOrigin::Positions, None) => return Err(ImportError::Missing { what: "X (positions)", found: names() }),
     };
     let Placement { grid, mask: flags, source } = Placement::new(&mask, &bounds, edges, center, options.axes)?;
-    let drives = match find("prescribedU").and_then(MatValue::numbers) {
+    let drives = match DRIVE_NAMES.into_iter().find_map(find).and_then(MatValue::numbers) {
         _ if options.drive_mm.len() == steps.len() => options.drive_mm.clone(),
         Some((_, values)) if options.drive_mm.is_empty() && values.len() == steps.len() => {
             values.iter().map(|d| d * options.unit_mm).collect()
@@ -107,8 +112,9 @@ pub fn recording_from_mat(
             }
         })
         .collect();
-    let used = [field_name, "mask", "osc", "X", "prescribedU"];
-    let ignored: Vec<&str> = variables.iter().map(|(n, _)| n.as_str()).filter(|n| !used.contains(n)).collect();
+    let is_used =
+        |n: &str| n == field_name || ["mask", "X"].contains(&n) || EDGE_NAMES.contains(&n) || DRIVE_NAMES.contains(&n);
+    let ignored: Vec<&str> = variables.iter().map(|(n, _)| n.as_str()).filter(|n| !is_used(n)).collect();
     let notes = serde_json::json!({
         "imported": { "field": field_name, "ignored_variables": ignored, "voxel_mm_by_index": edges, "region": options.region,
             "origin": options.origin, "center_of_positions_mm": positions_mm, "axes": IndexAxis::words(options.axes),

@@ -2,11 +2,12 @@
 
 use super::{
     BarGroup, ColorMap, CorrelationPlot, DeformedShape, DensityPanel, DensityPlot, GroupedBars, ReportError,
-    VoxelField, VoxelMaps, Vtu, element_means, nodal_values, surface_quads, symbol_of_parameter,
+    SolutionField, VoxelField, VoxelMaps, Vtu, nodal_values, surface_quads, symbol_of_parameter,
 };
-use crate::fem::{Equilibrium, ForwardModel, QuadraturePoint};
+use crate::fem::{Equilibrium, ForwardModel};
 use crate::kinematics::{Decomposition, decompose};
 use crate::material::Ogden;
+use crate::mesh::Mesh;
 use crate::sensitivity::{Evaluation, SampleMaps};
 
 /// The deformed specimen, coloured by the largest principal stretch.
@@ -29,39 +30,15 @@ pub fn deformed_picture(model: &ForwardModel, material: &Ogden, state: &Equilibr
     Ok(shape.to_svg())
 }
 
-/// The fields for ParaView: displacement at the nodes; F, J, principal stretches, λ, k and σ as element means.
+/// Fields of an equilibrium on its mesh for ParaView.
 ///
 /// # Errors
 /// [`ReportError`].
-pub fn vtu_of(model: &ForwardModel, material: &Ogden, state: &Equilibrium) -> Result<String, ReportError> {
-    let mesh = model.mesh();
-    let fields = model.quadrature_fields(material, state);
-    let mean = |value: &dyn Fn(&QuadraturePoint) -> [f64; 9]| -> Vec<[f64; 9]> {
-        element_means(mesh.num_elements(), fields.iter().map(|q| (q.element, q.volume_mm3, value(q))))
-    };
-    let flat = |t: &[[f64; 3]; 3]| {
-        let mut out = [0.0; 9];
-        for (slot, x) in out.iter_mut().zip(t.iter().flatten()) {
-            *slot = *x;
-        }
-        out
-    };
-    let tensor = |v: &[f64; 9]| [[v[0], v[1], v[2]], [v[3], v[4], v[5]], [v[6], v[7], v[8]]];
-    let gradients: Vec<_> = mean(&|q| flat(&q.deformation_gradient)).iter().map(tensor).collect();
-    let stresses: Vec<_> = mean(&|q| flat(&q.cauchy_stress)).iter().map(tensor).collect();
-    let states: Vec<_> = gradients.iter().map(decompose).collect();
-    let stretches: Vec<[f64; 3]> = states.iter().map(|d| d.principal_stretches).collect();
+pub fn vtu_of(mesh: &Mesh, fields: &[SolutionField]) -> Result<String, ReportError> {
     let mut vtu = Vtu::new(mesh)?;
-    vtu.point_vectors("displacement_mm", &state.displacement)?
-        .cell_tensors("deformation_gradient", &gradients)?
-        .cell_scalars("jacobian", &states.iter().map(|d| d.jacobian).collect::<Vec<_>>())?
-        .cell_vectors("principal_stretches", &stretches)?
-        .cell_scalars("stretch_amplitude", &states.iter().map(|d| d.stretch_amplitude).collect::<Vec<_>>())?
-        .cell_scalars(
-            "deformation_mode",
-            &states.iter().map(|d| d.deformation_mode.unwrap_or(f64::NAN)).collect::<Vec<_>>(),
-        )?
-        .cell_tensors("cauchy_stress_kpa", &stresses)?;
+    for field in fields {
+        vtu.field(field)?;
+    }
     Ok(vtu.to_xml())
 }
 

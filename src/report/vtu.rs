@@ -2,16 +2,15 @@
 
 use super::ReportError;
 use super::base64::encode;
+use super::shown_mesh::ShownMesh;
+use super::solution_field::{FieldPlace, SolutionField};
 use super::text::escape;
-use super::vtu_cells::{cell_type, nodes_in_vtk_order};
 use crate::mesh::Mesh;
 use std::path::Path;
 
 /// A mesh with fields, to be written as a `.vtu` file.
 ///
-/// Hexahedra become triquadratic ones, prisms biquadratic wedges, which lack the bubble nodes in their triangles; nodes
-/// that no cell shows are left out. A mirrored mesh is written as it is, the half or quarter; ParaView's filter
-/// *Reflect* completes it. Lengths in mm. Tensors have nine components, row after row: F_xX, F_xY, F_xZ, F_yX, …
+/// Of a mesh there is what [`ShownMesh`] shows; ParaView's filter *Reflect* completes a mirrored one. Lengths in mm. Tensors have nine components, row after row: F_xX, F_xY, F_xZ, F_yX, …
 ///
 /// ```
 /// use lambdak::mesh::{ElementKind, Mesh, Mirror};
@@ -34,11 +33,7 @@ use std::path::Path;
 /// # Ok::<(), lambdak::report::ReportError>(())
 /// ```
 pub struct Vtu<'a> {
-    mesh: &'a Mesh,
-    /// Nodes that are written, in the mesh's order.
-    used: Vec<usize>,
-    /// Number in the file of each node of the mesh.
-    number: Vec<u64>,
+    shown: ShownMesh<'a>,
     point_arrays: String,
     cell_arrays: String,
 }
@@ -49,24 +44,7 @@ impl<'a> Vtu<'a> {
     /// # Errors
     /// [`ReportError::BrokenConnectivity`], [`ReportError::UnknownNode`].
     pub fn new(mesh: &'a Mesh) -> Result<Self, ReportError> {
-        let nodes_per_element = mesh.element_kind.num_nodes();
-        if !mesh.connectivity.len().is_multiple_of(nodes_per_element) {
-            return Err(ReportError::BrokenConnectivity { found: mesh.connectivity.len(), nodes_per_element });
-        }
-        let num_nodes = mesh.nodes.len();
-        let mut is_used = vec![false; num_nodes];
-        for element in 0..mesh.num_elements() {
-            for &local in nodes_in_vtk_order(mesh.element_kind) {
-                let node = mesh.element(element)[local] as usize;
-                *is_used.get_mut(node).ok_or(ReportError::UnknownNode { element, node, num_nodes })? = true;
-            }
-        }
-        let used: Vec<usize> = (0..num_nodes).filter(|&n| is_used[n]).collect();
-        let mut number = vec![0; num_nodes];
-        for (i, &node) in used.iter().enumerate() {
-            number[node] = i as u64;
-        }
-        Ok(Vtu { mesh, used, number, point_arrays: String::new(), cell_arrays: String::new() })
+        Ok(Vtu { shown: ShownMesh::new(mesh)?, point_arrays: String::new(), cell_arrays: String::new() })
     }
 
     /// Adds one number per node of the mesh.
@@ -74,7 +52,7 @@ impl<'a> Vtu<'a> {
     /// # Errors
     /// [`ReportError::LengthMismatch`].
     pub fn point_scalars(&mut self, name: &str, values: &[f64]) -> Result<&mut Self, ReportError> {
-        self.add_points(name, &values.iter().map(|v| [*v]).collect::<Vec<_>>())
+        self.add(FieldPlace::Nodes, name, 1, values)
     }
 
     /// Adds one vector per node of the mesh, such as the displacement.
@@ -82,7 +60,7 @@ impl<'a> Vtu<'a> {
     /// # Errors
     /// [`ReportError::LengthMismatch`].
     pub fn point_vectors(&mut self, name: &str, values: &[[f64; 3]]) -> Result<&mut Self, ReportError> {
-        self.add_points(name, values)
+        self.add(FieldPlace::Nodes, name, 3, values.as_flattened())
     }
 
     /// Adds one number per element.
@@ -90,7 +68,7 @@ impl<'a> Vtu<'a> {
     /// # Errors
     /// [`ReportError::LengthMismatch`].
     pub fn cell_scalars(&mut self, name: &str, values: &[f64]) -> Result<&mut Self, ReportError> {
-        self.add_cells(name, &values.iter().map(|v| [*v]).collect::<Vec<_>>())
+        self.add(FieldPlace::Elements, name, 1, values)
     }
 
     /// Adds three numbers per element, such as the principal stretches.
@@ -98,7 +76,7 @@ impl<'a> Vtu<'a> {
     /// # Errors
     /// [`ReportError::LengthMismatch`].
     pub fn cell_vectors(&mut self, name: &str, values: &[[f64; 3]]) -> Result<&mut Self, ReportError> {
-        self.add_cells(name, values)
+        self.add(FieldPlace::Elements, name, 3, values.as_flattened())
     }
 
     /// Adds one tensor per element, such as F or the Cauchy stress.
@@ -106,36 +84,42 @@ impl<'a> Vtu<'a> {
     /// # Errors
     /// [`ReportError::LengthMismatch`].
     pub fn cell_tensors(&mut self, name: &str, values: &[[[f64; 3]; 3]]) -> Result<&mut Self, ReportError> {
-        let rows: Vec<[f64; 9]> = values
-            .iter()
-            .map(|t| [t[0][0], t[0][1], t[0][2], t[1][0], t[1][1], t[1][2], t[2][0], t[2][1], t[2][2]])
-            .collect();
-        self.add_cells(name, &rows)
+        self.add(FieldPlace::Elements, name, 9, values.as_flattened().as_flattened())
     }
 
-    fn add_points<const N: usize>(&mut self, name: &str, values: &[[f64; N]]) -> Result<&mut Self, ReportError> {
-        check_length(name, values.len(), self.mesh.nodes.len(), "nodes")?;
-        let shown: Vec<[f64; N]> = self.used.iter().map(|&n| values[n]).collect();
-        self.point_arrays.push_str(&float_array(name, &shown));
-        Ok(self)
+    /// Adds a field of an equilibrium.
+    ///
+    /// # Errors
+    /// [`ReportError::LengthMismatch`].
+    pub fn field(&mut self, field: &SolutionField) -> Result<&mut Self, ReportError> {
+        self.add(field.place, field.name, field.num_components(), &field.values)
     }
 
-    fn add_cells<const N: usize>(&mut self, name: &str, values: &[[f64; N]]) -> Result<&mut Self, ReportError> {
-        check_length(name, values.len(), self.mesh.num_elements(), "elements")?;
-        self.cell_arrays.push_str(&float_array(name, values));
+    fn add(
+        &mut self,
+        place: FieldPlace,
+        name: &str,
+        components: usize,
+        values: &[f64],
+    ) -> Result<&mut Self, ReportError> {
+        match place {
+            FieldPlace::Nodes => {
+                let shown = self.shown.of_nodes(name, components, values)?;
+                self.point_arrays.push_str(&float_array(name, components, &shown));
+            }
+            FieldPlace::Elements => {
+                self.shown.check_elements(name, components, values)?;
+                self.cell_arrays.push_str(&float_array(name, components, values));
+            }
+        }
         Ok(self)
     }
 
     /// The file's text.
     pub fn to_xml(&self) -> String {
-        let order = nodes_in_vtk_order(self.mesh.element_kind);
-        let num_cells = self.mesh.num_elements();
-        let points: Vec<[f64; 3]> = self.used.iter().map(|&n| self.mesh.nodes[n]).collect();
-        let connectivity = (0..num_cells).flat_map(|e| {
-            let nodes = self.mesh.element(e);
-            order.iter().map(move |&local| self.number[nodes[local] as usize])
-        });
-        let offsets = (1..=num_cells).map(|e| (e * order.len()) as u64);
+        let (num_cells, per_cell) = (self.shown.num_cells(), self.shown.nodes_per_cell());
+        let connectivity = self.shown.connectivity();
+        let offsets = (1..=num_cells).map(|e| (e * per_cell) as u64);
         let integers = |name: &str, values: &mut dyn Iterator<Item = u64>| {
             // VTK's ids are signed; node numbers are far below 2⁶³, so the bytes are the same.
             data_array("Int64", name, 1, &values.flat_map(u64::to_le_bytes).collect::<Vec<u8>>())
@@ -146,13 +130,13 @@ impl<'a> Vtu<'a> {
              <UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{num_cells}\">\n\
              <PointData>\n{}</PointData>\n<CellData>\n{}</CellData>\n<Points>\n{}</Points>\n<Cells>\n{}{}{}</Cells>\n\
              </Piece>\n</UnstructuredGrid>\n</VTKFile>\n",
-            self.used.len(),
+            self.shown.num_points(),
             self.point_arrays,
             self.cell_arrays,
-            float_array("position_mm", &points),
-            integers("connectivity", &mut connectivity.into_iter()),
+            float_array("position_mm", 3, self.shown.positions_mm().as_flattened()),
+            integers("connectivity", &mut connectivity.into_iter().map(u64::from)),
             integers("offsets", &mut offsets.into_iter()),
-            data_array("UInt8", "types", 1, &vec![cell_type(self.mesh.element_kind); num_cells]),
+            data_array("UInt8", "types", 1, &vec![self.shown.cell_type(); num_cells]),
         )
     }
 
@@ -188,16 +172,8 @@ pub(super) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
     std::fs::write(path, bytes).map_err(|source| ReportError::Write { path: path.to_path_buf(), source })
 }
 
-fn check_length(name: &str, found: usize, expected: usize, of: &'static str) -> Result<(), ReportError> {
-    if found == expected {
-        Ok(())
-    } else {
-        Err(ReportError::LengthMismatch { name: name.to_string(), found, expected, of })
-    }
-}
-
-fn float_array<const N: usize>(name: &str, values: &[[f64; N]]) -> String {
-    data_array("Float64", name, N, &values.iter().flatten().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>())
+fn float_array(name: &str, components: usize, values: &[f64]) -> String {
+    data_array("Float64", name, components, &values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>())
 }
 
 /// One array: its length in bytes as UInt64, then its bytes, together in base64.

@@ -7,7 +7,7 @@
 //! and slots ([`HoleShape`]); in a double-lap test further blocks beside it ([`Specimen::samples`]). The mesh is a
 //! section extruded along that axis, so holes of two directions in one specimen are refused. Parsing and validation:
 //! [`Specimen::from_json`]. Limits of what can be made: [`ManufacturingLimits`]. Drawings for the mould maker:
-//! [`to_svg`], [`to_dxf`], [`to_stl`].
+//! [`to_svg`], [`to_dxf`], [`to_stl`], [`to_step`].
 
 #[cfg(feature = "solids")]
 mod clearance;
@@ -16,6 +16,7 @@ mod drawing_dxf;
 mod drawing_holes;
 mod drawing_labels;
 mod drawing_sheet;
+mod drawing_step;
 #[cfg(feature = "triangles")]
 mod drawing_stl;
 mod drawing_svg;
@@ -39,6 +40,9 @@ mod read_error;
 mod samples;
 #[cfg(test)]
 pub(crate) mod sampling;
+mod section_loop;
+mod solid;
+mod step_file;
 #[cfg(test)]
 mod tests;
 
@@ -46,6 +50,7 @@ mod tests;
 pub(crate) use file::Name;
 
 pub use drawing_dxf::to_dxf;
+pub use drawing_step::{MOULD_WALL_MM, mould_to_step, to_step};
 #[cfg(feature = "triangles")]
 pub use drawing_stl::{DrawingError, to_stl};
 pub use drawing_svg::to_svg;

@@ -86,6 +86,13 @@ def _drives(drive_mm: Optional[Numbers]) -> Any:
     return None if drive_mm is None else np.atleast_1d(np.asarray(drive_mm))
 
 
+def _listed(names: Optional[Sequence[str]]) -> Any:
+    """A list of names; one name may stand alone."""
+    if names is None:
+        return None
+    return [names] if isinstance(names, str) else list(names)
+
+
 def solve(
     specimen: Specimen,
     material: Optional[Material] = None,
@@ -93,14 +100,24 @@ def solve(
     drive_mm: Optional[Numbers] = None,
     mesh: Optional[Mesh] = None,
     fields: Optional[str] = None,
+    arrays: Optional[Sequence[str]] = None,
     is_whole: Optional[bool] = None,
     folder: Optional[PathLike] = None,
     threads: Optional[int] = None,
     on_progress: Optional[OnProgress] = None,
 ) -> Solution:
-    """Forces and fields of a specimen at its drives, by finite elements."""
+    """Forces and fields of a specimen at its drives, by finite elements.
+
+    `arrays` names further files in `folder`: `"mat"`, `"hdf5"`, `"vtkhdf"`.
+    """
     request = given(
-        specimen=specimen, material=material, drive_mm=_drives(drive_mm), mesh=mesh, fields=fields, is_whole=is_whole
+        specimen=specimen,
+        material=material,
+        drive_mm=_drives(drive_mm),
+        mesh=mesh,
+        fields=fields,
+        arrays=_listed(arrays),
+        is_whole=is_whole,
     )
     done = _run("solve", request, folder, threads, on_progress)
     return Solution.of(done.result, done.folder)
@@ -117,6 +134,7 @@ def evaluate(
     protocol: Optional[Fields] = None,
     has_detectable: Optional[bool] = None,
     has_files: Optional[bool] = None,
+    arrays: Optional[Sequence[str]] = None,
     is_whole: Optional[bool] = None,
     folder: Optional[PathLike] = None,
     threads: Optional[int] = None,
@@ -125,7 +143,8 @@ def evaluate(
     """What a scan of a specimen would see, and what it would tell about the material.
 
     `has_files=False` makes numbers alone, for loops over designs. `has_detectable=True` says how small errors of the
-    experiment may be and still be named by a diagnosis (`detectable` of the result).
+    experiment may be and still be named by a diagnosis (`detectable` of the result). `arrays` names further files in
+    `folder`: `"mat"`, `"hdf5"`, `"vtkhdf"`.
     """
     request = given(
         specimen=specimen,
@@ -137,6 +156,7 @@ def evaluate(
         protocol=protocol,
         has_detectable=has_detectable,
         has_files=has_files,
+        arrays=_listed(arrays),
         is_whole=is_whole,
     )
     done = _run("evaluate", request, folder, threads, on_progress)
@@ -285,11 +305,15 @@ def calibrate(
     protocol: Optional[Fields] = None,
     has_profiles: Optional[bool] = None,
     has_contours: Optional[bool] = None,
+    arrays: Optional[Sequence[str]] = None,
     folder: Optional[PathLike] = None,
     threads: Optional[int] = None,
     on_progress: Optional[OnProgress] = None,
 ) -> Calibration:
-    """The material, from one recording or several of them together, with its uncertainty."""
+    """The material, from one recording or several of them together, with its uncertainty.
+
+    `arrays` names further files in `folder`: `"mat"`, `"hdf5"`.
+    """
     sources = _sources(recordings)
     request = given(
         recordings=[_named(one) for one in sources],
@@ -307,6 +331,7 @@ def calibrate(
         protocol=protocol,
         has_profiles=has_profiles,
         has_contours=has_contours,
+        arrays=_listed(arrays),
     )
     done = _run("calibrate", request, folder, threads, on_progress)
     return Calibration.of(done.result, done.folder, sources)
@@ -610,9 +635,6 @@ def export_material(
     on_progress: Optional[OnProgress] = None,
 ) -> MaterialExport:
     """A material as Abaqus, Ansys, CalculiX, COMSOL and FEBio read it, each in its own convention."""
-    listed = [formats] if isinstance(formats, str) else formats
-    request = given(
-        material=material, formats=None if listed is None else list(listed), stress_unit=stress_unit, name=name
-    )
+    request = given(material=material, formats=_listed(formats), stress_unit=stress_unit, name=name)
     done = _run("export-material", request, folder, threads, on_progress)
     return MaterialExport.of(done.result, done.folder)

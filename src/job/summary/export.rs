@@ -27,3 +27,9 @@ pub(in crate::job) fn export_model(result: &ExportModelResult) -> String {
         files.join("\n")
     )
 }
+
+/// What is in the files.
+pub(in crate::job) fn export_recording(id: &str, shape: [usize; 3], num_drives: usize, files: &[String]) -> String {
+    let [nx, ny, nz] = shape;
+    format!("{id}: {nx} × {ny} × {nz} voxels at {num_drives} drives\n{}\n", files.join("\n"))
+}

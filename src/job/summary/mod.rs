@@ -23,7 +23,7 @@ pub(super) use curves::{curves, uniaxial};
 pub(super) use design::design;
 pub(super) use diagnosis::{diagnosis, together};
 pub(super) use evaluation::evaluation;
-pub(super) use export::{export_material, export_model};
+pub(super) use export::{export_material, export_model, export_recording};
 pub(super) use load_curves::load_curves;
 pub(super) use next::next;
 pub(super) use paper_tables::paper_tables;

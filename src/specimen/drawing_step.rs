@@ -1,0 +1,88 @@
+//! The specimen, and a mould for it, as exact solids in STEP files (ISO 10303-21, AP214), for CAD programs.
+//!
+//! Walls of holes and arcs are cylinders; walls of ellipses are ellipses extruded. Nothing is approximated.
+
+use super::section_loop::{hole_loop, outline, rectangle};
+use super::solid::{Sense, Solid, SolidBuilder};
+use super::step_file::step_file;
+use super::{Specimen, SpecimenError};
+
+/// Thickness of a mould's walls and of its floor, mm.
+pub const MOULD_WALL_MM: f64 = 8.0;
+
+/// The specimen as a STEP file, mm, in the specimen's frame.
+///
+/// ```
+/// use lambdak::specimen::{Specimen, to_step};
+///
+/// let specimen = Specimen::from_json(&std::fs::read_to_string("geometries/two-hole-shear.json")?)?;
+/// assert!(to_step(&specimen)?.starts_with("ISO-10303-21;"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// [`SpecimenError`] where the specimen is invalid.
+pub fn to_step(specimen: &Specimen) -> Result<String, SpecimenError> {
+    specimen.validate()?;
+    Ok(step_file(&specimen.name, &specimen_solid(specimen)))
+}
+
+/// An open mould for the specimen as a STEP file, mm, in the specimen's frame: a box whose cavity is the specimen, with
+/// a pin where it has a hole.
+///
+/// Walls and floor are [`MOULD_WALL_MM`] thick. The cavity is open at one end of the extrusion (−y for holes along the
+/// thickness, +z for holes along the width), and the pins end level with the box: what is poured in is struck off
+/// there. There is no draft and no allowance for shrinkage.
+///
+/// # Errors
+/// [`SpecimenError`] where the specimen is invalid.
+pub fn mould_to_step(specimen: &Specimen) -> Result<String, SpecimenError> {
+    specimen.validate()?;
+    Ok(step_file(&format!("mould of {}", specimen.name), &mould_solid(specimen)))
+}
+
+fn specimen_solid(specimen: &Specimen) -> Solid {
+    let half = 0.5 * specimen.extrusion_mm();
+    let mut loops = vec![outline(specimen)];
+    loops.extend(specimen.holes.iter().map(|hole| hole_loop(&hole.wall())));
+    let count = loops.len();
+    let mut builder = SolidBuilder::new(specimen.extrusion_axis(), loops, vec![-half, half]);
+    builder.wall(0, [0, 1], Sense::Forward);
+    (1..count).for_each(|hole| builder.wall(hole, [0, 1], Sense::Backward));
+    let top: Vec<(usize, Sense)> = outer_and_inner(0, 1..count, Sense::Forward);
+    let bottom: Vec<(usize, Sense)> = outer_and_inner(0, 1..count, Sense::Backward);
+    builder.cap(&bottom, 0, Sense::Backward);
+    builder.cap(&top, 1, Sense::Forward);
+    builder.finish()
+}
+
+fn mould_solid(specimen: &Specimen) -> Solid {
+    let half = 0.5 * specimen.extrusion_mm();
+    let outside = rectangle(specimen.section_size().map(|extent| extent + 2.0 * MOULD_WALL_MM));
+    let mut loops = vec![outside, outline(specimen)];
+    loops.extend(specimen.holes.iter().map(|hole| hole_loop(&hole.wall())));
+    let count = loops.len();
+    // Levels: below the floor, the cavity's floor, the rim.
+    let levels = vec![-half - MOULD_WALL_MM, -half, half];
+    let mut builder = SolidBuilder::new(specimen.extrusion_axis(), loops, levels);
+    builder.wall(0, [0, 2], Sense::Forward);
+    builder.wall(1, [1, 2], Sense::Backward);
+    builder.cap(&[(0, Sense::Backward)], 0, Sense::Backward);
+    builder.cap(&outer_and_inner(1, 2..count, Sense::Forward), 1, Sense::Forward);
+    builder.cap(&outer_and_inner(0, 1..2, Sense::Forward), 2, Sense::Forward);
+    for pin in 2..count {
+        builder.wall(pin, [1, 2], Sense::Forward);
+        builder.cap(&[(pin, Sense::Forward)], 2, Sense::Forward);
+    }
+    builder.finish()
+}
+
+/// The bounds of a plane face seen from above: the outer one in this sense, those inside of it in the other.
+fn outer_and_inner(outer: usize, inner: std::ops::Range<usize>, sense: Sense) -> Vec<(usize, Sense)> {
+    let other = if sense == Sense::Forward { Sense::Backward } else { Sense::Forward };
+    std::iter::once((outer, sense)).chain(inner.map(|loop_index| (loop_index, other))).collect()
+}
+
+#[cfg(test)]
+#[path = "drawing_step_tests.rs"]
+mod tests;
