@@ -2,7 +2,8 @@
 //!
 //! Section coordinates are (x, lateral): z where the specimen is extruded along its thickness, y where along its width.
 
-use super::{HoleWall, Outline, Specimen, dumbbell};
+use super::dumbbell::Profile;
+use super::{Block, HoleWall, Specimen};
 
 /// Straight parts of a slot and differences of an ellipse's axes below this are none, mm: programs for solids take
 /// points that near for one.
@@ -53,16 +54,16 @@ pub(super) fn rectangle([length, lateral]: [f64; 2]) -> SectionLoop {
 
 /// The outline of a specimen.
 pub(super) fn outline(specimen: &Specimen) -> SectionLoop {
-    match specimen.outline {
-        Outline::Block => rectangle(specimen.section_size()),
-        Outline::Iso37Type4 => dumbbell_outline(),
+    match specimen.profile() {
+        None => rectangle(specimen.section_size()),
+        Some(profile) => dumbbell_outline(&profile, &specimen.block),
     }
 }
 
-/// The dumb-bell, from the lower end of its right transition on.
-fn dumbbell_outline() -> SectionLoop {
-    let [rise, settle] = dumbbell::arcs();
-    let end = [0.5 * dumbbell::LENGTH_MM, 0.5 * dumbbell::END_WIDTH_MM];
+/// A dumb-bell in its block, from the lower end of its right transition on.
+fn dumbbell_outline(profile: &Profile, block: &Block) -> SectionLoop {
+    let [rise, settle] = profile.arcs();
+    let end = [0.5 * block.length_mm, 0.5 * block.width_mm];
     // The quarter x > 0, z > 0 outwards: its points, and what leads from each to the next. The transition begins hollow.
     let points = [rise.start_mm, settle.start_mm, settle.end_mm, end];
     let arcs = [Some((rise.center_mm, false)), Some((settle.center_mm, true)), None];
@@ -79,7 +80,7 @@ fn dumbbell_outline() -> SectionLoop {
             let curve = arc.map_or(SectionCurve::Line, |(center, is_counterclockwise)| SectionCurve::Conic {
                 conic: Conic {
                     center_mm: mirrored(center),
-                    half_mm: [dumbbell::TRANSITION_RADIUS_MM; 2],
+                    half_mm: [profile.radius_mm(); 2],
                     along: [1.0, 0.0],
                 },
                 is_counterclockwise,
