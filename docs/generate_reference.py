@@ -40,7 +40,7 @@ ANCHORS = {schema: re.sub(r"\W", "", title) for title, schema, _, _ in FILES}
 
 COMMANDS = [
     ["solve"], ["evaluate"], ["scan"], ["import"], ["calibrate"], ["diagnose"], ["next"], ["design"], ["sweep"], ["sweep", "merge"], ["compare"],
-    ["uniaxial"], ["curves"], ["export", "material"], ["export", "model"], ["paper-tables"], ["prove-diagnosis"], ["run"], ["serve"],
+    ["uniaxial"], ["curves"], ["export", "material"], ["export", "model"], ["export", "recording"], ["paper-tables"], ["prove-diagnosis"], ["run"], ["serve"],
     ["worker"],
 ]
 
@@ -208,7 +208,7 @@ EXPLAINED = {
     "import": "tutorial-import.md", "calibrate": "calibration.md", "diagnose": "diagnosis.md", "next": "next-scan.md", "design": "tutorial-design.md",
     "sweep": "sweeps.md", "sweep merge": "sweeps.md#shards-without-a-clusters-scheduler", "compare": "sweeps.md#comparison",
     "uniaxial": "tutorial-curves.md#one-curve", "curves": "tutorial-curves.md#several-tests-together-one-kept-back",
-    "export material": "export.md", "export model": "export.md#models", "paper-tables": "paper-comparison.md#tables-1-to-3-and-figure-8",
+    "export material": "export.md", "export model": "export.md#models", "export recording": "export.md#results", "paper-tables": "paper-comparison.md#tables-1-to-3-and-figure-8",
     "prove-diagnosis": "diagnosis.md#proof", "run": "requests.md", "serve": "service.md", "worker": "service.md#workers",
 }
 

@@ -69,11 +69,11 @@ fn fill(dataset: &mut DatasetBuilder, name: &str, array: &Array) -> Result<(), A
     };
     let shape: Vec<u64> = sizes.iter().map(|&n| n as u64).collect();
     dataset.with_shape(&shape);
-    dataset.set_attr("unit", AttrValue::String(array.unit.into()));
-    dataset.set_attr("description", AttrValue::String(array.about.clone()));
+    dataset.set_attr("unit", AttrValue::VarLenString(array.unit.into()));
+    dataset.set_attr("description", AttrValue::VarLenString(array.about.clone()));
     if !array.axes.is_empty() {
         let names = array.axes.iter().map(|(name, _)| (*name).to_string()).collect();
-        dataset.set_attr("axes", AttrValue::StringArray(names));
+        dataset.set_attr("axes", AttrValue::VarLenStringArray(names));
     }
     Ok(())
 }

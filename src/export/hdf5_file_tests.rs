@@ -36,8 +36,8 @@ fn the_last_index_is_the_fastest_in_the_file() {
         assert_eq!(*value, (100 * i + 10 * j + k) as f64);
     }
     let attributes = array.attrs().unwrap();
-    assert_eq!(attributes["unit"], AttrValue::String("mm".into()));
-    assert_eq!(attributes["description"], AttrValue::String("displacement".into()));
+    assert_eq!(attributes["unit"].as_str(), Some("mm"));
+    assert_eq!(attributes["description"].as_str(), Some("displacement"));
     assert_eq!(attributes["axes"].as_strings().unwrap(), ["x", "y", "drive"]);
 }
 

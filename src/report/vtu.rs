@@ -10,7 +10,8 @@ use std::path::Path;
 
 /// A mesh with fields, to be written as a `.vtu` file.
 ///
-/// Of a mesh there is what [`ShownMesh`] shows; ParaView's filter *Reflect* completes a mirrored one. Lengths in mm. Tensors have nine components, row after row: F_xX, F_xY, F_xZ, F_yX, …
+/// Of a mesh there is what [`ShownMesh`] shows; ParaView's filter *Reflect* completes a mirrored one. Lengths in mm.
+/// Tensors have nine components, row after row: F_xX, F_xY, F_xZ, F_yX, …
 ///
 /// ```
 /// use lambdak::mesh::{ElementKind, Mesh, Mirror};

@@ -64,7 +64,7 @@ pub(super) fn outline(specimen: &Specimen) -> SectionLoop {
 fn dumbbell_outline(profile: &Profile, block: &Block) -> SectionLoop {
     let [rise, settle] = profile.arcs();
     let end = [0.5 * block.length_mm, 0.5 * block.width_mm];
-    // The quarter x > 0, z > 0 outwards: its points, and what leads from each to the next. The transition begins hollow.
+    // The quarter x > 0, z > 0 outwards: its points, and what leads from each to the next, hollow first.
     let points = [rise.start_mm, settle.start_mm, settle.end_mm, end];
     let arcs = [Some((rise.center_mm, false)), Some((settle.center_mm, true)), None];
     let mut pieces = Vec::with_capacity(16);
