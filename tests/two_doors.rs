@@ -99,6 +99,7 @@ fn requests(evaluation: &Value, scans: [(&Path, &str); 2]) -> Vec<Asked> {
     let next = json!({ "study": small_study(), "num_terms": 1, "mesh_factor": 4.0, "num_drives": 1 });
     let diagnosis = json!({ "mesh_factor": 4.0, "max_causes": 1 });
     let solve = json!({ "specimen": shipped("two-hole-shear.json"), "drive_mm": [2.0], "mesh": 4.0 });
+    let solve = with(solve, "arrays", json!(["mat", "hdf5", "vtkhdf"]));
     vec![
         Asked::alike("solve", solve),
         Asked::alike("evaluate", small_evaluation(1.5)),
@@ -120,6 +121,7 @@ fn requests(evaluation: &Value, scans: [(&Path, &str); 2]) -> Vec<Asked> {
         Asked::alike("uniaxial", json!({ "csv": curve(false), "fit": { "max_terms": 1 } })),
         Asked::alike("export-material", json!({ "material": shipped("materials/ecoflex-0020-two-term.json") })),
         Asked::alike("export-model", json!({ "specimen": shipped("solid-shear.json"), "mesh": 4.0 })),
+        both("export-recording", json!({}), "recording", path(folder).into(), id.into()),
         Asked::alike("design", small_study()),
         Asked::alike("sweep", small_sweep_study()),
         Asked::alike("compare", json!({ "pairs": [{ "name": "same", "base": evaluation, "current": evaluation }] })),

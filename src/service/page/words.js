@@ -129,6 +129,7 @@ export const KINDS = {
   "uniaxial-fits": "uniaxial fit",
   "material-exports": "material export",
   "model-exports": "model export",
+  "recording-exports": "recording export",
   comparisons: "comparison",
   "paper-tables": "tables",
   proofs: "proof",
