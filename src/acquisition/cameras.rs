@@ -127,7 +127,8 @@ mod tests {
     use super::*;
     use crate::voxel::{Face, MeasuredComponents, Surface};
 
-    /// The same seed gives the same recording; its noise is the one that was told, and nothing is seen along the normal.
+    /// The same seed gives the same recording; its noise is the one that was told, and nothing is seen along the
+    /// normal.
     #[test]
     fn cameras_see_a_face_with_noise() {
         let text = include_str!("../../geometries/solid-shear.json");

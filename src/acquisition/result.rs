@@ -59,8 +59,8 @@ pub struct ScanStep {
     pub window_s: Option<[f64; 2]>,
     /// What became of the voxels; null for raw scans and for cameras.
     pub reconstruction: Option<StepReport>,
-    /// Displacements found less those scanned, per direction; null for raw scans and for cameras, whose noise is the one
-    /// they were told.
+    /// Displacements found less those scanned, per direction; null for raw scans and for cameras, whose noise is the
+    /// one they were told.
     pub error: Option<[ErrorReport; 3]>,
 }
 

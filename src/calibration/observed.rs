@@ -24,11 +24,11 @@ pub struct ObservedStep {
     pub drive_mm: f64,
     /// The force, where it was recorded.
     pub force: Option<ObservedForce>,
-    /// u of the compared voxels, mm, in the mask's order; NaN where missing. Components that cameras do not measure have
-    /// no weight, and what stands there does not count.
+    /// u of the compared voxels, mm, in the mask's order; NaN where missing. Components that cameras do not measure
+    /// have no weight, and what stands there does not count.
     pub displacement: Vec<[f64; 3]>,
     /// The noise of each of them in multiples of [`Observed::noise_sd_mm`], in the mask's order; `None` where it is
-    /// alike everywhere.
+    /// alike everywhere, as that of cameras is taken to be.
     pub relative_noise: Option<Vec<[f64; 3]>>,
     /// What was measured of the fixed and the moved face and is imposed there, beyond the nominal motion of their
     /// plates, per mm of drive. None where plates are taken to move as they were told.
@@ -96,7 +96,9 @@ impl Observed {
                     .force_n
                     .map(|value_n| ObservedForce { value_n, sd_n: step.force_sd_n.unwrap_or(force_sd_n) }),
                 displacement: mask.voxels.iter().map(|&v| cleaned.field[v as usize]).collect(),
-                relative_noise: relative_noise(&recording.grid, &flags, &cleaned.field, stated_sd_mm)
+                relative_noise: Some(&recording.grid)
+                    .filter(|grid| grid.surface.is_none())
+                    .and_then(|grid| relative_noise(grid, &flags, &cleaned.field, stated_sd_mm))
                     .map(|all| mask.voxels.iter().map(|&v| all[v as usize]).collect()),
                 faces_per_mm: [None, None],
             })
@@ -273,7 +275,8 @@ impl Cleaned {
         for &v in &outliers {
             field[v] = [f64::NAN; 3];
         }
-        let lost = lost_voxels(grid, flags, &field, noise_sd_mm);
+        // No coil's signal fades over a face, and at the ends of a bonded edge its displacement is rough along both axes.
+        let lost = if grid.surface.is_none() { lost_voxels(grid, flags, &field, noise_sd_mm) } else { Vec::new() };
         for &v in &lost {
             field[v] = [f64::NAN; 3];
         }

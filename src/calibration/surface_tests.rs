@@ -36,8 +36,8 @@ fn what_is_promised_of_a_face_is_found() {
     for s in &report.spreads {
         let promised = s.promised_sd.unwrap();
         assert_eq!((s.draws, s.failed_draws, s.limited_draws), (n, 0, 0));
-        // s²/σ² is χ² over its degrees of freedom, whose standard deviation is √(2/f): 3.5 of them, 99.95 %. Of κ, known
-        // to some tens of percent, the estimate is not quite linear in the noise: a tenth more.
+        // s²/σ² is χ² over its degrees of freedom, whose standard deviation is √(2/f): 3.5 of them, 99.95 %. Of κ,
+        // known to some tens of percent, the estimate is not quite linear in the noise: a tenth more.
         let ratio = (s.found_sd / promised).powi(2);
         assert!((ratio - 1.0).abs() < 3.5 * (2.0 / degrees).sqrt() + 0.1, "{}: {ratio}", s.parameter);
         let shift = (s.mean - s.truth) / promised * (n as f64).sqrt();
@@ -50,8 +50,8 @@ fn what_is_promised_of_a_face_is_found() {
     assert!((mean - 1.0).abs() < 3.5 * (2.0 / (num_data * n as f64)).sqrt(), "{mean}");
 }
 
-/// A recording of a face goes through its folder and is fitted, with heights and without, by χ² and by the paper's loss:
-/// without noise the truth comes back. What only the volume tells is refused.
+/// A recording of a face goes through its folder and is fitted, with heights and without, by χ² and by the paper's
+/// loss: without noise the truth comes back. What only the volume tells is refused.
 #[test]
 fn recordings_of_a_face_are_calibrated() {
     let bar = Specimen { test: TestKind::Uniaxial, samples_in_parallel: 1, drive_mm: vec![3.0], ..block() };

@@ -34,7 +34,8 @@ pub fn seconds_per_drive(num_nodes: usize, num_voxels: usize) -> f64 {
 }
 
 /// Processor seconds of `num_drives` drives of all samples of a specimen on a mesh, each seen by a scan with these
-/// voxels, of the volume or of a surface, where there is one; none where a sample cannot be meshed or the scan has no grid. Meshes once.
+/// voxels, of the volume or of a surface, where there is one; none where a sample cannot be meshed or the scan has no
+/// grid. Meshes once.
 pub(super) fn seconds(
     specimen: &Specimen,
     mesh: &MeshOptions,

@@ -1,6 +1,7 @@
 //! Point clouds as CSV: `x,y,z,ux,uy,uz` with optional `w` (weight) and `sd`, in the specimen's frame; one file per
-//! step. Points of digital volume correlation are voxels; those of a face that cameras saw are subsets of that face, and
-//! need no column of what is not measured: the place along the normal, and with one camera the displacement along it.
+//! step. Points of digital volume correlation are voxels; those of a face that cameras saw are subsets of that face,
+//! and need no column of what is not measured: the place along the normal, and with one camera the displacement along
+//! it.
 
 use super::import::{ImportError, ImportOptions, finish};
 use super::{RecordedStep, Recording};

@@ -76,8 +76,8 @@ fn scattered_points_are_averaged() {
     assert!(r.steps[0].displacement.iter().all(|u| (u[0] - 2.0).abs() < 0.4));
 }
 
-/// Points of a face that one camera saw: neither the place along the normal nor the displacement along it is needed, and
-/// where the place is given, the points must lie on the face.
+/// Points of a face that one camera saw: neither the place along the normal nor the displacement along it is needed,
+/// and where the place is given, the points must lie on the face.
 #[test]
 fn points_of_a_face_are_its_subsets() {
     let mut with_place = String::from("x,y,z,ux,uy\n");

@@ -294,9 +294,9 @@ mod tests {
         assert!((of_three.mean_per_voxel / of_one.mean_per_voxel - 1.0).abs() < 1e-12);
     }
 
-    /// A bar in homogeneous extension, whose displacement changes with every parameter by c (x, −y/2, −z/2): what cameras
-    /// at its face tell is a sum of squares of the subsets' centres, n (n² − 1) h²/12 for n centres h apart, and of the
-    /// height where that is measured.
+    /// A bar in homogeneous extension, whose displacement changes with every parameter by c (x, −y/2, −z/2): what
+    /// cameras at its face tell is a sum of squares of the subsets' centres, n (n² − 1) h²/12 for n centres h apart,
+    /// and of the height where that is measured.
     #[test]
     fn a_face_of_a_homogeneous_bar_tells_a_closed_form() {
         let specimen = Specimen { test: TestKind::Uniaxial, ..block("bar") };

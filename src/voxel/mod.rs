@@ -1,7 +1,7 @@
 //! The scan's grid: which voxels hold material, and what each of them measures.
 //!
-//! What cameras measure of a face ([`Surface`]) is the same with voxels of no thickness: a grid of one layer whose sample
-//! points lie on the face, and whose voxels are the subsets of a digital image correlation.
+//! What cameras measure of a face ([`Surface`]) is the same with voxels of no thickness: a grid of one layer whose
+//! sample points lie on the face, and whose voxels are the subsets of a digital image correlation.
 
 mod filter;
 mod grid;

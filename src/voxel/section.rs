@@ -97,8 +97,8 @@ impl<'a> Section<'a> {
         overlap
     }
 
-    /// As [`Self::overlap`], of a voxel of `grid`: on a face that is seen edge-on in the section, a straight line without
-    /// holes, it is all material between its ends.
+    /// As [`Self::overlap`], of a voxel of `grid`: on a face that is seen edge-on in the section, a straight line
+    /// without holes, it is all material between its ends.
     pub fn overlap_on(&self, grid: &VoxelGrid, x: [f64; 2], b: [f64; 2]) -> Overlap {
         match grid.normal_axis() {
             Some(axis) if axis == self.across => {

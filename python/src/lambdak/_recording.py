@@ -57,8 +57,8 @@ class Recording:
         force_sd_n: Its standard deviation, N, one for all or one for each drive.
         window_s: Beginning and end of each acquisition in the time of `load`, s.
         noise_sd_mm: Standard deviation of a voxel's displacement along x, y, z, mm; estimated where it is left out.
-        surface: The face that cameras saw, such as `{"face": "+z", "components": "in_plane"}`: the grid is then one layer on
-            it, and a component that is not measured holds NaN, in noise_sd_mm `None`.
+        surface: The face that cameras saw, such as `{"face": "+z", "components": "in_plane"}`: the grid is then one layer
+            on it, and a component that is not measured holds NaN, in noise_sd_mm `None`.
         filter: `none`, or `hamming2` where displacements went through a 2 × 2 × 2 Hamming kernel.
         load: Shape (readings, 3): time in s, drive in mm, force in N over the whole loading.
         id: Name of the recording in results.
