@@ -1,14 +1,12 @@
 //! Displacements of a face, as cameras measure them, are observations like voxels: fits find the truth, by the standard
 //! deviations that were promised.
 
-use super::test_problem::{block, coarse, scan, tight, truth};
+use super::test_problem::{block, coarse, scan, truth};
 use super::*;
 use crate::fem::SolveOptions;
-use crate::mesh::MeshOptions;
-use crate::recording::{Filter, ReadLimits, Recording};
+use crate::recording::Filter;
 use crate::sensitivity::{Protocol, ScanSettings};
-use crate::specimen::{Specimen, TestKind};
-use crate::voxel::{Face, MeasuredComponents, Surface, VoxelError};
+use crate::voxel::{Face, MeasuredComponents, Surface};
 
 fn seen(face: Face, components: MeasuredComponents) -> ScanSettings {
     let surface = Some(Surface { face, components });
@@ -48,48 +46,6 @@ fn what_is_promised_of_a_face_is_found() {
     let num_data = 2.0 * 24.0 * 8.0 + 1.0;
     let mean = report.fits.iter().map(|f| f.as_ref().unwrap().chi2_per_datum).sum::<f64>() / n as f64;
     assert!((mean - 1.0).abs() < 3.5 * (2.0 / (num_data * n as f64)).sqrt(), "{mean}");
-}
-
-/// A recording of a face goes through its folder and is fitted, with heights and without, by χ² and by the paper's
-/// loss: without noise the truth comes back. What only the volume tells is refused.
-#[test]
-fn recordings_of_a_face_are_calibrated() {
-    let bar = Specimen { test: TestKind::Uniaxial, samples_in_parallel: 1, drive_mm: vec![3.0], ..block() };
-    for (specimen, face, components, num_components) in [
-        (block(), Face::MinusZ, MeasuredComponents::InPlane, 2),
-        (bar.clone(), Face::PlusY, MeasuredComponents::All, 3),
-    ] {
-        let (scan, solve) = (seen(face, components), SolveOptions { tolerance: 1e-11, ..SolveOptions::default() });
-        let scan = ScanSettings { voxel_mm: [0.5; 3], ..scan };
-        let mesh = coarse(&specimen);
-        let plain = Protocol::default();
-        let made = SyntheticScan::new(&specimen, &truth(), &scan, &plain, &mesh, &solve, &|| false).unwrap();
-        let recording = made.recording("face", &specimen, made.noiseless(), Filter::None).unwrap();
-        let filtered = made.recording("face", &specimen, made.noiseless(), Filter::Hamming2);
-        assert!(matches!(filtered, Err(CalibrationError::Voxel(VoxelError::FilteredSurface))));
-        let folder = tempfile::tempdir().unwrap();
-        recording.write(folder.path()).unwrap();
-        let read = Recording::read(folder.path(), &ReadLimits::default()).unwrap();
-        let observed = [Observed::new(&read, 0.01).unwrap()];
-        assert_eq!((observed[0].num_outside, observed[0].num_outliers), (0, 0));
-        for objective in [Objective::Weighted, Objective::Paper { beta: PAPER_BETA }] {
-            let mesh = |s: &Specimen| MeshOptions::scaled(s, 2.5);
-            let mut problem = CalibrationProblem::new(&observed, &mesh, objective).unwrap();
-            let mut start = truth();
-            start.terms[0].mu_kpa *= 1.2;
-            start.terms[0].alpha *= 0.85;
-            let fit = problem.fit(&start, None, &tight(), &|| false).unwrap();
-            assert_eq!(fit.num_data, num_components * observed[0].mask.num_voxels() + 1);
-            for parameter in truth().parameters() {
-                let off = (fit.material.value(parameter) - truth().value(parameter)).abs();
-                let sd = fit.sd(parameter).unwrap();
-                // Values are stored in single precision, a millionth of their noise.
-                assert!(off < 0.01 * sd, "{face:?} {}: off by {off}, sd {sd}", parameter.name());
-            }
-        }
-        let inside = observed[0].clone().with_boundary(Boundary::Measured).unwrap_err();
-        assert!(matches!(inside, CalibrationError::NeedsVolume { .. }), "{inside}");
-    }
 }
 
 /// The noise of a recording that does not state it is estimated in the components that are measured.
