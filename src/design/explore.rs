@@ -22,7 +22,7 @@ pub fn geometry_margins(specimen: &Specimen, limits: &ManufacturingLimits, voxel
             }
         }
         if let Outline::Dumbbell(gauge) = &sample.outline {
-            margins.extend(gauge.slacks_mm(&sample.block));
+            margins.extend(gauge.slacks_mm([sample.block.length_mm, sample.block.width_mm]));
         }
     }
     margins

@@ -17,8 +17,8 @@ use crate::mesh::MeshOptions;
 use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
 
-/// The part of the gauge about its middle over which stretches are averaged: well inside it, where an extensometer would
-/// sit.
+/// The part of the gauge about its middle over which stretches are averaged: well inside it, where an extensometer
+/// would sit.
 const MEASURED_PART: f64 = 0.5;
 /// Displacements at which the finite elements are solved.
 const NUM_DRIVES: usize = 8;

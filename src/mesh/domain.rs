@@ -257,7 +257,7 @@ fn check_dumbbell(specimen: &Specimen) -> Result<(), MeshError> {
         let (name, relation) = ("width_mm", "equal to");
         return Err(MeshError::OutlineMismatch { name, value_mm, relation, limit_mm: standard_mm });
     }
-    match dumbbell.misfits(&specimen.block).into_iter().next() {
+    match dumbbell.misfits([specimen.block.length_mm, specimen.block.width_mm]).into_iter().next() {
         None => Ok(()),
         Some(misfit) => {
             let (name, value_mm) = (misfit.dimension.name(), misfit.value_mm);

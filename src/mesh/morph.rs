@@ -49,8 +49,9 @@ pub enum DesignVariable {
 /// symmetric results (forces, integrals) in second order only. The same holds for [`DesignVariable::HoleAngle`].
 ///
 /// Of a dumb-bell of free gauge, gauge, arcs and ends each stretch in themselves along x, and across it every section
-/// stretches with its width ([`Profile::rate`]). A dumb-bell of a standard keeps its outline: length moves its ends, its
-/// other dimensions give zero, as those of a gauge do in a block. An index of a hole that does not exist gives zero.
+/// stretches with its width ([`Profile::rate`]). A dumb-bell of a standard keeps its outline: length moves its ends,
+/// its other dimensions give zero, as those of a gauge do in a block. An index of a hole that does not exist gives
+/// zero.
 pub fn shape_velocity(mesh: &Mesh, specimen: &Specimen, variable: DesignVariable) -> Vec<[f64; 3]> {
     let field = Field::new(mesh, specimen);
     mesh.nodes.iter().map(|&p| field.velocity(p, variable)).collect()

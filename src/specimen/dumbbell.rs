@@ -8,7 +8,6 @@
 //! The dumb-bell of ISO 37, type 4 (w = 1, e = 3, g = 6, R = 3, all mm; from the standard's table of dimensions), is
 //! [`ISO37_TYPE4`].
 
-use super::Block;
 use serde::{Deserialize, Serialize};
 
 /// Overall length of the standard's dumb-bell, mm.
@@ -90,35 +89,36 @@ pub struct DumbbellMisfit {
 }
 
 impl Dumbbell {
-    /// Which dimensions do not go with the others and with the block; empty for a dumb-bell that can be drawn.
-    pub fn misfits(&self, block: &Block) -> Vec<DumbbellMisfit> {
+    /// Which dimensions do not go with the others and with length and width of the whole; empty for a dumb-bell that
+    /// can be drawn.
+    pub fn misfits(&self, whole_mm: [f64; 2]) -> Vec<DumbbellMisfit> {
         let is_kept = |(_, value, min, max): &(_, f64, f64, f64)| {
             *value >= min * (1.0 - ROUNDING) && *value <= max * (1.0 + ROUNDING)
         };
         let misfit = |(dimension, value_mm, min_mm, max_mm)| DumbbellMisfit { dimension, value_mm, min_mm, max_mm };
-        self.limits(block).into_iter().filter(|limit| !is_kept(limit)).map(misfit).collect()
+        self.limits(whole_mm).into_iter().filter(|limit| !is_kept(limit)).map(misfit).collect()
     }
 
     /// How far each dimension is from the limits that the others set, mm; negative where it does not go with them.
-    pub fn slacks_mm(&self, block: &Block) -> Vec<f64> {
-        let both = self.limits(block).map(|(_, value, min, max)| [value - min, max - value]);
+    pub fn slacks_mm(&self, whole_mm: [f64; 2]) -> Vec<f64> {
+        let both = self.limits(whole_mm).map(|(_, value, min, max)| [value - min, max - value]);
         both.into_iter().flatten().filter(|slack| *slack < f64::INFINITY).collect()
     }
 
     /// Each dimension with the smallest and the largest that go with the others, mm.
-    fn limits(&self, block: &Block) -> [(DumbbellDimension, f64, f64, f64); 4] {
+    fn limits(&self, whole_mm: [f64; 2]) -> [(DumbbellDimension, f64, f64, f64); 4] {
         use DumbbellDimension as D;
-        let width_mm = block.width_mm;
-        let profile = Profile::new(self, block);
+        let [length_mm, width_mm] = whole_mm;
+        let profile = Profile::new(self, whole_mm);
         let shortest_mm = 2.0 * profile.knots_mm()[2] + 2.0 * MIN_TAB_RATIO * width_mm;
         let rise_mm = 0.5 * (width_mm - self.gauge_width_mm);
         // Four arcs that are as long in x as the whole: 16 a² = 16 (R − rise/4) rise.
-        let flattest_mm = block.length_mm.powi(2) / (16.0 * rise_mm) + 0.25 * rise_mm;
+        let flattest_mm = length_mm.powi(2) / (16.0 * rise_mm) + 0.25 * rise_mm;
         [
             (D::GaugeWidth, self.gauge_width_mm, MIN_GAUGE_RATIO * width_mm, width_mm - MIN_WIDENING_MM),
             (D::GaugeLength, self.gauge_length_mm, MIN_GAUGE_ASPECT * self.gauge_width_mm, f64::INFINITY),
             (D::FilletRadius, self.fillet_radius_mm, rise_mm, flattest_mm),
-            (D::Length, block.length_mm, shortest_mm, f64::INFINITY),
+            (D::Length, length_mm, shortest_mm, f64::INFINITY),
         ]
     }
 }
@@ -152,10 +152,10 @@ pub struct OutlineArc {
 }
 
 impl Profile {
-    /// The side of a dumb-bell in its block. Of dimensions that do not go together ([`Dumbbell::misfits`]) it is no
-    /// curve, but every function of it still returns.
-    pub fn new(dumbbell: &Dumbbell, block: &Block) -> Profile {
-        let (half_gauge, half_end) = (0.5 * dumbbell.gauge_width_mm, 0.5 * block.width_mm);
+    /// The side of a dumb-bell with this length and width of the whole, mm. Of dimensions that do not go together
+    /// ([`Dumbbell::misfits`]) it is no curve, but every function of it still returns.
+    pub fn new(dumbbell: &Dumbbell, [length_mm, width_mm]: [f64; 2]) -> Profile {
+        let (half_gauge, half_end) = (0.5 * dumbbell.gauge_width_mm, 0.5 * width_mm);
         let radius = dumbbell.fillet_radius_mm;
         let cosine = 1.0 - (half_end - half_gauge) / (2.0 * radius);
         Profile {
@@ -164,7 +164,7 @@ impl Profile {
             gauge_end: 0.5 * dumbbell.gauge_length_mm,
             radius,
             arc_length_x: radius * (1.0 - cosine * cosine).max(0.0).sqrt(),
-            half_length: 0.5 * block.length_mm,
+            half_length: 0.5 * length_mm,
         }
     }
 

@@ -15,7 +15,8 @@ const WALL_POINTS: usize = 128;
 impl Specimen {
     /// The side of a dumb-bell; `None` of a block.
     pub fn profile(&self) -> Option<Profile> {
-        self.outline.dumbbell().map(|dumbbell| Profile::new(&dumbbell, &self.block))
+        let whole_mm = [self.block.length_mm, self.block.width_mm];
+        self.outline.dumbbell().map(|dumbbell| Profile::new(&dumbbell, whole_mm))
     }
 
     /// Half the extent along z at `x_mm`, mm: width/2 of a block, the profile of a dumb-bell.

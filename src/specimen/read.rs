@@ -172,7 +172,7 @@ impl Specimen {
         let has_block = self.extents().iter().all(|(_, extent_mm)| extent_mm.is_finite() && *extent_mm > 0.0);
         // How they go together means something only where each of them does.
         if problems.len() == num_before && has_block {
-            problems.extend(dumbbell.misfits(&self.block).into_iter().map(|misfit| {
+            problems.extend(dumbbell.misfits([self.block.length_mm, self.block.width_mm]).into_iter().map(|misfit| {
                 let field = path_of(misfit.dimension);
                 let max_mm = misfit.max_mm.min(MAX_SIZE_MM);
                 SpecimenError::DumbbellMisfit { field, value_mm: misfit.value_mm, min_mm: misfit.min_mm, max_mm }

@@ -86,7 +86,7 @@ pub(crate) fn free_dumbbell() -> impl Strategy<Value = Specimen> {
             other_samples: Vec::new(),
         };
         // The shortest block that it fits in, or one with longer ends.
-        let shortest_mm = dumbbell.misfits(&specimen.block).iter().map(|m| m.min_mm).fold(0.0, f64::max);
+        let shortest_mm = dumbbell.misfits([1.0, width_mm]).iter().map(|m| m.min_mm).fold(0.0, f64::max);
         specimen.block.length_mm = shortest_mm.max(1.0) + 2.0 * tabs * width_mm;
         specimen
     })
