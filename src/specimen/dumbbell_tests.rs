@@ -3,7 +3,7 @@
 use super::*;
 
 fn standard() -> Profile {
-    Profile::new(&ISO37_TYPE4, &[ISO37_LENGTH_MM, ISO37_WIDTH_MM])
+    Profile::new(&ISO37_TYPE4, [ISO37_LENGTH_MM, ISO37_WIDTH_MM])
 }
 
 /// The standard's, a stocky one, one that hardly widens, and one whose sides rise by 60°.
