@@ -3,6 +3,8 @@
 /// Steps after which Newton's method for the nearest point has long converged: it is monotone, and gains at least half
 /// a digit per step far from the root.
 const MAX_STEPS: usize = 200;
+/// Points nearer to the long axis than this part of the short semi-axis are on it: squares of such numbers underflow.
+const ON_AXIS: f64 = 1e-20;
 /// Steps of the arithmetic–geometric mean, which doubles its digits in each.
 const MEAN_STEPS: i32 = 12;
 
@@ -13,7 +15,7 @@ const MEAN_STEPS: i32 = 12;
 /// monotone. Source: D. Eberly, Distance from a Point to an Ellipse, an Ellipsoid, or a Hyperellipsoid (2013).
 pub(super) fn nearest_point([a, b]: [f64; 2], p: [f64; 2]) -> [f64; 2] {
     let y = p.map(f64::abs);
-    let first_quadrant = if y[1] > 0.0 {
+    let first_quadrant = if y[1] > ON_AXIS * b {
         if y[0] > 0.0 { nearest_of_quadrant([a, b], y) } else { [0.0, b] }
     } else {
         // On the long axis: beyond the centre of curvature of the tip the tip is nearest.
@@ -29,14 +31,14 @@ pub(super) fn nearest_point([a, b]: [f64; 2], p: [f64; 2]) -> [f64; 2] {
 }
 
 fn nearest_of_quadrant([a, b]: [f64; 2], y: [f64; 2]) -> [f64; 2] {
-    // In units of b: s = b² t.
+    // With s = b² (t − 1): near the long axis t is tiny, and t − 1 would lose it.
     let ratio = (a / b) * (a / b);
     let z = [y[0] / a, y[1] / b];
-    let (n0, n1) = (ratio * z[0], z[1]);
-    let excess = |t: f64| (n0 / (t + ratio)).powi(2) + (n1 / (t + 1.0)).powi(2) - 1.0;
-    let slope = |t: f64| -2.0 * (n0 * n0 / (t + ratio).powi(3) + n1 * n1 / (t + 1.0).powi(3));
+    let (n0, n1, apart) = (ratio * z[0], z[1], ratio - 1.0);
+    let excess = |t: f64| (n0 / (t + apart)).powi(2) + (n1 / t).powi(2) - 1.0;
+    let slope = |t: f64| -2.0 * (n0 * n0 / (t + apart).powi(3) + n1 * n1 / t.powi(3));
     // Here the excess is positive: the second term alone is 1.
-    let mut t = n1 - 1.0;
+    let mut t = n1;
     for _ in 0..MAX_STEPS {
         let next = t - excess(t) / slope(t);
         if !(next > t) {
@@ -44,7 +46,7 @@ fn nearest_of_quadrant([a, b]: [f64; 2], y: [f64; 2]) -> [f64; 2] {
         }
         t = next;
     }
-    [ratio * y[0] / (t + ratio), y[1] / (t + 1.0)]
+    [ratio * y[0] / (t + apart), y[1] / t]
 }
 
 /// Circumference, 4 a E(√(1 − b²/a²)), by the arithmetic–geometric mean: 2π (a² − Σ 2ⁿ⁻¹ cₙ²)/M(a, b) with
@@ -96,6 +98,12 @@ mod tests {
         assert_eq!(nearest_point([4.0, 1.0], [0.0, 0.0]), [0.0, 1.0]);
         assert_eq!(nearest_point([4.0, 1.0], [9.0, 0.0]), [4.0, 0.0]);
         assert_eq!(nearest_point([4.0, 1.0], [0.0, -3.0]), [0.0, -1.0]);
+        // A hair off the long axis is the axis, in and beyond the tip's centre of curvature.
+        for (x, hair) in [(9.0, 1e-17), (3.0, 1e-17), (9.0, 1e-19), (3.0, 1e-150)] {
+            let (near, on) = (nearest_point([4.0, 1.0], [x, hair]), nearest_point([4.0, 1.0], [x, 0.0]));
+            // Newton's steps end where rounding ends them.
+            assert!((near[0] - on[0]).abs() < 1e-9 && (near[1] - on[1]).abs() < 1e-9, "{x} {hair}: {near:?} {on:?}");
+        }
         // Inside the tip's centre of curvature (a² − b²)/a = 3.75 a side is nearest.
         assert!(nearest_point([4.0, 1.0], [3.0, 0.0])[1] > 0.5);
     }

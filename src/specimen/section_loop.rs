@@ -78,11 +78,7 @@ fn dumbbell_outline(profile: &Profile, block: &Block) -> SectionLoop {
                 (points[from], from.checked_sub(1).and_then(|m| arcs[m]))
             };
             let curve = arc.map_or(SectionCurve::Line, |(center, is_counterclockwise)| SectionCurve::Conic {
-                conic: Conic {
-                    center_mm: mirrored(center),
-                    half_mm: [profile.radius_mm(); 2],
-                    along: [1.0, 0.0],
-                },
+                conic: Conic { center_mm: mirrored(center), half_mm: [profile.radius_mm(); 2], along: [1.0, 0.0] },
                 is_counterclockwise,
             });
             pieces.push(Piece { start_mm: mirrored(point), curve });
