@@ -21,9 +21,6 @@ const LOST: f64 = 4.0;
 const FEWEST_DIFFERENCES: usize = 9;
 /// A voxel that agrees with no more neighbours than this is an outlier.
 const MOST_AGREEING: usize = 1;
-/// The same of a subset of a face, which has no neighbours along the normal: at the ends of the bonded edges strains
-/// differ much along both axes that are left.
-const MOST_AGREEING_ON_FACE: usize = 0;
 
 /// The voxels of `field` (mm, in the grid's order, NaN where missing) that agree with hardly any of their neighbours.
 /// Only voxels that `flags` marks are looked at. `noise_sd_mm` is the noise, where it is known.
@@ -40,7 +37,6 @@ pub(super) fn outlying_voxels(
     let agrees = |v: usize, w: usize, axis: usize| {
         (0..3).all(|c| (field[v][c] - field[w][c]).abs() <= limits[axis][c].max(f64::MIN_POSITIVE))
     };
-    let most_agreeing = if grid.surface.is_some() { MOST_AGREEING_ON_FACE } else { MOST_AGREEING };
     (0..field.len())
         .filter(|&v| is_there(v))
         .filter(|&v| {
@@ -51,7 +47,7 @@ pub(super) fn outlying_voxels(
                     agreeing += usize::from(agrees(v, w, axis));
                 }
             }
-            num >= FEWEST_NEIGHBOURS && agreeing <= most_agreeing
+            num >= FEWEST_NEIGHBOURS && agreeing <= MOST_AGREEING
         })
         .collect()
 }
