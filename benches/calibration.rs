@@ -31,6 +31,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         noise_sd_mm: [0.05; 3],
         force_sd_n: 0.02,
         partial_voxels: PartialVoxels::Uniform,
+        surface: None,
     };
     let never = || false;
     let cases = [

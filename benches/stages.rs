@@ -33,6 +33,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         noise_sd_mm: [0.05; 3],
         force_sd_n: 0.02,
         partial_voxels: PartialVoxels::default(),
+        surface: None,
     };
     let chosen: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     for (label, factor, runs) in [("search", 1.8, 9), ("20k", 1.15, 5), ("70k", 0.73, 3), ("200k", 0.5, 1)] {

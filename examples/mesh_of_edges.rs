@@ -34,6 +34,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         noise_sd_mm: [NOISE_SD_MM; 3],
         force_sd_n: 0.02,
         partial_voxels: PartialVoxels::default(),
+        surface: None,
     };
     println!("size  layers  grading  elements  information of the displacements about ln alpha");
     for (factor, levels, grading) in MESHES {
