@@ -275,7 +275,8 @@ impl Cleaned {
         for &v in &outliers {
             field[v] = [f64::NAN; 3];
         }
-        // No coil's signal fades over a face, and at the ends of a bonded edge its displacement is rough along both axes.
+        // No coil's signal fades over a face, and at the ends of a bonded edge its displacement is rough along both
+        // axes.
         let lost = if grid.surface.is_none() { lost_voxels(grid, flags, &field, noise_sd_mm) } else { Vec::new() };
         for &v in &lost {
             field[v] = [f64::NAN; 3];

@@ -188,7 +188,8 @@ impl Predictor<'_> {
     }
 }
 
-/// The plates' shifts at each step, and their shifts and rotations; `None` where the parts of a set-up are not looked for.
+/// The plates' shifts at each step, and their shifts and rotations; `None` where the parts of a set-up are not looked
+/// for.
 fn own_motions(observed: &Observed) -> Option<[Arc<dyn Cause>; 2]> {
     let is_of_steps = |c: &dyn Cause| c.moves_only_plates() && c.parameters().iter().all(|p| p.only_step.is_some());
     let motions = Registry::standard().set_up(observed).into_iter().find(|c| is_of_steps(c.as_ref()))?;
