@@ -226,6 +226,10 @@ class Program:
         return self.helps[words]
 
 
+# Second words of commands that have two.
+SECOND_WORDS = ("material", "model", "recording", "merge")
+
+
 def check_commands(path, blocks, program, errors):
     for block in blocks:
         if block.language != "sh":
@@ -235,7 +239,7 @@ def check_commands(path, blocks, program, errors):
             for call in re.findall(r"(?:^\s*|[;|(&]\s*)lambdak ((?!-)[^;|#)>]*)", line):
                 words = call.split()
                 command = words[:1]
-                if command and command[0] in ("export", "sweep") and len(words) > 1 and words[1] in ("material", "model", "merge"):
+                if command and command[0] in ("export", "sweep") and len(words) > 1 and words[1] in SECOND_WORDS:
                     command = words[:2]
                 found = program.help(*command)
                 if found is None:
