@@ -1,13 +1,13 @@
 //! A specimen in a file (`specimen/1`): the fields of [`Specimen`] behind the tag that names the format.
 
+use super::bounds::SCHEMA;
 #[cfg(feature = "schema")]
-use super::drives::{MAX_DRIVE_ANGLE_DEG, MAX_DRIVES};
-use super::read::SCHEMA;
-#[cfg(feature = "schema")]
-use super::read::{
+use super::bounds::{
     MAX_DIAMETER_MM, MAX_HOLES, MAX_NAME_LENGTH, MAX_OTHER_SAMPLES, MAX_SAMPLES_IN_PARALLEL, MAX_SIZE_MM,
     MIN_DIAMETER_MM, MIN_FILLET_MM, MIN_SIZE_MM,
 };
+#[cfg(feature = "schema")]
+use super::drives::{MAX_DRIVE_ANGLE_DEG, MAX_DRIVES};
 use super::{Block, Hole, Outline, Sample, Specimen, TestKind};
 use crate::field::file_tag;
 #[cfg(feature = "schema")]

@@ -9,6 +9,7 @@
 //! [`Specimen::from_json`]. Limits of what can be made: [`ManufacturingLimits`]. Drawings for the mould maker:
 //! [`to_svg`], [`to_dxf`], [`to_stl`], [`to_step`].
 
+mod bounds;
 #[cfg(feature = "solids")]
 mod clearance;
 mod drawing;
@@ -49,6 +50,10 @@ mod tests;
 #[cfg(feature = "design")]
 pub(crate) use file::Name;
 
+pub use bounds::{
+    MAX_DIAMETER_MM, MAX_HOLES, MAX_NAME_LENGTH, MAX_OTHER_SAMPLES, MAX_SAMPLES_IN_PARALLEL, MAX_SIZE_MM,
+    MIN_DIAMETER_MM, MIN_SIZE_MM, SCHEMA,
+};
 pub use drawing_dxf::to_dxf;
 pub use drawing_step::{MOULD_WALL_MM, mould_to_step, to_step};
 #[cfg(feature = "triangles")]
@@ -66,10 +71,7 @@ pub use json::JsonProblem;
 pub use ligament::{Ligament, LigamentKind, SectionEdge};
 pub use limits::{DiameterRange, LimitMargin, ManufacturingLimits, Symmetry};
 pub use limits_error::LimitsError;
-pub use read::{
-    MAX_DIAMETER_MM, MAX_HOLES, MAX_NAME_LENGTH, MAX_OTHER_SAMPLES, MAX_SAMPLES_IN_PARALLEL, MAX_SIZE_MM,
-    MIN_DIAMETER_MM, MIN_SIZE_MM, SCHEMA, min_meshable_ligament_mm,
-};
+pub use read::min_meshable_ligament_mm;
 pub use read_error::SpecimenError;
 
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,9 @@
 //! Reading, writing and validating a specimen (`specimen/1`).
 
+use super::bounds::{
+    MAX_DIAMETER_MM, MAX_HOLES, MAX_NAME_LENGTH, MAX_OTHER_SAMPLES, MAX_SAMPLES_IN_PARALLEL, MAX_SIZE_MM,
+    MIN_DIAMETER_MM, MIN_FILLET_MM, MIN_SIZE_MM, SCHEMA,
+};
 use super::dumbbell::{DumbbellDimension, ISO37_LENGTH_MM, ISO37_THICKNESS_MM, ISO37_WIDTH_MM};
 use super::json::{JsonProblem, schema_of};
 use super::{
@@ -8,26 +12,6 @@ use super::{
 };
 use crate::field::{FieldError, FieldPath};
 
-/// The schema that this version reads and writes.
-pub const SCHEMA: &str = "specimen/1";
-/// Smallest extent of a block, mm.
-pub const MIN_SIZE_MM: f64 = 0.2;
-/// Largest extent of a block, mm.
-pub const MAX_SIZE_MM: f64 = 1000.0;
-/// Smallest diameter of a hole, mm.
-pub const MIN_DIAMETER_MM: f64 = 0.1;
-/// Largest diameter of a hole, mm.
-pub const MAX_DIAMETER_MM: f64 = MAX_SIZE_MM;
-/// Smallest radius of a dumb-bell's arcs, mm.
-pub const MIN_FILLET_MM: f64 = 0.1;
-/// Most holes.
-pub const MAX_HOLES: usize = 64;
-/// Most samples that share a load cell.
-pub const MAX_SAMPLES_IN_PARALLEL: u32 = 64;
-/// Most kinds of samples beside the first one: each is a model of its own.
-pub const MAX_OTHER_SAMPLES: usize = 7;
-/// Longest name, characters.
-pub const MAX_NAME_LENGTH: usize = 200;
 /// How far a dumb-bell's block may be off the standard, mm: rounding only.
 const STANDARD_TOLERANCE_MM: f64 = 1e-6;
 
