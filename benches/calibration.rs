@@ -7,7 +7,7 @@
 
 use lambdak::calibration::{CalibrationProblem, FitOptions, Objective, Observed, SyntheticScan};
 use lambdak::fem::SolveOptions;
-use lambdak::material::Ogden;
+use lambdak::material::Material;
 use lambdak::mesh::MeshOptions;
 use lambdak::recording::Filter;
 use lambdak::sensitivity::{PartialVoxels, ScanSettings};
@@ -39,7 +39,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ("two terms", include_str!("../geometries/materials/ecoflex-0020-two-term.json"), 137.0, 100.0),
     ];
     for (name, text, other_seconds, wanted) in cases {
-        let truth = Ogden::from_json(text)?;
+        let truth = Material::from_json(text)?;
         let fine = MeshOptions { grading: 0.4, ..MeshOptions::scaled(&specimen, 0.7) };
         let synthetic = SyntheticScan::new(
             &specimen,

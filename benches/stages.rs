@@ -5,7 +5,7 @@
 //! stage to the whole forward solution.
 
 use lambdak::fem::{ForwardModel, SolveOptions};
-use lambdak::material::Ogden;
+use lambdak::material::Material;
 use lambdak::mesh::{DesignVariable, MeshOptions, mesh_specimen, shape_velocity};
 use lambdak::sensitivity::{DriveSelection, EvaluationOptions, PartialVoxels, ScanSettings, Scanner, evaluate};
 use lambdak::specimen::Specimen;
@@ -27,7 +27,7 @@ fn median(runs: usize, mut work: impl FnMut()) -> f64 {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let specimen = Specimen::from_json(include_str!("../geometries/two-hole-shear.json"))?;
-    let material = Ogden::from_json(include_str!("../geometries/materials/ecoflex-0020.json"))?;
+    let material = Material::from_json(include_str!("../geometries/materials/ecoflex-0020.json"))?;
     let scan = ScanSettings {
         voxel_mm: [1.0, 0.1875, 0.75],
         noise_sd_mm: [0.05; 3],

@@ -54,7 +54,7 @@ type Measured = (Vec<[f64; 3]>, f64);
 
 /// What a scan would see of a known material, with a wave in place of noise, and the force.
 fn measured(specimen: &Specimen, grid: &VoxelGrid) -> Result<Measured, Box<dyn std::error::Error>> {
-    let truth = Ogden::new(2173.0, [(17.0, 1.91)])?;
+    let truth = Material::new(2173.0, [(17.0, 1.91)])?;
     let mut model = ForwardModel::of_specimen(specimen, &MeshOptions::search(specimen))?;
     let state = model.solve(&truth, specimen.drive_mm[0], None, &SolveOptions::default(), &|| false)?;
     let mask = VoxelMask::of_specimen(specimen, grid.clone())?;

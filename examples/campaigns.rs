@@ -12,7 +12,7 @@
 use lambdak::calibration::{Observed, SyntheticScan};
 use lambdak::design::Study;
 use lambdak::fem::SolveOptions;
-use lambdak::material::Ogden;
+use lambdak::material::Material;
 use lambdak::mesh::MeshOptions;
 use lambdak::next::{NextOptions, NextResult, Plan, Precision, advise};
 use lambdak::recording::Filter;
@@ -35,7 +35,7 @@ const DRIVES_MM: [f64; 2] = [2.0, 4.0];
 /// A material, the precision that is asked of it, and its name.
 struct Case {
     name: &'static str,
-    truth: Ogden,
+    truth: Material,
     precision: f64,
 }
 
@@ -70,8 +70,8 @@ fn main() -> Result<(), Failure> {
     let draws = numbers.first().copied().unwrap_or(20);
     let seed = numbers.get(1).copied().unwrap_or(1);
     let cases = [
-        Case { name: "one term", truth: Ogden::new(400.0, [(17.0, 1.91)])?, precision: 0.01 },
-        Case { name: "two terms", truth: Ogden::new(400.0, [(12.0, 3.0), (-4.0, -3.0)])?, precision: 0.1 },
+        Case { name: "one term", truth: Material::new(400.0, [(17.0, 1.91)])?, precision: 0.01 },
+        Case { name: "two terms", truth: Material::new(400.0, [(12.0, 3.0), (-4.0, -3.0)])?, precision: 0.1 },
     ];
     for case in cases {
         let laboratory = Laboratory::new(case)?;

@@ -9,7 +9,7 @@ use lambdak::report::{Line, LinePlot};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut specimen = Specimen::from_json(include_str!("../geometries/uniaxial-bar.json"))?;
-    let material = Ogden::new(2173.0, [(17.0, 1.91)])?;
+    let material = Material::new(2173.0, [(17.0, 1.91)])?;
     let scan = ScanSettings { voxel_mm: [1.0, 0.5, 1.0], ..ScanSettings::default() };
     let drives = DriveSelection::DriveMm(vec![8.0]);
     let mut points = Vec::new();
@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let options =
             EvaluationOptions { mesh: MeshOptions::search(&specimen), ..EvaluationOptions::standard(&specimen) };
         let (evaluation, _) = evaluate(&specimen, &material, &scan, &drives, &options, &|| false)?;
-        // Parameters come in the order of `Ogden::parameters`: κ, μ₁, α₁.
+        // Parameters come in the order of `Material::parameters`: κ, μ₁, α₁.
         let alpha = &evaluation.promised_sd[2];
         let percent = alpha.relative_sd.map_or(f64::NAN, |sd| 100.0 * sd);
         println!("{diameter_mm} mm: {} known to {percent:.2} %", alpha.parameter);

@@ -8,7 +8,7 @@ use lambdak::prelude::*;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let specimen = Specimen::from_json(include_str!("../geometries/solid-shear.json"))?;
-    let material = Ogden::new(2200.0, [(16.0, 1.9), (0.35, 8.0)])?;
+    let material = Material::new(2200.0, [(16.0, 1.9), (0.35, 8.0)])?;
     let scan = ScanSettings { voxel_mm: [1.0, 0.4, 1.0], ..ScanSettings::default() };
     let options = EvaluationOptions { mesh: MeshOptions::search(&specimen), ..EvaluationOptions::standard(&specimen) };
     let drives = DriveSelection::DriveMm(specimen.drive_mm.clone());

@@ -28,7 +28,7 @@ const NOISE_SD_MM: f64 = 0.05;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let specimen = Specimen::from_json(include_str!("../geometries/two-hole-shear.json"))?;
     let (bulk_kpa, mu_kpa, alpha) = (2173.0, 17.0, 1.91);
-    let material = Ogden::new(bulk_kpa, [(mu_kpa, alpha)])?;
+    let material = Material::new(bulk_kpa, [(mu_kpa, alpha)])?;
     let scan = ScanSettings {
         voxel_mm: [1.0, 0.1875, 0.75],
         noise_sd_mm: [NOISE_SD_MM; 3],

@@ -92,7 +92,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// A noisy recording of a sample in which `cause` is at work.
 fn recorded(specimen: &Specimen, cause: &dyn Cause) -> Result<Recording, Box<dyn Error>> {
-    let material = Ogden::new(2173.0, [(17.0, 1.91)])?;
+    let material = Material::new(2173.0, [(17.0, 1.91)])?;
     let mask = VoxelMask::covering(specimen, [2.5, 0.8, 2.5])?;
     let empty = |drive_mm: f64| RecordedStep {
         drive_mm,

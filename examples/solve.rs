@@ -8,7 +8,7 @@ use lambdak::prelude::*;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let specimen = Specimen::from_json(include_str!("../geometries/two-hole-shear.json"))?;
-    let material = Ogden::new(2173.0, [(17.0, 1.91)])?;
+    let material = Material::new(2173.0, [(17.0, 1.91)])?;
     let mut model = ForwardModel::of_specimen(&specimen, &MeshOptions::search(&specimen))?;
     let path = model.solve_path(&material, &specimen.drive_mm, &SolveOptions::default(), &|| false)?;
     for state in path {

@@ -7,7 +7,7 @@
 //! use lambdak::prelude::*;
 //!
 //! let specimen = Specimen::from_json(&std::fs::read_to_string("geometries/solid-shear.json")?)?;
-//! let material = Ogden::new(2173.0, [(17.0, 1.91)])?;
+//! let material = Material::new(2173.0, [(17.0, 1.91)])?;
 //! let mut model = ForwardModel::of_specimen(&specimen, &MeshOptions::search(&specimen))?;
 //! let state = model.solve(&material, 2.5, None, &SolveOptions::default(), &|| false)?;
 //!
@@ -83,7 +83,7 @@ pub mod prelude {
         diagnose, diagnose_with,
     };
     pub use crate::fem::{Equilibrium, Field, ForwardModel, SolveOptions};
-    pub use crate::material::{Ogden, OgdenTerm, Parameter};
+    pub use crate::material::{Material, OgdenTerm, Parameter};
     pub use crate::mesh::{MeshOptions, MeshSize};
     #[cfg(feature = "calibration")]
     pub use crate::recording::{Filter, RecordedStep, Recording};

@@ -9,15 +9,15 @@ use lambdak::export::{MaterialFormat, Model, ModelFormat, Origin, VolumetricLaw,
 use lambdak::fem::{Equilibrium, ForwardModel, SolveOptions};
 use lambdak::homogeneous::{HomogeneousTest, StressUnit, respond};
 use lambdak::kinematics::decompose;
-use lambdak::material::{ArrudaBoyce, InvariantLaw, Ogden, OgdenTerm, Yeoh, first_piola_kirchhoff_stress};
+use lambdak::material::{ArrudaBoyce, InvariantLaw, Material, OgdenTerm, Yeoh, first_piola_kirchhoff_stress};
 use lambdak::mesh::MeshOptions;
 use lambdak::specimen::Specimen;
 use prerequisites::Missing;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-fn ogden(bulk_kpa: f64, terms: &[(f64, f64)]) -> Ogden {
-    Ogden { bulk_kpa, terms: terms.iter().map(|&(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha }).collect(), law: None }
+fn ogden(bulk_kpa: f64, terms: &[(f64, f64)]) -> Material {
+    Material { bulk_kpa, terms: terms.iter().map(|&(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha }).collect(), law: None }
 }
 
 /// Runs the input file `name.inp` of `folder`, and gives time and total force (N) of each increment.
@@ -84,8 +84,9 @@ fn a_card_gives_our_stresses() -> Result<(), Missing> {
         ogden(2173.0, &[(17.0, 1.91)]),
         ogden(2200.0, &[(16.0, 1.9), (0.35, 8.0)]),
         ogden(900.0, &[(12.0, 2.5), (-3.0, -2.0), (0.5, 5.0)]),
-        Ogden::of_law(2100.0, InvariantLaw::Yeoh(Yeoh { coefficients_kpa: [8.0, -0.3, 0.05] })).unwrap(),
-        Ogden::of_law(2100.0, InvariantLaw::ArrudaBoyce(ArrudaBoyce { mu_kpa: 15.0, locking_stretch: 1.8 })).unwrap(),
+        Material::of_law(2100.0, InvariantLaw::Yeoh(Yeoh { coefficients_kpa: [8.0, -0.3, 0.05] })).unwrap(),
+        Material::of_law(2100.0, InvariantLaw::ArrudaBoyce(ArrudaBoyce { mu_kpa: 15.0, locking_stretch: 1.8 }))
+            .unwrap(),
     ];
     let stretches = [1.2, 1.6, 2.0];
     for (index, material) in materials.iter().enumerate() {
@@ -114,8 +115,8 @@ fn a_card_states_its_volumetric_energy() -> Result<(), Missing> {
     let folder = tempfile::tempdir().unwrap();
     let materials = [
         ogden(200.0, &[(16.0, 1.9), (0.35, 8.0)]),
-        Ogden::of_law(200.0, InvariantLaw::Yeoh(Yeoh { coefficients_kpa: [8.0, -0.3, 0.05] })).unwrap(),
-        Ogden::of_law(200.0, InvariantLaw::ArrudaBoyce(ArrudaBoyce { mu_kpa: 15.0, locking_stretch: 1.8 })).unwrap(),
+        Material::of_law(200.0, InvariantLaw::Yeoh(Yeoh { coefficients_kpa: [8.0, -0.3, 0.05] })).unwrap(),
+        Material::of_law(200.0, InvariantLaw::ArrudaBoyce(ArrudaBoyce { mu_kpa: 15.0, locking_stretch: 1.8 })).unwrap(),
     ];
     let stretches = [0.9, 1.1];
     for (index, material) in materials.iter().enumerate() {
@@ -147,7 +148,7 @@ fn a_card_states_its_volumetric_energy() -> Result<(), Missing> {
 /// A specimen, its material and drives.
 struct Case {
     specimen: &'static str,
-    material: Ogden,
+    material: Material,
     drives_mm: [f64; 2],
     /// Triangles extruded to prisms in place of hexahedra.
     has_prisms: bool,
@@ -239,7 +240,7 @@ fn forces_are_ours() -> Result<(), Missing> {
     let soft = ogden(324.7, &[(17.0, 1.91)]);
     let two = ogden(330.0, &[(16.0, 1.9), (0.35, 4.0)]);
     let foam = ogden(33.0, &[(17.0, 1.91)]);
-    let case = |specimen, material: &Ogden, drives_mm| Case {
+    let case = |specimen, material: &Material, drives_mm| Case {
         specimen,
         material: material.clone(),
         drives_mm,

@@ -1,7 +1,7 @@
 //! `lambdak uniaxial` and `lambdak curves` as a user runs them.
 
 use lambdak::homogeneous::{CurveLaw, HomogeneousTest, ShearTerm, incompressible_stress};
-use lambdak::material::{Gent, InvariantLaw, Ogden};
+use lambdak::material::{Gent, InvariantLaw, Material};
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -87,7 +87,7 @@ fn what_was_read_and_left_out_is_said() {
         assert!(shown.contains(words), "{words}: {shown}");
     }
     let written = std::fs::read_to_string(folder.path().join("results/zug/uniaxial/material.json")).unwrap();
-    let material = Ogden::from_json(&written).unwrap();
+    let material = Material::from_json(&written).unwrap();
     // Half of 28 kPa, from numbers with all their digits.
     assert!((material.initial_shear_modulus_kpa() - 14.0).abs() < 1e-3, "{written}");
     assert!((material.bulk_kpa - 14e3).abs() < 1.0, "{written}");

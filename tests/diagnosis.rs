@@ -5,7 +5,7 @@ use lambdak::diagnosis::{
     CauseName, Diagnosis, DiagnosisOptions, DiagnosisResult, Laboratory, Scene, Verdict, diagnose, together,
 };
 use lambdak::fem::{Field, PlateMotion};
-use lambdak::material::Ogden;
+use lambdak::material::Material;
 use lambdak::mesh::MeshOptions;
 use lambdak::recording::{Filter, LoadCurve, RecordedStep, Recording};
 use lambdak::specimen::Specimen;
@@ -16,8 +16,8 @@ use rand_distr::{Distribution, StandardNormal};
 const NOISE_MM: f64 = 0.03;
 const FORCE_SD_N: f64 = 0.01;
 
-fn material() -> Ogden {
-    Ogden::from_json(include_str!("../geometries/materials/ecoflex-0020.json")).unwrap()
+fn material() -> Material {
+    Material::from_json(include_str!("../geometries/materials/ecoflex-0020.json")).unwrap()
 }
 
 /// A recording of `scene` at 2 and 4 mm, made on a mesh of other element sizes than the diagnosis uses.
@@ -25,7 +25,7 @@ fn recorded(scene: &Scene, seed: u64) -> Recording {
     recorded_of(&material(), scene, seed)
 }
 
-fn recorded_of(material: &Ogden, scene: &Scene, seed: u64) -> Recording {
+fn recorded_of(material: &Material, scene: &Scene, seed: u64) -> Recording {
     let mut specimen = Specimen::from_json(include_str!("../geometries/two-hole-shear.json")).unwrap();
     specimen.drive_mm = vec![2.0, 4.0];
     let mask = VoxelMask::covering(&specimen, [1.5, 0.4, 1.2]).unwrap();

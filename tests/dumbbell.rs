@@ -5,7 +5,7 @@ mod common;
 
 use lambdak::fem::SolveOptions;
 use lambdak::homogeneous::{CurveFitOptions, DumbbellError, DumbbellOptions, fit_dumbbell};
-use lambdak::material::{LawKind, Ogden};
+use lambdak::material::{LawKind, Material};
 use lambdak::mesh::MeshOptions;
 use lambdak::specimen::{Outline, Specimen};
 
@@ -52,7 +52,7 @@ fn the_material_behind_a_dumb_bell_is_recovered() {
 #[test]
 fn the_law_behind_a_dumb_bell_is_recovered() {
     let specimen = Specimen::from_json(SPECIMEN).unwrap();
-    let truth = Ogden::of_law(2200.0, LawKind::Gent.law(&[16.0, 12.0])).unwrap();
+    let truth = Material::of_law(2200.0, LawKind::Gent.law(&[16.0, 12.0])).unwrap();
     let drives: Vec<f64> = (1..=12).map(|i| 2.3 * f64::from(i)).collect();
     let mut model = common::model(&specimen, 1.3);
     let path = model.solve_path(&truth, &drives, &SolveOptions::default(), &common::never).unwrap();

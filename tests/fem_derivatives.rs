@@ -7,7 +7,7 @@ use common::{
     two_terms,
 };
 use lambdak::fem::{Equilibrium, ForwardModel, ParameterSensitivity};
-use lambdak::material::Ogden;
+use lambdak::material::Material;
 use lambdak::mesh::{DesignVariable, morphed, shape_velocity};
 use lambdak::specimen::Specimen;
 
@@ -17,7 +17,7 @@ struct State {
     sensitivities: Vec<ParameterSensitivity>,
 }
 
-fn state(model: &mut ForwardModel, material: &Ogden, drive: f64, start: Option<&Equilibrium>) -> State {
+fn state(model: &mut ForwardModel, material: &Material, drive: f64, start: Option<&Equilibrium>) -> State {
     let equilibrium = model.solve(material, drive, start, &tight(), &never).unwrap();
     let sensitivities = model.tangent(material, &equilibrium).unwrap().material_sensitivities().unwrap();
     State { equilibrium, sensitivities }

@@ -9,7 +9,7 @@ mod common;
 
 use common::{Matrix, Vector, cube, determinant, inverse, multiply, ogden, tight, unit_block};
 use lambdak::fem::ForwardModel;
-use lambdak::material::{Ogden, first_piola_kirchhoff_stress};
+use lambdak::material::{Material, first_piola_kirchhoff_stress};
 use lambdak::mesh::{ElementKind, Mesh};
 use std::fmt::Write;
 
@@ -108,7 +108,7 @@ fn integrate(mesh: &Mesh, mut work: impl FnMut(usize, Vector, f64, &[f64; 27], &
 }
 
 /// Errors of displacement and of its gradient, L2.
-fn errors(kind: ElementKind, n: usize, material: &Ogden, compliance: f64, is_curved: bool) -> [f64; 2] {
+fn errors(kind: ElementKind, n: usize, material: &Material, compliance: f64, is_curved: bool) -> [f64; 2] {
     let curve = |p: Vector| {
         let s = |v: f64| (std::f64::consts::PI * v).sin();
         [p[0] + 0.06 * s(2.0 * p[1]) * s(p[2]), p[1] - 0.07 * s(2.0 * p[0]), p[2] + 0.05 * s(p[0]) * s(2.0 * p[1])]

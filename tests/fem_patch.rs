@@ -4,7 +4,7 @@ mod common;
 
 use common::{Matrix, Random, Vector, cube, determinant, ogden, tight, unit_block};
 use lambdak::fem::ForwardModel;
-use lambdak::material::{Ogden, first_piola_kirchhoff_stress};
+use lambdak::material::{Material, first_piola_kirchhoff_stress};
 use lambdak::mesh::ElementKind;
 
 /// Stretch, shear and rotation, then almost the largest shear in use; the volume changes by `dilation`.
@@ -25,7 +25,7 @@ fn apply(f: &Matrix, x: &Vector) -> Vector {
     [0, 1, 2].map(|i| (0..3).map(|j| f[i][j] * x[j]).sum::<f64>() - x[i])
 }
 
-fn check(kind: ElementKind, material: &Ogden, f: &Matrix) {
+fn check(kind: ElementKind, material: &Material, f: &Matrix) {
     let mut random = Random::new(7);
     // Every node moves by up to 12 % of an element's edge, those in the middle of edges and faces included.
     let shift = 0.12 / 2.0;

@@ -10,7 +10,7 @@ mod common;
 use common::{Random, ogden, specimen};
 use lambdak::fem::{ForwardModel, SolveError, SolveOptions};
 use lambdak::kinematics::principal_stretches;
-use lambdak::material::Ogden;
+use lambdak::material::Material;
 use lambdak::mesh::{MeshError, MeshOptions, mesh_specimen};
 use lambdak::specimen::{HoleAxis, Specimen, TestKind};
 use rayon::prelude::*;
@@ -54,7 +54,7 @@ fn random_specimen(random: &mut Random) -> Specimen {
 }
 
 /// One to three terms, each with μα > 0 (so the sum is stable); κ/μ from 5 to 10⁴, uniform in its logarithm.
-fn random_material(random: &mut Random) -> Ogden {
+fn random_material(random: &mut Random) -> Material {
     let terms: Vec<(f64, f64)> = (0..=random.below(3))
         .map(|i| {
             let alpha =
@@ -69,7 +69,7 @@ fn random_material(random: &mut Random) -> Ogden {
     material
 }
 
-fn outcome(s: &Specimen, material: &Ogden) -> (String, Option<f64>) {
+fn outcome(s: &Specimen, material: &Material) -> (String, Option<f64>) {
     // Coarse, and at most four levels: convergence is asked, not accuracy. Coarser ones lose definiteness earlier.
     let options = MeshOptions::scaled(s, 3.0);
     let options = MeshOptions { levels: options.levels.min(4), ..options };
@@ -105,7 +105,7 @@ fn outcome(s: &Specimen, material: &Ogden) -> (String, Option<f64>) {
 }
 
 /// Prints the smallest principal stretch at the last drive that converges.
-fn explain(model: &mut ForwardModel, material: &Ogden, reached_mm: f64, options: &SolveOptions) {
+fn explain(model: &mut ForwardModel, material: &Material, reached_mm: f64, options: &SolveOptions) {
     let Ok(state) = model.solve(material, reached_mm, None, options, &|| false) else {
         println!("  {reached_mm} mm is not reached again from rest in other steps");
         return;
@@ -119,7 +119,7 @@ fn explain(model: &mut ForwardModel, material: &Ogden, reached_mm: f64, options:
 #[test]
 fn random_specimens_converge_or_fail_typed() {
     let mut random = Random::new(20);
-    let cases: Vec<(Specimen, Ogden)> =
+    let cases: Vec<(Specimen, Material)> =
         (0..NUM_SPECIMENS).map(|_| (random_specimen(&mut random), random_material(&mut random))).collect();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
     let start = Instant::now();

@@ -5,7 +5,7 @@ mod common;
 
 use lambdak::fem::SolveOptions;
 use lambdak::homogeneous::ShearTerm;
-use lambdak::material::Ogden;
+use lambdak::material::Material;
 use lambdak::rate::{
     ForceHistory, ForceHistoryOptions, ForceHistorySequence, ForceTable, ShearLayer, fit_force_history,
 };
@@ -14,7 +14,7 @@ use lambdak::specimen::Specimen;
 const SPECIMEN: &str = include_str!("../geometries/two-hole-shear.json");
 
 /// The two-hole specimen's force over drive for a material, on a coarse mesh.
-fn table(material: &Ogden) -> ForceTable {
+fn table(material: &Material) -> ForceTable {
     let specimen = Specimen::from_json(SPECIMEN).unwrap();
     let mut model = common::model(&specimen, 1.8);
     let drives: Vec<f64> = (1..=7).map(f64::from).collect();
@@ -24,7 +24,7 @@ fn table(material: &Ogden) -> ForceTable {
     ForceTable::odd(&drives, &forces).unwrap()
 }
 
-fn analyse(text: &str, material: &Ogden) -> ForceHistorySequence {
+fn analyse(text: &str, material: &Material) -> ForceHistorySequence {
     let mut history = ForceHistory { time_s: Vec::new(), drive_mm: Vec::new(), force_n: Vec::new(), force_sd_n: None };
     for line in text.lines().skip(1) {
         let cells: Vec<f64> = line.split(',').map(|c| c.parse().unwrap()).collect();

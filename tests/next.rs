@@ -3,7 +3,7 @@
 use lambdak::calibration::{Observed, SyntheticScan};
 use lambdak::design::Study;
 use lambdak::fem::SolveOptions;
-use lambdak::material::Ogden;
+use lambdak::material::Material;
 use lambdak::mesh::MeshOptions;
 use lambdak::next::{NextOptions, NextResult, Plan, Precision, StopVerdict, advise};
 use lambdak::recording::Filter;
@@ -35,11 +35,11 @@ fn plain() -> Study {
     study(&json!({}), &json!({}))
 }
 
-fn one_term() -> Ogden {
-    Ogden::new(400.0, [(17.0, 1.91)]).unwrap()
+fn one_term() -> Material {
+    Material::new(400.0, [(17.0, 1.91)]).unwrap()
 }
 
-fn record(study: &Study, truth: &Ogden, drive_mm: f64, draw: u64) -> Observed {
+fn record(study: &Study, truth: &Material, drive_mm: f64, draw: u64) -> Observed {
     let driven = Specimen { drive_mm: vec![drive_mm], ..study.base.clone() };
     let mesh = MeshOptions::scaled(&driven, MESH);
     let scan =
@@ -122,7 +122,7 @@ fn a_common_gain_holds_back() {
 #[test]
 fn a_wrong_law_is_not_sure_of_itself() {
     let study = plain();
-    let two_terms = Ogden::new(400.0, [(0.05, 14.0), (-8.0, -4.0)]).unwrap();
+    let two_terms = Material::new(400.0, [(0.05, 14.0), (-8.0, -4.0)]).unwrap();
     let wrong = ask(&study, &[record(&study, &two_terms, 4.0, 0)], &options(Some(0.001)));
     let right = ask(&study, &[record(&study, &one_term(), 4.0, 0)], &options(Some(0.001)));
     assert!(wrong.misfit.structured_by_component_mm.iter().any(|mm| *mm > 0.0));

@@ -14,7 +14,7 @@
 mod common;
 
 use lambdak::fem::{Equilibrium, ForwardModel, SolveOptions};
-use lambdak::material::Ogden;
+use lambdak::material::Material;
 use lambdak::mesh::{Locator, Mesh};
 use lambdak::specimen::Specimen;
 use serde_json::Value;
@@ -49,7 +49,7 @@ struct Solved {
     path: Vec<Equilibrium>,
 }
 
-fn solved(specimen: &Specimen, material: &Ogden, factor: f64) -> Solved {
+fn solved(specimen: &Specimen, material: &Material, factor: f64) -> Solved {
     let mut model = common::model(specimen, factor);
     let path =
         model.solve_path(material, &specimen.drive_mm, &SolveOptions::default(), &common::never).expect("converges");
@@ -72,7 +72,7 @@ const FROM_DIFFERENCE: f64 = 2.5;
 fn check(name: &str, text: &str) {
     let reference: Value = serde_json::from_str(text).unwrap();
     let specimen = Specimen::from_json(&reference["specimen"].to_string()).unwrap();
-    let material = Ogden::from_json(&reference["material"].to_string()).unwrap();
+    let material = Material::from_json(&reference["material"].to_string()).unwrap();
     let [standard, fine] = [1.0, 0.7].map(|factor| solved(&specimen, &material, factor));
     let mut failures = Vec::new();
     let mut num_beyond = 0;

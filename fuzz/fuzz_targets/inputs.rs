@@ -2,7 +2,7 @@
 #![no_main]
 
 use lambdak::design::Study;
-use lambdak::material::Ogden;
+use lambdak::material::Material;
 use lambdak::specimen::{ManufacturingLimits, Specimen};
 use libfuzzer_sys::fuzz_target;
 use std::path::Path;
@@ -14,9 +14,9 @@ fuzz_target!(|data: &[u8]| {
         let again = serde_json::to_string(&specimen).expect("a specimen is JSON");
         assert_eq!(Specimen::from_json(&again).expect("what is written is read"), specimen);
     }
-    if let Ok(material) = Ogden::from_json(text) {
+    if let Ok(material) = Material::from_json(text) {
         let again = serde_json::to_string(&material).expect("a material is JSON");
-        assert_eq!(Ogden::from_json(&again).expect("what is written is read"), material);
+        assert_eq!(Material::from_json(&again).expect("what is written is read"), material);
     }
     let _ = ManufacturingLimits::from_json(text);
     // A study names other files; there are none.

@@ -7,7 +7,7 @@
 use super::driven::DrivenSample;
 use super::{AcquisitionError, LoadProgram, loading_history};
 use crate::fem::SolveOptions;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::recording::{Filter, RecordedStep, Recording};
 use crate::specimen::Specimen;
@@ -74,7 +74,7 @@ pub struct Filmed {
 pub fn film(
     id: &str,
     specimen: &Specimen,
-    material: &Ogden,
+    material: &Material,
     mesh: &MeshOptions,
     solve: &SolveOptions,
     options: &CameraOptions,
@@ -134,7 +134,7 @@ mod tests {
         let text = include_str!("../../geometries/solid-shear.json");
         let specimen = Specimen { drive_mm: vec![2.0], ..Specimen::from_json(text).expect("a specimen") };
         let material =
-            Ogden::from_json(include_str!("../../geometries/materials/ecoflex-0020.json")).expect("a material");
+            Material::from_json(include_str!("../../geometries/materials/ecoflex-0020.json")).expect("a material");
         let surface = Some(Surface { face: Face::PlusZ, components: MeasuredComponents::InPlane });
         let options = CameraOptions {
             grid: VoxelGrid::planned(&specimen, [0.5; 3], surface).expect("a grid"),

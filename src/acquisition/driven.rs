@@ -2,7 +2,7 @@
 
 use super::AcquisitionError;
 use crate::fem::{Equilibrium, ForwardModel, SolveOptions};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::specimen::Specimen;
 use crate::voxel::{Sampling, VoxelGrid, VoxelMask, VoxelOperator};
@@ -33,7 +33,7 @@ impl DrivenSample {
     pub fn new(
         specimen: &Specimen,
         index: usize,
-        material: &Ogden,
+        material: &Material,
         mesh: &MeshOptions,
         solve: &SolveOptions,
         grid: &VoxelGrid,

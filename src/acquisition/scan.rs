@@ -4,7 +4,7 @@ use super::driven::DrivenSample;
 use super::loading::{LoadProgram, loading_history};
 use super::{AcquisitionError, Complex, KSpace, signal_images};
 use crate::fem::SolveOptions;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::recording::{RawRecording, RawStep};
 use crate::specimen::Specimen;
@@ -98,7 +98,7 @@ pub struct Scan {
 pub fn scan(
     id: &str,
     specimen: &Specimen,
-    material: &Ogden,
+    material: &Material,
     mesh: &MeshOptions,
     solve: &SolveOptions,
     options: &ScanOptions,

@@ -1,7 +1,7 @@
 use super::unwrap::wrapped;
 use super::*;
 use crate::fem::SolveOptions;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::{MeshOptions, mesh_specimen};
 use crate::recording::{Filter, RawRecording, RawStep};
 use crate::specimen::Specimen;
@@ -17,8 +17,8 @@ fn solid() -> Specimen {
     Specimen { holes: vec![], ..two_hole() }
 }
 
-fn material() -> Ogden {
-    Ogden::from_json(include_str!("../../geometries/materials/ecoflex-0020.json")).unwrap()
+fn material() -> Material {
+    Material::from_json(include_str!("../../geometries/materials/ecoflex-0020.json")).unwrap()
 }
 
 fn options(specimen: &Specimen, snr: f64, seed: u64) -> ScanOptions {

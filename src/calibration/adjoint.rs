@@ -6,7 +6,7 @@
 use super::error::CalibrationError;
 use super::problem::CalibrationProblem;
 use crate::fem::{Equilibrium, SolveOptions};
-use crate::material::Ogden;
+use crate::material::Material;
 
 impl CalibrationProblem<'_> {
     /// The objective at `material` and its derivatives by κ, μ₁, α₁, … in their own units. Priors are not in it.
@@ -15,7 +15,7 @@ impl CalibrationProblem<'_> {
     /// [`CalibrationError`].
     pub fn objective_and_adjoint_gradient(
         &mut self,
-        material: &Ogden,
+        material: &Material,
         solve: &SolveOptions,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<(f64, Vec<f64>), CalibrationError> {

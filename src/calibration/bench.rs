@@ -4,7 +4,7 @@ use super::error::CalibrationError;
 use super::prediction::{Averages, Prediction, Unseen};
 use super::stress_path::StressPath;
 use crate::fem::{ForwardModel, SolveOptions};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::specimen::Specimen;
 use crate::voxel::{Sampling, VoxelMask, VoxelOperator};
@@ -54,7 +54,7 @@ impl Bench {
     pub(super) fn predict(
         &mut self,
         drives_mm: &[f64],
-        material: &Ogden,
+        material: &Material,
         near: Option<&Prediction>,
         solve: &SolveOptions,
         is_cancelled: &dyn Fn() -> bool,
@@ -79,7 +79,7 @@ impl Bench {
     /// [`CalibrationError`].
     pub(super) fn scan(
         &mut self,
-        material: &Ogden,
+        material: &Material,
         drive_mm: f64,
         solve: &SolveOptions,
         is_cancelled: &dyn Fn() -> bool,
@@ -96,7 +96,7 @@ impl Bench {
     }
 
     /// The states that a prediction visits.
-    pub(super) fn stress_path(&self, material: &Ogden, prediction: &Prediction) -> StressPath {
+    pub(super) fn stress_path(&self, material: &Material, prediction: &Prediction) -> StressPath {
         let visited = self
             .parts
             .iter()

@@ -18,7 +18,7 @@ use super::run::{Run, with_falling_exponents};
 use super::starts::Candidates;
 use super::target::Objective;
 use super::terms::{Rule, SETTLED, TermSelection, choose, compare, is_kept};
-use crate::material::{Ogden, Parameter};
+use crate::material::{Material, Parameter};
 use crate::mesh::MeshOptions;
 use crate::sensitivity::IDENTIFIABILITY_LIMIT;
 use crate::specimen::Specimen;
@@ -124,7 +124,7 @@ pub fn calibrate(
         let (iterations, distance, limit) = (fit.iterations, fit.distance, options.fit.tolerance);
         return Err(CalibrationError::NotConverged { iterations, distance, limit });
     }
-    let mesh_error = |value: &dyn Fn(&Ogden) -> f64| match &meshes {
+    let mesh_error = |value: &dyn Fn(&Material) -> f64| match &meshes {
         Some(m) => ERROR_OVER_SHIFT * (value(&fit.material) - value(&m.coarse)).abs(),
         None => 0.0,
     };
@@ -133,8 +133,8 @@ pub fn calibrate(
         let value = fit.material.value(parameter);
         // κ is positive and hardly known: its logarithm is nearer to Gaussian.
         let mesh_error = match parameter {
-            Parameter::Kappa => value * mesh_error(&|m: &Ogden| m.value(parameter).ln()),
-            _ => mesh_error(&|m: &Ogden| m.value(parameter)),
+            Parameter::Kappa => value * mesh_error(&|m: &Material| m.value(parameter).ln()),
+            _ => mesh_error(&|m: &Material| m.value(parameter)),
         };
         estimates.push(estimate(&fit, parameter, value, mesh_error, options.discretisation_factor));
     }
@@ -145,7 +145,7 @@ pub fn calibrate(
     }
     let initial_shear_modulus = has_force.then(|| {
         let (value, sd) = fit.initial_shear_modulus();
-        let error = mesh_error(&Ogden::initial_shear_modulus_kpa);
+        let error = mesh_error(&Material::initial_shear_modulus_kpa);
         // The shift of a sum of parameters is bounded by its own standard deviation likewise.
         let shift = sd.unwrap_or(0.0) / fit.misfit_factor.sqrt() * fit.structured_misfit;
         let error = options.discretisation_factor * error;

@@ -4,7 +4,7 @@ use super::error::CalibrationError;
 use super::problem::CalibrationProblem;
 use super::recording_fit::RecordingFit;
 use crate::fem::{Equilibrium, SolveOptions};
-use crate::material::{Ogden, Parameter};
+use crate::material::{Material, Parameter};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -106,7 +106,7 @@ pub fn contours(
 /// ℓ_u and ℓ_F of a material; `near` is replaced by its equilibria.
 pub(super) fn losses_at(
     problem: &mut CalibrationProblem,
-    material: &Ogden,
+    material: &Material,
     near: &mut [Vec<Equilibrium>],
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<[f64; 2], CalibrationError> {

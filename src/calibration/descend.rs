@@ -7,7 +7,7 @@ use super::step::{self, Constraints};
 use super::stress_path::StressPath;
 use super::system::NormalSystem;
 use crate::fem::SolveError;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::optimise::{self, Damping, LeastSquares, Raise, Rules, Shortening, Stop};
 
 /// Where a descent ended.
@@ -48,7 +48,7 @@ impl Descent {
 }
 
 /// Solves a material near given predictions.
-pub(super) type Predict<'a> = dyn FnMut(&Ogden, &[Prediction]) -> Result<Vec<Prediction>, CalibrationError> + 'a;
+pub(super) type Predict<'a> = dyn FnMut(&Material, &[Prediction]) -> Result<Vec<Prediction>, CalibrationError> + 'a;
 
 /// Where a descent begins.
 #[derive(Clone, Debug)]

@@ -20,14 +20,14 @@ use super::synthetic::Measurement;
 use super::system::NormalSystem;
 use super::target::Target;
 use crate::fem::Equilibrium;
-use crate::material::{Ogden, Parameter};
+use crate::material::{Material, Parameter};
 use crate::sensitivity::{FisherInformation, ScanSettings};
 
 /// A fitted material. Its existence means that the fit converged; one that did not is a [`CalibrationError`].
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// The estimate.
-    pub material: Ogden,
+    pub material: Material,
     /// Fisher information at the estimate, prior included; its covariance is that of the estimate.
     pub information: FisherInformation,
     /// χ² / (data − fitted parameters): 1 where model and noise are right.
@@ -78,7 +78,7 @@ impl FitStart {
     pub fn new(
         bench: &mut Bench,
         drives_mm: &[f64],
-        material: &Ogden,
+        material: &Material,
         options: &FitOptions,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<FitStart, CalibrationError> {
@@ -110,7 +110,7 @@ impl FitStart {
         data.check(bench.num_voxels(), self.prediction.states.len().saturating_sub(data.on_the_way.len()))?;
         let drives_mm = data.all_drives_mm();
         let targets = [Target::of_measurement(data, scan)];
-        let mut predict = |material: &Ogden, near: &[Prediction]| {
+        let mut predict = |material: &Material, near: &[Prediction]| {
             Ok(vec![bench.predict(&drives_mm, material, near.first(), &options.solve, is_cancelled)?])
         };
         let system = |p: &[Prediction]| NormalSystem::new(p, &targets, options.bulk, options.held);
@@ -148,7 +148,7 @@ pub fn fit(
     bench: &mut Bench,
     scan: &ScanSettings,
     data: &Measurement,
-    start: &Ogden,
+    start: &Material,
     options: &FitOptions,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Fit, CalibrationError> {

@@ -27,7 +27,7 @@ fn truth_is_recovered_without_noise() {
 #[test]
 fn laws_are_recovered_without_noise() {
     for law in crate::material::laws() {
-        let truth = Ogden { bulk_kpa: 200.0, terms: vec![], law: Some(law) };
+        let truth = Material { bulk_kpa: 200.0, terms: vec![], law: Some(law) };
         let (mut bench, synthetic) = same_mesh(&truth);
         let mut start = truth.clone();
         for (n, p) in truth.parameters().into_iter().enumerate() {
@@ -51,7 +51,7 @@ fn gradient_of_the_misfit() {
     let data = synthetic.draw(3, 0);
     let at = ogden(260.0, &[[19.0, 1.7]]);
     for bulk in [Bulk::Free, Bulk::LogPrior { center_kpa: 150.0, log_sd: 0.1 }] {
-        let mut system = |m: &Ogden| {
+        let mut system = |m: &Material| {
             let p = bench.predict(&data.drives_mm, m, None, &tight().solve, &|| false).unwrap();
             NormalSystem::new(&[p], &[Target::of_measurement(&data, &scan())], bulk, Held::default()).unwrap()
         };
@@ -78,7 +78,7 @@ fn failures_are_typed() {
     let (mut bench, synthetic) = same_mesh(&truth());
     let data = synthetic.draw(3, 0);
     let start = ogden(400.0, &[[22.1, 1.34]]);
-    let mut run = |data: &Measurement, start: &Ogden, options: &FitOptions, scan: &ScanSettings, stop: bool| {
+    let mut run = |data: &Measurement, start: &Material, options: &FitOptions, scan: &ScanSettings, stop: bool| {
         fit(&mut bench, scan, data, start, options, &|| stop).unwrap_err()
     };
     let usual = FitOptions::default();

@@ -251,8 +251,7 @@ impl Observed {
         let place_of = seen.spread(&places, u32::MAX);
         let places = self.mask.voxels.iter().map(|&v| place_of[v as usize]).collect();
         let operator = if placing.turns_or_reshapes() {
-            let half_mm = half_extents_mm(specimen);
-            let place = |x| placing.point_of(half_mm, x);
+            let place = placing.map_of(specimen);
             VoxelOperator::placed(specimen, mesh, &acquired, Sampling::default(), &place)?
         } else {
             VoxelOperator::new(specimen, mesh, &acquired, Sampling::default())?
@@ -302,11 +301,22 @@ impl Placing {
         self.rotation_rad.iter().any(|w| w.abs() > 0.0) || !self.shape.is_nominal()
     }
 
-    /// The point of the drawn block that is seen at `x` of the shifted image, and its derivatives with respect to the
-    /// point R x + s of the made block.
-    fn point_of(&self, half_mm: [f64; 3], x: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
-        let turned = turned_by(self.rotation_rad, [0, 1, 2].map(|i| x[i] - self.shift_mm[i]));
-        self.shape.pulled_back(half_mm, [0, 1, 2].map(|i| turned[i] + self.shift_mm[i]))
+    /// The map from x of the shifted image to the point of the drawn block that is seen there, and its derivatives with
+    /// respect to the point R x + s of the made block.
+    fn map_of(&self, specimen: &Specimen) -> impl Fn([f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) + Sync {
+        let (shift_mm, rotation_rad) = (self.shift_mm, self.rotation_rad);
+        let inverse = self.shape.inverse(half_extents_mm(specimen));
+        // Columns of the rotation: it is the same for all points.
+        let turned = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|e| turned_by(rotation_rad, e));
+        move |x| {
+            let mut at = shift_mm;
+            for i in 0..3 {
+                for j in 0..3 {
+                    at[i] += turned[j][i] * (x[j] - shift_mm[j]);
+                }
+            }
+            inverse.point_of(at)
+        }
     }
 }
 

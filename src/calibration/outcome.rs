@@ -6,7 +6,7 @@ use super::prediction::SolverWork;
 use super::profile::Profile;
 use super::recording_fit::RecordingFit;
 use super::terms::TermSelection;
-use crate::material::{Ogden, Parameter};
+use crate::material::{Material, Parameter};
 
 /// One parameter of a [`Calibration`].
 #[derive(Clone, Debug)]
@@ -35,7 +35,7 @@ pub struct MeshComparison {
     /// Free unknowns of the coarser and the finer models, all recordings together.
     pub num_unknowns: [usize; 2],
     /// The material on the coarser mesh.
-    pub coarse: Ogden,
+    pub coarse: Material,
     /// What is allowed for discretisation errors.
     pub allowance: Allowance,
 }

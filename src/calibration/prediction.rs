@@ -3,7 +3,7 @@
 use super::error::CalibrationError;
 use super::observed::View;
 use crate::fem::{Equilibrium, ForwardModel, SolveError, SolveOptions};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::voxel::VoxelOperator;
 use utoipa::ToSchema;
 
@@ -60,7 +60,7 @@ impl SolverWork {
 /// What a material predicts of a measurement, with its derivatives. Does not depend on the data.
 #[derive(Clone, Debug)]
 pub(super) struct Prediction {
-    pub(super) material: Ogden,
+    pub(super) material: Material,
     pub(super) states: Vec<Equilibrium>,
     /// Equilibria of the kinds of samples that were joined to it.
     joined: Vec<Vec<Equilibrium>>,
@@ -82,7 +82,7 @@ impl Prediction {
         model: &mut ForwardModel,
         seen: &dyn Averages,
         drives_mm: &[f64],
-        material: &Ogden,
+        material: &Material,
         near: Option<&[Equilibrium]>,
         solve: &SolveOptions,
         is_cancelled: &dyn Fn() -> bool,

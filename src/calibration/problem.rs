@@ -12,7 +12,7 @@ use super::system::NormalSystem;
 use super::target::{Objective, Target};
 use crate::fem::{Departures, ForwardModel, SolveOptions};
 use crate::kinematics::IDENTITY;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::specimen::Specimen;
 use nalgebra::DMatrix;
@@ -116,7 +116,7 @@ impl<'a> CalibrationProblem<'a> {
 
     pub(super) fn predict(
         &mut self,
-        material: &Ogden,
+        material: &Material,
         near: Option<&[Prediction]>,
         solve: &SolveOptions,
         is_cancelled: &dyn Fn() -> bool,
@@ -132,7 +132,7 @@ impl<'a> CalibrationProblem<'a> {
     /// [`CalibrationError`].
     pub fn fit(
         &mut self,
-        start: &Ogden,
+        start: &Material,
         near: Option<&RecordingFit>,
         options: &FitOptions,
         is_cancelled: &dyn Fn() -> bool,
@@ -158,7 +158,7 @@ impl<'a> CalibrationProblem<'a> {
     fn descend_from(
         &mut self,
         first: Vec<Prediction>,
-        start: &Ogden,
+        start: &Material,
         options: &FitOptions,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<RecordingFit, CalibrationError> {
@@ -173,7 +173,7 @@ impl<'a> CalibrationProblem<'a> {
             .fold(StressPath::default(), StressPath::join);
         let targets = Target::of_recordings(observed, views, *objective)?;
         let mut models = Models { scanned: models, others, views };
-        let mut trial = |material: &Ogden, near: &[Prediction]| {
+        let mut trial = |material: &Material, near: &[Prediction]| {
             models.predict(observed, material, Some(near), &options.solve, is_cancelled)
         };
         let evaluate = |p: &[Prediction]| NormalSystem::new(p, &targets, options.bulk, options.held);
@@ -190,7 +190,11 @@ impl<'a> CalibrationProblem<'a> {
     ///
     /// # Errors
     /// [`CalibrationError`].
-    pub fn at(&mut self, material: &Ogden, is_cancelled: &dyn Fn() -> bool) -> Result<RecordingFit, CalibrationError> {
+    pub fn at(
+        &mut self,
+        material: &Material,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<RecordingFit, CalibrationError> {
         // A huge tolerance: converged where it stands.
         let options = FitOptions { tolerance: f64::MAX, ..FitOptions::default() };
         self.fit(material, None, &options, is_cancelled)
@@ -202,7 +206,7 @@ impl<'a> CalibrationProblem<'a> {
     /// [`CalibrationError::Solve`].
     pub fn force_at(
         &mut self,
-        material: &Ogden,
+        material: &Material,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Vec<Vec<f64>>, CalibrationError> {
         let found = self.predict(material, None, &SolveOptions::default(), is_cancelled)?;
@@ -258,7 +262,7 @@ impl Models<'_> {
     fn predict(
         &mut self,
         observed: &[Observed],
-        material: &Ogden,
+        material: &Material,
         near: Option<&[Prediction]>,
         solve: &SolveOptions,
         is_cancelled: &dyn Fn() -> bool,

@@ -3,14 +3,14 @@
 use super::options::Held;
 use super::prediction::{Prediction, SolverWork};
 use crate::fem::Equilibrium;
-use crate::material::{Ogden, Parameter};
+use crate::material::{Material, Parameter};
 use crate::sensitivity::{Covariance, FisherInformation};
 
 /// A material fitted to recordings.
 #[derive(Clone, Debug)]
 pub struct RecordingFit {
     /// The estimate.
-    pub material: Ogden,
+    pub material: Material,
     /// Fisher information at the estimate with the objective's weights, prior included.
     pub information: FisherInformation,
     /// Covariance of the estimate under the noise: the inverse information, or the sandwich where weights and noise
@@ -105,7 +105,7 @@ impl RecordingFit {
         measured.iter().zip(self.predicted(recording, step)).map(rest).collect()
     }
 
-    /// How that changes with every parameter, in the order of [`Ogden::parameters`]: displacements of the compared
+    /// How that changes with every parameter, in the order of [`Material::parameters`]: displacements of the compared
     /// voxels (mm per unit) and the force (N per unit).
     pub fn sensitivities(&self, recording: usize, step: usize) -> (&[Vec<[f64; 3]>], &[f64]) {
         let prediction = &self.predictions[recording];

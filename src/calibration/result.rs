@@ -7,7 +7,7 @@ use super::prediction::SolverWork;
 use super::profile::Profile;
 use super::target::{Objective, PAPER_BETA};
 use super::terms::TermSelection;
-use crate::material::Ogden;
+use crate::material::Material;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -34,7 +34,7 @@ pub struct CalibrationResult {
     /// What was minimised, and the value of both objectives.
     pub objective: ObjectiveResult,
     /// The material as fitted; what the data do not determine stands here as it was assumed.
-    pub material: Ogden,
+    pub material: Material,
     /// Correlation of the estimates in the order of `parameters`; null where undetermined.
     pub correlation: Vec<Vec<Option<f64>>>,
     /// What does not depend on a force: exponents and ratios to μ₁. Empty where a force was recorded.
@@ -130,7 +130,7 @@ pub struct DiscretisationResult {
     /// Free displacement unknowns of the coarser and the finer mesh.
     pub num_unknowns: [usize; 2],
     /// The estimate on the coarser mesh.
-    pub coarse_material: Ogden,
+    pub coarse_material: Material,
     /// Estimated displacement error of the finer mesh at the largest drive, rms, mm.
     pub own_error_mm: f64,
     /// Standard deviation allowed for discretisation errors, those of the data included, over our own.

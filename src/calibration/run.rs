@@ -11,17 +11,17 @@ use super::recording_fit::RecordingFit;
 use super::starts::{first_starts, further_starts, law_starts};
 use super::target::{Objective, PAPER_BETA};
 use super::terms::{TermRow, compare, degeneracies, is_kept};
-use crate::material::{MAX_TERMS, Ogden, least_relative_stiffness};
+use crate::material::{MAX_TERMS, Material, least_relative_stiffness};
 
 /// The same material with its exponents falling.
-pub(super) fn with_falling_exponents(material: &Ogden) -> Ogden {
+pub(super) fn with_falling_exponents(material: &Material) -> Material {
     let mut sorted = material.clone();
     sorted.terms.sort_by(|a, b| b.alpha.total_cmp(&a.alpha));
     sorted
 }
 
 /// Where a fit starts: the exponents of its terms, or the parameters of its law.
-fn start_in_words(start: &Ogden) -> String {
+fn start_in_words(start: &Material) -> String {
     let rounded = |v: f64| (100.0 * v).round() / 100.0;
     if let Some(law) = &start.law {
         let values = law.parameters().iter().map(|p| format!("{} {}", p.name(), rounded(law.value(*p))));
@@ -102,7 +102,7 @@ impl<'a> Run<'a> {
     pub(super) fn fit(
         &mut self,
         problem: &mut CalibrationProblem,
-        start: &Ogden,
+        start: &Material,
         near: Option<&RecordingFit>,
     ) -> Result<RecordingFit, CalibrationError> {
         let fit = problem.fit(start, near, &self.fit_options, self.is_cancelled)?;
@@ -115,7 +115,7 @@ impl<'a> Run<'a> {
     pub(super) fn best_of(
         &mut self,
         problem: &mut CalibrationProblem,
-        starts: &[Ogden],
+        starts: &[Material],
     ) -> Result<Option<(TermRow, RecordingFit)>, CalibrationError> {
         let mut found: Vec<RecordingFit> = Vec::new();
         let mut failure = None;

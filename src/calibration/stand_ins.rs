@@ -11,7 +11,7 @@ use super::problem::CalibrationProblem;
 use super::synthetic::SyntheticScan;
 use super::target::{Objective, PAPER_BETA};
 use crate::fem::SolveOptions;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::recording::Filter;
 use crate::sensitivity::{Protocol, ScanSettings};
@@ -65,7 +65,7 @@ pub struct StandIn {
 /// [`CalibrationError`].
 pub fn stand_ins(
     specimen: &Specimen,
-    truth: &Ogden,
+    truth: &Material,
     options: &StandInOptions,
     on_stage: &dyn Fn(&str),
     is_cancelled: &dyn Fn() -> bool,
@@ -106,7 +106,7 @@ pub fn stand_ins(
         let values = trained.calibration.selection.rows.first().map(|r| r.values.clone()).unwrap_or_default();
         if let [bulk_kpa, mu_kpa, alpha] = values[..] {
             let terms = vec![crate::material::OgdenTerm { mu_kpa, alpha }];
-            let material = Ogden { bulk_kpa, terms, law: None };
+            let material = Material { bulk_kpa, terms, law: None };
             let mesh = |s: &Specimen| MeshOptions::scaled(s, options.fit_factor);
             let mut problem = CalibrationProblem::new(observed, &mesh, options.objective)?;
             let fit = problem.at(&material, is_cancelled)?;

@@ -8,7 +8,7 @@ use super::problem::CalibrationProblem;
 use super::recording_fit::RecordingFit;
 use super::system::raw_sums;
 use super::target::Target;
-use crate::material::{LawKind, MAX_TERMS, Ogden, OgdenTerm};
+use crate::material::{LawKind, MAX_TERMS, Material, OgdenTerm};
 use crate::specimen::{Specimen, TestKind};
 use nalgebra::DVector;
 
@@ -50,12 +50,12 @@ fn shear_modulus_kpa(observed: &[Observed]) -> f64 {
     REFERENCE_SHEAR_KPA
 }
 
-fn ogden(bulk_kpa: f64, terms: Vec<OgdenTerm>) -> Ogden {
-    Ogden { bulk_kpa, terms, law: None }
+fn ogden(bulk_kpa: f64, terms: Vec<OgdenTerm>) -> Material {
+    Material { bulk_kpa, terms, law: None }
 }
 
 /// Blind one-term starts, the likeliest first.
-pub(super) fn first_starts(observed: &[Observed]) -> Vec<Ogden> {
+pub(super) fn first_starts(observed: &[Observed]) -> Vec<Material> {
     let shear = shear_modulus_kpa(observed);
     FIRST_EXPONENTS
         .iter()
@@ -64,15 +64,15 @@ pub(super) fn first_starts(observed: &[Observed]) -> Vec<Ogden> {
 }
 
 /// Blind starts of a law in the first invariant.
-pub(super) fn law_starts(observed: &[Observed], kind: LawKind) -> Vec<Ogden> {
+pub(super) fn law_starts(observed: &[Observed], kind: LawKind) -> Vec<Material> {
     let shear = shear_modulus_kpa(observed);
-    let start = |law| Ogden { bulk_kpa: START_BULK_RATIO * shear, terms: Vec::new(), law: Some(law) };
+    let start = |law| Material { bulk_kpa: START_BULK_RATIO * shear, terms: Vec::new(), law: Some(law) };
     kind.starts(shear).into_iter().map(start).collect()
 }
 
 /// What a further term would change, for every exponent that it is tried with. Does not depend on the data.
 pub(super) struct Candidates {
-    old: Ogden,
+    old: Material,
     held: Held,
     /// Exponents solved together, and the predictions with terms of these.
     groups: Vec<(Vec<f64>, Vec<Prediction>)>,
@@ -110,11 +110,11 @@ impl Candidates {
     /// The fit's material with one term more, in the order of the decrease of the objective that the new term promises:
     /// for each exponent the new μ that the linear model likes best, all old parameters moving along. At most `count`,
     /// each with the decrease promised.
-    pub(super) fn ranked(&self, targets: &[Target], count: usize) -> Vec<(f64, Ogden)> {
+    pub(super) fn ranked(&self, targets: &[Target], count: usize) -> Vec<(f64, Material)> {
         let old = &self.old;
         let num_old = 2 * old.terms.len() + 1;
         let shear = old.initial_shear_modulus_kpa();
-        let mut candidates: Vec<(f64, Ogden)> = Vec::new();
+        let mut candidates: Vec<(f64, Material)> = Vec::new();
         for (chunk, predictions) in &self.groups {
             let (matrix, gradient) = raw_sums(predictions, targets);
             let free: Vec<usize> = (0..num_old).filter(|&i| !self.held.contains(i)).collect();
@@ -148,9 +148,9 @@ impl Candidates {
         }
         candidates.sort_by(|a, b| b.0.total_cmp(&a.0));
         // Neighbouring exponents lead to the same optimum: spread the starts.
-        let mut chosen: Vec<(f64, Ogden)> = Vec::new();
+        let mut chosen: Vec<(f64, Material)> = Vec::new();
         for (gain, start) in candidates {
-            let alpha = |m: &Ogden| m.terms.last().map_or(0.0, |t| t.alpha);
+            let alpha = |m: &Material| m.terms.last().map_or(0.0, |t| t.alpha);
             if chosen.len() < count && chosen.iter().all(|(_, c)| (alpha(c) - alpha(&start)).abs() > 3.0) {
                 chosen.push((gain, start));
             }
@@ -180,7 +180,7 @@ pub(super) fn further_starts(
     options: &FitOptions,
     count: usize,
     is_cancelled: &dyn Fn() -> bool,
-) -> Result<Vec<(f64, Ogden)>, CalibrationError> {
+) -> Result<Vec<(f64, Material)>, CalibrationError> {
     let candidates = Candidates::new(problem, fit, options, is_cancelled)?;
     Ok(candidates.ranked(&problem.targets()?, count))
 }

@@ -5,7 +5,7 @@ use super::options::{Bulk, FitOptions, Held};
 use super::system::NormalSystem;
 use crate::material::{
     LawParameter, MAX_ALPHA, MAX_CHAIN_LIMIT, MAX_LOCKING_STRETCH, MIN_ALPHA, MIN_CHAIN_LIMIT, MIN_LOCKING_STRETCH,
-    Ogden, Parameter,
+    Material, Parameter,
 };
 use crate::optimise::{LinearLimit, NoStep, limited_step};
 use nalgebra::{DMatrix, DVector};
@@ -63,7 +63,7 @@ pub(super) struct Step {
 
 impl Constraints {
     /// The limits of a fit from `start`.
-    pub(super) fn new(start: &Ogden, options: &FitOptions) -> Result<Constraints, CalibrationError> {
+    pub(super) fn new(start: &Material, options: &FitOptions) -> Result<Constraints, CalibrationError> {
         start.validate()?;
         let shear = start.initial_shear_modulus_kpa();
         let mut by_exponent: Vec<usize> = (0..start.terms.len()).collect();

@@ -2,7 +2,7 @@ use super::super::test_problem::ogden;
 use super::*;
 use crate::sensitivity::FisherInformation;
 
-fn system(material: &Ogden, matrix: DMatrix<f64>, gradient: &[f64]) -> NormalSystem {
+fn system(material: &Material, matrix: DMatrix<f64>, gradient: &[f64]) -> NormalSystem {
     let parameters = material.parameters();
     NormalSystem {
         values: parameters.iter().map(|p| material.value(*p)).collect(),
@@ -17,7 +17,7 @@ fn system(material: &Ogden, matrix: DMatrix<f64>, gradient: &[f64]) -> NormalSys
     }
 }
 
-fn two_terms() -> Ogden {
+fn two_terms() -> Material {
     ogden(2000.0, &[[16.0, 1.9], [0.35, 3.2]])
 }
 

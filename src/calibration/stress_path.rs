@@ -12,7 +12,7 @@ use super::step::Constraints;
 use super::system::{NormalSystem, scales_of};
 use crate::fem::{Equilibrium, ForwardModel};
 use crate::kinematics::principal_stretches;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::optimise::{self, LeastSquares, Rules, Shortening, Step, Stop};
 use nalgebra::{DMatrix, DVector};
 
@@ -37,7 +37,7 @@ pub(super) struct StressPath {
 
 impl StressPath {
     /// The states of `equilibria` of `material`.
-    pub(super) fn new(model: &ForwardModel, material: &Ogden, equilibria: &[Equilibrium]) -> StressPath {
+    pub(super) fn new(model: &ForwardModel, material: &Material, equilibria: &[Equilibrium]) -> StressPath {
         let mut states = Vec::new();
         // With one term parameters and stresses are one to one: nothing is curved.
         if material.terms.len() < 2 {
@@ -76,21 +76,21 @@ impl StressPath {
         &self,
         limits: &Constraints,
         system: &NormalSystem,
-        material: &Ogden,
+        material: &Material,
         step: &DVector<f64>,
-    ) -> Result<Ogden, CalibrationError> {
+    ) -> Result<Material, CalibrationError> {
         let linear = system.moved(material, step);
         if self.is_straight() {
             return Ok(linear);
         }
         let (stresses, slopes) = self.stresses(material);
         let wanted = stresses + slopes * step;
-        let near = Ogden { bulk_kpa: linear.bulk_kpa, ..material.clone() };
+        let near = Material { bulk_kpa: linear.bulk_kpa, ..material.clone() };
         let mut inner = StressFit { path: self, limits, outer: system, wanted: &wanted };
         let start = inner.point(near);
         let own_system = self.system(system, &start.material, &wanted);
         let StressPoint { material: near, misfit } = optimise::descend(&mut inner, start, own_system, &RULES)?.at;
-        let length = |m: &Ogden| {
+        let length = |m: &Material| {
             let moved = m.terms.iter().zip(&material.terms);
             moved
                 .map(|(new, old)| (new.mu_kpa / old.mu_kpa).ln().powi(2) + (new.alpha / old.alpha - 1.0).powi(2))
@@ -102,12 +102,12 @@ impl StressPath {
     }
 
     /// Σ (wanted − stress)² of a material.
-    fn misfit(&self, material: &Ogden, wanted: &DVector<f64>) -> f64 {
+    fn misfit(&self, material: &Material, wanted: &DVector<f64>) -> f64 {
         (wanted - self.stresses(material).0).norm_squared()
     }
 
     /// The normal equations of the fit of `material`'s stresses to `wanted`, in scaled parameters.
-    fn system(&self, outer: &NormalSystem, material: &Ogden, wanted: &DVector<f64>) -> NormalSystem {
+    fn system(&self, outer: &NormalSystem, material: &Material, wanted: &DVector<f64>) -> NormalSystem {
         let (stresses, slopes) = self.stresses(material);
         let misfit = wanted - stresses;
         let mut matrix = slopes.tr_mul(&slopes);
@@ -125,7 +125,7 @@ impl StressPath {
 
     /// Traceless principal Kirchhoff stresses Σμ λ̄^α of all states (kPa, times the root of the volume), and their
     /// derivatives with respect to the scaled parameters, κ first.
-    fn stresses(&self, material: &Ogden) -> (DVector<f64>, DMatrix<f64>) {
+    fn stresses(&self, material: &Material) -> (DVector<f64>, DMatrix<f64>) {
         let mut stresses = DVector::zeros(3 * self.states.len());
         let mut slopes = DMatrix::zeros(3 * self.states.len(), 2 * material.terms.len() + 1);
         for (s, (logs, root)) in self.states.iter().enumerate() {
@@ -146,7 +146,7 @@ impl StressPath {
 
 /// A material and how far its stresses are from those wanted.
 struct StressPoint {
-    material: Ogden,
+    material: Material,
     misfit: f64,
 }
 
@@ -159,7 +159,7 @@ struct StressFit<'a> {
 }
 
 impl StressFit<'_> {
-    fn point(&self, material: Ogden) -> StressPoint {
+    fn point(&self, material: Material) -> StressPoint {
         StressPoint { misfit: self.path.misfit(&material, self.wanted), material }
     }
 }
@@ -201,7 +201,7 @@ mod tests {
     use crate::fem::SolveOptions;
     use crate::sensitivity::FisherInformation;
 
-    fn system(material: &Ogden) -> NormalSystem {
+    fn system(material: &Material) -> NormalSystem {
         let parameters = material.parameters();
         let n = parameters.len();
         NormalSystem {
@@ -217,7 +217,7 @@ mod tests {
         }
     }
 
-    fn limits(material: &Ogden) -> Constraints {
+    fn limits(material: &Material) -> Constraints {
         Constraints::new(material, &FitOptions::default()).unwrap()
     }
 
@@ -235,7 +235,7 @@ mod tests {
         assert!(moved.terms[1].alpha - moved.terms[0].alpha >= 1.0 - 1e-9 || moved == system.moved(&material, &far));
     }
 
-    fn path(material: &Ogden) -> StressPath {
+    fn path(material: &Material) -> StressPath {
         let specimen = block();
         let mut model =
             ForwardModel::new(crate::mesh::mesh_specimen(&specimen, &coarse(&specimen)).unwrap(), &specimen).unwrap();
@@ -243,11 +243,11 @@ mod tests {
         StressPath::new(&model, material, &[state])
     }
 
-    fn two_terms() -> Ogden {
+    fn two_terms() -> Material {
         ogden(200.0, &[[16.0, 1.9], [0.35, 8.0]])
     }
 
-    fn distance(a: &Ogden, b: &Ogden) -> f64 {
+    fn distance(a: &Material, b: &Material) -> f64 {
         a.parameters().iter().map(|p| (a.value(*p) / b.value(*p) - 1.0).powi(2)).sum::<f64>().sqrt()
     }
 
@@ -281,7 +281,7 @@ mod tests {
         let step = DVector::from_column_slice(&[0.0, rest[0], rest[1], rest[2], 0.15]);
         let system = system(&material);
         let wanted = &stresses + &slopes * &step;
-        let missed = |m: &Ogden| (path.stresses(m).0 - &wanted).norm() / stresses.norm();
+        let missed = |m: &Material| (path.stresses(m).0 - &wanted).norm() / stresses.norm();
         let followed = missed(&path.moved(&limits(&material), &system, &material, &step).unwrap());
         let linear = missed(&system.moved(&material, &step));
         assert!(followed < 0.1 * linear, "{followed} {linear}");

@@ -23,7 +23,7 @@ use super::run::{Run, with_falling_exponents};
 use super::starts::Candidates;
 use super::synthetic::SyntheticScan;
 use super::terms::{Rule, SETTLED, choose, compare};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::recording::Filter;
 use crate::sensitivity::{Protocol, ScanSettings};
@@ -37,7 +37,7 @@ pub struct StudyCase {
     /// With its drives.
     pub specimen: Specimen,
     /// What made the data.
-    pub truth: Ogden,
+    pub truth: Material,
     /// Voxels and noise.
     pub scan: ScanSettings,
     /// Filter of the recordings.
@@ -264,7 +264,7 @@ fn one_draw(
     }
     let num_terms = fits.len();
     let starts = reference.candidates.ranked(&problem.targets()?, case.options.num_starts);
-    let starts: Vec<Ogden> =
+    let starts: Vec<Material> =
         starts.into_iter().filter(|(promise, _)| *promise >= case.options.least_promise).map(|(_, s)| s).collect();
     if let Some((row, _)) = run.best_of(problem, &starts)? {
         rows.push(row);
@@ -289,7 +289,7 @@ fn one_draw(
     Ok(Draw { fit, chosen, is_alike })
 }
 
-fn summarise(draws: &[Draw], truth: &Ogden, noiseless: &RecordingFit, coarse: &RecordingFit, factor: f64) -> Study {
+fn summarise(draws: &[Draw], truth: &Material, noiseless: &RecordingFit, coarse: &RecordingFit, factor: f64) -> Study {
     let fitted: Vec<&DrawFit> = draws.iter().filter_map(|d| d.fit.as_ref()).collect();
     // 0/0 is the NaN that is meant.
     let mean = |values: &mut dyn Iterator<Item = f64>| {

@@ -2,7 +2,7 @@ use super::super::test_problem::{block, ogden, scan};
 use super::*;
 use crate::calibration::TermCount;
 
-fn case(truth: Ogden, filter: Filter, draws: usize, max_terms: usize) -> StudyCase {
+fn case(truth: Material, filter: Filter, draws: usize, max_terms: usize) -> StudyCase {
     let specimen = block();
     StudyCase {
         truth_mesh: MeshOptions { grading: 0.4, ..MeshOptions::scaled(&specimen, 2.0) },

@@ -3,7 +3,7 @@
 use super::error::CalibrationError;
 use super::force_readings::{ForceOnTheWay, LoadCell, ObservedForce};
 use crate::fem::{ForwardModel, SolveOptions};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::recording::{Filter, LoadCurve, RecordedStep, Recording};
 use crate::sensitivity::{Protocol, ScanSettings};
@@ -106,7 +106,7 @@ impl SyntheticScan {
     /// [`CalibrationError`].
     pub fn new(
         specimen: &Specimen,
-        material: &Ogden,
+        material: &Material,
         scan: &ScanSettings,
         protocol: &Protocol,
         mesh: &MeshOptions,

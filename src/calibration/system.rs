@@ -11,7 +11,7 @@ use super::error::CalibrationError;
 use super::options::{Bulk, Held};
 use super::prediction::{HELD_LOG_SD, Prediction};
 use super::target::Target;
-use crate::material::{Ogden, Parameter};
+use crate::material::{Material, Parameter};
 use crate::sensitivity::FisherInformation;
 use nalgebra::{DMatrix, DVector};
 
@@ -93,7 +93,7 @@ impl NormalSystem {
     }
 
     /// `material` after the scaled change `step`.
-    pub(super) fn moved(&self, material: &Ogden, step: &DVector<f64>) -> Ogden {
+    pub(super) fn moved(&self, material: &Material, step: &DVector<f64>) -> Material {
         let mut next = material.clone();
         for (i, &parameter) in self.parameters.iter().enumerate() {
             let value = self.values[i];
@@ -109,7 +109,7 @@ impl NormalSystem {
 }
 
 /// ∂ξ/∂s of every parameter: ξ itself, with its sign, and half the initial shear modulus where ξ may be zero.
-pub(super) fn scales_of(material: &Ogden) -> Vec<f64> {
+pub(super) fn scales_of(material: &Material) -> Vec<f64> {
     let half_shear = 0.5 * material.initial_shear_modulus_kpa();
     let scale = |p: Parameter| if p.has_any_sign() { half_shear } else { material.value(p) };
     material.parameters().into_iter().map(scale).collect()

@@ -8,7 +8,7 @@
 //!   needs no noise level and, with n in the ten thousands, is the strictest.
 
 use super::recording_fit::RecordingFit;
-use crate::material::{Ogden, OgdenTerm};
+use crate::material::{Material, OgdenTerm};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -138,7 +138,7 @@ pub(super) fn choose(rows: &[TermRow], rule: Rule, threshold: f64) -> usize {
 
 /// The largest part that a term has of the stress, over the isochoric principal stretches `visited`: of a term with a
 /// large exponent μα may be nothing and the stress at large stretches much.
-fn largest_share(material: &Ogden, term: &OgdenTerm, visited: &[[f64; 3]]) -> f64 {
+fn largest_share(material: &Material, term: &OgdenTerm, visited: &[[f64; 3]]) -> f64 {
     let size = |terms: &[OgdenTerm], stretches: &[f64; 3]| {
         let stress = stretches.map(|s| terms.iter().map(|t| t.mu_kpa * s.powf(t.alpha)).sum::<f64>());
         let mean = stress.iter().sum::<f64>() / 3.0;

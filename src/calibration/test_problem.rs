@@ -4,7 +4,7 @@ use super::bench::Bench;
 use super::options::FitOptions;
 use super::synthetic::SyntheticScan;
 use crate::fem::{ForwardModel, SolveOptions};
-use crate::material::{Ogden, OgdenTerm};
+use crate::material::{Material, OgdenTerm};
 use crate::mesh::MeshOptions;
 use crate::sensitivity::{PartialVoxels, Protocol, ScanSettings};
 use crate::specimen::{Block, Outline, Specimen, TestKind};
@@ -24,12 +24,12 @@ pub(super) fn block() -> Specimen {
     }
 }
 
-pub(super) fn ogden(bulk_kpa: f64, terms: &[[f64; 2]]) -> Ogden {
-    Ogden { bulk_kpa, terms: terms.iter().map(|&[mu_kpa, alpha]| OgdenTerm { mu_kpa, alpha }).collect(), law: None }
+pub(super) fn ogden(bulk_kpa: f64, terms: &[[f64; 2]]) -> Material {
+    Material { bulk_kpa, terms: terms.iter().map(|&[mu_kpa, alpha]| OgdenTerm { mu_kpa, alpha }).collect(), law: None }
 }
 
 /// Compressible enough for κ to be seen.
-pub(super) fn truth() -> Ogden {
+pub(super) fn truth() -> Material {
     ogden(200.0, &[[17.0, 1.91]])
 }
 
@@ -54,7 +54,7 @@ pub(super) fn tight() -> FitOptions {
 }
 
 /// A model with its voxels, and the scan of `material` made on the same mesh.
-pub(super) fn same_mesh(material: &Ogden) -> (Bench, SyntheticScan) {
+pub(super) fn same_mesh(material: &Material) -> (Bench, SyntheticScan) {
     let specimen = block();
     let mesh = coarse(&specimen);
     let model = ForwardModel::of_specimen(&specimen, &mesh).unwrap();

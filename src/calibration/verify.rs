@@ -14,7 +14,7 @@ use super::options::{Bulk, FitOptions};
 use super::synthetic::SyntheticScan;
 use super::system::NormalSystem;
 use super::target::Target;
-use crate::material::{Ogden, Parameter};
+use crate::material::{Material, Parameter};
 use crate::mesh::MeshOptions;
 use crate::sensitivity::{FisherInformation, IDENTIFIABILITY_LIMIT, Protocol, ScanSettings};
 use crate::specimen::Specimen;
@@ -131,7 +131,7 @@ pub struct Verification {
 }
 
 /// Where every fit starts: 30 % away from the truth in each parameter, alternating, κ a factor of two.
-fn blind_start(truth: &Ogden, bulk: Bulk) -> Ogden {
+fn blind_start(truth: &Material, bulk: Bulk) -> Material {
     let mut start = truth.clone();
     if bulk != Bulk::Held {
         start.bulk_kpa *= 2.0;
@@ -156,7 +156,7 @@ fn blind_start(truth: &Ogden, bulk: Bulk) -> Ogden {
 /// cancelled. A draw whose fit does not converge is counted.
 pub fn verify(
     specimen: &Specimen,
-    truth: &Ogden,
+    truth: &Material,
     scan: &ScanSettings,
     options: &VerifyOptions,
     on_draw: &(dyn Fn() + Sync),
@@ -171,7 +171,7 @@ pub fn verify(
 /// As [`verify`].
 pub fn verify_in_full(
     specimen: &Specimen,
-    truth: &Ogden,
+    truth: &Material,
     scan: &ScanSettings,
     options: &VerifyOptions,
     on_draw: &(dyn Fn() + Sync),
@@ -195,7 +195,7 @@ pub fn verify_in_full(
 fn verify_with(
     benches: &mut [Bench],
     specimen: &Specimen,
-    truth: &Ogden,
+    truth: &Material,
     synthetic: &SyntheticScan,
     options: &VerifyOptions,
     on_draw: &(dyn Fn() + Sync),
@@ -280,7 +280,7 @@ fn verify_with(
 
 /// Statistics per parameter. A held κ is not estimated: nothing is promised of it and it is not identifiable.
 fn spread(
-    truth: &Ogden,
+    truth: &Material,
     fits: &[Result<Fit, CalibrationError>],
     noiseless: Option<&Fit>,
     promised: &FisherInformation,

@@ -208,7 +208,7 @@ fn measure_two_hole_shear() {
     let two = include_str!("../../geometries/materials/ecoflex-0020-two-term.json");
     let factor = |name: &str, usual: f64| std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(usual);
     for (name, text) in [("one term", one), ("two terms", two)] {
-        let material = Ogden::from_json(text).unwrap();
+        let material = Material::from_json(text).unwrap();
         let mut options = VerifyOptions::new(&specimen, factor("DRAWS", 20.0) as usize, factor("SEED", 1.0) as u64);
         options.fit_mesh = MeshOptions::scaled(&specimen, factor("FIT", 1.35));
         options.truth_mesh = MeshOptions { grading: 0.4, ..MeshOptions::scaled(&specimen, factor("TRUTH", 0.85)) };

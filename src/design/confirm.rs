@@ -322,7 +322,7 @@ fn failure(error: EvaluationError) -> EvaluationFailure {
 fn of_material(
     fixture: &Fixture,
     name: &str,
-    material: &crate::material::Ogden,
+    material: &crate::material::Material,
     evaluation: Evaluation,
     maps: &EvaluationMaps,
 ) -> MaterialEvaluation {

@@ -13,7 +13,7 @@
 use super::evaluation_failure::EvaluationFailure;
 use super::study::Study;
 use crate::diagnosis::{DiagnosisError, DiagnosisOptions, PlannedScan, Registry, detectable};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::sensitivity::{DetectableSize, DetectionLimit, Evaluation};
 use crate::specimen::{Hole, Specimen};
 
@@ -92,7 +92,7 @@ fn tested_with_a_hole(study: &Study) -> Vec<Counted> {
 pub(super) fn sizes_of(
     study: &Study,
     specimen: &Specimen,
-    material: &Ogden,
+    material: &Material,
     evaluation: &Evaluation,
     mesh_factor: f64,
     is_cancelled: &(dyn Fn() -> bool + Sync),

@@ -15,7 +15,7 @@ use super::study::{MaterialPrior, Study};
 use super::tell_apart::{Imitation, log_separation, separation, state_of};
 use crate::fem::{Equilibrium, ForwardModel, ParameterSensitivity, QuadraturePoint, SolveOptions, Tangent};
 use crate::kinematics::principal_stretches;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::{MeshOptions, shape_velocity};
 use crate::sensitivity::{
     ForceReading, ForceReadings, MaterialState, ScannedBlock, information_of_protocol, integrate_over_blocks,
@@ -180,7 +180,7 @@ impl<'a> Evaluator<'a> {
     fn on_the_way(
         &self,
         model: &mut ForwardModel,
-        material: &Ogden,
+        material: &Material,
         drive: f64,
         moves: &[Move],
         is_cancelled: &(dyn Fn() -> bool + Sync),
@@ -262,7 +262,7 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Response to the material sample with this index.
-    fn response(&self, material: &Ogden, index: usize, shown: &[Shown]) -> Result<Response, EvaluationFailure> {
+    fn response(&self, material: &Material, index: usize, shown: &[Shown]) -> Result<Response, EvaluationFailure> {
         let scan = &self.study.scan;
         let voxel_volume = scan.voxel_mm.iter().product();
         let fields: Vec<Vec<QuadraturePoint>> = shown

@@ -1,7 +1,7 @@
 //! The materials at which designs are judged: the priors' central values and variants.
 
 use super::study::MaterialPrior;
-use crate::material::{Ogden, Parameter};
+use crate::material::{Material, Parameter};
 
 /// A material at which designs are judged, and its weight.
 #[derive(Clone, Debug, PartialEq)]
@@ -9,7 +9,7 @@ pub struct MaterialSample {
     /// Index of the prior.
     pub prior: usize,
     /// Values.
-    pub material: Ogden,
+    pub material: Material,
     /// Weight; all sum to one.
     pub weight: f64,
 }

@@ -1,7 +1,7 @@
 //! What the samples of a design do, as solved and as they are a small step further along a move of the design.
 
 use crate::fem::{ForwardModel, ParameterSensitivity, PathSensitivity};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::sensitivity::{ForceReading, MaterialState};
 
 /// An earlier material fitted to a sample's scan.
@@ -9,7 +9,7 @@ use crate::sensitivity::{ForceReading, MaterialState};
 pub(super) struct ImitatingMaterial {
     /// The sample whose scan it is.
     pub of: usize,
-    pub material: Ogden,
+    pub material: Material,
     pub state: MaterialState,
 }
 

@@ -3,7 +3,7 @@
 
 use super::aim::Objective;
 use super::study_limits::{AngleDeg, Count, CountOrNone, HoleCount, LengthMm};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::sensitivity::{Protocol, ScanSettings};
 use crate::specimen::{HoleAxis, HoleKind, ManufacturingLimits, Specimen, TestKind};
 use serde::{Deserialize, Serialize};
@@ -16,7 +16,7 @@ pub struct MaterialPrior {
     /// Name in results.
     pub name: String,
     /// Central values.
-    pub material: Ogden,
+    pub material: Material,
     /// Relative standard deviation of the prior: each design is also judged with all α raised and all μ lowered by it,
     /// and the reverse (0: at the central values only).
     pub relative_sd: f64,

@@ -8,7 +8,7 @@ use super::study_limits::{DEFAULT_SEED, DEFAULT_WEIGHT, RelativeSd, SCHEMA, Weig
 use crate::field::file_tag;
 use crate::field::schema::{Seed, schema_of_file};
 use crate::field::{FieldError, read};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::sensitivity::{Protocol, ScanSettings};
 use crate::specimen::json::schema_of;
 use crate::specimen::{ManufacturingLimits, Name, Specimen};
@@ -74,8 +74,8 @@ struct MaterialEntry {
     /// Name in results.
     name: String,
     /// Central values.
-    #[schema(value_type = Ogden)]
-    material: Inline<Ogden>,
+    #[schema(value_type = Material)]
+    material: Inline<Material>,
     /// Relative standard deviation of the prior; 0 by default.
     #[serde(default)]
     #[schema(value_type = RelativeSd)]
@@ -99,7 +99,7 @@ impl StudyFile {
     fn study<E>(
         self,
         base: impl FnOnce(Inline<Specimen>) -> Result<Specimen, E>,
-        mut material: impl FnMut(usize, Inline<Ogden>) -> Result<Ogden, E>,
+        mut material: impl FnMut(usize, Inline<Material>) -> Result<Material, E>,
     ) -> Result<Study, E> {
         let mut materials = Vec::with_capacity(self.materials.len());
         for (index, entry) in self.materials.into_iter().enumerate() {
@@ -136,7 +136,7 @@ impl Study {
         })?;
         let study = file.study(
             |base| base.resolve(folder, Specimen::from_json),
-            |_, material| material.resolve(folder, Ogden::from_json),
+            |_, material| material.resolve(folder, Material::from_json),
         )?;
         study.validate()?;
         Ok(study)

@@ -6,7 +6,7 @@
 use super::evaluation_failure::EvaluationFailure;
 use super::study::Study;
 use crate::fem::{Equilibrium, ForwardModel, SolveOptions, Tangent};
-use crate::material::{Ogden, Parameter};
+use crate::material::{Material, Parameter};
 use crate::optimise::{LeastSquares, Rules, Shortening, Step, Stop, descend};
 use crate::sensitivity::{InformationError, MaterialState, Separation, separation_over_quadrature};
 use nalgebra::DVector;
@@ -27,7 +27,7 @@ const LARGEST_STEP: f64 = 0.4;
 /// A material fitted to another's scan.
 pub(super) struct Nearest {
     /// Its values there.
-    pub material: Ogden,
+    pub material: Material,
     /// Its equilibrium.
     pub equilibrium: Equilibrium,
     /// The same as the scan's figures need it.
@@ -50,7 +50,7 @@ pub(super) fn separation(
     study: &Study,
     model: &ForwardModel,
     positions: &[[f64; 3]],
-    material: &Ogden,
+    material: &Material,
     ours: &MaterialState,
     theirs: &MaterialState,
 ) -> Result<Separation, InformationError> {
@@ -73,7 +73,7 @@ pub(super) struct Imitation<'a> {
 
 /// An imitating material, what it does, and how far that is from the scan.
 pub(super) struct Imitator {
-    material: Ogden,
+    material: Material,
     equilibrium: Equilibrium,
     state: MaterialState,
     separation: Separation,
@@ -82,14 +82,14 @@ pub(super) struct Imitator {
 impl Imitation<'_> {
     /// Fits `material`, whose equilibrium at the drive is `start`, to the scan. Where a step has no equilibrium, it is
     /// halved; where none helps, the distance is that of the linear step from there.
-    pub fn nearest(mut self, material: &Ogden, start: &Equilibrium) -> Result<Nearest, EvaluationFailure> {
+    pub fn nearest(mut self, material: &Material, start: &Equilibrium) -> Result<Nearest, EvaluationFailure> {
         let first = self.imitator(material.clone(), start.clone())?;
         let found = descend(&mut self, first, (), &RULES)?.at;
         let Imitator { material, equilibrium, state, separation } = found;
         Ok(Nearest { material, equilibrium, state, distance_sd: separation.distance_sd })
     }
 
-    fn imitator(&mut self, material: Ogden, equilibrium: Equilibrium) -> Result<Imitator, EvaluationFailure> {
+    fn imitator(&mut self, material: Material, equilibrium: Equilibrium) -> Result<Imitator, EvaluationFailure> {
         let state = state_of(&equilibrium, &mut self.model.tangent(&material, &equilibrium)?)?;
         let positions = &self.model.mesh().nodes;
         let separation = separation(self.study, self.model, positions, &material, &state, self.theirs)?;
@@ -132,7 +132,7 @@ impl LeastSquares for Imitation<'_> {
 }
 
 /// The material after a part of a step, no parameter changed by more than [`LARGEST_STEP`]; κ by its logarithm.
-fn moved(material: &Ogden, steps: &[f64], part: f64) -> Ogden {
+fn moved(material: &Material, steps: &[f64], part: f64) -> Material {
     let relative: Vec<f64> =
         material.parameters().into_iter().zip(steps).map(|(p, s)| s / material.value(p).abs().max(1e-12)).collect();
     let largest = relative.iter().fold(0.0f64, |s, r| s.max(r.abs()));

@@ -4,13 +4,13 @@ use super::laboratory::Prediction;
 use super::scene::Scene;
 use super::supposed::{Supposed, scene_of};
 use super::trace::Trace;
-use crate::material::Ogden;
+use crate::material::Material;
 
 /// A fitted material with causes.
 #[derive(Clone)]
 pub struct CauseFit {
     /// The material.
-    pub material: Ogden,
+    pub material: Material,
     /// The causes.
     pub causes: Vec<Supposed>,
     /// Weighted squares of the misfit (see [`Metric`](super::metric::Metric)), priors included: −2 ln of the likelihood

@@ -11,7 +11,7 @@ use super::registry::Registry;
 use super::supposed::{Supposed, scene_of};
 use super::trace::Trace;
 use crate::calibration::Observed;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::rate::BeforeAfter;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -76,7 +76,7 @@ impl Predictor<'_> {
         let causes = self.carried(cases, from, to);
         let case = &mut cases[to];
         case.laboratory.forget();
-        let models: [(&Ogden, &[Supposed]); 2] =
+        let models: [(&Material, &[Supposed]); 2] =
             [(&teacher.nominal.material, &[]), (&teacher.corrected.material, &causes)];
         let own = if from == to { None } else { own_motions(&case.found.observed) };
         let (mut plain, mut shifted, mut moved) = (Vec::new(), Vec::new(), Vec::new());
@@ -145,7 +145,7 @@ impl Predictor<'_> {
     fn predict(
         &self,
         case: &mut Case,
-        material: &Ogden,
+        material: &Material,
         causes: &[Supposed],
     ) -> Result<Option<Prediction>, DiagnosisError> {
         match case.laboratory.predict(material, &scene_of(causes), self.is_cancelled) {
@@ -155,7 +155,12 @@ impl Predictor<'_> {
         }
     }
 
-    fn misfit(&self, case: &mut Case, material: &Ogden, causes: &[Supposed]) -> Result<Option<Misfit>, DiagnosisError> {
+    fn misfit(
+        &self,
+        case: &mut Case,
+        material: &Material,
+        causes: &[Supposed],
+    ) -> Result<Option<Misfit>, DiagnosisError> {
         Ok(self.predict(case, material, causes)?.map(|p| misfit(case, &p.trace)))
     }
 
@@ -164,7 +169,7 @@ impl Predictor<'_> {
         &self,
         own: &Arc<dyn Cause>,
         case: &mut Case,
-        material: &Ogden,
+        material: &Material,
         causes: &[Supposed],
     ) -> Result<Option<Misfit>, DiagnosisError> {
         let mut all = causes.to_vec();

@@ -44,7 +44,7 @@ use super::score::{Prepared, ScoreTest};
 use super::score_round::{Place, directions_of, suspects_of};
 use super::trace::Trace;
 use crate::calibration::{Boundary, Observed};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::sensitivity::{DetectableSize, DetectionLimit};
 use nalgebra::DMatrix;
@@ -104,7 +104,7 @@ impl Detectable {
 /// work was cancelled.
 pub fn detectable(
     planned: &PlannedScan,
-    material: &Ogden,
+    material: &Material,
     options: &DiagnosisOptions,
     is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<Detectable>, DiagnosisError> {

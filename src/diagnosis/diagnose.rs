@@ -25,7 +25,7 @@ use super::registry::Registry;
 use super::rounds::take_out_artefacts;
 use super::trace::Trace;
 use crate::calibration::{Boundary, Observed};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::recording::Recording;
 
@@ -107,7 +107,7 @@ pub(super) struct Run<'a> {
     /// The finer mesh; `None` where ours is fine already, or the finer one cannot be meshed.
     pub(super) finer: Option<Finer<'a>>,
     /// The material from which nominal fits start.
-    pub(super) start: Ogden,
+    pub(super) start: Material,
     /// Displacement unknowns of the model.
     pub(super) num_unknowns: usize,
     /// What was recorded, less what the load curve's effects add.
@@ -205,7 +205,7 @@ impl<'a> Run<'a> {
     }
 
     /// Fits the nominal model to `measured` and goes on from it.
-    fn fit_nominal(&mut self, measured: &Trace, start: &Ogden) -> Result<(), DiagnosisError> {
+    fn fit_nominal(&mut self, measured: &Trace, start: &Material) -> Result<(), DiagnosisError> {
         let nominal = fit_nominal(&mut self.inference, measured, start, self.options.prior.is_some())?;
         self.findings.restart_from(nominal);
         Ok(())

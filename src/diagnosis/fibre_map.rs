@@ -13,7 +13,7 @@ use super::scene::Scene;
 use super::score::{Prepared, ScoreTest};
 use super::supposed::Path;
 use crate::fem::Fibre;
-use crate::material::Ogden;
+use crate::material::Material;
 use nalgebra::{DMatrix, DVector};
 
 /// Spacing of the grid of directions, degrees.
@@ -62,7 +62,7 @@ pub struct FibreDirection {
 /// [`DiagnosisError::Solve`].
 pub fn fibre_directions(
     laboratory: &mut Laboratory,
-    material: &Ogden,
+    material: &Material,
     scene: &Scene,
     prediction: &Prediction,
     test: &ScoreTest,

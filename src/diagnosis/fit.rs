@@ -8,7 +8,7 @@ use super::metric::{Metric, Weighed};
 use super::prior::{FitSettings, shear_modulus};
 use super::supposed::{Path, Supposed, paths_of, scene_of};
 use super::trace::Trace;
-use crate::material::{Ogden, Parameter};
+use crate::material::{Material, Parameter};
 use crate::optimise::{Damping, End, LeastSquares, Raise, Rules, Shortening, Step, Stop, descend};
 use nalgebra::{DMatrix, DVector};
 
@@ -31,7 +31,7 @@ const LARGEST_CAUSE_STEP: f64 = 6.0;
 /// parameter, and with each parameter of the causes in its scales.
 pub fn derivatives(
     laboratory: &mut Laboratory,
-    material: &Ogden,
+    material: &Material,
     causes: &[Supposed],
     prediction: &Prediction,
 ) -> Result<Vec<Trace>, DiagnosisError> {
@@ -42,7 +42,7 @@ pub fn derivatives(
 /// of the first causes).
 fn derivatives_beyond(
     laboratory: &mut Laboratory,
-    material: &Ogden,
+    material: &Material,
     causes: &[Supposed],
     prediction: &Prediction,
     known: &[Trace],
@@ -69,7 +69,7 @@ pub fn fit(
     laboratory: &mut Laboratory,
     metric: &Metric,
     measured: &Trace,
-    material: &Ogden,
+    material: &Material,
     causes: &[Supposed],
     settings: &FitSettings,
     is_cancelled: &(dyn Fn() -> bool + Sync),
@@ -89,7 +89,7 @@ pub fn fit(
 /// As [`fit`].
 pub(super) fn fit_member(
     member: Member,
-    material: &Ogden,
+    material: &Material,
     is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<CauseFit, DiagnosisError> {
     let mut found = fit_members(&mut [member], material, is_cancelled)?;
@@ -120,7 +120,7 @@ pub struct Member<'a, 'b> {
 
 /// Where a fit stands: the material, and of each member its causes, what they predict and the deviance.
 struct Point {
-    material: Ogden,
+    material: Material,
     causes: Vec<Vec<Supposed>>,
     predictions: Vec<Prediction>,
     deviances: Vec<f64>,
@@ -139,7 +139,7 @@ impl Point {
 /// As [`fit`].
 pub fn fit_members(
     members: &mut [Member],
-    material: &Ogden,
+    material: &Material,
     is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<CauseFit>, DiagnosisError> {
     let Some(settings) = members.first().map(|m| m.settings) else { return Ok(Vec::new()) };
@@ -244,7 +244,7 @@ pub(super) fn deviance_at(
     laboratory: &mut Laboratory,
     metric: &Metric,
     measured: &Trace,
-    material: &Ogden,
+    material: &Material,
     causes: &[Supposed],
     settings: &FitSettings,
     is_cancelled: &(dyn Fn() -> bool + Sync),
@@ -255,7 +255,7 @@ pub(super) fn deviance_at(
 
 fn evaluate(
     members: &mut [Member],
-    material: Ogden,
+    material: Material,
     causes: Vec<Vec<Supposed>>,
     is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Point, DiagnosisError> {
@@ -327,7 +327,7 @@ pub(super) fn normal_system(
     metric: &Metric,
     measured: &Trace,
     prediction: &Prediction,
-    material: &Ogden,
+    material: &Material,
     causes: &[Supposed],
     settings: &FitSettings,
     columns: &[Trace],
@@ -360,7 +360,7 @@ pub(super) fn normal_system(
 pub fn normal_matrix(
     metric: &Metric,
     weighed: &[Weighed],
-    material: &Ogden,
+    material: &Material,
     causes: &[Supposed],
     settings: &FitSettings,
 ) -> DMatrix<f64> {
@@ -388,7 +388,7 @@ fn deviance_of(
     metric: &Metric,
     measured: &Trace,
     prediction: &Prediction,
-    material: &Ogden,
+    material: &Material,
     causes: &[Supposed],
     settings: &FitSettings,
 ) -> f64 {
@@ -407,7 +407,7 @@ fn deviance_of(
 }
 
 /// The material and the members' causes after a scaled step, shortened to the largest allowed and cut to the ranges.
-fn moved(members: &[Member], at: &Point, step: &DVector<f64>) -> (Ogden, Vec<Vec<Supposed>>) {
+fn moved(members: &[Member], at: &Point, step: &DVector<f64>) -> (Material, Vec<Vec<Supposed>>) {
     let parameters = at.material.parameters();
     let mut part = 1.0f64;
     for m in members {
@@ -454,7 +454,7 @@ fn moved(members: &[Member], at: &Point, step: &DVector<f64>) -> (Ogden, Vec<Vec
 }
 
 /// The size of one unit of each scaled parameter, in the parameter's own units; for ln κ that is κ.
-pub fn scales(material: &Ogden, causes: &[Supposed]) -> Vec<f64> {
+pub fn scales(material: &Material, causes: &[Supposed]) -> Vec<f64> {
     let of_material = material.parameters().into_iter().map(|p| material.value(p).abs());
     of_material.chain(causes.iter().flat_map(|c| c.cause.parameters()).map(|p| p.scale)).collect()
 }

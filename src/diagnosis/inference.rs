@@ -10,7 +10,7 @@ use super::metric::Metric;
 use super::prior::{BulkPrior, FitSettings};
 use super::supposed::Supposed;
 use super::trace::Trace;
-use crate::material::Ogden;
+use crate::material::Material;
 
 /// Most leaps of a cause after its fit.
 const MAX_LEAPS: usize = 3;
@@ -107,7 +107,7 @@ impl<'a> Inference<'a> {
     pub(super) fn fit(
         &mut self,
         measured: &Trace,
-        material: &Ogden,
+        material: &Material,
         causes: &[Supposed],
     ) -> Result<CauseFit, DiagnosisError> {
         fit(&mut self.laboratory, &self.metric, measured, material, causes, &self.settings, self.is_cancelled)
@@ -121,7 +121,7 @@ impl<'a> Inference<'a> {
     pub(super) fn fit_with_leaps(
         &mut self,
         measured: &Trace,
-        material: &Ogden,
+        material: &Material,
         causes: &[Supposed],
         known: &[Trace],
     ) -> Result<CauseFit, DiagnosisError> {
@@ -141,7 +141,7 @@ impl<'a> Inference<'a> {
     fn fit_beyond(
         &mut self,
         measured: &Trace,
-        material: &Ogden,
+        material: &Material,
         causes: &[Supposed],
         known: &[Trace],
     ) -> Result<CauseFit, DiagnosisError> {

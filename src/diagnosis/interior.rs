@@ -12,7 +12,7 @@ use super::metric::Metric;
 use super::nominal::fit_nominal;
 use super::trace::Trace;
 use crate::calibration::{CUT_PART, Observed};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::rate::BeforeAfter;
 use serde::{Deserialize, Serialize};
@@ -83,7 +83,7 @@ pub(super) fn test_interior(
     inference: &Inference,
     observed: &Observed,
     residual: &Trace,
-    start: &Ogden,
+    start: &Material,
 ) -> Result<Option<InteriorTest>, DiagnosisError> {
     (inference.progress)("interior test: the inside driven by what was measured around it");
     let part = match observed.between_measured_planes(CUT_PART) {
@@ -108,7 +108,7 @@ fn fitted_inside(
     observed: &Observed,
     part: &Observed,
     residual: &Trace,
-    start: &Ogden,
+    start: &Material,
 ) -> Result<InteriorTest, DiagnosisError> {
     let mesh = MeshOptions::scaled(&part.specimen, inference.mesh_factor);
     let mut inside = Inference {

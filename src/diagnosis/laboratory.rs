@@ -8,7 +8,7 @@ use super::supposed::Path;
 use super::trace::Trace;
 use crate::calibration::Observed;
 use crate::fem::{Change, Departures, Equilibrium, ForwardModel, SolveError, SolveOptions, Tangent};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::{MeshOptions, half_extents_mm, mesh_specimen};
 use crate::specimen::TestKind;
 use rayon::prelude::*;
@@ -113,7 +113,7 @@ impl<'a> Laboratory<'a> {
     /// [`DiagnosisError::Solve`] where a step has no equilibrium or the work was cancelled.
     pub fn predict(
         &mut self,
-        material: &Ogden,
+        material: &Material,
         scene: &Scene,
         is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Prediction, DiagnosisError> {
@@ -154,7 +154,7 @@ impl<'a> Laboratory<'a> {
 
     /// Equilibria from those that the station last found, steps side by side; `None` for a step that has none to start
     /// from or finds none from there.
-    fn warm_states(&self, at: usize, material: &Ogden, scene: &Scene) -> Vec<Option<Equilibrium>> {
+    fn warm_states(&self, at: usize, material: &Material, scene: &Scene) -> Vec<Option<Equilibrium>> {
         let station = &self.stations[at];
         let solved = |n: usize| {
             let near = station.states.get(n)?;
@@ -168,7 +168,7 @@ impl<'a> Laboratory<'a> {
     fn cold_state(
         &self,
         model: &mut ForwardModel,
-        material: &Ogden,
+        material: &Material,
         drive_mm: f64,
         last: Option<&Equilibrium>,
         is_cancelled: &(dyn Fn() -> bool + Sync),
@@ -198,7 +198,7 @@ impl<'a> Laboratory<'a> {
     /// As [`Self::predict`].
     pub fn load_curve(
         &mut self,
-        material: &Ogden,
+        material: &Material,
         scene: &Scene,
         drives_mm: &[f64],
         is_cancelled: &(dyn Fn() -> bool + Sync),
@@ -222,7 +222,7 @@ impl<'a> Laboratory<'a> {
     }
 
     /// Derivatives of `prediction`, which is that of `material` and `scene`: first with respect to every material
-    /// parameter (in the order of [`Ogden::parameters`]), then along each path t ↦ path(t) at t = 0. path(0) must be
+    /// parameter (in the order of [`Material::parameters`]), then along each path t ↦ path(t) at t = 0. path(0) must be
     /// `scene`. What is cheap is differenced over ±`step`: the residual of the equilibrium, the image and the load
     /// cell. Changes of holes and faces use the exact derivative of the mesh's nodes instead.
     ///
@@ -230,7 +230,7 @@ impl<'a> Laboratory<'a> {
     /// [`DiagnosisError::Solve`].
     pub fn derivatives(
         &mut self,
-        material: &Ogden,
+        material: &Material,
         scene: &Scene,
         prediction: &Prediction,
         with_material: bool,
@@ -299,7 +299,7 @@ impl<'a> Laboratory<'a> {
     fn tangents<'t>(
         &self,
         at: usize,
-        material: &'t Ogden,
+        material: &'t Material,
         scene: &Scene,
         prediction: &'t Prediction,
         with_material: bool,
@@ -327,7 +327,7 @@ impl<'a> Laboratory<'a> {
     fn changes_along(
         &self,
         mut tangent: Tangent,
-        material: &Ogden,
+        material: &Material,
         of_step: &OfStep,
         paths: &[(&Path, Option<&[[f64; 3]]>)],
     ) -> Result<Vec<SeenChange>, DiagnosisError> {
@@ -414,7 +414,7 @@ impl<'a> Laboratory<'a> {
     /// [`DiagnosisError::Solve`].
     pub fn bond_derivatives(
         &mut self,
-        material: &Ogden,
+        material: &Material,
         scene: &Scene,
         prediction: &Prediction,
         is_moved_face: bool,
@@ -456,7 +456,7 @@ impl<'a> Laboratory<'a> {
     }
 
     /// The departures of a scene at a step.
-    fn departures(&self, material: &Ogden, scene: &Scene, step: usize) -> Departures {
+    fn departures(&self, material: &Material, scene: &Scene, step: usize) -> Departures {
         scene.departures(step, &self.observed.steps[step], bond_scale(material), self.face_axis)
     }
 
@@ -496,7 +496,7 @@ impl<'a> Laboratory<'a> {
 }
 
 /// Stiffness (kPa/mm) of the sample under a node of its bond: shear modulus / node spacing.
-fn bond_scale(material: &Ogden) -> f64 {
+fn bond_scale(material: &Material) -> f64 {
     let mu = material.initial_shear_modulus_kpa();
     mu.abs() / BOND_LENGTH_MM
 }

@@ -13,7 +13,7 @@ use super::score::{Prepared, ScoreTest};
 use super::supposed::Path;
 use super::trace::Trace;
 use crate::fem::Field;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::specimen::TestKind;
 
 /// Parts of a bonded face along its longer and its shorter axis.
@@ -113,7 +113,7 @@ impl BondMap {
     /// [`DiagnosisError`].
     pub fn new(
         laboratory: &mut Laboratory,
-        material: &Ogden,
+        material: &Material,
         scene: &Scene,
         prediction: &Prediction,
         test: &ScoreTest,
@@ -168,7 +168,7 @@ impl StiffnessMap {
     /// [`DiagnosisError`].
     pub fn new(
         laboratory: &mut Laboratory,
-        material: &Ogden,
+        material: &Material,
         scene: &Scene,
         prediction: &Prediction,
         test: &ScoreTest,

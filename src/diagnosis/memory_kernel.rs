@@ -10,7 +10,7 @@
 //! elastic force but for what pressure adds.
 
 use crate::fem::{Equilibrium, ForwardModel, SolveError, Tangent};
-use crate::material::{Ogden, first_piola_kirchhoff_stress};
+use crate::material::{Material, first_piola_kirchhoff_stress};
 use crate::rate::ForceTable;
 use nalgebra::Matrix3;
 
@@ -46,12 +46,12 @@ impl KernelState {
     /// [`SolveError`]: the tangent is not positive definite.
     pub fn of(
         model: &ForwardModel,
-        material: &Ogden,
+        material: &Material,
         equilibrium: &Equilibrium,
         tangent: &mut Tangent,
     ) -> Result<KernelState, SolveError> {
         let rate = tangent.path_sensitivity(&[], None, 1.0)?;
-        let isochoric = Ogden { bulk_kpa: 0.0, ..material.clone() };
+        let isochoric = Material { bulk_kpa: 0.0, ..material.clone() };
         let here = model.quadrature_fields(material, equilibrium);
         // The deformation gradient of the rate alone is I + dF/dd.
         let moved = model.quadrature_fields_at(material, &model.mesh().nodes, &rate.displacement);
@@ -139,7 +139,7 @@ mod tests {
         specimen.block.length_mm = 60.0;
         specimen.block.width_mm = 60.0;
         specimen.block.thickness_mm = 3.0;
-        let material = Ogden { bulk_kpa: 3000.0, terms: vec![OgdenTerm { mu_kpa: 15.0, alpha: 2.4 }], law: None };
+        let material = Material { bulk_kpa: 3000.0, terms: vec![OgdenTerm { mu_kpa: 15.0, alpha: 2.4 }], law: None };
         let mesh = mesh_specimen(&specimen, &MeshOptions::scaled(&specimen, 6.0)).unwrap();
         let mut model = ForwardModel::new(mesh, &specimen).unwrap();
         let mut last = None;

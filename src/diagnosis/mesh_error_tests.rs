@@ -3,7 +3,7 @@ use crate::diagnosis::cause::CauseName;
 use crate::diagnosis::prior::BulkPrior;
 use crate::diagnosis::registry::Registry;
 use crate::diagnosis::supposed::Supposed;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::recording::{Filter, RecordedStep, Recording};
 use crate::specimen::Specimen;
 use crate::voxel::VoxelMask;
@@ -40,7 +40,7 @@ fn a_finer_mesh_corrects_estimates() {
     let never = || false;
     let (mesh_factor, truth) = (2.2, -0.012);
     let specimen = Specimen::from_json(include_str!("../../geometries/two-hole-shear.json")).unwrap();
-    let material = Ogden::from_json(include_str!("../../geometries/materials/ecoflex-0020.json")).unwrap();
+    let material = Material::from_json(include_str!("../../geometries/materials/ecoflex-0020.json")).unwrap();
     let observed = observed(specimen, [1.5, 0.8, 1.6]);
     let laboratory_of =
         |factor: f64| Laboratory::new(&observed, &MeshOptions::scaled(&observed.specimen, factor)).unwrap();

@@ -9,7 +9,7 @@ use super::laboratory::Laboratory;
 use super::scene::Scene;
 use super::supposed::Supposed;
 use super::trace::Trace;
-use crate::material::{Ogden, OgdenTerm};
+use crate::material::{Material, OgdenTerm};
 
 /// The material from which the first fit starts: the one believed, or a neo-Hookean one with the modulus of the
 /// measured force and the κ/μ of a rubber.
@@ -18,13 +18,13 @@ use crate::material::{Ogden, OgdenTerm};
 /// [`DiagnosisError`]: no equilibrium, or the work was cancelled.
 pub(super) fn first_guess(
     laboratory: &mut Laboratory,
-    believed: Option<&Ogden>,
+    believed: Option<&Material>,
     is_cancelled: &(dyn Fn() -> bool + Sync),
-) -> Result<Ogden, DiagnosisError> {
+) -> Result<Material, DiagnosisError> {
     if let Some(believed) = believed {
         return Ok(believed.clone());
     }
-    let mut material = Ogden { bulk_kpa: 2000.0, terms: vec![OgdenTerm { mu_kpa: 16.0, alpha: 2.0 }], law: None };
+    let mut material = Material { bulk_kpa: 2000.0, terms: vec![OgdenTerm { mu_kpa: 16.0, alpha: 2.0 }], law: None };
     let predicted = laboratory.predict(&material, &Scene::default(), is_cancelled)?;
     let forces = laboratory.measured().force;
     let ratio = |n: &usize| forces[*n] / predicted.trace.force[*n];
@@ -42,7 +42,7 @@ pub(super) fn first_guess(
 pub(super) fn fit_nominal(
     inference: &mut Inference,
     measured: &Trace,
-    start: &Ogden,
+    start: &Material,
     is_believed: bool,
 ) -> Result<CauseFit, DiagnosisError> {
     let settings = inference.settings;
@@ -66,7 +66,7 @@ pub(super) fn fit_nominal(
 pub(super) fn fit_with_terms(
     inference: &mut Inference,
     measured: &Trace,
-    start: &Ogden,
+    start: &Material,
     causes: &[Supposed],
 ) -> Result<CauseFit, DiagnosisError> {
     let mut found = inference.fit(measured, start, causes)?;

@@ -3,7 +3,7 @@
 use super::cause::CauseName;
 use super::error::DiagnosisError;
 use crate::calibration::Boundary;
-use crate::material::Ogden;
+use crate::material::Material;
 
 /// Settings of [`super::diagnose()`].
 #[derive(Clone, Debug)]
@@ -14,7 +14,7 @@ pub struct DiagnosisOptions {
     /// drive.
     pub allowance_mm: Option<f64>,
     /// The material as believed; its number of terms is then the nominal one.
-    pub prior: Option<Ogden>,
+    pub prior: Option<Material>,
     /// Most causes that are named, however they were found; artefacts of the image do not count. No round begins once
     /// the count is reached.
     pub max_causes: usize,

@@ -10,7 +10,7 @@ use super::mesh_error::MeshDefect;
 use super::prior::FitSettings;
 use super::ranked::Ranked;
 use crate::calibration::Observed;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::rate::Verdict;
 
 /// The diagnosis of a recording.
@@ -38,7 +38,7 @@ pub struct Diagnosis {
     /// Maps of the nominal misfit.
     pub maps: Vec<(String, ScoreMap)>,
     /// The material as believed.
-    pub believed: Option<Ogden>,
+    pub believed: Option<Material>,
     /// Priors and stops of the last fits.
     pub settings: FitSettings,
     /// The recording as compared.

@@ -1,6 +1,6 @@
 //! What is known of a material before a fit, and when a fit stops.
 
-use crate::material::Ogden;
+use crate::material::Material;
 
 /// What is known of κ beforehand: ln κ is Gaussian.
 #[derive(Clone, Copy, Debug)]
@@ -25,7 +25,7 @@ impl ShearPrior {
     /// The prior's part of a fit in scaled parameters (κ first): its squares (the distance from the centre in standard
     /// deviations, squared), the derivatives of the modulus' logarithm, and the factor on these that gives half of the
     /// squares' negative gradient.
-    pub(super) fn terms(&self, material: &Ogden) -> (f64, Vec<f64>, f64) {
+    pub(super) fn terms(&self, material: &Material) -> (f64, Vec<f64>, f64) {
         let modulus = shear_modulus(material);
         let away = (self.center_kpa / modulus).ln();
         let weight = self.log_sd.powi(-2);
@@ -52,6 +52,6 @@ pub struct FitSettings {
 }
 
 /// ½ Σ μᵢαᵢ, kPa.
-pub fn shear_modulus(material: &Ogden) -> f64 {
+pub fn shear_modulus(material: &Material) -> f64 {
     material.initial_shear_modulus_kpa()
 }

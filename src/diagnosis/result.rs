@@ -10,7 +10,7 @@ use super::location::Location;
 use super::outcome::Diagnosis;
 use super::prior::shear_modulus;
 use super::registry::remedy_of;
-use crate::material::{Ogden, Parameter};
+use crate::material::{Material, Parameter};
 use crate::rate::{BeforeAfter, Verdict};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -72,7 +72,7 @@ const SMALLEST_DIFFERENCE: f64 = 0.02;
 
 impl ModulusAgainstBelief {
     /// Of `found` against `believed`; none where they agree.
-    pub fn new(believed: &Ogden, found: &Ogden) -> Option<ModulusAgainstBelief> {
+    pub fn new(believed: &Material, found: &Material) -> Option<ModulusAgainstBelief> {
         let (believed_kpa, found_kpa) = (shear_modulus(believed), shear_modulus(found));
         let as_relative_cell_gain_error = found_kpa / believed_kpa - 1.0;
         (as_relative_cell_gain_error.abs() > SMALLEST_DIFFERENCE).then_some(ModulusAgainstBelief {
@@ -124,11 +124,11 @@ pub struct DiagnosisResult {
     /// How it ended.
     pub verdict: Verdict,
     /// The material with the causes modelled.
-    pub material: Ogden,
+    pub material: Material,
     /// Its parameters.
     pub material_parameters: Vec<ParameterResult>,
     /// The material that the nominal model gives.
-    pub nominal_material: Ogden,
+    pub nominal_material: Material,
     /// How the modulus differs from the believed one; left out where it does not, where no material was believed, or
     /// where no force was recorded.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -17,7 +17,7 @@ use super::search::Search;
 use super::supposed::{Path, Supposed, paths_of, scene_of};
 use super::trace::Trace;
 use crate::calibration::Observed;
-use crate::material::Ogden;
+use crate::material::Material;
 use std::sync::Arc;
 
 /// Most full fits per round.
@@ -148,7 +148,7 @@ pub(super) fn suspects_of(
 #[derive(Clone, Copy)]
 pub(super) struct Place<'p> {
     /// The material.
-    pub(super) material: &'p Ogden,
+    pub(super) material: &'p Material,
     /// The causes found so far.
     pub(super) causes: &'p [Supposed],
     /// What both predict.

@@ -6,7 +6,7 @@ use super::mesh_error::FINER;
 use super::options::DiagnosisOptions;
 use super::scene::Scene;
 use crate::calibration::Observed;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::recording::{Filter, RecordedStep, Recording};
 use crate::specimen::Specimen;
@@ -33,8 +33,8 @@ pub(super) fn options() -> DiagnosisOptions {
 }
 
 /// The material of the recordings.
-pub(super) fn material() -> Ogden {
-    Ogden::from_json(include_str!("../../geometries/materials/ecoflex-0020.json")).unwrap()
+pub(super) fn material() -> Material {
+    Material::from_json(include_str!("../../geometries/materials/ecoflex-0020.json")).unwrap()
 }
 
 /// A deterministic number that stands for noise: near Gaussian, of unit variance.
@@ -53,7 +53,7 @@ impl Noise {
 }
 
 /// A noisy recording of `scene` in `material` at 2 and 4 mm, made on a mesh of `mesh_factor`.
-pub(super) fn recorded(material: &Ogden, scene: &Scene, mesh_factor: f64) -> Recording {
+pub(super) fn recorded(material: &Material, scene: &Scene, mesh_factor: f64) -> Recording {
     let mut specimen = Specimen::from_json(include_str!("../../geometries/solid-shear.json")).unwrap();
     specimen.drive_mm = vec![2.0, 4.0];
     let mask = VoxelMask::covering(&specimen, [2.5, 0.8, 2.5]).unwrap();

@@ -14,7 +14,7 @@ use super::outcome::Diagnosis;
 use super::prior::{BulkPrior, FitSettings, ShearPrior};
 use super::result::{ParameterResult, material_parameters, parameter};
 use super::supposed::Supposed;
-use crate::material::Ogden;
+use crate::material::Material;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -52,7 +52,7 @@ pub struct CommonCause {
 #[serde(deny_unknown_fields)]
 pub struct TogetherResult {
     /// Their one material, each recording with its own causes.
-    pub material: Ogden,
+    pub material: Material,
     /// Its parameters.
     pub material_parameters: Vec<ParameterResult>,
     /// Whether one material serves all.
@@ -216,7 +216,7 @@ impl CommonFit<'_> {
     /// Fits one material to all cases with `causes`; what is `common` is one number in all.
     fn fit(
         &mut self,
-        start: &Ogden,
+        start: &Material,
         causes: &[Vec<Supposed>],
         common: Option<&Common>,
     ) -> Result<Vec<CauseFit>, DiagnosisError> {

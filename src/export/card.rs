@@ -5,7 +5,7 @@ use super::error::ExportError;
 use super::label::label;
 use super::programs::MaterialFormat;
 use crate::homogeneous::StressUnit;
-use crate::material::Ogden;
+use crate::material::Material;
 
 /// Numbers on a line of Abaqus and CalculiX.
 const PER_LINE: usize = 8;
@@ -28,10 +28,10 @@ pub struct Origin<'a> {
 /// ```
 /// use lambdak::export::{MaterialFormat, Origin, material_card};
 /// use lambdak::homogeneous::StressUnit;
-/// use lambdak::material::Ogden;
+/// use lambdak::material::Material;
 /// let text = r#"{ "schema": "ogden/1", "bulk_kpa": 2000.0, "terms": [{ "mu_kpa": 16.0, "alpha": 2.0 }] }"#;
 /// let origin = Origin { name: "silicone", version: "0.1.0", input_hash: "" };
-/// let card = material_card(&Ogden::from_json(text)?, MaterialFormat::Abaqus, StressUnit::MPa, &origin)?;
+/// let card = material_card(&Material::from_json(text)?, MaterialFormat::Abaqus, StressUnit::MPa, &origin)?;
 /// assert!(card.ends_with("*HYPERELASTIC, OGDEN, N=1\n1.6e-2, 2.0e0, 1.0e0\n"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -39,7 +39,7 @@ pub struct Origin<'a> {
 /// # Errors
 /// [`ExportError`].
 pub fn material_card(
-    material: &Ogden,
+    material: &Material,
     format: MaterialFormat,
     unit: StressUnit,
     origin: &Origin,

@@ -8,7 +8,7 @@
 use super::error::ExportError;
 use super::number::number;
 use crate::homogeneous::StressUnit;
-use crate::material::{LawParameter, Ogden, OgdenTerm};
+use crate::material::{LawParameter, Material, OgdenTerm};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -152,7 +152,7 @@ impl Convention {
     /// one.
     pub(super) fn constants(
         &self,
-        material: &Ogden,
+        material: &Material,
         unit: StressUnit,
         program: &'static str,
     ) -> Result<Vec<Constant>, ExportError> {

@@ -3,11 +3,11 @@
 
 use super::*;
 use crate::homogeneous::{HomogeneousTest, StressUnit, respond};
-use crate::material::{LawKind, Ogden, OgdenTerm, energy_density, first_piola_kirchhoff_stress, laws};
+use crate::material::{LawKind, Material, OgdenTerm, energy_density, first_piola_kirchhoff_stress, laws};
 
 /// Materials with one to three of Ogden's terms, and with each law in the first invariant.
-fn materials() -> Vec<Ogden> {
-    let make = |bulk_kpa, terms: &[(f64, f64)]| Ogden {
+fn materials() -> Vec<Material> {
+    let make = |bulk_kpa, terms: &[(f64, f64)]| Material {
         bulk_kpa,
         terms: terms.iter().map(|&(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha }).collect(),
         law: None,
@@ -17,22 +17,22 @@ fn materials() -> Vec<Ogden> {
         make(2200.0, &[(16.0, 1.9), (0.35, 8.0)]),
         make(900.0, &[(12.0, 2.5), (-3.0, -2.0), (0.001, 14.0)]),
     ];
-    let of_law = |law| Ogden { bulk_kpa: 2100.0, terms: vec![], law: Some(law) };
+    let of_law = |law| Material { bulk_kpa: 2100.0, terms: vec![], law: Some(law) };
     ogden.into_iter().chain(laws().map(of_law)).collect()
 }
 
-fn kind(material: &Ogden) -> Option<LawKind> {
+fn kind(material: &Material) -> Option<LawKind> {
     material.law.map(|law| law.kind())
 }
 
 /// The materials that each program has.
-fn cases() -> Vec<(Ogden, MaterialFormat)> {
-    let has = |(material, format): &(Ogden, MaterialFormat)| format.convention(kind(material)).is_some();
+fn cases() -> Vec<(Material, MaterialFormat)> {
+    let has = |(material, format): &(Material, MaterialFormat)| format.convention(kind(material)).is_some();
     let all = materials().into_iter().flat_map(|m| MaterialFormat::ALL.map(|format| (m.clone(), format)));
     all.filter(has).collect()
 }
 
-fn volumetric_law(material: &Ogden, format: MaterialFormat) -> VolumetricLaw {
+fn volumetric_law(material: &Material, format: MaterialFormat) -> VolumetricLaw {
     format.convention(kind(material)).unwrap().law
 }
 
@@ -181,7 +181,7 @@ fn uniaxial(energy: &dyn Fn([f64; 3]) -> f64, stretch: f64) -> f64 {
     slope(&|h| at(stretch + h, low))
 }
 
-fn card(material: &Ogden, format: MaterialFormat, unit: StressUnit) -> String {
+fn card(material: &Material, format: MaterialFormat, unit: StressUnit) -> String {
     let origin = Origin { name: "test -- 1", version: "0", input_hash: "0" };
     material_card(material, format, unit, &origin).unwrap()
 }
@@ -302,15 +302,16 @@ fn pressures_differ_as_cards_say() {
 #[test]
 fn what_a_program_cannot_read_is_refused() {
     let terms = (1..=4).map(|i| OgdenTerm { mu_kpa: 1.0, alpha: f64::from(i) }).collect();
-    let material = Ogden { bulk_kpa: 1e3, terms, law: None };
-    let refused = |material: &Ogden, format: MaterialFormat| format.convert(material, StressUnit::MPa).err().unwrap();
+    let material = Material { bulk_kpa: 1e3, terms, law: None };
+    let refused =
+        |material: &Material, format: MaterialFormat| format.convert(material, StressUnit::MPa).err().unwrap();
     let found = refused(&material, MaterialFormat::Calculix);
     assert_eq!(found, ExportError::TooManyTerms { program: "CalculiX", count: 4, limit: 3 });
     // Eight numbers a line: four pairs, then D_1 to D_4.
     let text = card(&material, MaterialFormat::Abaqus, StressUnit::MPa);
     let lines: Vec<usize> = text.lines().filter(|l| !l.starts_with('*')).map(|l| l.split(',').count()).collect();
     assert_eq!(lines, [8, 4]);
-    let gent = Ogden { bulk_kpa: 1e3, terms: vec![], law: Some(laws()[1]) };
+    let gent = Material { bulk_kpa: 1e3, terms: vec![], law: Some(laws()[1]) };
     for format in [MaterialFormat::Abaqus, MaterialFormat::Calculix] {
         let others = vec!["Ansys", "COMSOL", "FEBio"];
         assert_eq!(refused(&gent, format), ExportError::NoSuchLaw { program: format.program(), law: "Gent", others });

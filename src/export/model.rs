@@ -1,7 +1,7 @@
 //! A mesh with material, boundary conditions and drives, numbered as other programs number.
 
 use super::convention::Converted;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::{ElementKind, Mesh};
 use crate::report::nodes_in_vtk_order;
 
@@ -11,7 +11,7 @@ pub struct Model<'a> {
     /// The mesh, with the nodes of its plates and mirror planes.
     pub mesh: &'a Mesh,
     /// The material.
-    pub material: &'a Ogden,
+    pub material: &'a Material,
     /// Drives, mm, one load step each.
     pub drives_mm: &'a [f64],
     /// Unit vector in which the moved face goes for a positive drive.

@@ -8,7 +8,7 @@ use super::model::{Model, Numbered, Written};
 use super::programs::MaterialFormat;
 use super::{febio, keywords};
 use crate::homogeneous::StressUnit;
-use crate::material::Ogden;
+use crate::material::Material;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -46,12 +46,12 @@ impl ModelFormat {
     ///
     /// # Errors
     /// [`ExportError`].
-    pub fn check(self, material: &Ogden) -> Result<(), ExportError> {
+    pub fn check(self, material: &Material) -> Result<(), ExportError> {
         self.convert(material).map(|_| ())
     }
 
     /// `material` in the program's convention in MPa, which go with mm and N.
-    fn convert(self, material: &Ogden) -> Result<Converted, ExportError> {
+    fn convert(self, material: &Material) -> Result<Converted, ExportError> {
         self.material().convert(material, StressUnit::MPa)
     }
 

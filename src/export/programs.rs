@@ -3,7 +3,7 @@
 use super::convention::{Convention, Converted, LawConstant, Shape, Volumetric, VolumetricLaw};
 use super::error::ExportError;
 use crate::homogeneous::StressUnit;
-use crate::material::{LawKind, LawParameter, Ogden, OgdenTerm};
+use crate::material::{LawKind, LawParameter, Material, OgdenTerm};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -86,7 +86,7 @@ impl MaterialFormat {
     ///
     /// # Errors
     /// [`ExportError`].
-    pub fn convert(self, material: &Ogden, unit: StressUnit) -> Result<Converted, ExportError> {
+    pub fn convert(self, material: &Material, unit: StressUnit) -> Result<Converted, ExportError> {
         let law = material.law.map(|law| law.kind());
         let has = |format: &MaterialFormat| format.convention(law).is_some();
         let convention = self.convention(law).ok_or_else(|| ExportError::NoSuchLaw {

@@ -14,7 +14,7 @@ use super::tangent::Tangent;
 const ACCURACY: f64 = 1e-8;
 
 impl Tangent<'_> {
-    /// dJ/dξ for every parameter in the order of [`Ogden::parameters`](crate::material::Ogden::parameters).
+    /// dJ/dξ for every parameter in the order of [`Material::parameters`](crate::material::Material::parameters).
     /// `by_displacement` is ∂J/∂u at each node (per mm), `by_force` is ∂J/∂F (per N). For the nominal experiment (no
     /// released faces).
     ///

@@ -15,7 +15,7 @@ use super::linearisation::Linearisation;
 use super::plates::Plates;
 use super::rates::Rates;
 use super::topology::Topology;
-use crate::material::{Lanes, Ogden, Parameter};
+use crate::material::{Lanes, Material, Parameter};
 use crate::mesh::Mesh;
 use crate::specimen::Specimen;
 use std::sync::{Arc, OnceLock};
@@ -51,7 +51,7 @@ const TURNS_WORTH_HELP: usize = 32;
 #[derive(Clone, Copy)]
 pub(super) struct Configuration<'a> {
     /// The material.
-    pub(super) material: &'a Ogden,
+    pub(super) material: &'a Material,
     /// Reference position of each node, mm.
     pub(super) positions: &'a [[f64; 3]],
     /// Displacement of each node, mm.
@@ -59,8 +59,8 @@ pub(super) struct Configuration<'a> {
 }
 
 /// A material of which only the geometry of elements at rest is asked.
-fn any_material() -> Ogden {
-    Ogden { bulk_kpa: 1.0, terms: Vec::new(), law: None }
+fn any_material() -> Material {
+    Material { bulk_kpa: 1.0, terms: Vec::new(), law: None }
 }
 
 impl Assembler {
@@ -342,7 +342,7 @@ impl Assembler {
     /// [`StepFailure::InvertedElement`]; the linearisation is then of no use.
     pub(super) fn linearise(
         &self,
-        material: &Ogden,
+        material: &Material,
         state: &Equilibrium,
         into: &mut Linearisation,
     ) -> Result<(), StepFailure> {
@@ -375,7 +375,7 @@ impl Assembler {
     /// [`StepFailure::InvertedElement`]; the residual is then of no use.
     pub(super) fn evaluate(
         &self,
-        material: &Ogden,
+        material: &Material,
         state: &Equilibrium,
         into: &mut Linearisation,
     ) -> Result<(), StepFailure> {

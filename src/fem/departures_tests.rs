@@ -1,7 +1,7 @@
 //! Departures against closed forms and Taylor's theorem.
 
 use super::*;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::{MeshOptions, mesh_specimen};
 use crate::specimen::Specimen;
 
@@ -9,18 +9,18 @@ const TWO_HOLE: &str = include_str!("../../geometries/two-hole-shear.json");
 const ECOFLEX: &str = include_str!("../../geometries/materials/ecoflex-0020.json");
 const TIGHT: SolveOptions = SolveOptions { tolerance: 1e-9, max_iterations: 20, min_step: 1.0 / 64.0 };
 
-fn coarse() -> (Specimen, MeshOptions, Ogden) {
+fn coarse() -> (Specimen, MeshOptions, Material) {
     let specimen = Specimen::from_json(TWO_HOLE).unwrap();
     let options = MeshOptions { use_mirror: false, ..MeshOptions::scaled(&specimen, 3.0) };
-    (specimen, options, Ogden::from_json(ECOFLEX).unwrap())
+    (specimen, options, Material::from_json(ECOFLEX).unwrap())
 }
 
-fn model() -> (ForwardModel, Ogden) {
+fn model() -> (ForwardModel, Material) {
     let (specimen, options, material) = coarse();
     (ForwardModel::new(mesh_specimen(&specimen, &options).unwrap(), &specimen).unwrap(), material)
 }
 
-fn solve(model: &mut ForwardModel, material: &Ogden, near: Option<&Equilibrium>) -> Equilibrium {
+fn solve(model: &mut ForwardModel, material: &Material, near: Option<&Equilibrium>) -> Equilibrium {
     model.solve(material, 4.0, near, &TIGHT, &|| false).unwrap()
 }
 

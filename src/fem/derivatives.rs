@@ -49,7 +49,7 @@ struct Path<'a> {
 }
 
 impl Tangent<'_> {
-    /// ∂u/∂ξ and ∂F/∂ξ for every parameter, in the order of [`Ogden::parameters`](crate::material::Ogden::parameters).
+    /// ∂u/∂ξ and ∂F/∂ξ for every parameter, in the order of [`Material::parameters`](crate::material::Material::parameters).
     ///
     /// # Errors
     /// [`SolveError::Linear`] if the tangent is not positive definite.

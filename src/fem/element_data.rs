@@ -5,7 +5,7 @@
 
 use super::departures::Fibre;
 use super::law_correction::LawCorrection;
-use crate::material::{LANES, Lanes, Ogden, Parameter, Tensor};
+use crate::material::{LANES, Lanes, Material, Parameter, Tensor};
 use crate::mesh::ElementKind;
 
 /// Most nodes (and quadrature points) of an element.
@@ -78,7 +78,7 @@ pub struct ElementInput<'a> {
     /// Pressure coefficients; `None` for the condensed ones.
     pub pressure: Option<[f64; 4]>,
     /// The material.
-    pub material: &'a Ogden,
+    pub material: &'a Material,
     /// Factor on the isochoric stiffness at the quadrature points; one if absent.
     pub stiffness_factor: Option<&'a [Lanes; MAX_GROUPS]>,
     /// ln of the volume ratio free of pressure at the quadrature points; zero if absent.

@@ -9,7 +9,7 @@ use super::guide::Guide;
 use super::mesh_model::MeshModel;
 use super::options::{SolveOptions, Statistics};
 use super::tangent::Tangent;
-use crate::material::{MAX_TERMS, Ogden};
+use crate::material::{MAX_TERMS, Material};
 use crate::mesh::{Mesh, MeshOptions, mesh_specimen, refined};
 use crate::specimen::Specimen;
 
@@ -153,7 +153,7 @@ impl ForwardModel {
     /// [`SolveError::TooManyTerms`], [`SolveError::InvalidDrive`].
     pub fn solve(
         &mut self,
-        material: &Ogden,
+        material: &Material,
         drive_mm: f64,
         start: Option<&Equilibrium>,
         options: &SolveOptions,
@@ -177,7 +177,7 @@ impl ForwardModel {
     /// As [`Self::solve`].
     pub fn solve_path(
         &mut self,
-        material: &Ogden,
+        material: &Material,
         drives_mm: &[f64],
         options: &SolveOptions,
         is_cancelled: &dyn Fn() -> bool,
@@ -197,7 +197,7 @@ impl ForwardModel {
     /// As [`ForwardModel::solve`].
     pub fn solve_by_parts(
         &mut self,
-        material: &Ogden,
+        material: &Material,
         drive_mm: f64,
         options: &SolveOptions,
         is_cancelled: &dyn Fn() -> bool,
@@ -224,7 +224,7 @@ impl ForwardModel {
     /// positive definite.
     pub fn tangent<'a>(
         &mut self,
-        material: &'a Ogden,
+        material: &'a Material,
         equilibrium: &'a Equilibrium,
     ) -> Result<Tangent<'a>, SolveError> {
         self.fine.tangent(material, equilibrium)
@@ -232,7 +232,7 @@ impl ForwardModel {
 
     /// Deformation and stress at every quadrature point, element after element, in the order of
     /// [`crate::mesh::ElementKind::quadrature`].
-    pub fn quadrature_fields(&self, material: &Ogden, equilibrium: &Equilibrium) -> Vec<QuadraturePoint> {
+    pub fn quadrature_fields(&self, material: &Material, equilibrium: &Equilibrium) -> Vec<QuadraturePoint> {
         let at = Configuration { material, positions: &self.mesh().nodes, displacement: &equilibrium.displacement };
         self.fine.assembler.quadrature_fields(&at, Some(&equilibrium.pressure))
     }
@@ -241,7 +241,7 @@ impl ForwardModel {
     /// the pressure is the condensed one.
     pub fn quadrature_fields_at(
         &self,
-        material: &Ogden,
+        material: &Material,
         positions: &[[f64; 3]],
         displacement: &[[f64; 3]],
     ) -> Vec<QuadraturePoint> {
@@ -252,7 +252,7 @@ impl ForwardModel {
     ///
     /// # Errors
     /// [`SolveError::Diverged`] where the state is not one of this mesh.
-    pub fn plate_tractions(&self, material: &Ogden, equilibrium: &Equilibrium) -> Result<Vec<[f64; 3]>, SolveError> {
+    pub fn plate_tractions(&self, material: &Material, equilibrium: &Equilibrium) -> Result<Vec<[f64; 3]>, SolveError> {
         let at = Configuration { material, positions: &self.mesh().nodes, displacement: &equilibrium.displacement };
         let tractions = self.fine.assembler.plate_tractions(&at);
         tractions.map_err(|cause| SolveError::diverged_at(equilibrium.drive_mm, cause))
@@ -260,7 +260,7 @@ impl ForwardModel {
 }
 
 /// Whether a solution may be asked for.
-fn check(material: &Ogden, drive_mm: f64) -> Result<(), SolveError> {
+fn check(material: &Material, drive_mm: f64) -> Result<(), SolveError> {
     if material.terms.len() > MAX_TERMS {
         return Err(SolveError::TooManyTerms { num_terms: material.terms.len(), limit: MAX_TERMS });
     }

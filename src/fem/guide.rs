@@ -9,7 +9,7 @@ use super::equilibrium::Equilibrium;
 use super::mesh_model::MeshModel;
 use super::newton::Newton;
 use super::options::SolveOptions;
-use crate::material::{LANES, Ogden};
+use crate::material::{LANES, Material};
 use crate::mesh::{Location, Locator, Mesh};
 use crate::specimen::Specimen;
 use std::sync::Arc;
@@ -88,7 +88,7 @@ impl Guide {
     }
 
     /// The coarse equilibrium `from` on the mesh of `fine`.
-    fn transfer(&self, fine: &Assembler, material: &Ogden, from: &Equilibrium) -> Equilibrium {
+    fn transfer(&self, fine: &Assembler, material: &Material, from: &Equilibrium) -> Equilibrium {
         let (coarse_mesh, mesh) = (self.coarse.assembler.mesh(), fine.mesh());
         let kind = coarse_mesh.element_kind;
         let mut displacement: Vec<[f64; 3]> = self
@@ -141,7 +141,7 @@ impl Guide {
     }
 
     /// The coarse pressure of each element as a + b·x.
-    fn affine_pressures(&self, material: &Ogden, from: &Equilibrium) -> Vec<[f64; 4]> {
+    fn affine_pressures(&self, material: &Material, from: &Equilibrium) -> Vec<[f64; 4]> {
         let coarse = &self.coarse.assembler;
         let at = Configuration { material, positions: &coarse.mesh().nodes, displacement: &from.displacement };
         let mut out = ElementOutput::default();
@@ -179,7 +179,7 @@ mod tests {
     #[test]
     fn a_coarse_mesh_beside_leads_to_the_same_equilibrium() {
         let specimen = Specimen::from_json(include_str!("../../geometries/two-hole-shear.json")).unwrap();
-        let material = Ogden::new(2173.0, [(17.0, 1.91)]).unwrap();
+        let material = Material::new(2173.0, [(17.0, 1.91)]).unwrap();
         let options = MeshOptions::scaled(&specimen, 1.2);
         let solve = SolveOptions { tolerance: 1e-9, ..SolveOptions::default() };
         let mut guided = ForwardModel::of_specimen(&specimen, &options).unwrap();

@@ -9,7 +9,7 @@ use super::linearisation::Linearisation;
 use super::newton::{KEEP_TANGENT_BELOW, Newton};
 use super::options::{SolveOptions, Statistics};
 use super::tangent::Tangent;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::Mesh;
 use crate::specimen::Specimen;
 
@@ -54,7 +54,7 @@ impl MeshModel {
     /// A run of Newton's method.
     pub(super) fn newton<'a>(
         &'a mut self,
-        material: &'a Ogden,
+        material: &'a Material,
         options: &'a SolveOptions,
         is_cancelled: &'a dyn Fn() -> bool,
     ) -> Newton<'a> {
@@ -75,7 +75,7 @@ impl MeshModel {
     /// [`SolveError::Diverged`] where an element is inverted, [`SolveError::Linear`] where there is no factor.
     pub(super) fn tangent<'a>(
         &mut self,
-        material: &'a Ogden,
+        material: &'a Material,
         equilibrium: &'a Equilibrium,
     ) -> Result<Tangent<'a>, SolveError> {
         let there = &mut self.linearisation;

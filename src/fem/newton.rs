@@ -9,7 +9,7 @@ use super::equilibrium::{Equilibrium, Serial};
 use super::error::{SolveError, StepFailure};
 use super::linearisation::Linearisation;
 use super::options::{SolveOptions, Statistics};
-use crate::material::Ogden;
+use crate::material::Material;
 
 /// Relative residual below which the factor of an earlier iterate is tried first: the tangent changes by about as much.
 const REUSE_BELOW: f64 = 0.1;
@@ -38,7 +38,7 @@ pub(super) struct Newton<'a> {
     /// Where residuals and tangents are assembled; after a success it stands at the equilibrium found.
     pub(super) linearisation: &'a mut Linearisation,
     /// The material.
-    pub(super) material: &'a Ogden,
+    pub(super) material: &'a Material,
     /// Settings.
     pub(super) options: &'a SolveOptions,
     /// Asked before every load step and iteration.

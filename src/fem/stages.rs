@@ -4,14 +4,14 @@ use super::equilibrium::Equilibrium;
 use super::error::SolveError;
 use super::forward_model::ForwardModel;
 use super::mesh_model::MeshModel;
-use crate::material::Ogden;
+use crate::material::Material;
 
 impl ForwardModel {
     /// Assembles residual and tangent at `equilibrium`; returns the largest residual entry, kPa·mm².
     ///
     /// # Errors
     /// [`SolveError::Diverged`] where an element is inverted.
-    pub fn assemble_stage(&mut self, material: &Ogden, equilibrium: &Equilibrium) -> Result<f64, SolveError> {
+    pub fn assemble_stage(&mut self, material: &Material, equilibrium: &Equilibrium) -> Result<f64, SolveError> {
         let MeshModel { assembler, linearisation } = &mut self.fine;
         assembler
             .linearise(material, equilibrium, linearisation)

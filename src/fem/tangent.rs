@@ -4,7 +4,7 @@ use super::assembler::{Assembler, Configuration};
 use super::equilibrium::Equilibrium;
 use super::error::{SolveError, StepFailure};
 use super::linear::{LinearSystem, MAX_COLUMNS};
-use crate::material::Ogden;
+use crate::material::Material;
 
 /// The tangent stiffness K of one equilibrium with a factor: what every derivative of that equilibrium is solved with.
 ///
@@ -14,7 +14,7 @@ use crate::material::Ogden;
 /// the model solves again.
 pub struct Tangent<'a> {
     pub(super) assembler: Assembler,
-    pub(super) material: &'a Ogden,
+    pub(super) material: &'a Material,
     pub(super) equilibrium: &'a Equilibrium,
     pub(super) system: LinearSystem,
 }

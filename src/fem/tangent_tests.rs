@@ -1,20 +1,20 @@
 //! A tangent is a value: what its model or a model beside it solves meanwhile does not change it.
 
 use super::*;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::{MeshOptions, mesh_specimen};
 use crate::specimen::Specimen;
 
 const TWO_HOLE: &str = include_str!("../../geometries/two-hole-shear.json");
 const ECOFLEX: &str = include_str!("../../geometries/materials/ecoflex-0020.json");
 
-fn model() -> (ForwardModel, Ogden) {
+fn model() -> (ForwardModel, Material) {
     let specimen = Specimen::from_json(TWO_HOLE).unwrap();
     let mesh = mesh_specimen(&specimen, &MeshOptions::scaled(&specimen, 3.0)).unwrap();
-    (ForwardModel::new(mesh, &specimen).unwrap(), Ogden::from_json(ECOFLEX).unwrap())
+    (ForwardModel::new(mesh, &specimen).unwrap(), Material::from_json(ECOFLEX).unwrap())
 }
 
-fn solve(model: &mut ForwardModel, material: &Ogden, drive_mm: f64) -> Equilibrium {
+fn solve(model: &mut ForwardModel, material: &Material, drive_mm: f64) -> Equilibrium {
     model.solve(material, drive_mm, None, &SolveOptions::default(), &|| false).unwrap()
 }
 

@@ -11,7 +11,7 @@ use super::forward_model::ForwardModel;
 use super::mesh_model::MeshModel;
 use super::newton::finished;
 use super::options::SolveOptions;
-use crate::material::Ogden;
+use crate::material::Material;
 
 impl ForwardModel {
     /// Solves with the nodes of `fixed_nodes` and `moved_nodes` kept at their values in `guess`, under nodal dead
@@ -27,7 +27,7 @@ impl ForwardModel {
     #[doc(hidden)]
     pub fn solve_prescribed(
         &mut self,
-        material: &Ogden,
+        material: &Material,
         guess: &[[f64; 3]],
         load: Option<&[[f64; 3]]>,
         options: &SolveOptions,

@@ -6,7 +6,7 @@
 //! stretch.
 
 use super::deformation::Deformation;
-use crate::material::{Lanes, Ogden, Parameter};
+use crate::material::{Lanes, Material, Parameter};
 
 /// Newton stops when the free face's traction is below this part of the shear stiffness.
 const TOLERANCE: f64 = 1e-13;
@@ -47,12 +47,12 @@ pub struct Response {
     pub principal_stretches: [f64; 3],
     /// Nominal stresses, kPa: P_xx and P_yy (for simple shear P_xy, 0).
     pub nominal_stress_kpa: [f64; 2],
-    /// Derivatives of these in the order of [`Ogden::parameters`].
+    /// Derivatives of these in the order of [`Material::parameters`].
     pub derivatives: Vec<[f64; 2]>,
 }
 
 /// Kirchhoff principal stresses, their derivatives ∂τⱼ/∂eₖ.
-fn kirchhoff(material: &Ogden, e: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
+fn kirchhoff(material: &Material, e: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
     let volume: f64 = e.iter().sum();
     let mut stress = [material.bulk_kpa * volume; 3];
     let mut tangent = [[material.bulk_kpa; 3]; 3];
@@ -84,7 +84,7 @@ fn kirchhoff(material: &Ogden, e: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
 }
 
 /// ∂τⱼ/∂ξ at fixed stretches, kPa per unit.
-fn parameter_derivative(material: &Ogden, parameter: Parameter, e: [f64; 3]) -> [f64; 3] {
+fn parameter_derivative(material: &Material, parameter: Parameter, e: [f64; 3]) -> [f64; 3] {
     let volume: f64 = e.iter().sum();
     let bar = e.map(|v| v - volume / 3.0);
     let deviator = |v: [f64; 3]| {
@@ -114,12 +114,12 @@ fn parameter_derivative(material: &Ogden, parameter: Parameter, e: [f64; 3]) -> 
 ///
 /// ```
 /// use lambdak::homogeneous::{HomogeneousTest, respond};
-/// use lambdak::material::Ogden;
-/// let material = Ogden::new(2173.0, [(17.0, 1.91)]).unwrap();
+/// use lambdak::material::Material;
+/// let material = Material::new(2173.0, [(17.0, 1.91)]).unwrap();
 /// let response = respond(&material, &HomogeneousTest::Uniaxial.at(1.5)).unwrap();
 /// assert!(response.principal_stretches.iter().product::<f64>() > 1.0);
 /// ```
-pub fn respond(material: &Ogden, deformation: &Deformation) -> Result<Response, HomogeneousError> {
+pub fn respond(material: &Material, deformation: &Deformation) -> Result<Response, HomogeneousError> {
     if !deformation.is_valid() {
         return Err(HomogeneousError::InvalidDeformation { deformation: *deformation });
     }
@@ -197,18 +197,18 @@ mod tests {
     use crate::material::laws;
     use crate::material::{OgdenTerm, first_piola_kirchhoff_stress};
 
-    fn material(bulk_kpa: f64) -> Ogden {
+    fn material(bulk_kpa: f64) -> Material {
         let terms = vec![
             OgdenTerm { mu_kpa: 12.0, alpha: 2.5 },
             OgdenTerm { mu_kpa: -3.0, alpha: -2.0 },
             OgdenTerm { mu_kpa: 0.01, alpha: 9.0 },
         ];
-        Ogden { bulk_kpa, terms, law: None }
+        Material { bulk_kpa, terms, law: None }
     }
 
     /// The same bulk modulus with Ogden's terms and with every law in the first invariant.
-    fn materials(bulk_kpa: f64) -> Vec<Ogden> {
-        let of_law = |law| Ogden { bulk_kpa, terms: vec![], law: Some(law) };
+    fn materials(bulk_kpa: f64) -> Vec<Material> {
+        let of_law = |law| Material { bulk_kpa, terms: vec![], law: Some(law) };
         [material(bulk_kpa)].into_iter().chain(laws().map(of_law)).collect()
     }
 

@@ -8,7 +8,7 @@ use super::compressible::respond;
 use super::deformation::{Deformation, incompressible_derivative, incompressible_stress};
 use super::fit_options::CurveFitOptions;
 use crate::material::{
-    InvariantLaw, Lanes, LawParameter, Ogden, OgdenTerm, Parameter, ShearTerm, first_invariant_less_3,
+    InvariantLaw, Lanes, LawParameter, Material, OgdenTerm, Parameter, ShearTerm, first_invariant_less_3,
     initial_shear_modulus_kpa, smallest_relative_stiffness, smallest_relative_stiffness_of_law,
 };
 use crate::optimise::LinearLimit;
@@ -35,7 +35,7 @@ pub struct LawValue {
 /// A law of the change of shape, which curves are fitted with.
 pub trait CurveLaw {
     /// The material of this law with κ, kPa.
-    fn material(&self, bulk_kpa: f64) -> Ogden;
+    fn material(&self, bulk_kpa: f64) -> Material;
 
     /// Nominal stress (kPa) of the incompressible material along the test's axis; not a number beyond the states that
     /// the law allows.
@@ -75,7 +75,7 @@ pub trait CurveLaw {
     /// `weight` times its derivatives by the unknowns into `row`. `None` where the state has no response.
     fn stress_and_row(
         &self,
-        material: Option<&Ogden>,
+        material: Option<&Material>,
         state: &Deformation,
         weight: f64,
         row: &mut [f64],
@@ -108,9 +108,9 @@ impl OgdenTerms {
 }
 
 impl CurveLaw for OgdenTerms {
-    fn material(&self, bulk_kpa: f64) -> Ogden {
+    fn material(&self, bulk_kpa: f64) -> Material {
         let terms = self.terms.iter().map(|t| OgdenTerm { mu_kpa: t.mu_kpa(), alpha: t.alpha }).collect();
-        Ogden { bulk_kpa, terms, law: None }
+        Material { bulk_kpa, terms, law: None }
     }
 
     fn incompressible_stress(&self, state: &Deformation) -> f64 {
@@ -177,7 +177,7 @@ impl CurveLaw for OgdenTerms {
 
     fn stress_and_row(
         &self,
-        material: Option<&Ogden>,
+        material: Option<&Material>,
         state: &Deformation,
         weight: f64,
         row: &mut [f64],
@@ -259,8 +259,8 @@ fn stress_of_unit_term(state: &Deformation) -> f64 {
 }
 
 impl CurveLaw for InvariantLaw {
-    fn material(&self, bulk_kpa: f64) -> Ogden {
-        Ogden { bulk_kpa, terms: Vec::new(), law: Some(*self) }
+    fn material(&self, bulk_kpa: f64) -> Material {
+        Material { bulk_kpa, terms: Vec::new(), law: Some(*self) }
     }
 
     fn incompressible_stress(&self, state: &Deformation) -> f64 {
@@ -322,7 +322,7 @@ impl CurveLaw for InvariantLaw {
 
     fn stress_and_row(
         &self,
-        material: Option<&Ogden>,
+        material: Option<&Material>,
         state: &Deformation,
         weight: f64,
         row: &mut [f64],

@@ -12,7 +12,7 @@ use super::fit_options::{CurveFitError, CurveFitOptions};
 use super::result::{CurveFitSequence, fit_curves};
 use super::table::{ForceTable, TableError};
 use crate::fem::{ForwardModel, PrepareError, SolveError, SolveOptions};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
@@ -117,7 +117,7 @@ pub enum DumbbellError {
 /// [`DumbbellError::Solve`].
 pub fn gauge_stretches(
     model: &mut ForwardModel,
-    material: &Ogden,
+    material: &Material,
     gauge_mm: f64,
     displacement_mm: &[f64],
     is_cancelled: &dyn Fn() -> bool,

@@ -12,7 +12,7 @@ use super::deformation::Deformation;
 use super::fit_options::{CurveFitError, CurveFitOptions};
 use super::loading_path::is_stable;
 use super::starts::{law_starts, starts};
-use crate::material::{InvariantLaw, LawKind, MAX_TERMS, MaterialError, Ogden};
+use crate::material::{InvariantLaw, LawKind, MAX_TERMS, Material, MaterialError};
 use crate::optimise::{Evaluation, LeastSquaresOptions, Minimum, minimise};
 use nalgebra::{DMatrix, DVector};
 
@@ -49,7 +49,7 @@ pub const BULK_OVER_SHEAR: f64 = 1000.0;
 ///
 /// # Errors
 /// [`MaterialError`] where a parameter is beyond what a material may hold, such as an exponent near zero.
-pub fn fitted_material(law: &dyn CurveLaw, bulk_kpa: Option<f64>) -> Result<Ogden, MaterialError> {
+pub fn fitted_material(law: &dyn CurveLaw, bulk_kpa: Option<f64>) -> Result<Material, MaterialError> {
     let material = law.material(bulk_kpa.unwrap_or(BULK_OVER_SHEAR * law.initial_shear_modulus_kpa()));
     material.validate().map(|()| material)
 }

@@ -7,7 +7,7 @@ use super::fit::{LawFit, fit_law, fit_terms, fitted_material, matches_of, model_
 use super::fit_options::{CurveFitError, CurveFitOptions};
 use super::selection::{Selection, compare, independent_count};
 use super::statistics::t_quantile;
-use crate::material::{LawKind, MaterialError, Ogden, ShearTerm};
+use crate::material::{LawKind, Material, MaterialError, ShearTerm};
 use crate::optimise::covariance;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -126,7 +126,7 @@ impl CurveFit {
     ///
     /// # Errors
     /// As [`fitted_material`].
-    pub fn material(&self) -> Result<Ogden, MaterialError> {
+    pub fn material(&self) -> Result<Material, MaterialError> {
         fitted_material(self.fitted_law().as_ref(), self.bulk_kpa)
     }
 }

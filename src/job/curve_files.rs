@@ -6,7 +6,7 @@ use crate::homogeneous::{
     BULK_OVER_SHEAR, CsvCurve, CsvOptions, CsvReading, Curve, CurveFitOptions, HomogeneousTest, StressUnit, Unloading,
     read_csv,
 };
-use crate::material::{LawKind, MaterialError, Ogden};
+use crate::material::{LawKind, Material, MaterialError};
 use crate::report::plain_number;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -238,7 +238,7 @@ impl CurveFitSettings {
 }
 
 /// Adds a fit's `material.json`, and says in the summary what its bulk modulus is where none was held.
-pub(super) fn add_material(outcome: &mut Outcome, material: &Result<Ogden, MaterialError>, is_bulk_held: bool) {
+pub(super) fn add_material(outcome: &mut Outcome, material: &Result<Material, MaterialError>, is_bulk_held: bool) {
     outcome.summary += &match material {
         Ok(_) if is_bulk_held => String::new(),
         Ok(material) => format!(

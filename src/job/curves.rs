@@ -8,7 +8,7 @@ use crate::field::FieldError;
 use crate::homogeneous::{
     Curve, CurveFit, CurveFitSequence, CurveMatch, CurveParameter, Interval, LawComparison, compare_laws, fit_curves,
 };
-use crate::material::{LawKind, Ogden};
+use crate::material::{LawKind, Material};
 use crate::provenance::VERSION;
 use crate::report::{fit_picture, law_picture};
 use serde::{Deserialize, Serialize};
@@ -52,7 +52,7 @@ struct CurvesResult<'a> {
     laws: &'a LawComparison,
     kept_back: Vec<CurveMatch>,
     /// The fit that is used as a material of its law; none where its parameters are beyond what a material may hold.
-    material: Option<Ogden>,
+    material: Option<Material>,
     /// Whether the material's bulk modulus was held in the fit; else it only stands for the incompressible limit.
     is_bulk_held: bool,
     /// What was read of the files, fitted curves first.

@@ -1,12 +1,12 @@
 //! The material, mesh and scan that are taken where a request leaves them out.
 
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::sensitivity::ScanSettings;
 use crate::specimen::Specimen;
 
 /// Ecoflex 00-20 as calibrated in the paper: κ 2173 kPa, μ₁ 17.0 kPa, α₁ 1.91.
-pub fn ecoflex() -> Ogden {
-    shipped(Ogden::from_json(include_str!("../../geometries/materials/ecoflex-0020.json")))
+pub fn ecoflex() -> Material {
+    shipped(Material::from_json(include_str!("../../geometries/materials/ecoflex-0020.json")))
 }
 
 /// The published two-hole double-lap shear specimen.

@@ -9,7 +9,7 @@ use crate::design::{
     SearchError, Study, Unfinished, VerificationSettings, search, study_hash,
 };
 use crate::field::FieldError;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::provenance::input_hash;
 use crate::report::design_report;
@@ -167,7 +167,7 @@ impl CheckedStudy {
         let total = 2 * study.materials.len() * draws;
         let done = AtomicUsize::new(0);
         let is_cancelled = || context.is_cancelled();
-        let of = |entry: &DesignEntry, material: &Ogden| -> Option<Verified> {
+        let of = |entry: &DesignEntry, material: &Material| -> Option<Verified> {
             let specimen = &entry.specimen;
             let scan_share = entry.evaluation.scan_share.clone();
             let protocol = Protocol { scan_share, ..study.protocol.clone() };

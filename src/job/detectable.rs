@@ -3,7 +3,7 @@
 use super::{Context, JobError, cost};
 use crate::diagnosis::{DiagnosisError, DiagnosisOptions, PlannedScan, detectable};
 use crate::field::FieldError;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::sensitivity::{DetectableSize, Evaluation, Protocol, ScanSettings};
 use crate::specimen::Specimen;
@@ -55,7 +55,7 @@ pub(super) fn detection_seconds(specimen: &Specimen, scan: &ScanSettings, num_dr
 /// [`JobError`]: the whole sample cannot be meshed or has no equilibrium, or the work was cancelled.
 pub(super) fn detectable_sizes(
     specimen: &Specimen,
-    material: &Ogden,
+    material: &Material,
     protocol: &Protocol,
     evaluation: &Evaluation,
     context: &Context,

@@ -10,7 +10,7 @@ use crate::diagnosis::{
     together,
 };
 use crate::field::FieldError;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshSize;
 use crate::recording::write_vectors;
 use crate::report::{diagnosis_pictures, diagnosis_report, together_pictures, together_report};
@@ -31,7 +31,7 @@ pub struct DiagnosisRequest {
     pub recordings: Vec<String>,
     /// The material as believed; its number of terms is the nominal one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub material: Option<Ogden>,
+    pub material: Option<Material>,
     /// Element size as a factor on the standard one.
     #[serde(default = "mesh_factor")]
     #[schema(minimum = 0.3, maximum = 5.0, default = mesh_factor)]
@@ -123,7 +123,7 @@ impl Request for DiagnosisRequest {
                 FieldError::new("/recording", "neither alone nor left out", "given, or recordings in its place");
             errors.push(error.remedy("give one of the two"));
         }
-        for error in self.material.iter().flat_map(Ogden::field_errors) {
+        for error in self.material.iter().flat_map(Material::field_errors) {
             errors.push(error.below("/material"));
         }
         for (index, name) in self.without.iter().enumerate().filter(|(_, name)| known_cause(name).is_none()) {

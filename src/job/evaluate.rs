@@ -7,7 +7,7 @@ use super::{Context, JobError, Outcome, RecordingOutline, Request, ResultSchema,
 use crate::export::{FieldFormat, FieldSeries, evaluation_arrays, vtkhdf_file};
 use crate::fem::Equilibrium;
 use crate::field::FieldError;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshSize;
 use crate::report::{
     bar_pictures, detectable_picture, histogram_picture, map_pictures, solution_fields, surface_json, vtu_of,
@@ -35,7 +35,7 @@ pub struct EvaluationRequest {
     pub specimen: Specimen,
     /// The material, Ogden's or another law; Ecoflex 00-20 where it is left out.
     #[serde(default = "defaults::ecoflex")]
-    pub material: Ogden,
+    pub material: Material,
     /// The scan; 1 × 0.1875 × 0.75 mm voxels, 0.05 mm and 0.02 N noise where it is left out.
     #[serde(default = "defaults::scan")]
     #[schema(default = defaults::scan)]

@@ -8,7 +8,7 @@ use super::{Context, JobError, Outcome, Request, ResultSchema, Run, summary};
 use crate::export::{Converted, ExportError, MaterialFormat, Origin, material_card};
 use crate::field::FieldError;
 use crate::homogeneous::StressUnit;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::provenance::VERSION;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -18,7 +18,7 @@ use utoipa::ToSchema;
 #[serde(deny_unknown_fields)]
 pub struct ExportMaterialRequest {
     /// The material, Ogden's or another law, such as the `material.json` of a fit.
-    pub material: Ogden,
+    pub material: Material,
     /// Name of the material in the files; that of its law, such as `ogden`, where it is left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(max_length = 200)]
@@ -44,7 +44,7 @@ struct ExportMaterialResult<'a> {
     version: &'static str,
     input_hash: &'a str,
     name: &'a str,
-    material: &'a Ogden,
+    material: &'a Material,
     stress_unit: StressUnit,
     cards: &'a [Card],
 }

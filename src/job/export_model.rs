@@ -5,7 +5,7 @@ use super::subject::{check_mesh, driven, model_of};
 use super::{Context, JobError, Outcome, RecordingOutline, Request, ResultSchema, Run, defaults, summary};
 use crate::export::{ExportError, Model, ModelFormat, Origin, model_file};
 use crate::field::FieldError;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshSize;
 use crate::provenance::VERSION;
 use crate::specimen::Specimen;
@@ -20,7 +20,7 @@ pub struct ExportModelRequest {
     pub specimen: Specimen,
     /// The material, Ogden's or another law; Ecoflex 00-20 where it is left out.
     #[serde(default = "defaults::ecoflex")]
-    pub material: Ogden,
+    pub material: Material,
     /// Drives in mm instead of the specimen's; one load step each.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(min_items = 1, max_items = 1000)]

@@ -3,7 +3,7 @@
 use super::cost::seconds_per_drive;
 use crate::fem::{ForwardModel, SolveOptions};
 use crate::kinematics::decompose;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::{MeshOptions, mesh_specimen};
 use crate::specimen::Specimen;
 
@@ -43,7 +43,7 @@ pub enum NoResponse {
 ///
 /// # Errors
 /// [`NoResponse`].
-pub fn quick_response(specimen: &Specimen, material: &Ogden) -> Result<QuickResponse, NoResponse> {
+pub fn quick_response(specimen: &Specimen, material: &Material) -> Result<QuickResponse, NoResponse> {
     let failed = |e: &dyn std::fmt::Display| NoResponse::Failed(e.to_string());
     let drive = specimen.largest_drive_mm();
     if !(drive.abs() > 0.0) {

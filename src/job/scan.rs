@@ -10,7 +10,7 @@ use crate::acquisition::{
 use crate::fem::SolveOptions;
 use crate::field::FieldError;
 use crate::field::schema::Seed;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::{MeshOptions, MeshSize};
 use crate::provenance::VERSION;
 use crate::recording::{Filter, write_vectors};
@@ -53,7 +53,7 @@ pub struct ScanRequest {
     pub specimen: Specimen,
     /// The material, Ogden's or another law; Ecoflex 00-20 where it is left out.
     #[serde(default = "defaults::ecoflex")]
-    pub material: Ogden,
+    pub material: Material,
     /// Drives in mm instead of the specimen's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(min_items = 1, max_items = 1000)]

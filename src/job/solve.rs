@@ -7,7 +7,7 @@ use crate::export::{FieldFormat, FieldSeries, solution_arrays, vtkhdf_file};
 use crate::fem::{Equilibrium, QuadraturePoint, SolveOptions, SolveResult};
 use crate::field::FieldError;
 use crate::kinematics::decompose;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::{Mesh, MeshSize};
 use crate::report::{deformed_picture, pvd, solution_fields, vtu_of};
 use crate::specimen::Specimen;
@@ -36,7 +36,7 @@ pub struct SolveRequest {
     pub specimen: Specimen,
     /// The material, Ogden's or another law; Ecoflex 00-20 where it is left out.
     #[serde(default = "defaults::ecoflex")]
-    pub material: Ogden,
+    pub material: Material,
     /// Drives in mm instead of the specimen's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(min_items = 1, max_items = 1000)]

@@ -2,7 +2,7 @@
 
 use super::{Context, JobError, Outcome, Request, ResultSchema, Run};
 use crate::field::FieldError;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshSize;
 use crate::sensitivity::ScanSettings;
 use crate::specimen::Specimen;
@@ -17,7 +17,7 @@ pub(super) struct SweepTaskRequest {
     /// The design. One that cannot be made is a result.
     specimen: Specimen,
     /// The material.
-    material: Ogden,
+    material: Material,
     /// The scan.
     scan: ScanSettings,
     /// Element size.

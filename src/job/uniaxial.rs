@@ -10,7 +10,7 @@ use crate::homogeneous::{
     CsvCurve, Curve, CurveFit, CurveFitSequence, CurveParameter, DumbbellFit, DumbbellOptions, HomogeneousTest,
     Interval, LawComparison, compare_laws, fit_curves, fit_dumbbell,
 };
-use crate::material::{LawKind, Ogden};
+use crate::material::{LawKind, Material};
 use crate::mesh::MeshSize;
 use crate::provenance::VERSION;
 use crate::report::{fit_picture, law_picture};
@@ -70,7 +70,7 @@ struct UniaxialResult<'a> {
     laws: &'a LawComparison,
     conversion: Option<&'a DumbbellFit>,
     /// The chosen fit as a material of its law; none where its parameters are beyond what a material may hold.
-    material: Option<Ogden>,
+    material: Option<Material>,
     /// Whether the material's bulk modulus was held in the fit; else it only stands for the incompressible limit.
     is_bulk_held: bool,
     /// What was read of the file.

@@ -1,4 +1,4 @@
-//! A material in a file: the fields of [`Ogden`] behind the tag that names the format, one format per law.
+//! A material in a file: the fields of [`Material`] behind the tag that names the format, one format per law.
 //!
 //! It is read through [`MaterialFields`], which holds the fields of all formats, so that errors keep their place in the
 //! text, and written through [`MaterialFile`], which has a form of its own for each.
@@ -9,7 +9,7 @@ use super::limits::{ARRUDA_BOYCE_SCHEMA, GENT_SCHEMA, SCHEMA, YEOH_SCHEMA};
 use super::limits::{
     MAX_ALPHA, MAX_CHAIN_LIMIT, MAX_LOCKING_STRETCH, MAX_MODULUS_KPA, MIN_CHAIN_LIMIT, MIN_LOCKING_STRETCH,
 };
-use super::{Ogden, OgdenTerm};
+use super::{Material, OgdenTerm};
 use crate::field::file_tag;
 #[cfg(feature = "schema")]
 use crate::field::schema::{list_of, number_above, number_within, schema_of_file, schema_type};
@@ -127,9 +127,9 @@ pub(super) enum MaterialFile {
     ArrudaBoyce(ArrudaBoyceFile),
 }
 
-impl From<Ogden> for MaterialFile {
-    fn from(material: Ogden) -> MaterialFile {
-        let Ogden { bulk_kpa, terms, law } = material;
+impl From<Material> for MaterialFile {
+    fn from(material: Material) -> MaterialFile {
+        let Material { bulk_kpa, terms, law } = material;
         match law {
             None => MaterialFile::Ogden(OgdenFile { schema: MaterialTag, bulk_kpa, terms }),
             Some(InvariantLaw::Yeoh(Yeoh { coefficients_kpa: [c_1_kpa, c_2_kpa, c_3_kpa] })) => {
@@ -183,10 +183,10 @@ pub(super) enum FieldsProblem {
     Foreign(&'static str),
 }
 
-impl TryFrom<MaterialFields> for Ogden {
+impl TryFrom<MaterialFields> for Material {
     type Error = FieldsProblem;
 
-    fn try_from(fields: MaterialFields) -> Result<Ogden, FieldsProblem> {
+    fn try_from(fields: MaterialFields) -> Result<Material, FieldsProblem> {
         let MaterialFields { schema, bulk_kpa, mut terms, c_1_kpa, c_2_kpa, c_3_kpa, mu_kpa, j_m, lambda_m } = fields;
         let mut numbers = [
             ("c_1_kpa", c_1_kpa),
@@ -219,10 +219,10 @@ impl TryFrom<MaterialFields> for Ogden {
         match numbers.iter().find(|(_, value)| value.is_some()) {
             Some((name, _)) => Err(FieldsProblem::Foreign(name)),
             None if terms.is_some() => Err(FieldsProblem::Foreign("terms")),
-            None => Ok(Ogden { bulk_kpa, terms: own_terms, law }),
+            None => Ok(Material { bulk_kpa, terms: own_terms, law }),
         }
     }
 }
 
 #[cfg(feature = "schema")]
-schema_of_file!(Ogden, MaterialFile);
+schema_of_file!(Material, MaterialFile);

@@ -1,5 +1,5 @@
 use super::*;
-use crate::material::{Ogden, OgdenTerm, energy_density, first_piola_kirchhoff_stress, least_relative_stiffness};
+use crate::material::{Material, OgdenTerm, energy_density, first_piola_kirchhoff_stress, least_relative_stiffness};
 
 /// One of each law, stiffening within the states of the tests.
 pub(crate) fn laws() -> [InvariantLaw; 3] {
@@ -53,7 +53,7 @@ fn slope_derivatives_match_differences() {
 /// Without its stiffening each law is the neo-Hookean one, an Ogden term of exponent 2: to the order of 1/J_m, 1/λ_m².
 #[test]
 fn limits_are_neo_hookean() {
-    let ogden = Ogden { bulk_kpa: 900.0, terms: vec![OgdenTerm { mu_kpa: 16.0, alpha: 2.0 }], law: None };
+    let ogden = Material { bulk_kpa: 900.0, terms: vec![OgdenTerm { mu_kpa: 16.0, alpha: 2.0 }], law: None };
     let f = [[1.3, 0.4, 0.0], [0.0, 0.9, 0.1], [0.0, -0.2, 1.0]];
     let wanted = first_piola_kirchhoff_stress(&ogden, &f);
     let almost = [
@@ -62,7 +62,7 @@ fn limits_are_neo_hookean() {
         (InvariantLaw::ArrudaBoyce(ArrudaBoyce { mu_kpa: 16.0, locking_stretch: 1e3 }), 1e-5),
     ];
     for (law, tolerance) in almost {
-        let material = Ogden { bulk_kpa: 900.0, terms: vec![], law: Some(law) };
+        let material = Material { bulk_kpa: 900.0, terms: vec![], law: Some(law) };
         let found = first_piola_kirchhoff_stress(&material, &f);
         for (a, b) in found.iter().flatten().zip(wanted.iter().flatten()) {
             assert!((a - b).abs() < tolerance * 100.0, "{law:?}: {a} {b}");
@@ -75,7 +75,7 @@ fn limits_are_neo_hookean() {
 #[test]
 fn gent_in_tension() {
     let law = Gent { mu_kpa: 16.0, limit: 9.0 };
-    let material = Ogden { bulk_kpa: 1.0, terms: vec![], law: Some(InvariantLaw::Gent(law)) };
+    let material = Material { bulk_kpa: 1.0, terms: vec![], law: Some(InvariantLaw::Gent(law)) };
     let l: f64 = 2.5;
     let lateral = l.powf(-0.5);
     let f = [[l, 0.0, 0.0], [0.0, lateral, 0.0], [0.0, 0.0, lateral]];
@@ -104,12 +104,12 @@ fn arruda_boyce_at_rest() {
 fn stability_follows_the_slopes() {
     let visited = [[1.6, 1.0, 0.625], [2.0, 0.5f64.sqrt(), 0.5f64.sqrt()]];
     for law in laws() {
-        assert!(least_relative_stiffness(&Ogden { bulk_kpa: 1.0, terms: vec![], law: Some(law) }, &visited) > 0.0);
+        assert!(least_relative_stiffness(&Material { bulk_kpa: 1.0, terms: vec![], law: Some(law) }, &visited) > 0.0);
     }
     let softening = InvariantLaw::Yeoh(Yeoh { coefficients_kpa: [8.0, -2.5, 0.0] });
-    let material = Ogden { bulk_kpa: 1.0, terms: vec![], law: Some(softening) };
+    let material = Material { bulk_kpa: 1.0, terms: vec![], law: Some(softening) };
     assert!(least_relative_stiffness(&material, &visited) < 0.0);
     let ended = InvariantLaw::Gent(Gent { mu_kpa: 16.0, limit: 1.5 });
-    let material = Ogden { bulk_kpa: 1.0, terms: vec![], law: Some(ended) };
+    let material = Material { bulk_kpa: 1.0, terms: vec![], law: Some(ended) };
     assert_eq!(least_relative_stiffness(&material, &visited), f64::NEG_INFINITY);
 }

@@ -52,7 +52,7 @@ pub struct OgdenTerm {
 /// In JSON it is `ogden/1`, `yeoh/1`, `gent/1` or `arruda_boyce/1`, with the tag `schema` before its fields.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "file::MaterialFields", into = "file::MaterialFile")]
-pub struct Ogden {
+pub struct Material {
     /// κ, kPa.
     pub bulk_kpa: f64,
     /// Ogden's terms.
@@ -107,38 +107,38 @@ impl Parameter {
     }
 }
 
-impl Ogden {
+impl Material {
     /// A valid material of a bulk modulus (kPa) and terms (μ in kPa, α).
     ///
     /// ```
-    /// use lambdak::material::Ogden;
-    /// let material = Ogden::new(2173.0, [(17.0, 1.91)])?;
+    /// use lambdak::material::Material;
+    /// let material = Material::new(2173.0, [(17.0, 1.91)])?;
     /// assert_eq!(material.terms[0].alpha, 1.91);
-    /// assert!(Ogden::new(-1.0, [(17.0, 1.91)]).is_err());
+    /// assert!(Material::new(-1.0, [(17.0, 1.91)]).is_err());
     /// # Ok::<(), lambdak::material::MaterialError>(())
     /// ```
     ///
     /// # Errors
-    /// As [`Ogden::validate`].
-    pub fn new(bulk_kpa: f64, terms: impl IntoIterator<Item = (f64, f64)>) -> Result<Ogden, MaterialError> {
+    /// As [`Material::validate`].
+    pub fn new(bulk_kpa: f64, terms: impl IntoIterator<Item = (f64, f64)>) -> Result<Material, MaterialError> {
         let terms = terms.into_iter().map(|(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha }).collect();
-        let material = Ogden { bulk_kpa, terms, law: None };
+        let material = Material { bulk_kpa, terms, law: None };
         material.validate().map(|()| material)
     }
 
     /// A valid material of a bulk modulus (kPa) and a law in the first invariant.
     ///
     /// ```
-    /// use lambdak::material::{Gent, InvariantLaw, Ogden};
-    /// let material = Ogden::of_law(2173.0, InvariantLaw::Gent(Gent { mu_kpa: 16.0, limit: 30.0 }))?;
+    /// use lambdak::material::{Gent, InvariantLaw, Material};
+    /// let material = Material::of_law(2173.0, InvariantLaw::Gent(Gent { mu_kpa: 16.0, limit: 30.0 }))?;
     /// assert_eq!(material.initial_shear_modulus_kpa(), 16.0);
     /// # Ok::<(), lambdak::material::MaterialError>(())
     /// ```
     ///
     /// # Errors
-    /// As [`Ogden::validate`].
-    pub fn of_law(bulk_kpa: f64, law: InvariantLaw) -> Result<Ogden, MaterialError> {
-        let material = Ogden { bulk_kpa, terms: Vec::new(), law: Some(law) };
+    /// As [`Material::validate`].
+    pub fn of_law(bulk_kpa: f64, law: InvariantLaw) -> Result<Material, MaterialError> {
+        let material = Material { bulk_kpa, terms: Vec::new(), law: Some(law) };
         material.validate().map(|()| material)
     }
 

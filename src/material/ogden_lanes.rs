@@ -15,7 +15,7 @@
 //! R(c, d) = expm1(c d)/expm1(d) → c, expanded about d = 0: exact in the limit, no perturbation of eigenvalues.
 
 use super::lanes::Lanes;
-use super::{Ogden, Parameter};
+use super::{Material, Parameter};
 
 /// Most Ogden terms that a material may have.
 pub const MAX_TERMS: usize = 6;
@@ -62,7 +62,7 @@ const LAW_EXPONENT: f64 = 2.0;
 impl SpectralState {
     /// Decomposes F (det F > 0).
     #[inline(always)]
-    pub fn new(material: &Ogden, deformation_gradient: &Tensor) -> SpectralState {
+    pub fn new(material: &Material, deformation_gradient: &Tensor) -> SpectralState {
         let f = deformation_gradient;
         let mut c = [[Lanes::ZERO; 3]; 3];
         for a in 0..3 {
@@ -118,7 +118,7 @@ impl SpectralState {
 
     /// α_p, e_ap and m_p of all terms, and of the term that a law acts like.
     #[inline(always)]
-    fn powers<'a>(&'a self, material: &'a Ogden) -> impl Iterator<Item = (f64, &'a [Lanes; 3], Lanes)> {
+    fn powers<'a>(&'a self, material: &'a Material) -> impl Iterator<Item = (f64, &'a [Lanes; 3], Lanes)> {
         let of_terms = material.terms.iter().take(MAX_TERMS).enumerate();
         of_terms
             .map(|(p, term)| (term.alpha, &self.power[p], self.mean_power[p]))
@@ -133,7 +133,7 @@ impl SpectralState {
 
     /// ∂P/∂ξ at fixed F and fixed pressure (zero for κ).
     #[inline(always)]
-    pub fn stress_parameter_derivative(&self, material: &Ogden, parameter: Parameter) -> Tensor {
+    pub fn stress_parameter_derivative(&self, material: &Material, parameter: Parameter) -> Tensor {
         let mut d = [Lanes::ZERO; 3];
         match parameter {
             Parameter::Kappa => {}
@@ -182,7 +182,7 @@ impl SpectralState {
     #[inline(always)]
     pub fn material_tangent<const FMA: bool>(
         &self,
-        material: &Ogden,
+        material: &Material,
         pressure: Lanes,
         pressure_rate: Lanes,
         out: &mut [[Lanes; 9]; 9],

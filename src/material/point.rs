@@ -1,7 +1,7 @@
 //! The material at one point: energy, stress, tangent and parameter derivatives with the exact volumetric term κ/2 (ln
 //! J)².
 
-use super::{Lanes, Ogden, Parameter, SpectralState, Tensor};
+use super::{Lanes, Material, Parameter, SpectralState, Tensor};
 
 /// det F.
 fn determinant(f: &[[f64; 3]; 3]) -> f64 {
@@ -18,7 +18,7 @@ fn first(t: &Tensor) -> [[f64; 3]; 3] {
 }
 
 /// Ψ (kPa) for given principal stretches (any order).
-pub fn energy_density(material: &Ogden, principal_stretches: [f64; 3]) -> f64 {
+pub fn energy_density(material: &Material, principal_stretches: [f64; 3]) -> f64 {
     let ln_j: f64 = principal_stretches.iter().map(|l| l.ln()).sum();
     let mut energy = 0.5 * material.bulk_kpa * ln_j * ln_j;
     for term in &material.terms {
@@ -40,7 +40,7 @@ pub(crate) fn first_invariant_less_3(log_stretches: [f64; 3]) -> f64 {
 }
 
 /// P = ∂Ψ/∂F (kPa), row current, column reference; det F must be positive.
-pub fn first_piola_kirchhoff_stress(material: &Ogden, deformation_gradient: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
+pub fn first_piola_kirchhoff_stress(material: &Material, deformation_gradient: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
     let pressure = material.bulk_kpa * determinant(deformation_gradient).ln();
     first(
         &SpectralState::new(material, &splat(deformation_gradient))
@@ -49,7 +49,7 @@ pub fn first_piola_kirchhoff_stress(material: &Ogden, deformation_gradient: &[[f
 }
 
 /// ∂P/∂F (kPa), `[3 i + J][3 k + L]`.
-pub fn material_tangent(material: &Ogden, deformation_gradient: &[[f64; 3]; 3]) -> [[f64; 9]; 9] {
+pub fn material_tangent(material: &Material, deformation_gradient: &[[f64; 3]; 3]) -> [[f64; 9]; 9] {
     let f = deformation_gradient;
     let pressure = Lanes::splat(material.bulk_kpa * determinant(f).ln());
     let rate = Lanes::splat(material.bulk_kpa);
@@ -60,7 +60,7 @@ pub fn material_tangent(material: &Ogden, deformation_gradient: &[[f64; 3]; 3]) 
 
 /// ∂P/∂ξ at fixed F (kPa per unit of ξ).
 pub fn stress_parameter_derivative(
-    material: &Ogden,
+    material: &Material,
     parameter: Parameter,
     deformation_gradient: &[[f64; 3]; 3],
 ) -> [[f64; 3]; 3] {
@@ -87,8 +87,8 @@ mod tests {
     use crate::material::laws;
     use nalgebra::Matrix3;
 
-    fn materials() -> Vec<Ogden> {
-        let make = |bulk_kpa, terms: &[(f64, f64)]| Ogden {
+    fn materials() -> Vec<Material> {
+        let make = |bulk_kpa, terms: &[(f64, f64)]| Material {
             bulk_kpa,
             terms: terms.iter().map(|&(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha }).collect(),
             law: None,
@@ -99,7 +99,10 @@ mod tests {
             make(90.0, &[(12.0, 2.5), (-3.0, -2.0), (0.001, 14.0)]),
         ];
         // Every law in the first invariant goes through the same tests.
-        ogden.into_iter().chain(laws().map(|law| Ogden { bulk_kpa: 2100.0, terms: vec![], law: Some(law) })).collect()
+        ogden
+            .into_iter()
+            .chain(laws().map(|law| Material { bulk_kpa: 2100.0, terms: vec![], law: Some(law) }))
+            .collect()
     }
 
     /// At rest, uniaxial with equal stretches, nearly equal, sheared, general.
@@ -114,7 +117,7 @@ mod tests {
         ]
     }
 
-    fn energy(m: &Ogden, f: &[[f64; 3]; 3]) -> f64 {
+    fn energy(m: &Material, f: &[[f64; 3]; 3]) -> f64 {
         let f = Matrix3::from_fn(|i, j| f[i][j]);
         let s = f.svd(false, false).singular_values;
         energy_density(m, [s[0], s[1], s[2]])

@@ -3,25 +3,25 @@
 use super::invariant_law::InvariantLaw;
 use super::limits::{MAX_ALPHA, MAX_MODULUS_KPA, MIN_ALPHA, SCHEMAS};
 use super::stability::has_stable_product;
-use super::{MAX_TERMS, MaterialError, Ogden};
+use super::{MAX_TERMS, Material, MaterialError};
 use crate::field::{FieldError, FieldPath};
 use crate::specimen::JsonProblem;
 use crate::specimen::json::schema_of;
 
-impl Ogden {
+impl Material {
     /// Reads and validates a material of any of its schemas.
     ///
     /// ```
-    /// use lambdak::material::Ogden;
+    /// use lambdak::material::Material;
     /// let text = r#"{ "schema": "ogden/1", "bulk_kpa": 2173.0, "terms": [{ "mu_kpa": 17.0, "alpha": 1.91 }] }"#;
-    /// assert_eq!(Ogden::from_json(text)?.terms[0].alpha, 1.91);
+    /// assert_eq!(Material::from_json(text)?.terms[0].alpha, 1.91);
     /// # Ok::<(), lambdak::material::MaterialError>(())
     /// ```
     ///
     /// # Errors
     /// [`MaterialError`]: the text does not fit the schema, or the material is not valid.
-    pub fn from_json(text: &str) -> Result<Ogden, MaterialError> {
-        let material: Ogden = serde_json::from_str(text).map_err(|error| match schema_of(text) {
+    pub fn from_json(text: &str) -> Result<Material, MaterialError> {
+        let material: Material = serde_json::from_str(text).map_err(|error| match schema_of(text) {
             Some(found) if !SCHEMAS.contains(&found.as_str()) => {
                 MaterialError::WrongSchema { found, expected: &SCHEMAS }
             }
@@ -50,7 +50,7 @@ impl Ogden {
         self.problems().into_iter().next().map_or(Ok(()), Err)
     }
 
-    /// Every rule that the material violates, with pointers into it; the first is that of [`Ogden::validate`].
+    /// Every rule that the material violates, with pointers into it; the first is that of [`Material::validate`].
     pub fn field_errors(&self) -> Vec<FieldError> {
         self.problems().iter().map(MaterialError::field_error).collect()
     }
@@ -124,9 +124,9 @@ mod tests {
     use crate::material::OgdenTerm;
     use proptest::prelude::*;
 
-    fn ogden(bulk_kpa: f64, terms: &[(f64, f64)]) -> Ogden {
+    fn ogden(bulk_kpa: f64, terms: &[(f64, f64)]) -> Material {
         let terms = terms.iter().map(|&(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha }).collect();
-        Ogden { bulk_kpa, terms, law: None }
+        Material { bulk_kpa, terms, law: None }
     }
 
     #[test]
@@ -151,10 +151,10 @@ mod tests {
     #[test]
     fn errors_name_the_field_and_the_schema() {
         let text = r#"{ "schema": "ogden/1", "bulk_kpa": 1.0, "terms": [{ "mu_kpa": 1.0, "alfa": 1.0 }] }"#;
-        let MaterialError::Json(problem) = Ogden::from_json(text).unwrap_err() else { panic!("not a JSON error") };
+        let MaterialError::Json(problem) = Material::from_json(text).unwrap_err() else { panic!("not a JSON error") };
         assert_eq!(problem.field, "terms[0].alfa");
         let text = r#"{ "schema": "ogden/2", "bulk_mpa": 1.0 }"#;
-        assert!(matches!(Ogden::from_json(text), Err(MaterialError::WrongSchema { .. })));
+        assert!(matches!(Material::from_json(text), Err(MaterialError::WrongSchema { .. })));
     }
 
     #[test]
@@ -176,16 +176,16 @@ mod tests {
             r#"{"schema":"arruda_boyce/1","bulk_kpa":2000.0,"mu_kpa":15.0,"lambda_m":2.5}"#,
         ];
         for text in texts {
-            let material = Ogden::from_json(text).unwrap();
+            let material = Material::from_json(text).unwrap();
             assert_eq!(serde_json::to_string(&material).unwrap(), text);
-            assert!(Ogden::from_json(&text.replace("bulk_kpa", "terms\":[],\"bulk_kpa")).is_err(), "{text}");
+            assert!(Material::from_json(&text.replace("bulk_kpa", "terms\":[],\"bulk_kpa")).is_err(), "{text}");
         }
-        let refused = |text: &str| Ogden::from_json(text).unwrap_err().to_string();
+        let refused = |text: &str| Material::from_json(text).unwrap_err().to_string();
         assert!(refused(&texts[1].replace("\"mu_kpa\":16.0,", "")).contains("missing field `mu_kpa`"));
         assert!(refused(&texts[1].replace("j_m", "lambda_m\":2.0,\"j_m")).contains("unknown field `lambda_m`"));
         assert!(refused(&texts[1].replace("30.0", "0.0")).contains("j_m is 0"));
         assert!(refused(&texts[0].replace("8.0", "-8.0")).contains("c_1_kpa is -8"));
-        let mut mixed = Ogden::from_json(texts[1]).unwrap();
+        let mut mixed = Material::from_json(texts[1]).unwrap();
         mixed.terms.push(OgdenTerm { mu_kpa: 1.0, alpha: 2.0 });
         assert!(matches!(mixed.validate(), Err(MaterialError::TermsBesideLaw { count: 1 })));
     }
@@ -195,8 +195,8 @@ mod tests {
     fn the_tag_is_of_the_file() {
         let written = serde_json::to_string(&ogden(2000.0, &[(17.0, 1.5)])).unwrap();
         assert_eq!(written, r#"{"schema":"ogden/1","bulk_kpa":2000.0,"terms":[{"mu_kpa":17.0,"alpha":1.5}]}"#);
-        assert!(serde_json::from_str::<Ogden>(&written.replace("ogden/1", "ogden/2")).is_err());
-        assert!(serde_json::from_str::<Ogden>(r#"{"bulk_kpa":2000.0,"terms":[]}"#).is_err());
+        assert!(serde_json::from_str::<Material>(&written.replace("ogden/1", "ogden/2")).is_err());
+        assert!(serde_json::from_str::<Material>(r#"{"bulk_kpa":2000.0,"terms":[]}"#).is_err());
     }
 
     #[test]
@@ -205,7 +205,7 @@ mod tests {
         let mut count = 0;
         for entry in std::fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
-            let material = Ogden::from_json(&std::fs::read_to_string(&path).unwrap());
+            let material = Material::from_json(&std::fs::read_to_string(&path).unwrap());
             assert!(material.is_ok(), "{}: {material:?}", path.display());
             count += 1;
         }
@@ -217,7 +217,7 @@ mod tests {
 
         #[test]
         fn any_text_is_read_or_refused(text in ".*") {
-            let _ = Ogden::from_json(&text);
+            let _ = Material::from_json(&text);
         }
 
         #[test]
@@ -226,7 +226,7 @@ mod tests {
             terms in prop::collection::vec((1e-3..1e3f64, 1e-2..50.0f64), 1..=MAX_TERMS),
         ) {
             let material = ogden(bulk, &terms);
-            let back = Ogden::from_json(&material.to_json()).unwrap();
+            let back = Material::from_json(&material.to_json()).unwrap();
             prop_assert_eq!(back.terms.len(), material.terms.len());
             for parameter in material.parameters() {
                 // The shortest decimal that reads back to the same number is written.

@@ -1,6 +1,6 @@
 //! The initial shear modulus ½ Σ μᵢαᵢ: the shear stiffness at rest, by which fits are compared.
 
-use super::{Lanes, Ogden, Parameter, ShearTerm};
+use super::{Lanes, Material, Parameter, ShearTerm};
 
 /// ½ Σ cᵢ of terms with products cᵢ = μᵢαᵢ, kPa.
 ///
@@ -9,13 +9,13 @@ pub fn initial_shear_modulus_kpa(terms: &[ShearTerm]) -> f64 {
     0.5 * terms.iter().map(|t| t.modulus_kpa).sum::<f64>()
 }
 
-impl Ogden {
+impl Material {
     /// The initial shear modulus ½ Σ μᵢαᵢ + 2 W′(0), kPa.
     ///
     /// ```
-    /// use lambdak::material::Ogden;
+    /// use lambdak::material::Material;
     /// let text = r#"{ "schema": "ogden/1", "bulk_kpa": 2000.0, "terms": [{ "mu_kpa": 16.0, "alpha": 2.0 }] }"#;
-    /// assert_eq!(Ogden::from_json(text)?.initial_shear_modulus_kpa(), 16.0);
+    /// assert_eq!(Material::from_json(text)?.initial_shear_modulus_kpa(), 16.0);
     /// # Ok::<(), lambdak::material::MaterialError>(())
     /// ```
     pub fn initial_shear_modulus_kpa(&self) -> f64 {
@@ -23,7 +23,7 @@ impl Ogden {
         self.law.map_or(of_terms, |law| of_terms + law.initial_shear_modulus_kpa())
     }
 
-    /// Its derivatives in the order of [`Ogden::parameters`].
+    /// Its derivatives in the order of [`Material::parameters`].
     pub fn initial_shear_modulus_derivatives(&self) -> Vec<f64> {
         let derivative = |parameter: &Parameter| match *parameter {
             Parameter::Kappa => 0.0,
@@ -46,7 +46,7 @@ mod tests {
         let terms = [[17.3, 1.91], [0.351, 7.77], [-2.1e-5, 11.3], [3.3e-9, -9.1]];
         let terms: Vec<OgdenTerm> = terms.iter().map(|&[mu_kpa, alpha]| OgdenTerm { mu_kpa, alpha }).collect();
         let halves: f64 = terms.iter().map(|t| 0.5 * t.mu_kpa * t.alpha).sum();
-        let material = Ogden { bulk_kpa: 2000.0, terms, law: None };
+        let material = Material { bulk_kpa: 2000.0, terms, law: None };
         assert_eq!(material.initial_shear_modulus_kpa().to_bits(), halves.to_bits());
         assert_eq!(initial_shear_modulus_kpa(&material.shear_terms()).to_bits(), halves.to_bits());
     }

@@ -4,7 +4,7 @@
 //! without limit. The products also add up to twice the initial shear modulus (see
 //! [`super::initial_shear_modulus_kpa`]).
 
-use super::{Ogden, OgdenTerm};
+use super::{Material, OgdenTerm};
 
 /// One Ogden term as curves see it: c = μα and α.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,8 +28,8 @@ impl From<OgdenTerm> for ShearTerm {
     }
 }
 
-impl Ogden {
-    /// The terms with their products μα, in the order of [`Ogden::terms`].
+impl Material {
+    /// The terms with their products μα, in the order of [`Material::terms`].
     pub fn shear_terms(&self) -> Vec<ShearTerm> {
         self.terms.iter().map(|&t| t.into()).collect()
     }

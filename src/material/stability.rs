@@ -22,7 +22,7 @@
 
 use super::invariant_law::InvariantLaw;
 use super::point::first_invariant_less_3;
-use super::{Ogden, OgdenTerm, ShearTerm, initial_shear_modulus_kpa, power_difference};
+use super::{Material, OgdenTerm, ShearTerm, initial_shear_modulus_kpa, power_difference};
 
 /// Up to this many terms every product μα must be positive; with more the visited states decide.
 const MAX_TERMS_OF_POSITIVE_PRODUCTS: usize = 2;
@@ -94,7 +94,7 @@ pub fn smallest_relative_stiffness_of_law(law: &InvariantLaw, log_stretches: [f6
 
 /// The smallest stiffness over states with these isochoric principal stretches and on the way to them, as a fraction of
 /// its value at rest, Σμα: positive is stable. Only increments that keep the principal axes are looked at.
-pub fn least_relative_stiffness(material: &Ogden, visited: &[[f64; 3]]) -> f64 {
+pub fn least_relative_stiffness(material: &Material, visited: &[[f64; 3]]) -> f64 {
     let terms = material.shear_terms();
     let at_rest = 2.0 * material.initial_shear_modulus_kpa();
     visited
@@ -135,9 +135,9 @@ mod tests {
     use super::*;
     use crate::material::LawKind;
 
-    fn ogden(terms: &[[f64; 2]]) -> Ogden {
+    fn ogden(terms: &[[f64; 2]]) -> Material {
         let terms = terms.iter().map(|&[mu_kpa, alpha]| OgdenTerm { mu_kpa, alpha }).collect();
-        Ogden { bulk_kpa: 1.0, terms, law: None }
+        Material { bulk_kpa: 1.0, terms, law: None }
     }
 
     /// The closed form is the curvature of the energy along traceless logarithmic strains.
@@ -226,7 +226,7 @@ mod tests {
     /// their traceless part and κ (Σ de)², by differences of the Kirchhoff stress.
     #[test]
     fn the_volume_adds_its_own_part() {
-        let material = Ogden { bulk_kpa: 150.0, ..ogden(&[[9.0, 1.7], [0.4, 7.0], [-2.0, 2.5]]) };
+        let material = Material { bulk_kpa: 150.0, ..ogden(&[[9.0, 1.7], [0.4, 7.0], [-2.0, 2.5]]) };
         let kirchhoff = |e: [f64; 3]| {
             let volume: f64 = e.iter().sum();
             let mut stress = [material.bulk_kpa * volume; 3];

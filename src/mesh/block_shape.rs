@@ -8,7 +8,7 @@
 
 use super::Mesh;
 use crate::specimen::Specimen;
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Terms of a face's polynomial: P_i(a) P_j(b) with Legendre polynomials P in the two axes of the face (in order), in
 /// half extents, by their degree i + j up to four: 1, a, b, aa, ab, bb, aaa and so on. The first is the mean over the
@@ -74,56 +74,110 @@ impl BlockShape {
     /// How far a point of the drawn block lies off, mm: the map less the identity. Also the velocity of the points as
     /// the coefficients change by `self` per unit of time.
     pub fn offset(&self, half_mm: [f64; 3], x: [f64; 3]) -> [f64; 3] {
-        let t = [0, 1, 2].map(|i| x[i] / half_mm[i]);
-        [0, 1, 2].map(|axis| {
-            let terms = face_terms(axis, t);
-            let [low, high] = self.faces_mm[axis].map(|c| c.iter().zip(terms).map(|(c, t)| c * t).sum::<f64>());
-            0.5 * (1.0 - t[axis]) * low + 0.5 * (1.0 + t[axis]) * high
-        })
+        let t = [x[0] / half_mm[0], x[1] / half_mm[1], x[2] / half_mm[2]];
+        let polynomials = [legendre(t[0]), legendre(t[1]), legendre(t[2])];
+        let mut offset = [0.0; 3];
+        for axis in 0..3 {
+            let [a, b] = OTHER_AXES[axis];
+            let (mut low, mut high) = (0.0, 0.0);
+            for n in 0..FACE_TERMS {
+                let term = polynomials[a][DEGREES[n][0]] * polynomials[b][DEGREES[n][1]];
+                low += self.faces_mm[axis][0][n] * term;
+                high += self.faces_mm[axis][1][n] * term;
+            }
+            offset[axis] = 0.5 * (1.0 - t[axis]) * low + 0.5 * (1.0 + t[axis]) * high;
+        }
+        offset
     }
 
     /// ∂x/∂X of the map at a point of the drawn block.
     fn slope(&self, half_mm: [f64; 3], x: [f64; 3]) -> Matrix3<f64> {
-        let t = [0, 1, 2].map(|i| x[i] / half_mm[i]);
+        let t = [x[0] / half_mm[0], x[1] / half_mm[1], x[2] / half_mm[2]];
+        let polynomials = [legendre(t[0]), legendre(t[1]), legendre(t[2])];
+        let rates = [legendre_rates(t[0]), legendre_rates(t[1]), legendre_rates(t[2])];
         let mut slope = Matrix3::identity();
         for axis in 0..3 {
-            let (terms, rates) = (face_terms(axis, t), face_term_rates(axis, t));
-            let sides = [0.5 * (1.0 - t[axis]), 0.5 * (1.0 + t[axis])];
-            for (side, coefficients) in self.faces_mm[axis].iter().enumerate() {
-                let sign = [-0.5, 0.5][side];
-                for (n, c) in coefficients.iter().enumerate() {
-                    slope[(axis, axis)] += sign * c * terms[n] / half_mm[axis];
-                    for (k, other) in other_axes(axis).into_iter().enumerate() {
-                        slope[(axis, other)] += sides[side] * c * rates[k][n] / half_mm[other];
-                    }
-                }
+            let [a, b] = OTHER_AXES[axis];
+            let (mut along, mut along_a, mut along_b) = (0.0, 0.0, 0.0);
+            for n in 0..FACE_TERMS {
+                let [i, j] = DEGREES[n];
+                let [low, high] = [self.faces_mm[axis][0][n], self.faces_mm[axis][1][n]];
+                let between = 0.5 * (1.0 - t[axis]) * low + 0.5 * (1.0 + t[axis]) * high;
+                along += 0.5 * (high - low) * (polynomials[a][i] * polynomials[b][j]);
+                along_a += between * (rates[a][i] * polynomials[b][j]);
+                along_b += between * (polynomials[a][i] * rates[b][j]);
             }
+            slope[(axis, axis)] += along / half_mm[axis];
+            slope[(axis, a)] += along_a / half_mm[a];
+            slope[(axis, b)] += along_b / half_mm[b];
         }
         slope
     }
 
+    /// The way back from the made to the drawn block.
+    pub fn inverse(&self, half_mm: [f64; 3]) -> BlockInverse {
+        BlockInverse { shape: *self, half_mm, is_nominal: self.is_nominal() }
+    }
+}
+
+/// From points of the made block to those of the drawn one.
+#[derive(Clone, Copy, Debug)]
+pub struct BlockInverse {
+    shape: BlockShape,
+    half_mm: [f64; 3],
+    is_nominal: bool,
+}
+
+impl BlockInverse {
     /// The point of the drawn block that comes to `x`, cut to the block, and ∂X/∂x there; the rows of cut coordinates
     /// are zero, since they do not change with x. What lies beyond a face is thus taken for what the face does.
-    pub fn pulled_back(&self, half_mm: [f64; 3], x: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
-        let mut drawn = x;
-        if !self.is_nominal() {
-            for _ in 0..INVERSIONS {
-                let cut = [0, 1, 2].map(|i| drawn[i].clamp(-1.5 * half_mm[i], 1.5 * half_mm[i]));
-                let offset = self.offset(half_mm, cut);
-                let next = [0, 1, 2].map(|i| x[i] - offset[i]);
-                let moved = (0..3).map(|i| (next[i] - drawn[i]).abs()).fold(0.0, f64::max);
-                drawn = next;
-                if moved < INVERTED_MM {
-                    break;
-                }
-            }
+    pub fn point_of(&self, x: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
+        let drawn = if self.is_nominal { x } else { self.solved(x) };
+        let mut cut = [0.0; 3];
+        for i in 0..3 {
+            cut[i] = drawn[i].clamp(-self.half_mm[i], self.half_mm[i]);
         }
-        let cut = [0, 1, 2].map(|i| drawn[i].clamp(-half_mm[i], half_mm[i]));
-        let back = self.slope(half_mm, cut).try_inverse().unwrap_or_else(Matrix3::identity);
-        let is_inside = |i: usize| (cut[i] - drawn[i]).abs() < f64::MIN_POSITIVE;
-        let rows = [0, 1, 2].map(|i| if is_inside(i) { [0, 1, 2].map(|j| back[(i, j)]) } else { [0.0; 3] });
+        let mut rows = [[0.0; 3]; 3];
+        let back = if self.is_nominal { Matrix3::identity() } else { inverse_of(self.shape.slope(self.half_mm, cut)) };
+        for i in (0..3).filter(|&i| (cut[i] - drawn[i]).abs() < f64::MIN_POSITIVE) {
+            rows[i] = [back[(i, 0)], back[(i, 1)], back[(i, 2)]];
+        }
         (cut, rows)
     }
+
+    /// The root of the map by Newton's method with the slope at the start, which the small offsets hardly change.
+    fn solved(&self, x: [f64; 3]) -> [f64; 3] {
+        // The polynomials grow fast beyond the block.
+        let near = |p: [f64; 3]| {
+            let mut cut = p;
+            for i in 0..3 {
+                cut[i] = p[i].clamp(-1.5 * self.half_mm[i], 1.5 * self.half_mm[i]);
+            }
+            cut
+        };
+        let back = inverse_of(self.shape.slope(self.half_mm, near(x)));
+        let mut drawn = x;
+        for _ in 0..INVERSIONS {
+            let offset = self.shape.offset(self.half_mm, near(drawn));
+            let mut off = Vector3::zeros();
+            for i in 0..3 {
+                off[i] = drawn[i] + offset[i] - x[i];
+            }
+            let step = back * off;
+            for i in 0..3 {
+                drawn[i] -= step[i];
+            }
+            if step.amax() < INVERTED_MM {
+                break;
+            }
+        }
+        drawn
+    }
+}
+
+/// The inverse; the identity where there is none, as where faces cross.
+fn inverse_of(slope: Matrix3<f64>) -> Matrix3<f64> {
+    slope.try_inverse().unwrap_or_else(Matrix3::identity)
 }
 
 /// Half extents of a specimen's block, mm.
@@ -145,10 +199,8 @@ pub fn made_mesh(mesh: &Mesh, specimen: &Specimen, shape: &BlockShape) -> Mesh {
     made
 }
 
-/// The two axes of a face across `axis`.
-fn other_axes(axis: usize) -> [usize; 2] {
-    [[1, 2], [0, 2], [0, 1]][axis]
-}
+/// The two axes of a face across each axis.
+const OTHER_AXES: [[usize; 2]; 3] = [[1, 2], [0, 2], [0, 1]];
 
 /// P₀ to P₄.
 fn legendre(t: f64) -> [f64; 5] {
@@ -160,18 +212,6 @@ fn legendre(t: f64) -> [f64; 5] {
 fn legendre_rates(t: f64) -> [f64; 5] {
     let s = t * t;
     [0.0, 1.0, 3.0 * t, 7.5 * s - 1.5, (17.5 * s - 7.5) * t]
-}
-
-fn face_terms(axis: usize, t: [f64; 3]) -> [f64; FACE_TERMS] {
-    let [a, b] = other_axes(axis).map(|i| legendre(t[i]));
-    DEGREES.map(|[i, j]| a[i] * b[j])
-}
-
-/// Derivatives of the terms with respect to a and b.
-fn face_term_rates(axis: usize, t: [f64; 3]) -> [[f64; FACE_TERMS]; 2] {
-    let [a, b] = other_axes(axis).map(|i| legendre(t[i]));
-    let [da, db] = other_axes(axis).map(|i| legendre_rates(t[i]));
-    [DEGREES.map(|[i, j]| da[i] * b[j]), DEGREES.map(|[i, j]| a[i] * db[j])]
 }
 
 #[cfg(test)]
@@ -206,7 +246,7 @@ mod tests {
         for x in [[3.0, 1.0, -2.0], [-12.0, -3.0, 9.0], [0.0, 3.1, 0.0]] {
             let offset = shape.offset(HALF, x);
             let made = [0, 1, 2].map(|i| x[i] + offset[i]);
-            let (back, slope) = shape.pulled_back(HALF, made);
+            let (back, slope) = shape.inverse(HALF).point_of(made);
             // The tolerance of the inverse map.
             assert!((0..3).all(|i| (back[i] - x[i]).abs() < 1e-9), "{x:?} {back:?}");
             // The slope against differences, of second order: (1e-4)² and rounding.
@@ -214,7 +254,7 @@ mod tests {
                 let at = |t: f64| {
                     let mut p = made;
                     p[j] += t;
-                    shape.pulled_back(HALF, p).0
+                    shape.inverse(HALF).point_of(p).0
                 };
                 let (ahead, behind) = (at(1e-4), at(-1e-4));
                 for i in 0..3 {
@@ -228,7 +268,7 @@ mod tests {
     /// A point beyond a face is taken for the nearest of the face, and does not depend on how far beyond it is.
     #[test]
     fn what_lies_beyond_a_face_is_the_face() {
-        let (back, slope) = shape().pulled_back(HALF, [1.0, 3.1, 2.0]);
+        let (back, slope) = shape().inverse(HALF).point_of([1.0, 3.1, 2.0]);
         assert!((back[1] - HALF[1]).abs() < 1e-15);
         assert_eq!(slope[1], [0.0; 3]);
         assert!((slope[0][0] - 1.0).abs() < 0.1);

@@ -10,7 +10,7 @@ use crate::calibration::{
     CalibrateOptions, CalibrationProblem, Objective, Observed, RecordingFit, TermCount, calibrate,
 };
 use crate::kinematics::{Decomposition, IDENTITY, decompose};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::sensitivity::{Covariance, FisherInformation, JointInformation, median, unknowns_of};
 use crate::specimen::Specimen;
@@ -33,13 +33,13 @@ pub(super) struct Point {
     /// Its weight in averages.
     pub(super) weight: f64,
     /// The material.
-    pub(super) material: Ogden,
+    pub(super) material: Material,
 }
 
 /// What is known so far.
 pub(super) struct Posterior {
     /// The estimate.
-    pub(super) material: Ogden,
+    pub(super) material: Material,
     /// Of all recordings about material and unknowns of the set-up, with the discrepancy in their noise.
     pub(super) information: JointInformation,
     /// To what the unknowns are known beforehand.

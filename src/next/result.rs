@@ -1,6 +1,6 @@
 //! The result of a job `next` (`next/1`).
 
-use crate::material::Ogden;
+use crate::material::Material;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -15,7 +15,7 @@ pub struct NextResult {
     /// Names of the recordings.
     pub recordings: Vec<String>,
     /// The law fitted to all of them.
-    pub material: Ogden,
+    pub material: Material,
     /// Every μ and α.
     pub parameters: Vec<NextParameter>,
     /// The parameter that is known least, or the farthest from its precision where one is asked.

@@ -6,7 +6,7 @@
 //! length no shorter than the range, has grown by no more than √D per range beyond it (the first term of its series).
 
 use super::discrepancy::Discrepancy;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::sensitivity::{FisherInformation, InformationError, JointInformation, MeasurementNoise, NuisanceColumn};
 
 /// A force and how it changes with material and unknowns.
@@ -61,7 +61,7 @@ impl ScannedStep {
     /// What the mean of `num` scans tells of the material and `num_unknowns` unknowns of the set-up.
     pub(super) fn information(
         &self,
-        material: &Ogden,
+        material: &Material,
         num_unknowns: usize,
         num: f64,
         discrepancy: &Discrepancy,
@@ -124,7 +124,7 @@ mod tests {
     }
 
     fn of_mu(num: f64, discrepancy: &Discrepancy) -> f64 {
-        let material = Ogden::new(200.0, [(17.0, 2.0)]).unwrap();
+        let material = Material::new(200.0, [(17.0, 2.0)]).unwrap();
         let joint = step().information(&material, 0, num, discrepancy).unwrap();
         joint.about_material(&material, &[]).unwrap().matrix()[(1, 1)]
     }

@@ -7,7 +7,7 @@ use super::scanned::{ForceRead, ScannedStep};
 use crate::design::tearing_stretch;
 use crate::fem::{Equilibrium, ForwardModel, SolveOptions};
 use crate::kinematics::{decompose, principal_stretches};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::sensitivity::{EvaluationError, Scanner, unknowns_of};
 use crate::specimen::{LimitMargin, Specimen, farthest_from_zero};
@@ -62,7 +62,7 @@ impl Bench {
     pub(super) fn trial(
         &mut self,
         scanned_mm: &[f64],
-        material: &Ogden,
+        material: &Material,
         plan: &Plan,
         posterior: &Posterior,
         is_cancelled: &dyn Fn() -> bool,
@@ -97,7 +97,7 @@ impl Bench {
     /// What a scan of an equilibrium tells, and its force.
     fn seen(
         &mut self,
-        material: &Ogden,
+        material: &Material,
         state: &Equilibrium,
         plan: &Plan,
         posterior: &Posterior,
@@ -136,7 +136,7 @@ impl Bench {
     }
 
     /// A scanned drive with the study's limits.
-    fn step(&self, material: &Ogden, state: &Equilibrium, plan: &Plan, scanned: ScannedStep) -> TrialStep {
+    fn step(&self, material: &Material, state: &Equilibrium, plan: &Plan, scanned: ScannedStep) -> TrialStep {
         let points = self.model.quadrature_fields(material, state);
         let stretches = points.iter().map(|q| (principal_stretches(&q.deformation_gradient)[0], q.volume_mm3));
         let (drive_mm, force_n) = (state.drive_mm, state.force_n);

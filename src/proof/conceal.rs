@@ -7,7 +7,7 @@ use crate::fem::{
     Departures, Equilibrium, Fibre, Field, ForwardModel, PlateMotion, PrepareError, SolveError, SolveOptions,
 };
 use crate::homogeneous::TableError;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::{MeshOptions, half_extents_mm, mesh_specimen, mesh_specimen_along};
 use crate::recording::{Filter, RecordedStep, Recording};
 use crate::specimen::Specimen;
@@ -277,7 +277,7 @@ fn departures(made: &Specimen, experiment: &Experiment, drive_mm: f64) -> Depart
     d
 }
 
-fn depart(d: &mut Departures, made: &Specimen, material: &Ogden, hidden: &Hidden, drive_mm: f64) {
+fn depart(d: &mut Departures, made: &Specimen, material: &Material, hidden: &Hidden, drive_mm: f64) {
     let half = half_extents_mm(made);
     let (strength, which) = (hidden.strength, hidden.which);
     let largest = made.drive_mm.iter().fold(1e-9f64, |s, x| s.max(x.abs()));

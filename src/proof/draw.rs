@@ -1,7 +1,7 @@
 //! What is hidden in a recording, drawn from a seed.
 
 use crate::diagnosis::CauseName;
-use crate::material::{Ogden, OgdenTerm};
+use crate::material::{Material, OgdenTerm};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
@@ -139,7 +139,7 @@ pub struct Hidden {
     /// Seed of this draw.
     pub seed: u64,
     /// The material.
-    pub material: Ogden,
+    pub material: Material,
     /// Noise of the displacement, mm.
     pub noise_sd_mm: f64,
     /// How strong: the cause's own measure (see [`draw_cause`]).
@@ -206,7 +206,7 @@ pub fn draw_cause(cause: HiddenCause, seed: u64) -> Hidden {
     let mut hidden = Hidden {
         cause,
         seed,
-        material: Ogden { bulk_kpa, terms: vec![OgdenTerm { mu_kpa, alpha }], law: None },
+        material: Material { bulk_kpa, terms: vec![OgdenTerm { mu_kpa, alpha }], law: None },
         noise_sd_mm: d.within(0.015, 0.035),
         strength: 0.0,
         which: 0,

@@ -1,7 +1,7 @@
 //! An experiment with hidden causes: its material, its noise, and everything that was not as it was told.
 
 use super::draw::{Draw, Hidden, HiddenCause, draw_cause};
-use crate::material::{Ogden, OgdenTerm};
+use crate::material::{Material, OgdenTerm};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -15,7 +15,7 @@ pub struct Experiment {
     /// Whether its block has no holes; else it has two.
     pub is_solid: bool,
     /// The material.
-    pub material: Ogden,
+    pub material: Material,
     /// Noise of the displacement, mm.
     pub noise_sd_mm: f64,
     /// Whether the recording states its noise.
@@ -116,7 +116,7 @@ fn draw_plain(d: &mut Draw, seed: u64) -> Experiment {
         let alpha = d.within(low, high);
         terms.push(OgdenTerm { mu_kpa: 2.0 * shear_kpa * d.within(0.05, 0.25) / alpha, alpha });
     }
-    let mut material = Ogden { bulk_kpa: 1.0, terms, law: None };
+    let mut material = Material { bulk_kpa: 1.0, terms, law: None };
     material.bulk_kpa = material.initial_shear_modulus_kpa() * d.log_within(90.0, 180.0);
     Experiment {
         seed,

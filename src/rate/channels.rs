@@ -116,7 +116,7 @@ pub(crate) fn channels(terms: &[ShearTerm], deformation: &Deformation) -> Channe
 mod tests {
     use super::*;
     use crate::homogeneous::{HomogeneousTest, incompressible_derivative, incompressible_stress};
-    use crate::material::{Ogden, OgdenTerm, energy_density};
+    use crate::material::{Material, OgdenTerm, energy_density};
 
     const TESTS: [HomogeneousTest; 4] = [
         HomogeneousTest::Uniaxial,
@@ -153,7 +153,7 @@ mod tests {
                 let term = ShearTerm { modulus_kpa: 10.0, alpha };
                 let found = channels(&[term], &state);
                 let material =
-                    Ogden { bulk_kpa: 0.0, terms: vec![OgdenTerm { mu_kpa: term.mu_kpa(), alpha }], law: None };
+                    Material { bulk_kpa: 0.0, terms: vec![OgdenTerm { mu_kpa: term.mu_kpa(), alpha }], law: None };
                 let exact = energy_density(&material, state.log_stretches().map(f64::exp));
                 // The series' error and the cancellation of 1/α² in the general form, 1e-16/1e-6.
                 assert!((found.energy - exact).abs() < 1e-7 * exact, "{test:?} {alpha} {} {exact}", found.energy);

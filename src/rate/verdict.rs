@@ -1,7 +1,7 @@
 //! What an analysis of load curves says.
 
 use crate::homogeneous::{CurveMatch, Interval, OgdenTerms, ShearTerm, fitted_material};
-use crate::material::{MaterialError, Ogden};
+use crate::material::{Material, MaterialError};
 use serde::{Deserialize, Serialize};
 
 /// How the search for what a model leaves out ended, be it of load curves or of a whole recording.
@@ -143,7 +143,7 @@ impl CurveMaterial {
     ///
     /// # Errors
     /// As [`fitted_material`].
-    pub fn material(&self) -> Result<Ogden, MaterialError> {
+    pub fn material(&self) -> Result<Material, MaterialError> {
         let term = |p: &[CauseParameter]| ShearTerm { modulus_kpa: p[0].value * p[1].value, alpha: p[1].value };
         let terms: Vec<ShearTerm> = self.parameters.chunks_exact(2).map(term).collect();
         fitted_material(&OgdenTerms::free(&terms), None)

@@ -4,14 +4,14 @@ use super::solution_field::{FieldPlace, SolutionField};
 use super::vtu::element_means;
 use crate::fem::{Equilibrium, ForwardModel, QuadraturePoint};
 use crate::kinematics::decompose;
-use crate::material::Ogden;
+use crate::material::Material;
 
 const VECTOR: &[&str] = &["component"];
 const TENSOR: &[&str] = &["row", "column"];
 
 /// The fields of an equilibrium: displacement at the nodes; F, J, principal stretches, λ, k and σ as element means.
 /// J, stretches, λ and k are those of the mean of F.
-pub fn solution_fields(model: &ForwardModel, material: &Ogden, state: &Equilibrium) -> Vec<SolutionField> {
+pub fn solution_fields(model: &ForwardModel, material: &Material, state: &Equilibrium) -> Vec<SolutionField> {
     let fields = model.quadrature_fields(material, state);
     let mean = |value: &dyn Fn(&QuadraturePoint) -> [[f64; 3]; 3]| -> Vec<[f64; 9]> {
         let flat = |t: [[f64; 3]; 3]| [t[0][0], t[0][1], t[0][2], t[1][0], t[1][1], t[1][2], t[2][0], t[2][1], t[2][2]];

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::fem::{Equilibrium, ForwardModel};
 use crate::kinematics::{Decomposition, decompose};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::Mesh;
 use crate::sensitivity::{Evaluation, SampleMaps};
 
@@ -14,7 +14,7 @@ use crate::sensitivity::{Evaluation, SampleMaps};
 ///
 /// # Errors
 /// [`ReportError`] for a mesh that does not fit its fields.
-pub fn deformed_picture(model: &ForwardModel, material: &Ogden, state: &Equilibrium) -> Result<String, ReportError> {
+pub fn deformed_picture(model: &ForwardModel, material: &Material, state: &Equilibrium) -> Result<String, ReportError> {
     let fields = model.quadrature_fields(material, state);
     let stretches: Vec<f64> =
         fields.iter().map(|q| decompose(&q.deformation_gradient).principal_stretches[0]).collect();

@@ -4,14 +4,14 @@ use super::ReportError;
 use super::surface::{nodal_values, surface_quads};
 use crate::fem::{Equilibrium, ForwardModel};
 use crate::kinematics::decompose;
-use crate::material::Ogden;
+use crate::material::Material;
 
 /// Facets of the surface as JSON: `reference_mm` and `displacement_mm` (twelve numbers per facet), `stretch_amplitude`
 /// and `deformation_mode` (one per facet; null where undefined), five digits.
 ///
 /// # Errors
 /// [`ReportError`].
-pub fn surface_json(model: &ForwardModel, material: &Ogden, state: &Equilibrium) -> Result<Vec<u8>, ReportError> {
+pub fn surface_json(model: &ForwardModel, material: &Material, state: &Equilibrium) -> Result<Vec<u8>, ReportError> {
     let fields = model.quadrature_fields(material, state);
     let states: Vec<_> = fields.iter().map(|q| decompose(&q.deformation_gradient)).collect();
     let stretch: Vec<f64> = states.iter().map(|d| d.stretch_amplitude).collect();

@@ -7,7 +7,7 @@ use super::lines::{Line, LinePlot};
 use super::number::significant;
 use crate::diagnosis::{Agreement, BeforeAfter, DiagnosisResult, TogetherResult};
 use crate::homogeneous::{HomogeneousTest, incompressible_stress};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::specimen::{Specimen, TestKind};
 
 /// Points per curve.
@@ -137,7 +137,7 @@ fn materials(t: &TogetherResult, all: &[&DiagnosisResult], specimen: &Specimen) 
         TestKind::DoubleLapShear => (HomogeneousTest::SimpleShear, drive / specimen.block.thickness_mm, "shear (1)"),
         TestKind::Uniaxial => (HomogeneousTest::Uniaxial, drive / specimen.block.length_mm, "stretch (1)"),
     };
-    let curve = |material: &Ogden| -> Vec<[f64; 2]> {
+    let curve = |material: &Material| -> Vec<[f64; 2]> {
         let terms = material.shear_terms();
         (0..NUM_POINTS)
             .map(|i| {
@@ -146,7 +146,7 @@ fn materials(t: &TogetherResult, all: &[&DiagnosisResult], specimen: &Specimen) 
             })
             .collect()
     };
-    let line = |name: &str, material: &Ogden| Line { name: name.into(), points: curve(material), has_marks: false };
+    let line = |name: &str, material: &Material| Line { name: name.into(), points: curve(material), has_marks: false };
     let mut lines: Vec<Line> = all.iter().map(|r| line(&r.recording, &r.material)).collect();
     lines.push(line("one for all", &t.material));
     LinePlot {

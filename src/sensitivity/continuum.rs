@@ -10,7 +10,7 @@ use super::joint_information::JointInformation;
 use super::protocol::{Nuisance, Protocol};
 use crate::fem::{ParameterSensitivity, QuadraturePoint};
 use crate::kinematics::{decompose, principal_stretches};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::{Mesh, Mirror};
 use nalgebra::DMatrix;
 
@@ -22,7 +22,7 @@ pub(super) fn num_copies(mirror: Mirror) -> f64 {
 /// 𝒮 of every μᵢ and αᵢ over the whole specimen: `volume_integral` = ∫ S dV, `sum` = ∫ S dV / V_voxel,
 /// `mean_per_voxel` = ∫ S dV / V.
 pub fn integrate_over_quadrature(
-    material: &Ogden,
+    material: &Material,
     points: &[QuadraturePoint],
     mirror: Mirror,
     voxel_volume_mm3: f64,
@@ -52,7 +52,7 @@ pub fn integrate_over_quadrature(
 
 /// 𝒮 as [`integrate_over_quadrature`] gives it, over all scanned blocks; `mean_per_voxel` over their whole volume.
 pub fn integrate_over_blocks(
-    material: &Ogden,
+    material: &Material,
     blocks: &[ScannedBlock],
     voxel_volume_mm3: f64,
 ) -> Vec<IntegratedSensitivity> {
@@ -76,13 +76,13 @@ pub fn integrate_over_blocks(
 /// Fisher information of one drive with ∫ dV / V_voxel in place of the sum over voxels.
 ///
 /// `points` come from [`crate::fem::ForwardModel::quadrature_fields`] (element after element, in the order of
-/// [`crate::mesh::ElementKind::quadrature`]); `sensitivities` stand in the order of [`Ogden::parameters`]. Products of
+/// [`crate::mesh::ElementKind::quadrature`]); `sensitivities` stand in the order of [`Material::parameters`]. Products of
 /// two sensitivities are even under the mirrors, so each reflected copy adds the same.
 ///
 /// # Errors
 /// [`InformationError::InvalidSd`], [`InformationError::LengthMismatch`], [`InformationError::NotFinite`].
 pub fn information_over_quadrature(
-    material: &Ogden,
+    material: &Material,
     mesh: &Mesh,
     points: &[QuadraturePoint],
     sensitivities: &[ParameterSensitivity],
@@ -108,7 +108,7 @@ pub fn information_over_quadrature(
 pub struct ForceReading {
     /// The force.
     pub force_n: f64,
-    /// Its derivatives with respect to the material's parameters, in the order of [`Ogden::parameters`].
+    /// Its derivatives with respect to the material's parameters, in the order of [`Material::parameters`].
     pub sensitivities: Vec<f64>,
 }
 
@@ -130,7 +130,7 @@ pub struct ScannedBlock<'a> {
     pub mesh: &'a Mesh,
     /// From [`crate::fem::ForwardModel::quadrature_fields`].
     pub points: &'a [QuadraturePoint],
-    /// In the order of [`Ogden::parameters`].
+    /// In the order of [`Material::parameters`].
     pub sensitivities: &'a [ParameterSensitivity],
 }
 
@@ -141,7 +141,7 @@ pub struct ScannedBlock<'a> {
 /// # Errors
 /// As [`information_over_quadrature`].
 pub fn information_of_protocol(
-    material: &Ogden,
+    material: &Material,
     blocks: &[ScannedBlock],
     forces: &ForceReadings,
     noise: &MeasurementNoise,

@@ -251,7 +251,7 @@ impl Covariance {
 mod tests {
     use super::super::information::tests::one_term;
     use super::*;
-    use crate::material::{Ogden, OgdenTerm};
+    use crate::material::{Material, OgdenTerm};
 
     const ALL: [Criterion; 4] =
         [Criterion::LogDeterminant, Criterion::Trace, Criterion::LargestEigenvalue, Criterion::WorstRelativeSd];
@@ -305,7 +305,7 @@ mod tests {
     #[test]
     fn twin_terms_do_not_panic() {
         let term = OgdenTerm { mu_kpa: 8.0, alpha: 2.0 };
-        let material = Ogden { bulk_kpa: 2000.0, terms: vec![term, term], law: None };
+        let material = Material { bulk_kpa: 2000.0, terms: vec![term, term], law: None };
         let mut information = FisherInformation::none(&material);
         information.add_force(&[0.0, 0.3, 0.7, 0.3, 0.7], 0.02);
         let covariance = information.covariance();

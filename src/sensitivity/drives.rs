@@ -4,7 +4,7 @@ use super::error::EvaluationError;
 use super::fixture::Fixture;
 use super::observation::median;
 use crate::fem::{Equilibrium, SolveOptions};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::specimen::{Specimen, TestKind, leads_on};
 use serde::{Deserialize, Serialize};
 
@@ -84,7 +84,7 @@ type Paths = (Vec<Vec<Equilibrium>>, usize);
 /// Solves for the drive at which the median of λ over all scanned voxels is `target`, each equilibrium from the last.
 pub(super) fn solve_for_median(
     fixture: &mut Fixture,
-    material: &Ogden,
+    material: &Material,
     target: f64,
     options: &SolveOptions,
     is_cancelled: &dyn Fn() -> bool,

@@ -13,7 +13,7 @@ use super::protocol::{Nuisance, Protocol, SAME_DRIVE_MM};
 use super::scan_settings::ScanSettings;
 use super::shares::{BestShares, SharedTime, best_shares};
 use crate::fem::{Equilibrium, Tangent};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::provenance::input_hash;
 use crate::specimen::Specimen;
 use crate::voxel::{Sampling, VoxelMask};
@@ -57,7 +57,7 @@ impl EvaluationMaps {
 /// See [`EvaluationError`].
 pub fn evaluate(
     specimen: &Specimen,
-    material: &Ogden,
+    material: &Material,
     scan: &ScanSettings,
     drives: &DriveSelection,
     options: &EvaluationOptions,
@@ -76,7 +76,7 @@ pub fn evaluate(
 /// See [`EvaluationError`].
 pub fn evaluate_fixture(
     fixture: &mut Fixture,
-    material: &Ogden,
+    material: &Material,
     drives: &DriveSelection,
     neighbours: &[Vec<Equilibrium>],
     options: &EvaluationOptions,
@@ -246,7 +246,7 @@ impl Drive<'_> {
     fn see(
         &self,
         fixture: &mut Fixture,
-        material: &Ogden,
+        material: &Material,
         equilibria: &[&Equilibrium],
     ) -> Result<(SeenBlocks, AtDrive), EvaluationError> {
         let scan = *fixture.scan();
@@ -319,7 +319,7 @@ fn unknowns_at(
 fn add_forces(
     forces: &mut JointInformation,
     fixture: &mut Fixture,
-    material: &Ogden,
+    material: &Material,
     options: &EvaluationOptions,
     scanned: &[EvaluationStep],
     is_cancelled: &dyn Fn() -> bool,
@@ -347,7 +347,7 @@ fn add_forces(
 /// SHA-256 over the JSON of all inputs. Field order is fixed by the types, so equal inputs have equal hashes.
 fn hash_of_inputs(
     specimen: &Specimen,
-    material: &Ogden,
+    material: &Material,
     scan: &ScanSettings,
     drives: &DriveSelection,
     options: &EvaluationOptions,

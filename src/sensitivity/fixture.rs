@@ -5,7 +5,7 @@ use super::evaluation_options::EvaluationOptions;
 use super::observation::Scanner;
 use super::scan_settings::ScanSettings;
 use crate::fem::{Equilibrium, ForwardModel, PrepareError, SolveError, SolveOptions};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::specimen::Specimen;
 
 /// A specimen's samples. All share the drive and the load cell, whose force is the sum of theirs; each that is scanned
@@ -96,7 +96,7 @@ impl Fixture {
     /// As [`ForwardModel::solve`].
     pub fn solve_path(
         &mut self,
-        material: &Ogden,
+        material: &Material,
         drives_mm: &[f64],
         neighbours: &[Vec<Equilibrium>],
         options: &SolveOptions,

@@ -7,7 +7,7 @@
 //!
 //! Not included: the correlation of the noise of filtered scans, and errors of the model.
 
-use crate::material::{Ogden, Parameter};
+use crate::material::{Material, Parameter};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -98,18 +98,18 @@ pub struct FisherInformation {
 
 impl FisherInformation {
     /// No information about the parameters of `material`, at its values.
-    pub fn none(material: &Ogden) -> Self {
+    pub fn none(material: &Material) -> Self {
         let parameters = material.parameters();
         let values = parameters.iter().map(|&p| material.value(p)).collect();
         let n = parameters.len();
         FisherInformation { parameters, values, matrix: DMatrix::zeros(n, n) }
     }
 
-    /// A matrix computed elsewhere, rows and columns in the order of [`Ogden::parameters`], in the parameters' units.
+    /// A matrix computed elsewhere, rows and columns in the order of [`Material::parameters`], in the parameters' units.
     ///
     /// # Errors
     /// [`InformationError::LengthMismatch`], [`InformationError::NotFinite`].
-    pub fn from_matrix(material: &Ogden, matrix: DMatrix<f64>) -> Result<Self, InformationError> {
+    pub fn from_matrix(material: &Material, matrix: DMatrix<f64>) -> Result<Self, InformationError> {
         let information = Self::none(material);
         check_length("rows of the matrix", matrix.nrows(), information.parameters.len())?;
         check_length("columns of the matrix", matrix.ncols(), information.parameters.len())?;
@@ -121,13 +121,13 @@ impl FisherInformation {
     /// Information of one drive.
     ///
     /// `voxel_sensitivities[i][v]` is ∂ū/∂ξ_i of voxel v (mm per unit of ξ_i) and `force_sensitivities[i]` is ∂F/∂ξ_i
-    /// (N per unit), both in the order of [`Ogden::parameters`]; `weights[v]` comes from
+    /// (N per unit), both in the order of [`Material::parameters`]; `weights[v]` comes from
     /// [`PartialVoxels::weights`](super::PartialVoxels::weights).
     ///
     /// # Errors
     /// [`InformationError::InvalidSd`], [`InformationError::LengthMismatch`], [`InformationError::NotFinite`].
     pub fn of_drive(
-        material: &Ogden,
+        material: &Material,
         voxel_sensitivities: &[Vec<[f64; 3]>],
         weights: &[f64],
         force_sensitivities: &[f64],

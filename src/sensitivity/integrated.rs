@@ -2,7 +2,7 @@
 
 use super::pointwise::{PointwiseSensitivity, alpha_sensitivity, law_sensitivity, mu_sensitivity};
 use crate::kinematics::Decomposition;
-use crate::material::{Lanes, Ogden, Parameter};
+use crate::material::{Lanes, Material, Parameter};
 use crate::voxel::VoxelMask;
 use serde::{Deserialize, Serialize};
 
@@ -47,7 +47,7 @@ impl IntegratedSensitivity {
 
 /// S_ξ with its derivatives at a point. Zero for κ, and by continuity where the mode is missing (λ = 1).
 pub fn parameter_sensitivity(
-    material: &Ogden,
+    material: &Material,
     parameter: Parameter,
     stretch_amplitude: f64,
     deformation_mode: Option<f64>,
@@ -68,7 +68,7 @@ pub fn parameter_sensitivity(
 }
 
 /// S_ξ per voxel, for maps.
-pub fn sensitivity_map(material: &Ogden, parameter: Parameter, states: &[Decomposition]) -> Vec<f64> {
+pub fn sensitivity_map(material: &Material, parameter: Parameter, states: &[Decomposition]) -> Vec<f64> {
     states
         .iter()
         .map(|s| parameter_sensitivity(material, parameter, s.stretch_amplitude, s.deformation_mode).value)
@@ -76,13 +76,13 @@ pub fn sensitivity_map(material: &Ogden, parameter: Parameter, states: &[Decompo
 }
 
 /// μᵢ and αᵢ: the parameters that a volume-preserving deformation can tell of.
-pub(super) fn shear_parameters(material: &Ogden) -> impl Iterator<Item = Parameter> {
+pub(super) fn shear_parameters(material: &Material) -> impl Iterator<Item = Parameter> {
     material.parameters().into_iter().filter(|p| *p != Parameter::Kappa)
 }
 
 /// 𝒮 of every μᵢ and αᵢ over the voxels of `mask`, whose states stand in the mask's order.
 pub fn integrate_over_voxels(
-    material: &Ogden,
+    material: &Material,
     states: &[Decomposition],
     mask: &VoxelMask,
 ) -> Vec<IntegratedSensitivity> {
@@ -112,8 +112,8 @@ mod tests {
     use crate::material::OgdenTerm;
     use crate::voxel::{Histogram2d, HistogramAxis, VoxelGrid};
 
-    fn material() -> Ogden {
-        Ogden {
+    fn material() -> Material {
+        Material {
             bulk_kpa: 2200.0,
             terms: vec![OgdenTerm { mu_kpa: 16.0, alpha: 1.9 }, OgdenTerm { mu_kpa: 0.35, alpha: 8.0 }],
             law: None,

@@ -5,7 +5,7 @@
 //! A − C (B + P⁻¹)⁻¹ Cᵀ.
 
 use super::information::{FisherInformation, InformationError, MeasurementNoise};
-use crate::material::Ogden;
+use crate::material::Material;
 use nalgebra::DMatrix;
 
 /// How the data of one drive change with an unknown of the set-up.
@@ -30,7 +30,7 @@ pub struct JointInformation {
 
 impl JointInformation {
     /// No information about `num` unknowns.
-    pub fn none(material: &Ogden, num: usize) -> JointInformation {
+    pub fn none(material: &Material, num: usize) -> JointInformation {
         JointInformation::of_scan(FisherInformation::none(material), num)
     }
 
@@ -109,7 +109,7 @@ impl JointInformation {
     ///
     /// # Errors
     /// [`InformationError::LengthMismatch`], [`InformationError::NotFinite`].
-    pub fn carried_to(&self, material: &Ogden) -> Result<JointInformation, InformationError> {
+    pub fn carried_to(&self, material: &Material) -> Result<JointInformation, InformationError> {
         let values: Vec<f64> = material.parameters().into_iter().map(|p| material.value(p)).collect();
         let ratio: Vec<f64> = self.material.values().iter().zip(&values).map(|(own, new)| own / new).collect();
         let n = ratio.len();
@@ -129,7 +129,7 @@ impl JointInformation {
     ///
     /// # Errors
     /// [`InformationError::NotFinite`].
-    pub fn about_material(&self, material: &Ogden, sd: &[f64]) -> Result<FisherInformation, InformationError> {
+    pub fn about_material(&self, material: &Material, sd: &[f64]) -> Result<FisherInformation, InformationError> {
         if sd.is_empty() {
             self.material.check_finite()?;
             return Ok(self.material.clone());

@@ -8,7 +8,7 @@ use super::joint_information::{JointInformation, NuisanceColumn};
 use super::scan_settings::ScanSettings;
 use crate::fem::ParameterSensitivity;
 use crate::kinematics::{Decomposition, decompose};
-use crate::material::{Ogden, Parameter};
+use crate::material::{Material, Parameter};
 use crate::mesh::Mesh;
 use crate::specimen::Specimen;
 use crate::voxel::{Histogram2d, HistogramAxis, Sampling, VoxelError, VoxelMask, VoxelOperator};
@@ -149,7 +149,7 @@ impl Scanner {
     /// # Errors
     /// Lengths that do not match, noise that is not positive: [`EvaluationError::Voxel`],
     /// [`EvaluationError::Information`].
-    pub fn observe(&self, material: &Ogden, state: &DrivenState) -> Result<Observation, EvaluationError> {
+    pub fn observe(&self, material: &Material, state: &DrivenState) -> Result<Observation, EvaluationError> {
         let states: Vec<Decomposition> =
             self.operator.deformation_gradients(state.displacement)?.iter().map(decompose).collect();
         let displacement = self.operator.average(state.displacement)?;

@@ -8,7 +8,7 @@
 use super::covariance::{Criterion, PromisedSd};
 use super::information::{FisherInformation, InformationError};
 use super::joint_information::JointInformation;
-use crate::material::{Ogden, Parameter};
+use crate::material::{Material, Parameter};
 use serde::{Deserialize, Serialize};
 
 /// The best shares of the time of one scan, and what they promise.
@@ -32,7 +32,7 @@ const STEP: f64 = 1e-6;
 /// Drives that share the time of a scan, with one material.
 #[derive(Clone, Debug)]
 pub struct SharedTime {
-    pub(super) material: Ogden,
+    pub(super) material: Material,
     /// What the voxels of each drive tell in the time of a whole scan.
     pub(super) voxels: Vec<JointInformation>,
     /// What the force at each of them tells.

@@ -2,7 +2,7 @@
 
 use super::target::Target;
 use crate::field::schema::{integer_within, schema_type};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshSize;
 use crate::provenance::{VERSION, input_hash};
 use crate::sensitivity::ScanSettings;
@@ -51,7 +51,7 @@ pub struct NamedMaterial {
     /// Name in results.
     pub name: String,
     /// Its values.
-    pub material: Ogden,
+    pub material: Material,
 }
 
 /// One axis of the space.

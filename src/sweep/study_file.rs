@@ -6,7 +6,7 @@ use crate::design::Inline;
 use crate::field::file_tag;
 use crate::field::schema::{Seed, schema_of_file};
 use crate::field::{FieldError, read};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshSize;
 use crate::sensitivity::ScanSettings;
 use crate::specimen::Specimen;
@@ -63,8 +63,8 @@ struct MaterialEntry {
     /// Name in results.
     name: String,
     /// Its values.
-    #[schema(value_type = Ogden)]
-    material: Inline<Ogden>,
+    #[schema(value_type = Material)]
+    material: Inline<Material>,
 }
 
 schema_of_file!(SweepStudy, StudyFile);
@@ -76,7 +76,7 @@ impl StudyFile {
     fn study<E>(
         self,
         base: impl FnOnce(Inline<Specimen>) -> Result<Specimen, E>,
-        mut material: impl FnMut(usize, Inline<Ogden>) -> Result<Ogden, E>,
+        mut material: impl FnMut(usize, Inline<Material>) -> Result<Material, E>,
     ) -> Result<SweepStudy, E> {
         let mut materials = Vec::with_capacity(self.materials.len());
         for (index, entry) in self.materials.into_iter().enumerate() {
@@ -112,7 +112,7 @@ impl SweepStudy {
         let file: StudyFile = read(&value).map_err(|e| not_a_study(e.to_string()))?;
         let study = file.study(
             |base| base.resolve(folder, Specimen::from_json),
-            |_, material| material.resolve(folder, Ogden::from_json),
+            |_, material| material.resolve(folder, Material::from_json),
         )?;
         study.validate()?;
         Ok(study)

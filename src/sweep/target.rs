@@ -1,7 +1,7 @@
 //! What a variable sets: one number of the specimen, the material or the scan, by name.
 
 use super::study_error::SweepStudyError;
-use crate::material::{LawParameter, Ogden, Parameter};
+use crate::material::{LawParameter, Material, Parameter};
 use crate::sensitivity::ScanSettings;
 use crate::specimen::{HoleShape, Specimen};
 
@@ -131,7 +131,7 @@ impl Target {
     }
 
     /// Sets `value`; false where there is no such hole, outline, gauge or term.
-    pub fn set(&self, value: f64, specimen: &mut Specimen, material: &mut Ogden, scan: &mut ScanSettings) -> bool {
+    pub fn set(&self, value: f64, specimen: &mut Specimen, material: &mut Material, scan: &mut ScanSettings) -> bool {
         let value = self.signed(value);
         let slot = match self.place {
             Place::Drive => {

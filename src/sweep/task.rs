@@ -3,7 +3,7 @@
 use super::points::points;
 use super::study::SweepStudy;
 use crate::fem::SolveError;
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::MeshSize;
 use crate::sensitivity::{
     DriveSelection, EvaluationError, EvaluationOptions, EvaluationStep, PromisedSd, ScanSettings, evaluate,
@@ -30,7 +30,7 @@ pub struct TaskInputs {
     /// The design; one that cannot be made is a result.
     pub specimen: Specimen,
     /// The material.
-    pub material: Ogden,
+    pub material: Material,
     /// The scan.
     pub scan: ScanSettings,
     /// The mesh.

@@ -3,7 +3,7 @@
 #![allow(dead_code)] // Each test binary uses a part.
 
 use lambdak::fem::{Equilibrium, ForwardModel, SolveError, SolveOptions};
-use lambdak::material::{Ogden, OgdenTerm};
+use lambdak::material::{Material, OgdenTerm};
 use lambdak::mesh::{ElementKind, Mesh, MeshOptions, Mirror, mesh_specimen};
 use lambdak::specimen::{Block, Hole, HoleAxis, HoleKind, HoleShape, Outline, Specimen, TestKind};
 use std::collections::HashMap;
@@ -12,17 +12,17 @@ pub type Vector = [f64; 3];
 pub type Matrix = [[f64; 3]; 3];
 
 /// κ and terms (μ, α).
-pub fn ogden(bulk_kpa: f64, terms: &[(f64, f64)]) -> Ogden {
-    Ogden { bulk_kpa, terms: terms.iter().map(|&(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha }).collect(), law: None }
+pub fn ogden(bulk_kpa: f64, terms: &[(f64, f64)]) -> Material {
+    Material { bulk_kpa, terms: terms.iter().map(|&(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha }).collect(), law: None }
 }
 
 /// Ecoflex 00-20, one term.
-pub fn one_term() -> Ogden {
+pub fn one_term() -> Material {
     ogden(2173.0, &[(17.0, 1.91)])
 }
 
 /// Ecoflex 00-20, two terms.
-pub fn two_terms() -> Ogden {
+pub fn two_terms() -> Material {
     ogden(2200.0, &[(16.0, 1.9), (0.35, 8.0)])
 }
 
@@ -94,7 +94,7 @@ pub fn never() -> bool {
     false
 }
 
-pub fn solve(model: &mut ForwardModel, material: &Ogden, drive_mm: f64) -> Result<Equilibrium, SolveError> {
+pub fn solve(model: &mut ForwardModel, material: &Material, drive_mm: f64) -> Result<Equilibrium, SolveError> {
     model.solve(material, drive_mm, None, &tight(), &never)
 }
 

@@ -33,7 +33,7 @@ fn hash_follows_the_inputs() {
             &EvaluationOptions { protocol, ..EvaluationOptions::standard(&specimen) },
         ),
         hash_of_inputs(&block("other"), &one_term(), &scan(), &drives, &options),
-        hash_of_inputs(&specimen, &Ogden { bulk_kpa: 1.0, ..one_term() }, &scan(), &drives, &options),
+        hash_of_inputs(&specimen, &Material { bulk_kpa: 1.0, ..one_term() }, &scan(), &drives, &options),
         hash_of_inputs(&specimen, &one_term(), &ScanSettings { force_sd_n: 0.03, ..scan() }, &drives, &options),
         hash_of_inputs(&specimen, &one_term(), &scan(), &DriveSelection::MedianStretch(1.2), &options),
     ];
@@ -41,7 +41,7 @@ fn hash_follows_the_inputs() {
 }
 
 /// Voxel displacements, as the scan sees them, at a material with one parameter changed.
-fn seen(specimen: &Specimen, material: &Ogden, options: &EvaluationOptions) -> EvaluationMaps {
+fn seen(specimen: &Specimen, material: &Material, options: &EvaluationOptions) -> EvaluationMaps {
     let drives = DriveSelection::DriveMm(vec![1.5]);
     evaluate(specimen, material, &coarse_scan(), &drives, options, &|| false).unwrap().1
 }
@@ -272,7 +272,7 @@ fn comparison_at_equal_median_stretch() {
 fn forces_on_the_way_and_unknowns_of_the_set_up() {
     use crate::material::OgdenTerm;
     let specimen = with_hole();
-    let material = Ogden {
+    let material = Material {
         bulk_kpa: 2000.0,
         terms: vec![OgdenTerm { mu_kpa: 12.0, alpha: 1.5 }, OgdenTerm { mu_kpa: 2.0, alpha: 5.0 }],
         law: None,

@@ -7,8 +7,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-pub(crate) fn one_term() -> Ogden {
-    Ogden { bulk_kpa: 2173.0, terms: vec![OgdenTerm { mu_kpa: 17.0, alpha: 1.91 }], law: None }
+pub(crate) fn one_term() -> Material {
+    Material { bulk_kpa: 2173.0, terms: vec![OgdenTerm { mu_kpa: 17.0, alpha: 1.91 }], law: None }
 }
 
 fn noise() -> MeasurementNoise {
@@ -105,7 +105,7 @@ fn information_adds() {
     assert!((prior.covariance().sd(0).unwrap() - 0.5 * 2173.0).abs() < 1e-9);
     assert!(prior.add_prior(Parameter::Mu(3), 1.0).is_err());
     assert!(prior.add_prior(Parameter::Mu(0), 0.0).is_err());
-    let other = FisherInformation::none(&Ogden { bulk_kpa: 1.0, ..one_term() });
+    let other = FisherInformation::none(&Material { bulk_kpa: 1.0, ..one_term() });
     assert!(matches!(two.add(&other), Err(InformationError::ParameterMismatch { .. })));
 }
 

@@ -3,7 +3,7 @@
 use crate::design::Study;
 use crate::field::FieldError;
 use crate::job::{QuickResponse, RequestSchema, defaults, quick_response, seconds_per_drive};
-use crate::material::Ogden;
+use crate::material::Material;
 use crate::mesh::{MeshSize, mesh_specimen};
 use crate::service::access::{Caller, Role};
 use crate::service::app::App;
@@ -37,7 +37,7 @@ pub(super) struct CheckRequest {
     /// With a material the specimen is solved at its largest drive on the search's mesh, where a limit on force or
     /// local stretch asks for it.
     #[serde(default)]
-    material: Option<Ogden>,
+    material: Option<Material>,
 }
 
 /// The schema of checks.
@@ -255,7 +255,7 @@ pub(super) struct NamedMaterial {
     /// Name.
     name: String,
     /// The material.
-    material: Ogden,
+    material: Material,
 }
 
 macro_rules! shipped {
