@@ -11,6 +11,7 @@
 
 use super::trace::Trace;
 use crate::calibration::Observed;
+use crate::dot::dot;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -258,16 +259,24 @@ fn products_of(
     b: &[Weighed],
     of_b: &(dyn Fn(&Weighed) -> &[f64] + Sync),
 ) -> DMatrix<f64> {
-    let num = a.first().map_or(0, |w| of_a(w).len());
-    let left: Vec<f64> = a.iter().flat_map(of_a).copied().collect();
-    let left = MatRef::from_column_major_slice(&left, num, a.len());
     let mut found = DMatrix::zeros(a.len(), b.len());
     if a.is_empty() || b.is_empty() {
         return found;
     }
+    if a.len() == 1 || b.len() == 1 {
+        for (i, a) in a.iter().enumerate() {
+            for (j, b) in b.iter().enumerate() {
+                found[(i, j)] = dot(of_a(a), of_b(b));
+            }
+        }
+        return found;
+    }
+    let num = of_a(&a[0]).len();
+    let left = a.iter().map(of_a).collect::<Vec<_>>().concat();
+    let left = MatRef::from_column_major_slice(&left, num, a.len());
     let size = b.len().div_ceil(rayon::current_num_threads());
     found.as_mut_slice().par_chunks_mut(size * a.len()).zip(b.par_chunks(size)).for_each(|(found, b)| {
-        let right: Vec<f64> = b.iter().flat_map(of_b).copied().collect();
+        let right = b.iter().map(of_b).collect::<Vec<_>>().concat();
         let right = MatRef::from_column_major_slice(&right, num, b.len());
         let found = MatMut::from_column_major_slice_mut(found, a.len(), b.len());
         matmul(found, Accum::Replace, left.transpose(), right, 1.0, Par::Seq);

@@ -10,6 +10,7 @@ use super::fronts::Fronts;
 use super::multifrontal::{Arenas, Lower, NonPositivePivot, Real, factorise};
 use super::substitution::FactorByFronts;
 use super::topology::Topology;
+use crate::dot::dot;
 use faer::Side;
 use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::SupernodalThreshold;
@@ -332,10 +333,6 @@ fn multiply(topology: &Topology, blocks: &[[f64; 9]], x: &[f64], y: &mut [f64]) 
             y[3 * j + c] += s;
         }
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
 /// Pattern of the transpose.

@@ -14,7 +14,7 @@ use faer::reborrow::{Reborrow, ReborrowMut};
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use faer::traits::RealField;
 use faer::{Accum, MatMut, MatRef, Par, Spec};
-use std::ops::{AddAssign, Neg, Range, SubAssign};
+use std::ops::{AddAssign, Mul, Neg, Range, SubAssign};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Columns of a panel of a front that several threads eliminate.
@@ -27,7 +27,10 @@ const UPDATE_PANEL: usize = 96;
 const WORTH_SHARING: usize = 250_000;
 
 /// A precision.
-pub(super) trait Real: RealField + Copy + Default + AddAssign + SubAssign + Neg<Output = Self> {}
+pub(super) trait Real:
+    RealField + Copy + Default + AddAssign + SubAssign + Mul<Output = Self> + Neg<Output = Self>
+{
+}
 impl Real for f32 {}
 impl Real for f64 {}
 

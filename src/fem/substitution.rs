@@ -6,6 +6,7 @@
 use super::crew::Crew;
 use super::fronts::Fronts;
 use super::multifrontal::Real;
+use crate::dot::dot;
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
@@ -125,11 +126,16 @@ impl<T: Real> FactorByFronts<'_, T> {
         }
     }
 
-    /// The factor's entries in the square and the rows below of front `s`.
+    /// The factor's entries of front `s`, column by column.
+    fn entries(&self, s: usize) -> &[T] {
+        let values = self.symbolic.col_ptr_for_val();
+        &self.values[values[s]..values[s + 1]]
+    }
+
+    /// The same, in the square and in the rows below.
     fn block(&self, s: usize) -> (MatRef<'_, T>, MatRef<'_, T>) {
-        let (values, n) = (self.symbolic.col_ptr_for_val(), self.fronts.num_columns(s));
-        let entries = &self.values[values[s]..values[s + 1]];
-        MatRef::from_column_major_slice(entries, n + self.fronts.num_below(s), n).split_at_row(n)
+        let n = self.fronts.num_columns(s);
+        MatRef::from_column_major_slice(self.entries(s), n + self.fronts.num_below(s), n).split_at_row(n)
     }
 
     /// Forward substitution with front `s`; `own` begins with unknown `first`. `change`(right-hand side, its number,
@@ -181,9 +187,17 @@ impl<T: Real> FactorByFronts<'_, T> {
             rows.own.extend_from_slice(&x[begin..begin + n]);
             rows.below.extend(pattern.iter().map(|&row| value(x, column, row)));
         }
+        if num == 1 {
+            // Columns of the factor lie together; a general product would go through its rows.
+            for (x, column) in rows.own.iter_mut().zip(self.entries(s).chunks_exact(n + m)) {
+                *x -= dot(&column[n..], &rows.below);
+            }
+        }
         let known = MatRef::from_column_major_slice(&rows.below, m, num);
         let mut x = MatMut::from_column_major_slice_mut(&mut rows.own, n, num);
-        matmul(x.as_mut(), Accum::Add, below.transpose(), known, -T::one_impl(), Par::Seq);
+        if num > 1 {
+            matmul(x.as_mut(), Accum::Add, below.transpose(), known, -T::one_impl(), Par::Seq);
+        }
         solve_upper_triangular_in_place(square.transpose(), x, Par::Seq);
         for (x, found) in own.iter_mut().zip(rows.own.chunks_exact(n)) {
             x[begin..begin + n].copy_from_slice(found);

@@ -167,7 +167,10 @@ fn rate_at(
     rates: &[f64; 4],
     g: usize,
 ) -> Lanes {
-    let mut sum = geometry.as_ref().map_or(Lanes::ZERO, |geometry| carried(&geometry[g], coefficients));
+    let mut sum = match geometry {
+        Some(geometry) => carried(&geometry[g], coefficients),
+        None => Lanes::ZERO,
+    };
     for m in 0..4 {
         sum += out.basis[m][g] * rates[m];
     }
@@ -207,7 +210,11 @@ fn varied<const FMA: bool>(
     variation: &Variation,
     out: &ElementOutput,
 ) -> NodalVector {
-    let geometry = variation.velocities.as_ref().map(|v| geometry_rate::<FMA>(tables, v, out));
+    // No closure: it would be compiled for any processor, where a fused multiply-add is a call.
+    let geometry = match &variation.velocities {
+        Some(velocities) => Some(geometry_rate::<FMA>(tables, velocities, out)),
+        None => None,
+    };
     let lanes = [Lanes::ZERO; MAX_GROUPS];
     let mut delta_f = [ZERO_TENSOR; MAX_GROUPS];
     let (mut rate, mut excess) = (lanes, lanes);
