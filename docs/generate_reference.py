@@ -158,6 +158,7 @@ class Formats:
             "of the undeformed block: x along its length (the direction of the pull), y along its thickness, z along its width. In a",
             "`double_lap_shear` test the faces y = ±thickness/2 are bonded to plates; the one at −y is fixed, the one at +y moves by the drive",
             "along x, or at `drive_angle_deg` from x towards z. In a `uniaxial` test the faces x = ±length/2 are held; the one at −x is fixed, the one at +x moves by the drive along x.",
+            "Before that it goes by `precompression_mm` towards −y, and keeps this displacement.",
             "A negative drive goes the other way: it shears towards −x, or pushes the bar together.",
             "",
             "Unknown fields are errors. A missing field that is not required has its default. All that is wrong is said at once, each with",

@@ -196,6 +196,7 @@ impl Case {
                 material: &self.material,
                 drives_mm: &self.drives_mm,
                 direction: [1.0, 0.0, 0.0],
+                beside_drive_mm: [0.0; 3],
                 multiplicity,
             };
             let origin = Origin { name: "prisms", version: "0", input_hash: "0" };

@@ -170,7 +170,8 @@ impl Observed {
 
 /// The specimen between the planes.
 fn cut_specimen(whole: &Specimen, axis: usize, plane_mm: f64) -> Result<Specimen, CalibrationError> {
-    let mut cut = whole.clone();
+    // What the planes did before the drive was measured with the rest.
+    let mut cut = Specimen { precompression_mm: 0.0, ..whole.clone() };
     match axis {
         0 => cut.block.length_mm = 2.0 * plane_mm,
         _ => cut.block.thickness_mm = 2.0 * plane_mm,

@@ -19,6 +19,7 @@ pub(super) fn block() -> Specimen {
         holes: vec![],
         drive_mm: vec![4.0],
         drive_angle_deg: 0.0,
+        precompression_mm: 0.0,
         samples_in_parallel: 2,
         other_samples: Vec::new(),
     }

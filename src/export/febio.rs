@@ -76,21 +76,29 @@ pub(super) fn deck(written: &Written, numbered: &Numbered) -> String {
         );
     }
     let drives = std::iter::once(0.0).chain(drives_mm.iter().copied());
+    let beside = std::iter::once(0.0).chain(drives_mm.iter().map(|_| 1.0));
     let largest_steps = (0..=drives_mm.len()).map(|_| 1.0 / STEPS_PER_DRIVE as f64);
-    for (component, part) in &written.driven {
-        let (axis, part) = (["x", "y", "z"][*component], number(*part));
+    let is_beside = written.driven.iter().any(|d| d.beside_mm.abs() > 0.0);
+    for driven in &written.driven {
+        let axis = ["x", "y", "z"][driven.component];
         let name = if written.driven.len() > 1 { format!("drive_{axis}") } else { "drive".into() };
+        // What is across the drive follows a curve of its own.
+        let (curve, value) = match driven.beside_mm {
+            mm if mm.abs() > 0.0 => (3, number(mm)),
+            _ => (1, number(driven.per_mm)),
+        };
         let _ = write!(
             text,
             "    <bc name=\"{name}\" node_set=\"{MOVED}\" type=\"prescribed displacement\">\n      <dof>{axis}</dof>\n      \
-             <value lc=\"1\">{part}</value>\n      <relative>0</relative>\n    </bc>\n"
+             <value lc=\"{curve}\">{value}</value>\n      <relative>0</relative>\n    </bc>\n"
         );
     }
     let _ = write!(
         text,
-        "  </Boundary>\n  <LoadData>\n{}{}  </LoadData>\n",
+        "  </Boundary>\n  <LoadData>\n{}{}{}  </LoadData>\n",
         curve(1, "LINEAR", drives),
         curve(2, "STEP", largest_steps),
+        if is_beside { curve(3, "LINEAR", beside) } else { String::new() },
     );
     let moved = held.iter().find(|s| s.name == MOVED).map(|s| list(&s.nodes)).unwrap_or_default();
     let _ = write!(

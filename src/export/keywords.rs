@@ -66,9 +66,9 @@ pub(super) fn deck(written: &Written, numbered: &Numbered, dialect: &Dialect) ->
     }
     for drive in written.drives_mm {
         let _ = write!(text, "*STEP, NLGEOM, INC=1000\n*STATIC\n0.25, 1.0, 1.0e-5, 0.5\n*BOUNDARY\n");
-        for (component, part) in &written.driven {
-            let n = component + 1;
-            let _ = writeln!(text, "{MOVED}, {n}, {n}, {}", number(drive * part));
+        for driven in &written.driven {
+            let n = driven.component + 1;
+            let _ = writeln!(text, "{MOVED}, {n}, {n}, {}", number(drive * driven.per_mm + driven.beside_mm));
         }
         let _ = writeln!(text, "{}*END STEP", dialect.output);
     }

@@ -16,8 +16,33 @@ pub struct Model<'a> {
     pub drives_mm: &'a [f64],
     /// Unit vector in which the moved face goes for a positive drive.
     pub direction: [f64; 3],
+    /// Displacement of the moved face beside the drive, mm; on from the end of the first load step.
+    pub beside_drive_mm: [f64; 3],
     /// How often the mesh stands in the test: mirrored copies times samples.
     pub multiplicity: f64,
+}
+
+/// A component of the moved face's displacement that is not always zero.
+#[derive(Clone, Copy)]
+pub(super) struct Driven {
+    /// Component, from 0.
+    pub component: usize,
+    /// Its part of the drive.
+    pub per_mm: f64,
+    /// What it has beside the drive, mm.
+    pub beside_mm: f64,
+}
+
+impl Driven {
+    /// The components that a model drives.
+    pub(super) fn of(model: &Model) -> Vec<Driven> {
+        let of_component = |component: usize| Driven {
+            component,
+            per_mm: model.direction[component],
+            beside_mm: model.beside_drive_mm[component],
+        };
+        (0..3).map(of_component).filter(|d| d.per_mm.abs() > 0.0 || d.beside_mm.abs() > 0.0).collect()
+    }
 }
 
 /// What stands in a file besides the mesh.
@@ -28,8 +53,8 @@ pub(super) struct Written<'a> {
     pub material: Converted,
     /// Drives, mm.
     pub drives_mm: &'a [f64],
-    /// Components (from 0) of the moved face that are driven, and their part of the drive.
-    pub driven: Vec<(usize, f64)>,
+    /// Components of the moved face that are driven.
+    pub driven: Vec<Driven>,
     /// What the reader should know, line by line.
     pub comments: Vec<String>,
     /// Name that all programs read.
@@ -90,11 +115,11 @@ impl<'a> Numbered<'a> {
 
     /// The sets of nodes that are held, none of them empty: name, numbers, and the components (x, y, z) that are zero.
     /// The moved nodes are driven in the other `driven` components.
-    pub(super) fn held(&self, driven: &[(usize, f64)]) -> Vec<NodeSet> {
+    pub(super) fn held(&self, driven: &[Driven]) -> Vec<NodeSet> {
         let mesh = self.mesh;
         let all = [
             ("FIXED", self.set(&mesh.fixed_nodes, false), [true; 3]),
-            (MOVED, self.set(&mesh.moved_nodes, false), [0, 1, 2].map(|i| driven.iter().all(|(d, _)| *d != i))),
+            (MOVED, self.set(&mesh.moved_nodes, false), [0, 1, 2].map(|i| driven.iter().all(|d| d.component != i))),
             ("MIRROR_Y", self.set(&mesh.mirror_y_nodes, true), [false, true, false]),
             ("MIRROR_Z", self.set(&mesh.mirror_z_nodes, true), [false, false, true]),
         ];

@@ -4,7 +4,7 @@ use super::card::Origin;
 use super::convention::Converted;
 use super::error::ExportError;
 use super::label::label;
-use super::model::{Model, Numbered, Written};
+use super::model::{Driven, Model, Numbered, Written};
 use super::programs::MaterialFormat;
 use super::{febio, keywords};
 use crate::homogeneous::StressUnit;
@@ -82,10 +82,14 @@ fn comments(model: &Model, origin: &Origin) -> Vec<String> {
         [x, _, _] if x >= 1.0 => "x".to_string(),
         [x, y, z] => format!("({x:.6}, {y:.6}, {z:.6})"),
     };
+    let beside = match model.beside_drive_mm {
+        mm if mm.iter().all(|c| *c == 0.0) => String::new(),
+        [x, y, z] => format!(" Beside that it is moved by ({x}, {y}, {z}) mm in the first step, and stays there."),
+    };
     vec![
         format!("{name}: written by lambdak {version} (inputs {input_hash})"),
         format!(
-            "Lengths in mm, forces in N, stresses in MPa. The moved face is driven along {way}, one load step for each drive."
+            "Lengths in mm, forces in N, stresses in MPa. The moved face is driven along {way}, one load step for each drive.{beside}"
         ),
         format!("{part} Forces of the whole test are the reactions on the moved face times {}.", model.multiplicity),
     ]
@@ -101,7 +105,7 @@ pub fn model_file(model: &Model, format: ModelFormat, origin: &Origin) -> Result
         kind: model.mesh.element_kind,
         material: format.convert(model.material)?,
         drives_mm: model.drives_mm,
-        driven: (0..3).map(|i| (i, model.direction[i])).filter(|(_, part)| part.abs() > 0.0).collect(),
+        driven: Driven::of(model),
         comments: comments(model, origin),
         name: label(origin.name),
     };

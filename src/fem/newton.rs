@@ -31,6 +31,10 @@ const KEPT_TANGENT_GAINS: f64 = 0.1;
 /// this part of the tolerance, so that equilibria are as good as by Newton's steps.
 const KEPT_TANGENT_TOLERANCE: f64 = 0.1;
 
+/// The first part of the way that the plates are pressed together, in first steps of a drive: a bonded block is stiffer
+/// across its plates than along them.
+const FIRST_PART_BEFORE_DRIVE: f64 = 0.1;
+
 /// A run of Newton's method on one mesh with one material.
 pub(super) struct Newton<'a> {
     /// The mesh and its departures.
@@ -56,7 +60,7 @@ impl Newton<'_> {
         let mesh = self.assembler.mesh();
         let mut current = match start {
             Some(e) => e.clone(),
-            None => Equilibrium::at_rest(mesh.nodes.len(), mesh.num_elements()),
+            None => self.before_drive(drive_mm)?,
         };
         let mut previous: Option<Equilibrium> = None;
         let mut step = self.assembler.plates().first_step_mm.min((drive_mm - current.drive_mm).abs());
@@ -92,6 +96,67 @@ impl Newton<'_> {
                 }
             }
         }
+    }
+
+    /// The equilibrium from which the sample is driven towards `drive_mm`: rest, or what brings the moved plate to where
+    /// it is before any drive, in steps.
+    ///
+    /// # Errors
+    /// As [`Self::solve`].
+    fn before_drive(&mut self, drive_mm: f64) -> Result<Equilibrium, SolveError> {
+        let (mesh, plates) = (self.assembler.mesh(), self.assembler.plates());
+        let mut current = Equilibrium::at_rest(mesh.nodes.len(), mesh.num_elements());
+        let whole = plates.before_drive_mm;
+        let length_mm = norm(&whole);
+        if !(length_mm > 0.0) {
+            return Ok(current);
+        }
+        let (mut done, mut part) = (0.0_f64, (plates.first_step_mm * FIRST_PART_BEFORE_DRIVE / length_mm).min(1.0));
+        while done < 1.0 {
+            let target = if done + part > 1.0 - 1e-9 { 1.0 } else { done + part };
+            let mut guess = current.clone();
+            for (u, lift) in guess.displacement.iter_mut().zip(&plates.lift) {
+                for (u, component) in u.iter_mut().zip(whole) {
+                    *u += (target - done) * lift * component;
+                }
+            }
+            let mut departures = self.assembler.departures().clone();
+            for (t, component) in departures.moved_plate.translation_mm.iter_mut().zip(whole) {
+                *t -= (1.0 - target) * component;
+            }
+            let assembler = self.assembler.departed(&departures);
+            let stepped = self.elsewhere(&assembler, |newton| newton.step(&guess, None, 0.0));
+            match stepped {
+                Ok(next) => {
+                    self.statistics.load_steps += 1;
+                    (done, current) = (target, next);
+                }
+                Err(_) if (self.is_cancelled)() => return Err(SolveError::Cancelled { reached_mm: 0.0 }),
+                Err(cause) => {
+                    self.statistics.failed_steps += 1;
+                    part *= 0.5;
+                    if part < self.options.min_step {
+                        return Err(SolveError::Diverged { reached_mm: 0.0, asked_mm: drive_mm, cause });
+                    }
+                }
+            }
+        }
+        Ok(current)
+    }
+
+    /// What `run` gives with another assembler of the same mesh; what it takes counts here.
+    fn elsewhere<T>(&mut self, assembler: &Assembler, run: impl FnOnce(&mut Newton) -> T) -> T {
+        let mut newton = Newton {
+            assembler,
+            linearisation: &mut *self.linearisation,
+            material: self.material,
+            options: self.options,
+            is_cancelled: self.is_cancelled,
+            statistics: std::mem::take(&mut self.statistics),
+        };
+        let out = run(&mut newton);
+        self.statistics = newton.statistics;
+        out
     }
 
     /// One load step from `from` to a drive (mm); `previous` is the equilibrium before `from`, if any.

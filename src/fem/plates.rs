@@ -19,6 +19,8 @@ pub(super) struct Plates {
     pub(super) driven_elements: Vec<u32>,
     /// Unit vector in which the moved plate goes for a positive drive.
     pub(super) direction: [f64; 3],
+    /// Displacement of the moved plate before it is driven, mm; it stays on.
+    pub(super) before_drive_mm: [f64; 3],
     /// Affine displacement in that direction per unit of drive at each node: the first guess of a load step.
     pub(super) lift: Vec<f64>,
     /// Largest first load step, mm.
@@ -67,6 +69,7 @@ impl Plates {
             released,
             driven_elements,
             direction: specimen.drive_direction(),
+            before_drive_mm: specimen.displacement_before_drive_mm(),
             lift: mesh.nodes.iter().map(|x| x[axis] / extent + 0.5).collect(),
             // One step to a shear strain of 0.8 takes five or six iterations; stretching is more nonlinear.
             first_step_mm: if axis == 1 { 0.85 } else { 0.3 } * extent,
@@ -96,14 +99,14 @@ impl Plates {
     /// Displacement (mm) that the plates impose on node `v` at a drive, were it at the position `x` (mm); the node must
     /// be on a plate.
     pub(super) fn imposed(&self, x: [f64; 3], departures: &Departures, v: usize, drive_mm: f64) -> [f64; 3] {
-        let (motion, center, along) = if self.is_moved[v] {
-            (&departures.moved_plate, self.face_centers[1], drive_mm)
+        let (motion, center, along, before) = if self.is_moved[v] {
+            (&departures.moved_plate, self.face_centers[1], drive_mm, self.before_drive_mm)
         } else {
-            (&departures.fixed_plate, self.face_centers[0], 0.0)
+            (&departures.fixed_plate, self.face_centers[0], 0.0, [0.0; 3])
         };
         let mut u = motion.displacement([0, 1, 2].map(|i| x[i] - center[i]), drive_mm);
-        for (u, component) in u.iter_mut().zip(self.direction) {
-            *u += along * component;
+        for (u, (component, before)) in u.iter_mut().zip(self.direction.iter().zip(before)) {
+            *u += along * component + before;
         }
         if let Some(face) = &departures.faces_per_mm[usize::from(self.is_moved[v])] {
             for (u, rate) in u.iter_mut().zip(face.at(x)) {

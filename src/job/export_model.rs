@@ -122,8 +122,14 @@ impl Run for CheckedExport {
             files: self.formats.iter().map(|&format| ModelFile { format, file: format.file_name() }).collect(),
         };
         let mut outcome = Outcome::new("export-model.json", &result, summary::export_model(&result))?;
-        let (drives_mm, direction) = (&specimen.drive_mm[..], specimen.drive_direction());
-        let model = Model { mesh, material: &self.request.material, drives_mm, direction, multiplicity };
+        let model = Model {
+            mesh,
+            material: &self.request.material,
+            drives_mm: &specimen.drive_mm,
+            direction: specimen.drive_direction(),
+            beside_drive_mm: specimen.displacement_before_drive_mm(),
+            multiplicity,
+        };
         let origin = Origin { name: &specimen.name, version: VERSION, input_hash: &context.input_hash };
         for &format in &self.formats {
             let text = model_file(&model, format, &origin).map_err(|e| context.failed(&e))?;

@@ -14,6 +14,7 @@ pub(super) fn specimen(test: TestKind, extents: [f64; 3], axis: HoleAxis, holes:
         holes: holes.iter().map(|h| Hole::circle(axis, [h[0], h[1]], h[2])).collect(),
         drive_mm: vec![1.0],
         drive_angle_deg: 0.0,
+        precompression_mm: 0.0,
         samples_in_parallel: 1,
         other_samples: Vec::new(),
     }

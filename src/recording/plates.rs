@@ -24,7 +24,10 @@ impl Recording {
     /// [`RecordingError::PlateMotion`] where a unit, a sign or the order of components is wrong.
     pub(super) fn check_plate_motion(&self) -> Result<(), RecordingError> {
         for (n, step) in self.steps.iter().enumerate() {
-            let Some(found_mm) = self.plate_motion_mm(&step.displacement) else { continue };
+            let Some(mut found_mm) = self.plate_motion_mm(&step.displacement) else { continue };
+            for (found, before) in found_mm.iter_mut().zip(self.specimen.displacement_before_drive_mm()) {
+                *found -= before;
+            }
             let found = match self.specimen.is_driven_along_x() {
                 true => fault(found_mm, step.drive_mm, &step.displacement),
                 false => oblique_fault(found_mm, step.drive_mm, &self.specimen),

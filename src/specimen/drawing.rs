@@ -173,9 +173,13 @@ impl Drawing {
         let faces = match specimen.test {
             TestKind::DoubleLapShear => {
                 let faces = format!("Double-lap shear, faces y = ±{} bonded", format_mm(0.5 * block.thickness_mm));
-                match specimen.is_driven_along_x() {
+                let faces = match specimen.is_driven_along_x() {
                     true => faces,
                     false => format!("{faces}, moved {}° from x to z", format_mm(specimen.drive_angle_deg)),
+                };
+                match specimen.is_precompressed() {
+                    false => faces,
+                    true => format!("{faces}, pressed together by {}", format_mm(specimen.precompression_mm)),
                 }
             }
             TestKind::Uniaxial => format!("Uniaxial, faces x = ±{} bonded", format_mm(0.5 * block.length_mm)),

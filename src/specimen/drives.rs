@@ -15,6 +15,9 @@ pub const MAX_NOMINAL_STRETCH: f64 = 3.0;
 /// Smallest supported nominal stretch in a uniaxial test. Flat discs with bonded ends keep an equilibrium as far as
 /// that; bars that are longer than wide have buckled before it, or their sides have met the grips.
 pub const MIN_NOMINAL_STRETCH: f64 = 0.5;
+/// Most that the plates of a double-lap test may be pressed together or pulled apart before they are driven, as a part
+/// of the thinnest sample's thickness. Bonded blocks of rubber bulge out over the plates' edges beyond it.
+pub const MAX_PRECOMPRESSION: f64 = 0.25;
 /// Rounding that a drive at the very limit may have, relative.
 const LIMIT_SLACK: f64 = 1e-9;
 
@@ -48,6 +51,16 @@ impl Specimen {
         }
         let (sin, cos) = self.drive_angle_deg.to_radians().sin_cos();
         [cos, 0.0, sin]
+    }
+
+    /// Whether its plates are pressed together, or pulled apart, before they are driven.
+    pub fn is_precompressed(&self) -> bool {
+        self.precompression_mm.abs() > 0.0
+    }
+
+    /// Displacement (mm) of the moved plate before it is driven: it stays on.
+    pub fn displacement_before_drive_mm(&self) -> [f64; 3] {
+        [0.0, -self.precompression_mm, 0.0]
     }
 
     /// Whether the moved plate or grip goes along x.
@@ -120,6 +133,7 @@ impl Specimen {
             problems.extend(self.check_drive(index, value_mm, previous_mm));
             previous_mm = value_mm;
         }
+        problems.extend(self.check_precompression());
         let value_deg = self.drive_angle_deg;
         let field = || FieldPath::of("drive_angle_deg");
         if !value_deg.is_finite() {
@@ -132,6 +146,20 @@ impl Specimen {
         }
         if self.outline.dumbbell().is_some() && self.is_compressed() {
             problems.push(SpecimenError::DumbbellCompressed { drive_mm: self.largest_drive_mm() });
+        }
+    }
+
+    fn check_precompression(&self) -> Option<SpecimenError> {
+        let value_mm = self.precompression_mm;
+        let limit_mm = MAX_PRECOMPRESSION * self.thinnest_mm();
+        if !value_mm.is_finite() {
+            Some(SpecimenError::NotFinite { field: FieldPath::of("precompression_mm"), value: value_mm })
+        } else if self.test == TestKind::Uniaxial && self.is_precompressed() {
+            Some(SpecimenError::PrecompressionOfPull { value_mm })
+        } else if value_mm.abs() > limit_mm * (1.0 + LIMIT_SLACK) {
+            Some(SpecimenError::PrecompressionTooLarge { value_mm, limit_mm, part: MAX_PRECOMPRESSION })
+        } else {
+            None
         }
     }
 

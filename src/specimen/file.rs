@@ -34,6 +34,8 @@ schema_type! {
     Drives = numbers(number(), 1..=MAX_DRIVES);
     /// Angle of the drive, degrees.
     DriveAngle = number_within(-MAX_DRIVE_ANGLE_DEG..=MAX_DRIVE_ANGLE_DEG);
+    /// How far the plates are pressed together, mm; less than a part of the thickness either way.
+    Precompression = number();
     /// Further samples of a double-lap test that share drive and load cell.
     OtherSamples = list_of::<Sample>(0..=MAX_OTHER_SAMPLES), of Sample;
     /// How many identical samples share the load cell.
@@ -70,6 +72,11 @@ pub(super) struct SpecimenFile {
     #[serde(default, skip_serializing_if = "is_along_x")]
     #[cfg_attr(feature = "schema", schema(value_type = DriveAngle))]
     drive_angle_deg: f64,
+    /// How far the plates of a double-lap test are pressed together before they are driven, and stay so, mm; negative
+    /// ones are pulled apart; 0 by default. Displacements count from the sample before that.
+    #[serde(default, skip_serializing_if = "is_none")]
+    #[cfg_attr(feature = "schema", schema(value_type = Precompression))]
+    precompression_mm: f64,
     /// How many identical samples share the load cell; 1 by default.
     #[serde(default = "single_sample")]
     #[cfg_attr(feature = "schema", schema(value_type = SamplesInParallel))]
@@ -83,6 +90,10 @@ pub(super) struct SpecimenFile {
 
 fn is_block(outline: &Outline) -> bool {
     *outline == Outline::Block
+}
+
+fn is_none(precompression_mm: &f64) -> bool {
+    *precompression_mm == 0.0
 }
 
 fn is_along_x(angle_deg: &f64) -> bool {
@@ -103,6 +114,7 @@ impl From<SpecimenFile> for Specimen {
             holes: file.holes,
             drive_mm: file.drive_mm,
             drive_angle_deg: file.drive_angle_deg,
+            precompression_mm: file.precompression_mm,
             samples_in_parallel: file.samples_in_parallel,
             other_samples: file.other_samples,
         }
@@ -120,6 +132,7 @@ impl From<Specimen> for SpecimenFile {
             holes: specimen.holes,
             drive_mm: specimen.drive_mm,
             drive_angle_deg: specimen.drive_angle_deg,
+            precompression_mm: specimen.precompression_mm,
             samples_in_parallel: specimen.samples_in_parallel,
             other_samples: specimen.other_samples,
         }

@@ -239,6 +239,9 @@ pub struct Specimen {
     /// Angle of the drive from x towards z, in the plane of the plates of a double-lap test, degrees; 0 in a uniaxial
     /// one.
     pub drive_angle_deg: f64,
+    /// How far the plates of a double-lap test are pressed together before they are driven, and stay so, mm; negative
+    /// ones are pulled apart. Displacements count from the sample before that.
+    pub precompression_mm: f64,
     /// How many samples like this one share the load cell.
     pub samples_in_parallel: u32,
     /// Further samples that share drive and load cell, in a double-lap test: blocks of their own size, with holes of

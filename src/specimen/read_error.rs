@@ -152,6 +152,24 @@ pub enum SpecimenError {
         /// The angle, degrees.
         value_deg: f64,
     },
+    /// The plates are pressed together, or pulled apart, further than is supported.
+    #[error(
+        "precompression_mm is {value_mm}; choose at most {limit_mm:.4} mm either way, {part} times the thinnest sample's thickness"
+    )]
+    PrecompressionTooLarge {
+        /// Its value, mm.
+        value_mm: f64,
+        /// Largest either way, mm.
+        limit_mm: f64,
+        /// The same as a part of the thickness.
+        part: f64,
+    },
+    /// A bar is compressed across its pull.
+    #[error("precompression_mm is {value_mm} in a uniaxial test, which has no plates: set it to 0 or leave it out")]
+    PrecompressionOfPull {
+        /// Its value, mm.
+        value_mm: f64,
+    },
     /// A dumb-bell is pushed together.
     #[error(
         "the drive is {drive_mm} mm; a dumb-bell bends as soon as it is pushed: give positive drives, or test a block"
@@ -315,6 +333,16 @@ impl SpecimenError {
             }
             E::AngleOfPull { value_deg } => FieldError::new("/drive_angle_deg", value_deg, "0 in a uniaxial test")
                 .remedy("grips move along x; leave the angle out"),
+            E::PrecompressionTooLarge { value_mm, limit_mm, part } => {
+                let allowed =
+                    format!("from -{limit_mm:.4} to {limit_mm:.4} mm, {part} times the thinnest sample's thickness");
+                FieldError::new("/precompression_mm", value_mm, allowed)
+                    .remedy("press the plates together less, or make the sample thicker")
+            }
+            E::PrecompressionOfPull { value_mm } => {
+                FieldError::new("/precompression_mm", value_mm, "0 in a uniaxial test")
+                    .remedy("a bar has grips and no plates; leave the precompression out")
+            }
             E::DumbbellCompressed { drive_mm } => FieldError::new("/drive_mm", drive_mm, "above 0 mm for a dumb-bell")
                 .remedy("a dumb-bell bends as soon as it is pushed; pull it, or test a block"),
             E::DriveTooLarge { index, value_mm, measure, limit, limit_mm, dimension, .. } => {

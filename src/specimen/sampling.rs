@@ -26,6 +26,7 @@ pub(crate) fn any_layout() -> impl Strategy<Value = Specimen> {
                 holes: holes.into_iter().map(place).collect(),
                 drive_mm: vec![0.3 * thickness_mm, thickness_mm],
                 drive_angle_deg: 0.0,
+                precompression_mm: 0.0,
                 samples_in_parallel: 2,
                 other_samples: Vec::new(),
             }
@@ -82,6 +83,7 @@ pub(crate) fn free_dumbbell() -> impl Strategy<Value = Specimen> {
             holes: Vec::new(),
             drive_mm: vec![1.0],
             drive_angle_deg: 0.0,
+            precompression_mm: 0.0,
             samples_in_parallel: 1,
             other_samples: Vec::new(),
         };

@@ -149,6 +149,7 @@ pub(crate) mod tests {
             holes: vec![],
             drive_mm: vec![5.0],
             drive_angle_deg: 0.0,
+            precompression_mm: 0.0,
             samples_in_parallel: 2,
             other_samples: Vec::new(),
         }

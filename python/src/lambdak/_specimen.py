@@ -190,6 +190,7 @@ class Specimen:
     name: str = "specimen"
     other_samples: Tuple[Sample, ...] = ()
     drive_angle_deg: Optional[float] = None
+    precompression_mm: Optional[float] = None
 
     def __init__(
         self,
@@ -205,11 +206,12 @@ class Specimen:
         name: str = "specimen",
         other_samples: Sequence[Sample] = (),
         drive_angle_deg: Optional[float] = None,
+        precompression_mm: Optional[float] = None,
     ) -> None:
         values = {"length_mm": length_mm, "thickness_mm": thickness_mm, "width_mm": width_mm, "test": test}
         self._set(holes=tuple(holes), outline=outline, name=name, drive_mm=_tuple(drive_mm), **plain(values))
         self._set(samples_in_parallel=plain(samples_in_parallel), other_samples=tuple(other_samples))
-        self._set(drive_angle_deg=plain(drive_angle_deg))
+        self._set(drive_angle_deg=plain(drive_angle_deg), precompression_mm=plain(precompression_mm))
         _check("specimen", self.to_dict())
 
     def _set(self, **values: Any) -> None:
@@ -226,11 +228,12 @@ class Specimen:
     @classmethod
     def _of_program(cls, found: Dict[str, Any]) -> "Specimen":
         """What the program has written or checked."""
-        own = ("name", "test", "drive_mm", "samples_in_parallel", "outline", "drive_angle_deg")
+        own = ("name", "test", "drive_mm", "samples_in_parallel", "outline", "drive_angle_deg", "precompression_mm")
         only_known(found, (*own, "schema", "block", "holes", "other_samples"), "the specimen")
         specimen = object.__new__(cls)
         others = tuple(Sample._of_program(sample) for sample in found.get("other_samples") or [])
-        specimen._set(samples_in_parallel=None, outline=None, drive_angle_deg=None, other_samples=others)
+        specimen._set(samples_in_parallel=None, outline=None, other_samples=others)
+        specimen._set(drive_angle_deg=None, precompression_mm=None)
         specimen._set(holes=_holes(found), **_block(found), **{name: found[name] for name in own if name in found})
         specimen._set(drive_mm=tuple(found["drive_mm"]))
         if isinstance(found.get("outline"), dict):
@@ -247,6 +250,7 @@ class Specimen:
             outline=self.outline.to_dict() if isinstance(self.outline, Dumbbell) else self.outline,
             samples_in_parallel=self.samples_in_parallel,
             drive_angle_deg=self.drive_angle_deg,
+            precompression_mm=self.precompression_mm,
         )
         if self.other_samples:
             optional["other_samples"] = [sample.to_dict() for sample in self.other_samples]

@@ -17,6 +17,7 @@ pub(crate) fn block(name: &str) -> Specimen {
         holes: vec![],
         drive_mm: vec![2.0],
         drive_angle_deg: 0.0,
+        precompression_mm: 0.0,
         samples_in_parallel: 1,
         other_samples: Vec::new(),
     }

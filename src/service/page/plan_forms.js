@@ -80,8 +80,10 @@ export function specimenForm(model, library, edited) {
       ],
       put: (v) => {
         sp.test = v;
-        if (v === "uniaxial") delete sp.drive_angle_deg;
-        else delete sp.outline;
+        if (v === "uniaxial") {
+          delete sp.drive_angle_deg;
+          delete sp.precompression_mm;
+        } else delete sp.outline;
       },
       changed: edited,
     }),
@@ -98,6 +100,18 @@ export function specimenForm(model, library, edited) {
               sp.drive_angle_deg = v;
             },
             meaning: "From x towards z, in the plane of the plates. Forces are along the drive.",
+            changed: edited,
+          }),
+          field({
+            label: "Plates pressed together, mm",
+            kind: "number",
+            value: sp.precompression_mm ?? 0,
+            example: "0",
+            pointer: "/specimen/precompression_mm",
+            put: (v) => {
+              sp.precompression_mm = v;
+            },
+            meaning: "Before they are driven, and kept so. A negative number pulls them apart.",
             changed: edited,
           }),
         ]),
