@@ -41,7 +41,6 @@ pub mod compare;
 pub mod design;
 #[cfg(feature = "calibration")]
 pub mod diagnosis;
-mod dot;
 #[cfg(feature = "design")]
 pub mod export;
 pub mod fem;

@@ -11,7 +11,7 @@
 
 use super::trace::Trace;
 use crate::calibration::Observed;
-use crate::dot::dot;
+use crate::fem::dot;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};

@@ -49,7 +49,8 @@ struct Path<'a> {
 }
 
 impl Tangent<'_> {
-    /// ∂u/∂ξ and ∂F/∂ξ for every parameter, in the order of [`Material::parameters`](crate::material::Material::parameters).
+    /// ∂u/∂ξ and ∂F/∂ξ for every parameter, in the order of
+    /// [`Material::parameters`](crate::material::Material::parameters).
     ///
     /// # Errors
     /// [`SolveError::Linear`] if the tangent is not positive definite.

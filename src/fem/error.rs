@@ -62,6 +62,19 @@ pub enum SolveError {
         /// What stopped the last attempt.
         cause: StepFailure,
     },
+    /// The plates could not be brought to where they are before the drive.
+    #[error(
+        "no equilibrium found beyond a precompression of {reached_mm:.4} mm (asked: {asked_mm} mm): {cause}; change \
+         precompression_mm towards 0, leave out holes, whose edges fail first, or check the material's stability"
+    )]
+    NotPrecompressed {
+        /// Last precompression with an equilibrium, mm.
+        reached_mm: f64,
+        /// Precompression asked for, mm.
+        asked_mm: f64,
+        /// What stopped the last attempt.
+        cause: StepFailure,
+    },
     /// The caller's cancellation check said stop.
     #[error("cancelled at a drive of {reached_mm} mm")]
     Cancelled {

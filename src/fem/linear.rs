@@ -5,12 +5,12 @@
 //! half the time and memory, and one iteration of conjugate gradients gains four to five digits.
 
 use super::crew::{Crew, Seat};
+use super::dot::dot;
 use super::error::LinearError;
 use super::fronts::Fronts;
 use super::multifrontal::{Arenas, Lower, NonPositivePivot, Real, factorise};
 use super::substitution::FactorByFronts;
 use super::topology::Topology;
-use crate::dot::dot;
 use faer::Side;
 use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::SupernodalThreshold;

@@ -19,6 +19,7 @@ mod departures_on_mesh;
 #[cfg(test)]
 mod departures_tests;
 mod derivatives;
+mod dot;
 mod element_data;
 mod equilibrium;
 mod error;
@@ -60,6 +61,8 @@ pub use change::{Change, ChangeSensitivity};
 pub use contact::Contact;
 pub use departures::{Departures, FIRM_BOND_KPA_PER_MM, Fibre, Field, PlateMotion, VectorField};
 pub use derivatives::{ParameterSensitivity, PathSensitivity};
+#[cfg(feature = "calibration")]
+pub(crate) use dot::dot;
 pub use equilibrium::Equilibrium;
 pub use error::{LinearError, PrepareError, SolveError, StepFailure};
 pub use fields::QuadraturePoint;

@@ -55,12 +55,11 @@ impl Newton<'_> {
     /// Solves at one drive (mm) in load steps, from rest or from `start`.
     ///
     /// # Errors
-    /// [`SolveError::Diverged`], [`SolveError::Cancelled`].
+    /// [`SolveError::Diverged`], [`SolveError::NotPrecompressed`], [`SolveError::Cancelled`].
     pub(super) fn solve(&mut self, drive_mm: f64, start: Option<&Equilibrium>) -> Result<Equilibrium, SolveError> {
-        let mesh = self.assembler.mesh();
         let mut current = match start {
             Some(e) => e.clone(),
-            None => self.before_drive(drive_mm)?,
+            None => self.before_drive()?,
         };
         let mut previous: Option<Equilibrium> = None;
         let mut step = self.assembler.plates().first_step_mm.min((drive_mm - current.drive_mm).abs());
@@ -98,12 +97,12 @@ impl Newton<'_> {
         }
     }
 
-    /// The equilibrium from which the sample is driven towards `drive_mm`: rest, or what brings the moved plate to where
-    /// it is before any drive, in steps.
+    /// The equilibrium from which the sample is driven: rest, or what brings the moved plate to where it is before any
+    /// drive, in steps.
     ///
     /// # Errors
-    /// As [`Self::solve`].
-    fn before_drive(&mut self, drive_mm: f64) -> Result<Equilibrium, SolveError> {
+    /// [`SolveError::NotPrecompressed`], [`SolveError::Cancelled`].
+    fn before_drive(&mut self) -> Result<Equilibrium, SolveError> {
         let (mesh, plates) = (self.assembler.mesh(), self.assembler.plates());
         let mut current = Equilibrium::at_rest(mesh.nodes.len(), mesh.num_elements());
         let whole = plates.before_drive_mm;
@@ -136,7 +135,8 @@ impl Newton<'_> {
                     self.statistics.failed_steps += 1;
                     part *= 0.5;
                     if part < self.options.min_step {
-                        return Err(SolveError::Diverged { reached_mm: 0.0, asked_mm: drive_mm, cause });
+                        let asked_mm = -whole[1];
+                        return Err(SolveError::NotPrecompressed { reached_mm: done * asked_mm, asked_mm, cause });
                     }
                 }
             }

@@ -4,9 +4,9 @@
 //! the work.
 
 use super::crew::Crew;
+use super::dot::dot;
 use super::fronts::Fronts;
 use super::multifrontal::Real;
-use crate::dot::dot;
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;

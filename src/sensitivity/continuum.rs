@@ -76,8 +76,8 @@ pub fn integrate_over_blocks(
 /// Fisher information of one drive with ∫ dV / V_voxel in place of the sum over voxels.
 ///
 /// `points` come from [`crate::fem::ForwardModel::quadrature_fields`] (element after element, in the order of
-/// [`crate::mesh::ElementKind::quadrature`]); `sensitivities` stand in the order of [`Material::parameters`]. Products of
-/// two sensitivities are even under the mirrors, so each reflected copy adds the same.
+/// [`crate::mesh::ElementKind::quadrature`]); `sensitivities` stand in the order of [`Material::parameters`]. Products
+/// of two sensitivities are even under the mirrors, so each reflected copy adds the same.
 ///
 /// # Errors
 /// [`InformationError::InvalidSd`], [`InformationError::LengthMismatch`], [`InformationError::NotFinite`].

@@ -105,7 +105,8 @@ impl FisherInformation {
         FisherInformation { parameters, values, matrix: DMatrix::zeros(n, n) }
     }
 
-    /// A matrix computed elsewhere, rows and columns in the order of [`Material::parameters`], in the parameters' units.
+    /// A matrix computed elsewhere, rows and columns in the order of [`Material::parameters`], in the parameters'
+    /// units.
     ///
     /// # Errors
     /// [`InformationError::LengthMismatch`], [`InformationError::NotFinite`].
