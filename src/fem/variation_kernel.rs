@@ -211,10 +211,10 @@ fn varied<const FMA: bool>(
     out: &ElementOutput,
 ) -> NodalVector {
     // No closure: it would be compiled for any processor, where a fused multiply-add is a call.
-    let geometry = match &variation.velocities {
-        Some(velocities) => Some(geometry_rate::<FMA>(tables, velocities, out)),
-        None => None,
-    };
+    let mut geometry = None;
+    if let Some(velocities) = &variation.velocities {
+        geometry = Some(geometry_rate::<FMA>(tables, velocities, out));
+    }
     let lanes = [Lanes::ZERO; MAX_GROUPS];
     let mut delta_f = [ZERO_TENSOR; MAX_GROUPS];
     let (mut rate, mut excess) = (lanes, lanes);
