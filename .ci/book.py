@@ -28,7 +28,8 @@ ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
 COPIED = ["geometries", "docs/examples", "api/python"]
 DEFAULT_TOLERANCE = 1e-3
-SLOWEST_BLOCK_S = 300
+# A guard against programs that hang; pages run beside a compiler.
+SLOWEST_BLOCK_S = 900
 # Pages at a time: a search for a design and a fit are not busy on all cores all the time.
 PAGES_AT_A_TIME = 2
 NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
