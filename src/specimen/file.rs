@@ -74,7 +74,7 @@ pub(super) struct SpecimenFile {
     drive_angle_deg: f64,
     /// How far the plates of a double-lap test are pressed together before they are driven, and stay so, mm; negative
     /// ones are pulled apart; 0 by default. Displacements count from the sample before that.
-    #[serde(default, skip_serializing_if = "is_none")]
+    #[serde(default, skip_serializing_if = "is_uncompressed")]
     #[cfg_attr(feature = "schema", schema(value_type = Precompression))]
     precompression_mm: f64,
     /// How many identical samples share the load cell; 1 by default.
@@ -92,7 +92,7 @@ fn is_block(outline: &Outline) -> bool {
     *outline == Outline::Block
 }
 
-fn is_none(precompression_mm: &f64) -> bool {
+fn is_uncompressed(precompression_mm: &f64) -> bool {
     *precompression_mm == 0.0
 }
 
