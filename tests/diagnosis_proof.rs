@@ -50,7 +50,7 @@ fn a_plain_gain_error_is_found_with_its_size() {
 fn a_stiffening_material_is_no_cause() {
     let experiment = draw_harmless(694_000_851);
     let made = conceal(&specimen(), &experiment).unwrap().recording;
-    let options = DiagnosisOptions { mesh_factor: 2.2, ..DiagnosisOptions::default() };
+    let options = DiagnosisOptions { mesh_factor: 2.8, ..DiagnosisOptions::default() };
     let found = diagnose(&made, &options, &|_| {}, &common::never).unwrap();
     let names: Vec<&str> = found.causes.iter().map(|c| c.name.as_str()).collect();
     assert_eq!((found.verdict, names), (Verdict::NoMismatch, vec![]));
@@ -107,7 +107,7 @@ fn a_recording_that_cannot_be_made_is_a_result() {
 #[test]
 fn a_third_left_is_no_explanation() {
     let hidden = draw_cause(HiddenCause::Gradient, 1_003_506);
-    let found = diagnosed_without(&hidden, &["gradient", "travel", "layer", "outline"], 2.6, 2);
+    let found = diagnosed_without(&hidden, &["gradient", "travel", "layer", "outline"], 3.2, 2);
     assert!(!(found.causes.is_empty() && found.alternatives.is_empty()));
     assert_eq!(found.verdict, Verdict::Unexplained);
 }
@@ -117,7 +117,7 @@ fn a_third_left_is_no_explanation() {
 #[test]
 fn an_ambiguous_cause_comes_with_the_experiment() {
     let made = conceal(&specimen(), &Experiment::of_one(&draw_cause(HiddenCause::Gain, 1_010_016))).unwrap();
-    let options = DiagnosisOptions { mesh_factor: 2.2, ..DiagnosisOptions::default() };
+    let options = DiagnosisOptions { mesh_factor: 2.8, ..DiagnosisOptions::default() };
     let found = diagnose(&made.recording, &options, &|_| {}, &common::never).unwrap();
     assert_eq!(found.verdict, Verdict::ExplainedAmbiguously);
     let names: Vec<&str> = found.causes.iter().chain(&found.alternatives).map(|c| c.name.as_str()).collect();
