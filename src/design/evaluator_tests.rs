@@ -93,7 +93,7 @@ fn gradients_of_a_gauge_pass_the_taylor_test() {
 
 /// See the tests that call it.
 fn check_gradients(study: &Study, specimen: &Specimen, space: &Subspace, variables: &[Variable]) {
-    let mut evaluator = Evaluator::new(study).with_coarseness(1.5);
+    let mut evaluator = Evaluator::new(study).with_coarseness(2.2);
     evaluator.solve.tolerance = 1e-10;
     let mesh = mesh_specimen(specimen, &evaluator.mesh_options(specimen)).expect("a mesh");
     let at = |mesh: crate::mesh::Mesh, drive: f64, thicker_mm: f64, moves: &[Move]| {
@@ -176,7 +176,7 @@ fn gradients_of_unlike_blocks() {
     let specimen = study.base.clone();
     let all = subspaces(&study);
     let space = all.iter().find(|s| s.vector_of(&specimen, 5.0).is_some()).expect("the base's structure");
-    let mut evaluator = Evaluator::new(&study).with_coarseness(1.5);
+    let mut evaluator = Evaluator::new(&study).with_coarseness(2.2);
     evaluator.solve.tolerance = 1e-10;
     let samples = specimen.samples();
     let meshes: Vec<crate::mesh::Mesh> =

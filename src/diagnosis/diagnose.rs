@@ -273,10 +273,11 @@ impl<'a> Run<'a> {
 
     /// Takes off what our mesh gets wrong of the nominal model, before a misfit is looked for.
     fn correct_mesh(&mut self) -> Result<(), DiagnosisError> {
-        self.finer = Finer::new(self.observed, self.options.mesh_factor);
+        let Inference { laboratory, progress, is_cancelled, .. } = &mut self.inference;
+        self.finer = Finer::new(laboratory, self.options.mesh_factor);
         let Some(finer) = self.finer.as_mut() else { return Ok(()) };
-        (self.inference.progress)("predicting on a finer mesh");
-        match finer.defect(&self.findings.nominal, self.inference.is_cancelled) {
+        progress("predicting on a finer mesh");
+        match finer.defect(laboratory, &self.findings.nominal, *is_cancelled) {
             Ok(found) => {
                 self.inference.laboratory.know_own_error(found.trace.clone());
                 self.mesh_defect = Some(found);

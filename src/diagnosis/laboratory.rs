@@ -7,9 +7,9 @@ use super::station::Stations;
 use super::supposed::Path;
 use super::trace::Trace;
 use crate::calibration::Observed;
-use crate::fem::{Change, Departures, Equilibrium, ForwardModel, SolveError, SolveOptions, Tangent};
+use crate::fem::{Change, Departures, Equilibrium, ForwardModel, Nesting, SolveError, SolveOptions, Tangent};
 use crate::material::Material;
-use crate::mesh::{MeshOptions, half_extents_mm, mesh_specimen};
+use crate::mesh::{Mesh, MeshOptions, half_extents_mm, mesh_specimen};
 use crate::specimen::TestKind;
 use rayon::prelude::*;
 
@@ -144,6 +144,35 @@ impl<'a> Laboratory<'a> {
             trace = trace.plus(-1.0, error);
         }
         Ok(Prediction { trace, states, seen })
+    }
+
+    /// The mesh of the specimen as drawn.
+    pub(super) fn nominal_mesh(&self) -> &Mesh {
+        self.stations.nominal()
+    }
+
+    /// Lets the next prediction of `scene` start from `states`, what `coarse`, in whose mesh ours lies as `nesting` says,
+    /// predicts of it; `known` are equilibria of another scene there and here.
+    ///
+    /// # Errors
+    /// [`DiagnosisError`]: the scene's specimen cannot be modelled.
+    pub(super) fn start_from(
+        &mut self,
+        coarse: &mut Laboratory,
+        nesting: &Nesting,
+        material: &Material,
+        scene: &Scene,
+        states: &[Equilibrium],
+        known: Option<&[Vec<Equilibrium>; 2]>,
+    ) -> Result<(), DiagnosisError> {
+        let (here, there) = (self.stations.at(scene)?, coarse.stations.at(scene)?);
+        let (fine, coarse) = (&self.stations[here].model, &coarse.stations[there].model);
+        let start = |(n, state): (usize, &Equilibrium)| {
+            let known = known.map(|[coarse, fine]| [&coarse[n], &fine[n]]);
+            fine.start_from(coarse, nesting, material, state, known)
+        };
+        self.stations[here].states = states.par_iter().enumerate().map(start).collect();
+        Ok(())
     }
 
     /// Says what a finer mesh predicts beyond ours of the sample as drawn. Where that is taken off what is measured,

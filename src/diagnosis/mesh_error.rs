@@ -18,7 +18,7 @@ use super::metric::Metric;
 use super::prior::FitSettings;
 use super::scene::Scene;
 use super::trace::Trace;
-use crate::calibration::Observed;
+use crate::fem::{Equilibrium, Nesting};
 use crate::mesh::MeshOptions;
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -52,6 +52,10 @@ pub struct Finer<'a> {
     laboratory: Laboratory<'a>,
     /// Element size as a factor on ours.
     ratio: f64,
+    /// How its mesh lies in ours; `None` where it does not.
+    nesting: Option<Nesting>,
+    /// What was last predicted of a scene on our mesh and on this one.
+    known: Option<[Vec<Equilibrium>; 2]>,
 }
 
 /// What a finer mesh does to a fit's prediction.
@@ -71,14 +75,18 @@ impl MeshDefect {
 }
 
 impl<'a> Finer<'a> {
-    /// `None` where ours is fine already, or the finer one cannot be meshed.
-    pub fn new(observed: &'a Observed, mesh_factor: f64) -> Option<Finer<'a>> {
+    /// Of a laboratory whose element size is `mesh_factor` times the standard one; `None` where that is fine already, or
+    /// the finer one cannot be meshed.
+    pub fn new(coarse: &Laboratory<'a>, mesh_factor: f64) -> Option<Finer<'a>> {
+        let observed = coarse.observed();
         let ratio = FINER.max(FINEST / mesh_factor);
         let mesh = MeshOptions::scaled(&observed.specimen, ratio * mesh_factor);
         if ratio > HARDLY_FINER {
             return None;
         }
-        Laboratory::new(observed, &mesh).ok().map(|laboratory| Finer { laboratory, ratio })
+        let laboratory = Laboratory::new(observed, &mesh).ok()?;
+        let nesting = Nesting::located(coarse.nominal_mesh(), laboratory.nominal_mesh());
+        Some(Finer { laboratory, ratio, nesting, known: None })
     }
 
     /// Corrects a fit by the finer mesh's prediction (deferred correction: what the finer mesh predicts beyond ours is
@@ -96,7 +104,7 @@ impl<'a> Finer<'a> {
         fitted: &mut CauseFit,
         is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<MeshDefect, DiagnosisError> {
-        let mut defect = self.defect(fitted, is_cancelled)?;
+        let mut defect = self.defect(laboratory, fitted, is_cancelled)?;
         for pass in 1..=MAX_CORRECTIONS {
             let before = fitted.prediction.trace.clone();
             let seen = defect.taken_off(measured);
@@ -105,7 +113,7 @@ impl<'a> Finer<'a> {
             if pass == MAX_CORRECTIONS || moved_mm < HARDLY_MOVED * defect.trace.rms_mm() {
                 break;
             }
-            match self.defect(fitted, is_cancelled) {
+            match self.defect(laboratory, fitted, is_cancelled) {
                 Ok(next) => defect = next,
                 Err(error) if is_cancelled() => return Err(error),
                 // What was corrected so far stands.
@@ -115,17 +123,26 @@ impl<'a> Finer<'a> {
         Ok(defect)
     }
 
-    /// What the finer mesh predicts beyond ours.
+    /// What the finer mesh predicts beyond ours, that of `coarse`. Its equilibria start from those on our mesh.
     ///
     /// # Errors
     /// As [`Self::correct`].
     pub fn defect(
         &mut self,
+        coarse: &mut Laboratory,
         fitted: &CauseFit,
         is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<MeshDefect, DiagnosisError> {
-        let theirs = self.laboratory.predict(&fitted.material, &fitted.scene(), is_cancelled)?;
-        Ok(MeshDefect { trace: theirs.trace.plus(-1.0, &fitted.prediction.trace), ratio: self.ratio })
+        let (material, scene, ours) = (&fitted.material, fitted.scene(), &fitted.prediction);
+        // A sample with a cut has another mesh.
+        let nesting = self.nesting.as_ref().filter(|_| scene.cut.is_none());
+        if let Some(nesting) = nesting {
+            self.laboratory.start_from(coarse, nesting, material, &scene, &ours.states, self.known.as_ref())?;
+        }
+        let theirs = self.laboratory.predict(material, &scene, is_cancelled)?;
+        let trace = theirs.trace.plus(-1.0, &ours.trace);
+        self.known = nesting.map(|_| [ours.states.clone(), theirs.states]);
+        Ok(MeshDefect { trace, ratio: self.ratio })
     }
 }
 

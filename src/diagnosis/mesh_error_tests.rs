@@ -1,4 +1,5 @@
 use super::*;
+use crate::calibration::Observed;
 use crate::diagnosis::cause::CauseName;
 use crate::diagnosis::prior::BulkPrior;
 use crate::diagnosis::registry::Registry;
@@ -66,7 +67,7 @@ fn a_finer_mesh_corrects_estimates() {
     let mut fitted = fit(&mut laboratory, &metric, &measured, &material, &supposed, &settings, &never).unwrap();
     let before = fitted.causes[0].values[0] - truth;
 
-    let mut finer = Finer::new(&observed, mesh_factor).unwrap();
+    let mut finer = Finer::new(&laboratory, mesh_factor).unwrap();
     let defect = finer.correct(&mut laboratory, &metric, &measured, &settings, &mut fitted, &never).unwrap();
     let after = fitted.causes[0].values[0] - truth;
     assert!(after.abs() < 0.5 * before.abs(), "{before} {after}");
@@ -85,6 +86,8 @@ fn a_finer_mesh_corrects_estimates() {
 fn a_fine_mesh_is_left_alone() {
     let specimen = Specimen::from_json(include_str!("../../geometries/solid-shear.json")).unwrap();
     let observed = observed(specimen, [4.0, 2.0, 4.0]);
-    assert!(Finer::new(&observed, FINEST).is_none());
-    assert!(Finer::new(&observed, 2.0 * FINEST).is_some());
+    let laboratory =
+        |factor: f64| Laboratory::new(&observed, &MeshOptions::scaled(&observed.specimen, factor)).unwrap();
+    assert!(Finer::new(&laboratory(FINEST), FINEST).is_none());
+    assert!(Finer::new(&laboratory(4.0 * FINEST), 4.0 * FINEST).is_some());
 }

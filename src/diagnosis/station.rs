@@ -87,6 +87,11 @@ impl<'a> Stations<'a> {
         Stations { observed, options, nominal: Arc::new(nominal), all: Vec::new() }
     }
 
+    /// The mesh of the specimen as drawn.
+    pub(super) fn nominal(&self) -> &Mesh {
+        &self.nominal
+    }
+
     /// The same for work beside them.
     pub(super) fn twin(&self) -> Stations<'a> {
         Stations { nominal: self.nominal.clone(), all: self.all.iter().map(Station::twin).collect(), ..*self }

@@ -7,6 +7,7 @@ use super::error::{PrepareError, SolveError};
 use super::fields::QuadraturePoint;
 use super::guide::Guide;
 use super::mesh_model::MeshModel;
+use super::nesting::Nesting;
 use super::options::{SolveOptions, Statistics};
 use super::tangent::Tangent;
 use crate::material::{MAX_TERMS, Material};
@@ -188,6 +189,27 @@ impl ForwardModel {
             path.push(next);
         }
         Ok(path)
+    }
+
+    /// A start for [`Self::solve`] from `state`, which `coarse` found of the same sample: what it is on this mesh, which
+    /// lies in the other as `nesting` says. With `known`, a state of each of the two for one and the same scene, what
+    /// the coarse mesh gets wrong there is taken off.
+    pub fn start_from(
+        &self,
+        coarse: &ForwardModel,
+        nesting: &Nesting,
+        material: &Material,
+        state: &Equilibrium,
+        known: Option<[&Equilibrium; 2]>,
+    ) -> Equilibrium {
+        let transfer = |s: &Equilibrium| nesting.transfer([&coarse.fine.assembler, &self.fine.assembler], material, s);
+        let mut start = transfer(state);
+        if let Some([coarse, fine]) = known {
+            start.add_difference(1.0, fine, &transfer(coarse));
+        }
+        // It was not solved for on this mesh.
+        start.serial = None;
+        start
     }
 
     /// As [`ForwardModel::solve`] from rest, the plates' departures growing in eight parts at the drive asked for: a

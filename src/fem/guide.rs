@@ -3,14 +3,12 @@
 //! A load step on a fine mesh costs five to twelve factorisations from rest; from the interpolated coarse solution it
 //! takes one to three. The coarse model costs a few percent of one fine factorisation.
 
-use super::assembler::{Assembler, Configuration};
-use super::element_data::ElementOutput;
 use super::equilibrium::Equilibrium;
 use super::mesh_model::MeshModel;
+use super::nesting::Nesting;
 use super::newton::Newton;
 use super::options::SolveOptions;
-use crate::material::{LANES, Material};
-use crate::mesh::{Location, Locator, Mesh};
+use crate::mesh::{Location, Mesh};
 use crate::specimen::Specimen;
 use std::sync::Arc;
 
@@ -20,34 +18,17 @@ pub(super) struct Guide {
     nesting: Arc<Nesting>,
 }
 
-/// How the nodes and elements of a fine mesh lie in a coarse one.
-struct Nesting {
-    /// Place of each fine node in the coarse mesh.
-    nodes: Vec<Location>,
-    /// Coarse element of each fine element.
-    parents: Vec<u32>,
-}
-
 impl Guide {
     /// Of a coarse model in which fine nodes lie at `nodes` and fine elements in `parents`.
     pub(super) fn new(coarse: MeshModel, nodes: Vec<Location>, parents: Vec<u32>) -> Guide {
-        Guide { coarse, nesting: Arc::new(Nesting { nodes, parents }) }
+        Guide { coarse, nesting: Arc::new(Nesting::new(nodes, parents)) }
     }
 
     /// Of a coarse mesh of the same `specimen` that does not share its nodes with `fine`; `None` where a node of `fine`
-    /// lies outside of it, or where it makes no model. (Walls are concave: a parabola through three points of an
-    /// arc lies on the arc or in the hole, so that coarse meshes hold the nodes of finer ones.)
+    /// lies outside of it, or where it makes no model.
     pub(super) fn beside(coarse: Mesh, fine: &Mesh, specimen: &Specimen) -> Option<Guide> {
-        let locator = Locator::new(&coarse);
-        let center = |e: usize| {
-            let nodes = fine.element(e);
-            let sum = |i: usize| nodes.iter().map(|&n| fine.nodes[n as usize][i]).sum::<f64>();
-            [0, 1, 2].map(|i| sum(i) / nodes.len() as f64)
-        };
-        let nodes: Vec<Location> = fine.nodes.iter().map(|&x| locator.locate(&coarse, x)).collect::<Option<_>>()?;
-        let parent = |e: usize| Some(locator.locate(&coarse, center(e))?.element);
-        let parents: Vec<u32> = (0..fine.num_elements()).map(parent).collect::<Option<_>>()?;
-        Some(Guide::new(MeshModel::new(coarse, specimen, &|_, _| false).ok()?, nodes, parents))
+        let nesting = Arc::new(Nesting::located(&coarse, fine)?);
+        Some(Guide { coarse: MeshModel::new(coarse, specimen, &|_, _| false).ok()?, nesting })
     }
 
     /// The same guide with nothing solved.
@@ -73,9 +54,9 @@ impl Guide {
         let beside_start = start.and_then(|start| Some((start, coarse.solve(start.drive_mm, None).ok()?)));
         let there = coarse.solve(drive_mm, beside_start.as_ref().map(|(_, at_start)| at_start)).ok();
         let found = there.and_then(|there| {
-            let mut first_guess = self.transfer(fine.assembler, fine.material, &there);
+            let mut first_guess = self.transfer(fine, &there);
             if let Some((start, at_start)) = beside_start {
-                let from_coarse = self.transfer(fine.assembler, fine.material, &at_start);
+                let from_coarse = self.transfer(fine, &at_start);
                 first_guess.add_difference(drive_mm / start.drive_mm, start, &from_coarse);
             }
             fine.step(&first_guess, None, drive_mm).ok()
@@ -88,83 +69,8 @@ impl Guide {
     }
 
     /// The coarse equilibrium `from` on the mesh of `fine`.
-    fn transfer(&self, fine: &Assembler, material: &Material, from: &Equilibrium) -> Equilibrium {
-        let (coarse_mesh, mesh) = (self.coarse.assembler.mesh(), fine.mesh());
-        let kind = coarse_mesh.element_kind;
-        let mut displacement: Vec<[f64; 3]> = self
-            .nesting
-            .nodes
-            .iter()
-            .map(|l| {
-                let n = kind.shape_functions(l.reference_coordinates);
-                let mut u = [0.0; 3];
-                for (a, &v) in coarse_mesh.element(l.element as usize).iter().enumerate() {
-                    for i in 0..3 {
-                        u[i] += n[a] * from.displacement[v as usize][i];
-                    }
-                }
-                u
-            })
-            .collect();
-        for &v in &mesh.fixed_nodes {
-            displacement[v as usize] = [0.0; 3];
-        }
-        for &v in &mesh.moved_nodes {
-            displacement[v as usize] = fine.plates().vector(from.drive_mm);
-        }
-        for &v in &mesh.mirror_y_nodes {
-            displacement[v as usize][1] = 0.0;
-        }
-        for &v in &mesh.mirror_z_nodes {
-            displacement[v as usize][2] = 0.0;
-        }
-        let affine = self.affine_pressures(material, from);
-        let mut out = ElementOutput::default();
-        let rest = vec![[0.0; 3]; mesh.nodes.len()];
-        let at_rest = Configuration { material, positions: &mesh.nodes, displacement: &rest };
-        let mut pressure = Vec::with_capacity(mesh.num_elements());
-        for e in 0..mesh.num_elements() {
-            fine.kernels().residual(fine.tables(), &fine.input(e, &at_rest, None), &mut out);
-            let mut p = [0.0; 4];
-            for q in 0..fine.tables().num_nodes() {
-                let (g, l) = (q / LANES, q % LANES);
-                let a = &affine[self.nesting.parents[e] as usize];
-                let value =
-                    a[0] + a[1] * out.points[0][g].0[l] + a[2] * out.points[1][g].0[l] + a[3] * out.points[2][g].0[l];
-                for (m, p) in p.iter_mut().enumerate() {
-                    *p += value * out.basis[m][g].0[l] * out.volume[g].0[l];
-                }
-            }
-            pressure.push(p);
-        }
-        Equilibrium { displacement, pressure, ..from.clone() }
-    }
-
-    /// The coarse pressure of each element as a + b·x.
-    fn affine_pressures(&self, material: &Material, from: &Equilibrium) -> Vec<[f64; 4]> {
-        let coarse = &self.coarse.assembler;
-        let at = Configuration { material, positions: &coarse.mesh().nodes, displacement: &from.displacement };
-        let mut out = ElementOutput::default();
-        (0..coarse.mesh().num_elements())
-            .map(|e| {
-                coarse.kernels().residual(coarse.tables(), &coarse.input(e, &at, None), &mut out);
-                // The basis is orthonormal and spans 1, x, y, z:
-                // monomial_n = Σ_m M_mn φ_m with M_mn = ∫ φ_m monomial_n.
-                let mut moments = nalgebra::Matrix4::<f64>::zeros();
-                for q in 0..coarse.tables().num_nodes() {
-                    let (g, l) = (q / LANES, q % LANES);
-                    let monomials = [1.0, out.points[0][g].0[l], out.points[1][g].0[l], out.points[2][g].0[l]];
-                    for m in 0..4 {
-                        for n in 0..4 {
-                            moments[(m, n)] += out.basis[m][g].0[l] * out.volume[g].0[l] * monomials[n];
-                        }
-                    }
-                }
-                // Σ p_m φ_m = Σ c_n monomial_n ⇒ M c = p.
-                let p = nalgebra::Vector4::from(from.pressure[e]);
-                moments.lu().solve(&p).map_or([0.0; 4], |c| c.into())
-            })
-            .collect()
+    fn transfer(&self, fine: &Newton, from: &Equilibrium) -> Equilibrium {
+        self.nesting.transfer([&self.coarse.assembler, fine.assembler], fine.material, from)
     }
 }
 
@@ -172,6 +78,7 @@ impl Guide {
 mod tests {
     use super::*;
     use crate::fem::ForwardModel;
+    use crate::material::Material;
     use crate::mesh::{MeshOptions, mesh_specimen};
 
     /// A mesh of some hundred elements finds the same equilibrium from a coarse mesh's as from rest, in one load step

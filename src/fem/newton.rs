@@ -113,18 +113,12 @@ impl Newton<'_> {
         let (mut done, mut part) = (0.0_f64, (plates.first_step_mm * FIRST_PART_BEFORE_DRIVE / length_mm).min(1.0));
         while done < 1.0 {
             let target = if done + part > 1.0 - 1e-9 { 1.0 } else { done + part };
-            let mut guess = current.clone();
-            for (u, lift) in guess.displacement.iter_mut().zip(&plates.lift) {
-                for (u, component) in u.iter_mut().zip(whole) {
-                    *u += (target - done) * lift * component;
-                }
-            }
             let mut departures = self.assembler.departures().clone();
             for (t, component) in departures.moved_plate.translation_mm.iter_mut().zip(whole) {
                 *t -= (1.0 - target) * component;
             }
             let assembler = self.assembler.departed(&departures);
-            let stepped = self.elsewhere(&assembler, |newton| newton.step(&guess, None, 0.0));
+            let stepped = self.elsewhere(&assembler, |newton| newton.step(&current, None, 0.0));
             match stepped {
                 Ok(next) => {
                     self.statistics.load_steps += 1;
@@ -223,27 +217,16 @@ impl Newton<'_> {
         }
     }
 
-    /// The state at a drive that is linear along the path, or affine where there is no path yet.
+    /// The state at a drive that is linear along the path, where there is one, with what the plates still lack carried
+    /// into the sample.
     fn first_guess(&self, from: &Equilibrium, previous: Option<&Equilibrium>, drive_mm: f64) -> Equilibrium {
-        let plates = self.assembler.plates();
         let mut trial = from.clone();
         trial.drive_mm = drive_mm;
-        let increment = drive_mm - from.drive_mm;
-        match previous {
-            Some(p) if (from.drive_mm - p.drive_mm).abs() > 0.0 => {
-                trial.add_difference(increment / (from.drive_mm - p.drive_mm), from, p);
-            }
-            _ => {
-                for (x, lift) in trial.displacement.iter_mut().zip(&plates.lift) {
-                    for (x, component) in x.iter_mut().zip(plates.direction) {
-                        *x += increment * lift * component;
-                    }
-                }
-            }
+        if let Some(p) = previous.filter(|p| (from.drive_mm - p.drive_mm).abs() > 0.0) {
+            trial.add_difference((drive_mm - from.drive_mm) / (from.drive_mm - p.drive_mm), from, p);
         }
-        for v in plates.held_nodes() {
-            trial.displacement[v] = self.assembler.imposed(v, drive_mm);
-        }
+        let imposed = |v: usize| self.assembler.imposed(v, drive_mm);
+        self.assembler.plates().carry(&self.assembler.mesh().nodes, &imposed, &mut trial.displacement);
         trial
     }
 

@@ -1,6 +1,7 @@
 //! The bonded faces: which nodes move with a plate or grip, which are released, and how a drive moves them.
 
 use super::departures::Departures;
+use super::lifting::AffineMap;
 use crate::mesh::Mesh;
 use crate::specimen::{Specimen, TestKind};
 
@@ -21,12 +22,14 @@ pub(super) struct Plates {
     pub(super) direction: [f64; 3],
     /// Displacement of the moved plate before it is driven, mm; it stays on.
     pub(super) before_drive_mm: [f64; 3],
-    /// Affine displacement in that direction per unit of drive at each node: the first guess of a load step.
-    pub(super) lift: Vec<f64>,
+    /// Where each node lies between the fixed face (0) and the moved one (1).
+    lift: Vec<f64>,
     /// Largest first load step, mm.
     pub(super) first_step_mm: f64,
     /// Centres of the fixed and of the moved face, mm.
     face_centers: [[f64; 3]; 2],
+    /// The axis across the faces.
+    axis: usize,
 }
 
 impl Plates {
@@ -78,6 +81,7 @@ impl Plates {
                 center[axis] = side * extent;
                 center
             }),
+            axis,
         }
     }
 
@@ -114,5 +118,37 @@ impl Plates {
             }
         }
         u
+    }
+
+    /// Brings the held nodes to where `imposed`(node) wants them (mm), and the nodes between the faces along
+    /// ([`super::lifting`]): a first guess of the displacement (mm) of the nodes at `positions` (mm).
+    pub(super) fn carry(
+        &self,
+        positions: &[[f64; 3]],
+        imposed: &dyn Fn(usize) -> [f64; 3],
+        displacement: &mut [[f64; 3]],
+    ) {
+        let in_plane = |x: [f64; 3]| [x[(self.axis + 1) % 3], x[(self.axis + 2) % 3]];
+        let maps = [false, true].map(|is_moved| {
+            let (mut points, mut lacking) = (Vec::new(), Vec::new());
+            for v in self.held_nodes().filter(|&v| self.is_moved[v] == is_moved) {
+                let (to, from) = (imposed(v), displacement[v]);
+                points.push(in_plane(positions[v]));
+                lacking.push([0, 1, 2].map(|i| to[i] - from[i]));
+            }
+            AffineMap::fitted(&points, &lacking)
+        });
+        for (side, map) in maps.iter().enumerate() {
+            let Some(map) = map else { continue };
+            for ((u, &x), lift) in displacement.iter_mut().zip(positions).zip(&self.lift) {
+                let part = if side == 1 { *lift } else { 1.0 - lift };
+                for (u, carried) in u.iter_mut().zip(map.at(in_plane(x))) {
+                    *u += part * carried;
+                }
+            }
+        }
+        for v in self.held_nodes() {
+            displacement[v] = imposed(v);
+        }
     }
 }

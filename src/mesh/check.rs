@@ -116,11 +116,12 @@ impl Mesh {
     /// ∂X/∂(ξ, η, ζ): row coordinate, column direction.
     pub(super) fn geometry_gradient(&self, element: usize, gradient: &[[f64; 3]; 27]) -> [[f64; 3]; 3] {
         let mut j = [[0.0; 3]; 3];
+        // Loops over fixed counts, which the compiler unrolls.
         for (&node, g) in self.element(element).iter().zip(gradient) {
-            let x = self.nodes[node as usize];
-            for (row, &xi) in j.iter_mut().zip(&x) {
-                for (entry, &gc) in row.iter_mut().zip(g) {
-                    *entry += xi * gc;
+            let x = &self.nodes[node as usize];
+            for i in 0..3 {
+                for c in 0..3 {
+                    j[i][c] += x[i] * g[c];
                 }
             }
         }
