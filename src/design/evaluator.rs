@@ -13,14 +13,14 @@ use super::shown::{Block, ImitatingMaterial, OnTheWay, Shown, Solved, sum_of_rea
 use super::space::{Subspace, Variable};
 use super::study::{MaterialPrior, Study};
 use super::tell_apart::{Imitation, log_separation, separation, state_of};
-use crate::fem::{Equilibrium, ForwardModel, ParameterSensitivity, QuadraturePoint, SolveOptions, Tangent};
+use crate::fem::{Change, Equilibrium, ForwardModel, ParameterSensitivity, QuadraturePoint, SolveOptions, Tangent};
 use crate::kinematics::principal_stretches;
 use crate::material::Material;
 use crate::mesh::{MeshOptions, shape_velocity};
 use crate::sensitivity::{
     ForceReading, ForceReadings, MaterialState, ScannedBlock, information_of_protocol, integrate_over_blocks,
 };
-use crate::specimen::Specimen;
+use crate::specimen::{PRECOMPRESSION_DIRECTION, Specimen};
 use serde::{Deserialize, Serialize};
 
 /// A design's responses to each material of [`sample_materials`], and, where asked for, their derivatives.
@@ -41,8 +41,30 @@ pub struct Evaluator<'a> {
     solve: SolveOptions,
 }
 
-/// How a variable moves the nodes (none: not at all) and the drive.
-type Move = (Option<Vec<[f64; 3]>>, f64);
+/// What a variable moves, per unit of it.
+pub(super) struct Move {
+    /// The nodes; `None`: not at all.
+    velocity: Option<Vec<[f64; 3]>>,
+    /// Whether it is the drive of the scan.
+    is_drive: bool,
+    /// The moved plate before the drive; `None`: not at all.
+    plate: Option<[f64; 3]>,
+}
+
+impl Move {
+    /// What it changes of an equilibrium at the drive of the scan.
+    fn at_scan(&self, tangent: &Tangent) -> Change {
+        match self.plate {
+            Some(rate) => tangent.change_of_moved_plate(rate),
+            None => tangent.change_of_nodes(self.velocity.as_deref(), if self.is_drive { 1.0 } else { 0.0 }),
+        }
+    }
+
+    /// What it changes of an equilibrium at a drive before, which stays as the scan's drive moves; `None`: nothing.
+    fn on_the_way(&self, tangent: &Tangent) -> Option<Change> {
+        (!self.is_drive && (self.velocity.is_some() || self.plate.is_some())).then(|| self.at_scan(tangent))
+    }
+}
 
 impl<'a> Evaluator<'a> {
     /// For `study`: at the priors' central values, and at their variants if its budget says so.
@@ -133,7 +155,10 @@ impl<'a> Evaluator<'a> {
             Solved { states: Vec::new(), on_the_way: Vec::new(), imitators: Vec::new(), paths: Vec::new() };
         let mut equilibria: Vec<Equilibrium> = Vec::new();
         let along_moves = |tangent: &mut Tangent, state: &MaterialState| {
-            let along = |m: &Move| tangent.path_sensitivity(&state.sensitivities, m.0.as_deref(), m.1);
+            let along = |m: &Move| {
+                let change = m.at_scan(tangent);
+                tangent.path_sensitivity_of(&state.sensitivities, &change)
+            };
             moves.iter().map(along).collect::<Result<Vec<_>, _>>()
         };
         for sample in &self.samples {
@@ -194,11 +219,10 @@ impl<'a> Evaluator<'a> {
         for equilibrium in model.solve_path(material, &drives, &self.solve, is_cancelled)? {
             let mut tangent = model.tangent(material, &equilibrium)?;
             let sensitivities = tangent.material_sensitivities()?;
-            for (rates, (velocity, _)) in found.rates.iter_mut().zip(moves) {
-                // The drives at which forces are read stay as the scan's drive moves.
-                rates.push(match velocity {
-                    Some(_) => {
-                        let along = tangent.path_sensitivity(&sensitivities, velocity.as_deref(), 0.0)?;
+            for (rates, a_move) in found.rates.iter_mut().zip(moves) {
+                rates.push(match a_move.on_the_way(&tangent) {
+                    Some(change) => {
+                        let along = tangent.path_sensitivity_of(&sensitivities, &change)?;
                         ForceReading { force_n: along.force_n, sensitivities: forces(&along.parameters) }
                     }
                     None => ForceReading { force_n: 0.0, sensitivities: vec![0.0; sensitivities.len()] },
@@ -223,10 +247,9 @@ impl<'a> Evaluator<'a> {
         let t = 1e-4;
         let mut sides = Vec::with_capacity(2);
         for step in [t, -t] {
-            let moved =
-                blocks.iter().zip(solved).zip(moves_of_blocks).map(|((block, solved), moves)| {
-                    Shown::moved(block, solved, index, (moves[index].0.as_deref(), step))
-                });
+            let moved = blocks.iter().zip(solved).zip(moves_of_blocks).map(|((block, solved), moves)| {
+                Shown::moved(block, solved, index, (moves[index].velocity.as_deref(), step))
+            });
             sides.push(self.responses(&moved.collect::<Vec<_>>())?);
         }
         let slope = |(a, b): (&Response, &Response)| -> Vec<f64> {
@@ -299,7 +322,7 @@ impl<'a> Evaluator<'a> {
     }
 }
 
-/// How `variable` moves the nodes of the design's sample with this number, and the drive.
+/// What `variable` moves of the design's sample with this number.
 fn a_move(
     model: &ForwardModel,
     (specimen, number): (&Specimen, usize),
@@ -316,7 +339,8 @@ fn a_move(
             }
         }
     }
-    (velocity, if variable == Variable::Drive { 1.0 } else { 0.0 })
+    let plate = (variable == Variable::Precompression).then_some(PRECOMPRESSION_DIRECTION);
+    Move { velocity, is_drive: variable == Variable::Drive, plate }
 }
 
 #[cfg(test)]

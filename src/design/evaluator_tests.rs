@@ -28,8 +28,10 @@ fn study() -> Study {
 /// remainders fall fourfold when h is halved, and the extrapolated central difference is the gradient.
 #[test]
 fn every_gradient_passes_the_taylor_test() {
-    let study = study();
+    let mut study = study();
+    study.vary.precompression_mm = Some(Range { min: -1.2, max: 0.4 });
     let mut specimen = study.base.clone();
+    specimen.precompression_mm = -0.5;
     specimen.drive_mm = vec![5.0];
     specimen.holes[0].center_mm = [-4.6, 1.3];
     specimen.holes[0].diameter_mm = 4.2;
@@ -96,10 +98,11 @@ fn check_gradients(study: &Study, specimen: &Specimen, space: &Subspace, variabl
     let mut evaluator = Evaluator::new(study).with_coarseness(2.2);
     evaluator.solve.tolerance = 1e-10;
     let mesh = mesh_specimen(specimen, &evaluator.mesh_options(specimen)).expect("a mesh");
-    let at = |mesh: crate::mesh::Mesh, drive: f64, thicker_mm: f64, moves: &[Move]| {
-        // The model takes the plates' distance from the specimen.
+    let at = |mesh: crate::mesh::Mesh, drive: f64, [thicker_mm, nearer_mm]: [f64; 2], moves: &[Move]| {
+        // The model takes the plates' distance and what they are pressed together from the specimen.
         let mut moved = specimen.clone();
         moved.block.thickness_mm += thicker_mm;
+        moved.precompression_mm += nearer_mm;
         let mut model = ForwardModel::new(mesh, &moved).expect("a model");
         let solved = evaluator.solve(&mut model, drive, moves, &|| false).expect("equilibria");
         let block = Block { model, num_scanned: 1 };
@@ -111,7 +114,7 @@ fn check_gradients(study: &Study, specimen: &Specimen, space: &Subspace, variabl
         let unit = if matches!(variable, Variable::Angle(_)) { 20.0 } else { 1.0 };
         let model = ForwardModel::new(mesh.clone(), specimen).expect("a model");
         let moves = vec![a_move(&model, (specimen, 0), space, variable)];
-        let (block, solved, here) = at(mesh.clone(), 5.0, 0.0, &moves);
+        let (block, solved, here) = at(mesh.clone(), 5.0, [0.0; 2], &moves);
         let mut gradients = evaluator.gradient(&[block], &[solved], 0, &[moves]).expect("a gradient");
         gradients.iter_mut().flatten().for_each(|slope| *slope *= unit);
         let value = |h: f64| -> Vec<Vec<f64>> {
@@ -120,7 +123,7 @@ fn check_gradients(study: &Study, specimen: &Specimen, space: &Subspace, variabl
                 moved = morphed(&moved, &shape_velocity(&mesh, specimen, design_variable), sign * unit * h);
             }
             let of = |which: Variable| if variable == which { h } else { 0.0 };
-            at(moved, 5.0 + of(Variable::Drive), of(Variable::Thickness), &[]).2
+            at(moved, 5.0 + of(Variable::Drive), [of(Variable::Thickness), of(Variable::Precompression)], &[]).2
         };
         let h = 0.08;
         let near = 1e-4;

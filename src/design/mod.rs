@@ -77,4 +77,4 @@ pub use study::{
 pub use study_error::StudyError;
 pub use study_hash::study_hash;
 pub use unfinished::Unfinished;
-pub use words::{block_in_brief, holes_in_brief};
+pub use words::{block_in_brief, holes_in_brief, plates_in_words};

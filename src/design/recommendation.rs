@@ -4,7 +4,7 @@
 use super::entry::DesignEntry;
 use super::findings::{Equals, symbol};
 use super::study::Study;
-use super::words::{listed, sample_in_words, short_number};
+use super::words::{listed, plates_in_words, sample_in_words, short_number};
 use crate::sensitivity::Protocol;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -86,7 +86,8 @@ fn scan_like_this(study: &Study, entry: &DesignEntry) -> String {
             listed(&each.collect::<Vec<_>>())
         }
     };
-    format!("Scan it {scans}{blocks}{on_the_way}.")
+    let plates = plates_in_words(&entry.specimen).map_or(String::new(), |plates| format!(", its {plates} before"));
+    format!("Scan it {scans}{plates}{blocks}{on_the_way}.")
 }
 
 fn because(base: &DesignEntry, ranked: &[DesignEntry], equals: Equals, chosen: &DesignEntry) -> String {

@@ -14,6 +14,8 @@ pub(super) fn in_steps(specimen: &Specimen, limits: &ManufacturingLimits, voxel_
     let nearest = |value: f64| multiple(step, (value / step).round());
     let mut rounded = specimen.clone();
     rounded.drive_mm.iter_mut().for_each(|d| *d = nearest(*d));
+    // Towards none: rounded up, the largest would be beyond what a specimen allows.
+    rounded.precompression_mm = multiple(step, (rounded.precompression_mm / step).trunc());
     if let Some(gauge) = rounded.outline.free_gauge_mut() {
         for length in [&mut gauge.gauge_width_mm, &mut gauge.gauge_length_mm] {
             *length = nearest(*length);

@@ -22,6 +22,8 @@ pub enum Variable {
     Drive,
     /// Drive of a scan before it.
     EarlierScan,
+    /// How far the plates are pressed together before the drive.
+    Precompression,
     /// Length of the block.
     Length,
     /// Thickness of the block.
@@ -67,6 +69,10 @@ impl Subspace {
     fn new(study: &Study, structure: Structure) -> Subspace {
         let mut template = study.base.clone();
         template.test = structure.test;
+        let has_plates = structure.test == TestKind::DoubleLapShear;
+        if !has_plates {
+            template.precompression_mm = 0.0;
+        }
         let vary = &study.vary;
         let (length, thickness, width) = (
             vary.length_mm.map_or(template.block.length_mm, |r| r.max),
@@ -118,6 +124,7 @@ impl Subspace {
         for (variable, interval) in [
             (Variable::Drive, Some(study.drive_range())),
             (Variable::EarlierScan, vary.earlier_scan_mm),
+            (Variable::Precompression, vary.precompression_mm.filter(|_| has_plates)),
             (Variable::Length, vary.length_mm),
             (Variable::Thickness, vary.thickness_mm),
             (Variable::Width, vary.width_mm),
@@ -164,6 +171,7 @@ impl Subspace {
                 Variable::Angle(o) => orbits[o].2[1] = self.allowed_angle(self.structure.orbits[o], value),
                 Variable::Drive => specimen.drive_mm = vec![value],
                 Variable::EarlierScan => earlier_mm = Some(value),
+                Variable::Precompression => specimen.precompression_mm = value,
                 Variable::Length => specimen.block.length_mm = value,
                 Variable::Thickness => specimen.block.thickness_mm = value,
                 Variable::Width => specimen.block.width_mm = value,
@@ -244,7 +252,7 @@ impl Subspace {
     }
 
     /// What a variable moves in the specimen's sample with this number (0: the first), with signs; empty where it moves
-    /// nothing, as the drive.
+    /// nothing but the plates, as the drive.
     pub fn moves(&self, variable: Variable, number: usize) -> Vec<(DesignVariable, f64)> {
         // A sample like the first moves with it, but for its thickness.
         let follows = number == 0 || variable != Variable::Thickness && self.is_like_first[number - 1];
@@ -286,6 +294,7 @@ impl Subspace {
             Variable::Angle(o) => of_orbit(o, DesignVariable::HoleAngle, |signs| signs[0] * signs[1]),
             Variable::Drive
             | Variable::EarlierScan
+            | Variable::Precompression
             | Variable::OtherLength(_)
             | Variable::OtherThickness(_)
             | Variable::OtherWidth(_) => Vec::new(),
@@ -328,6 +337,7 @@ impl Subspace {
                 Variable::Angle(o) => angle_within(holes[o].shape.map_or(0.0, |shape| shape.angle_deg), range),
                 Variable::Drive => drive_mm,
                 Variable::EarlierScan => *specimen.drive_mm.first().filter(|d| **d < drive_mm)?,
+                Variable::Precompression => specimen.precompression_mm,
                 Variable::Length => specimen.block.length_mm,
                 Variable::Thickness => specimen.block.thickness_mm,
                 Variable::Width => specimen.block.width_mm,

@@ -192,6 +192,7 @@ pub(super) fn is_same(a: &Specimen, b: &Specimen) -> bool {
     a.test == b.test
         && a.drive_mm.len() == b.drive_mm.len()
         && a.drive_mm.iter().zip(&b.drive_mm).all(|(a, b)| near(*a, *b))
+        && near(a.precompression_mm, b.precompression_mm)
         && of_a.len() == of_b.len()
         && of_a.iter().zip(&of_b).all(|(a, b)| is_same_sample(a, b))
 }

@@ -119,6 +119,11 @@ pub struct Vary {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub earlier_scan_mm: Option<Range>,
+    /// How far the plates of a double-lap test are pressed together before they are driven, and stay so, mm; negative
+    /// ones are pulled apart. At most a quarter of the thinnest sample's thickness either way.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub precompression_mm: Option<Range>,
     /// Outlines of holes that are tried beside circles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]

@@ -8,7 +8,7 @@ use super::study_limits::{
     MAX_COUNT, MAX_HOLES_TO_TRY, MAX_LENGTH_MM, MAX_RELATIVE_SD, MAX_WEIGHT, MIN_LENGTH_MM, MIN_WEIGHT,
 };
 use crate::field::{FieldError, FieldPath};
-use crate::specimen::{MAX_HOLE_ANGLE_DEG, MAX_NAME_LENGTH, Outline, Symmetry, TestKind};
+use crate::specimen::{MAX_HOLE_ANGLE_DEG, MAX_NAME_LENGTH, MAX_PRECOMPRESSION, Outline, Symmetry, TestKind};
 
 impl Study {
     /// Checks a study and all of its parts. Call it on a study that was not read by this program's readers.
@@ -180,6 +180,7 @@ impl Study {
             }
         }
         self.check_gauge(problems);
+        self.check_precompression(problems);
         if let Some(shapes) = &vary.hole_shapes {
             let path = || FieldPath::of("vary").name("hole_shapes").name("elongation_mm");
             check_range(path, shapes.elongation_mm, problems);
@@ -194,6 +195,28 @@ impl Study {
 }
 
 impl Study {
+    /// Whether there are plates where their precompression is to vary, and thick enough a block for it. Designs that are
+    /// too thin for theirs are passed over as ones that cannot be made.
+    fn check_precompression(&self, problems: &mut Vec<StudyError>) {
+        let Some(range) = self.vary.precompression_mm else { return };
+        if !self.tests().contains(&TestKind::DoubleLapShear) {
+            problems.push(StudyError::PrecompressionWithoutPlates);
+        }
+        let thickest_mm = self.vary.thickness_mm.map_or(self.base.block.thickness_mm, |r| r.max);
+        let limit_mm = MAX_PRECOMPRESSION * thickest_mm;
+        let field = |end: &str| FieldPath::of("vary").name("precompression_mm").name(end);
+        if !(range.min.abs() <= limit_mm) {
+            let allowed =
+                format!("from {:.4} to {limit_mm:.4} mm, {MAX_PRECOMPRESSION} times the thickness", -limit_mm);
+            problems.push(StudyError::OutOfRange { field: field("min"), value: range.min, allowed });
+        }
+        if !(range.max >= range.min && range.max <= limit_mm) {
+            let allowed =
+                format!("at least its min, at most {limit_mm:.4} mm, {MAX_PRECOMPRESSION} times the thickness");
+            problems.push(StudyError::OutOfRange { field: field("max"), value: range.max, allowed });
+        }
+    }
+
     /// Whether there is a gauge where one is to vary, and a dumb-bell is pulled.
     fn check_gauge(&self, problems: &mut Vec<StudyError>) {
         let vary = &self.vary;

@@ -181,6 +181,11 @@ pub enum StudyError {
          every relative_sd to 0 and choose another objective, or leave it out"
     )]
     EarlierScanNeedsVoxels,
+    /// Grips are no plates that could be pressed together.
+    #[error(
+        "vary.precompression_mm: vary.tests has no double_lap_shear, whose plates could be pressed together; leave it out"
+    )]
+    PrecompressionWithoutPlates,
     /// Unlike samples cannot be pulled side by side.
     #[error("vary.tests has uniaxial and the base other_samples; only a double-lap shear test may hold unlike samples")]
     OtherSamplesInTension,
@@ -295,6 +300,10 @@ impl StudyError {
             E::EarlierScanNeedsVoxels => {
                 let allowed = "left out where budget.refine or a relative_sd is above 0, and with tell_apart";
                 FieldError::new("/vary/earlier_scan_mm", "given", allowed).remedy("these are of one scan alone")
+            }
+            E::PrecompressionWithoutPlates => {
+                FieldError::new("/vary/precompression_mm", "given", "left out without a double-lap shear test")
+                    .remedy("a bar has grips and no plates that could be pressed together")
             }
             E::OtherSamplesInTension => {
                 FieldError::new("/vary/tests", "a list with uniaxial", "double_lap_shear where the base has other samples")

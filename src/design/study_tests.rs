@@ -121,6 +121,18 @@ fn all_errors_come_at_once() {
     assert_eq!(found, ["/base/samples_in_parallel", "/scan/voxel_mm/0", "/materials/1/name", "/vary/axes"]);
 }
 
+/// Plates are pressed together by a quarter of what is between them at most, and grips not at all.
+#[test]
+fn precompression_that_varies_has_plates() {
+    let range = |min: f64, max: f64| ("/vary/precompression_mm", json!({ "min": min, "max": max }));
+    assert!(pointers(&[range(-1.6, 0.4)]).is_empty());
+    assert_eq!(pointers(&[range(-30.0, 0.4)]), ["/vary/precompression_mm/min"]);
+    assert_eq!(pointers(&[range(-1.0, 30.0)]), ["/vary/precompression_mm/max"]);
+    assert_eq!(pointers(&[range(0.4, -1.0)]), ["/vary/precompression_mm/max"]);
+    let found = pointers(&[range(0.0, 0.4), ("/vary/tests", json!(["uniaxial"]))]);
+    assert_eq!(found, ["/vary/precompression_mm"]);
+}
+
 /// Only a dumb-bell of free gauge has one that may vary, and no dumb-bell is sheared.
 #[test]
 fn a_gauge_that_varies_is_there() {

@@ -56,6 +56,13 @@ pub fn block_in_brief(specimen: &Specimen) -> String {
     format!("{:.1} × {:.2} × {:.1}", b.length_mm, b.thickness_mm, b.width_mm)
 }
 
+/// How the plates are before the drive, in words; `None` where they are as far apart as the sample is thick.
+pub fn plates_in_words(specimen: &Specimen) -> Option<String> {
+    let by_mm = specimen.precompression_mm;
+    let way = if by_mm > 0.0 { "pressed together" } else { "pulled apart" };
+    specimen.is_precompressed().then(|| format!("plates {way} by {:.2} mm", by_mm.abs()))
+}
+
 /// One sample in words: a block of … mm without holes, or with these.
 pub fn sample_in_words(specimen: &Specimen) -> String {
     let kind = if specimen.outline.dumbbell().is_some() { "dumb-bell" } else { "block" };

@@ -109,6 +109,16 @@ impl Tangent<'_> {
         Change { velocity: velocity.map(<[_]>::to_vec), imposed, ..Change::default() }
     }
 
+    /// The change as the moved plate goes by `rate` (mm per unit of t) at the same drive: as precompression brings it
+    /// nearer.
+    pub fn change_of_moved_plate(&self, rate: [f64; 3]) -> Change {
+        let mut imposed = self.still();
+        for &v in &self.assembler.mesh().moved_nodes {
+            imposed[v as usize] = rate;
+        }
+        Change { imposed, ..Change::default() }
+    }
+
     /// The change as the held nodes move by `rate` (mm per unit of t; other nodes' entries are ignored).
     pub fn change_of_held_nodes(&self, rate: &[[f64; 3]]) -> Change {
         let mut imposed = self.still();

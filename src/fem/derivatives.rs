@@ -11,7 +11,7 @@
 //! smallest element their error is (1/500)⁴ κ/μ ≈ 10⁻⁸ at κ/μ = 10³.
 
 use super::assembler::Configuration;
-use super::change::{ACCURACY, ChangeSensitivity};
+use super::change::{ACCURACY, Change, ChangeSensitivity};
 use super::error::{SolveError, StepFailure};
 use super::rates::Rates;
 use super::tangent::Tangent;
@@ -93,15 +93,27 @@ impl Tangent<'_> {
         velocity: Option<&[[f64; 3]]>,
         drive_rate: f64,
     ) -> Result<PathSensitivity, SolveError> {
-        let change = self.change_of_nodes(velocity, drive_rate);
-        let mut found = self.sensitivities(std::slice::from_ref(&change))?;
+        self.path_sensitivity_of(sensitivities, &self.change_of_nodes(velocity, drive_rate))
+    }
+
+    /// As [`Self::path_sensitivity`] along a change of nodes and plates ([`Self::change_of_nodes`],
+    /// [`Self::change_of_moved_plate`]).
+    ///
+    /// # Errors
+    /// As [`Self::path_sensitivity`].
+    pub fn path_sensitivity_of(
+        &mut self,
+        sensitivities: &[ParameterSensitivity],
+        change: &Change,
+    ) -> Result<PathSensitivity, SolveError> {
+        let mut found = self.sensitivities(std::slice::from_ref(change))?;
         // One change, one derivative.
         let ChangeSensitivity { displacement, force_n } = found.swap_remove(0);
         let assembler = self.assembler.clone();
         let mesh = assembler.mesh();
         let driven = Some(&assembler.plates().driven_elements[..]);
         let still = vec![[0.0; 3]; mesh.nodes.len()];
-        let velocity = velocity.unwrap_or(&still);
+        let velocity = change.velocity.as_deref().unwrap_or(&still);
         let along = Path { velocity, rate: &displacement, step: difference_step(mesh, velocity, &displacement) };
         let mut reactions = Vec::with_capacity(sensitivities.len());
         let mut right = Vec::with_capacity(sensitivities.len());

@@ -5,7 +5,7 @@ use super::{
     ParetoPoint, PointKind, RankedItem, RankingPlot, Report, ReportHeader, Table, design_detection::detection,
     design_verification::verification, significant, symbol_of_parameter,
 };
-use crate::design::{DesignEntry, DesignResult, block_in_brief, holes_in_brief};
+use crate::design::{DesignEntry, DesignResult, block_in_brief, holes_in_brief, plates_in_words};
 use crate::specimen::{LimitMargin, Specimen, to_svg};
 
 /// Pictures made elsewhere, put in the page where they belong.
@@ -291,13 +291,18 @@ fn gain_bars(result: &DesignResult) -> Vec<(String, String)> {
         .collect()
 }
 
+fn drives_and_plates(specimen: &Specimen) -> String {
+    let drives = specimen.drive_mm.iter().map(|d| significant(*d, 3));
+    drives.chain(plates_in_words(specimen)).collect::<Vec<_>>().join(", ")
+}
+
 fn ranked_table(result: &DesignResult) -> Table {
     let row = |label: String, entry: &DesignEntry| {
         vec![
             label,
             of_samples(entry, holes_in_brief),
             of_samples(entry, block_in_brief),
-            entry.specimen.drive_mm.iter().map(|d| significant(*d, 3)).collect::<Vec<_>>().join(", "),
+            drives_and_plates(&entry.specimen),
             entry.largest_force().map_or("–".into(), |(material, n)| format!("{} ({material})", significant(n, 3))),
             format!(
                 "{} ± {}",

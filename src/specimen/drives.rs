@@ -18,6 +18,8 @@ pub const MIN_NOMINAL_STRETCH: f64 = 0.5;
 /// Most that the plates of a double-lap test may be pressed together or pulled apart before they are driven, as a part
 /// of the thinnest sample's thickness. Bonded blocks of rubber bulge out over the plates' edges beyond it.
 pub const MAX_PRECOMPRESSION: f64 = 0.25;
+/// Unit vector along which precompression brings the moved plate nearer to the fixed one.
+pub const PRECOMPRESSION_DIRECTION: [f64; 3] = [0.0, -1.0, 0.0];
 /// Rounding that a drive at the very limit may have, relative.
 const LIMIT_SLACK: f64 = 1e-9;
 
@@ -60,7 +62,7 @@ impl Specimen {
 
     /// Displacement (mm) of the moved plate before it is driven: it stays on.
     pub fn displacement_before_drive_mm(&self) -> [f64; 3] {
-        [0.0, -self.precompression_mm, 0.0]
+        PRECOMPRESSION_DIRECTION.map(|component| component * self.precompression_mm)
     }
 
     /// Whether the moved plate or grip goes along x.

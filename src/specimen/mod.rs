@@ -60,8 +60,8 @@ pub use drawing_step::{MOULD_WALL_MM, mould_to_step, to_step};
 pub use drawing_stl::{DrawingError, to_stl};
 pub use drawing_svg::to_svg;
 pub use drives::{
-    MAX_DRIVE_ANGLE_DEG, MAX_DRIVES, MAX_NOMINAL_STRETCH, MAX_SHEAR_STRAIN, MIN_NOMINAL_STRETCH, farthest_from_zero,
-    leads_on,
+    MAX_DRIVE_ANGLE_DEG, MAX_DRIVES, MAX_NOMINAL_STRETCH, MAX_PRECOMPRESSION, MAX_SHEAR_STRAIN, MIN_NOMINAL_STRETCH,
+    PRECOMPRESSION_DIRECTION, farthest_from_zero, leads_on,
 };
 pub use dumbbell::Dumbbell;
 pub use geometry::MIRROR_TOLERANCE_MM;

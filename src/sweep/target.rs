@@ -20,6 +20,7 @@ enum Place {
     Length,
     Thickness,
     Width,
+    Precompression,
     GaugeWidth,
     GaugeLength,
     FilletRadius,
@@ -38,7 +39,7 @@ enum Place {
 }
 
 impl Target {
-    /// Reads `drive_mm`, `block.length_mm`, `block.thickness_mm`, `block.width_mm`, `outline.dumbbell.gauge_width_mm`,
+    /// Reads `drive_mm`, `precompression_mm`, `block.length_mm`, `block.thickness_mm`, `block.width_mm`, `outline.dumbbell.gauge_width_mm`,
     /// `outline.dumbbell.gauge_length_mm`, `outline.dumbbell.fillet_radius_mm`, `holes[i].x_mm`,
     /// `holes[i].other_mm` (z of a hole along the thickness, y of one along the width), `holes[i].diameter_mm`,
     /// `holes[i].length_mm` and `holes[i].angle_deg` (of a hole with an outline of its own), `material.bulk_kpa`,
@@ -53,6 +54,7 @@ impl Target {
         let unknown = || SweepStudyError::UnknownTarget { variable: variable.into(), target: text.into() };
         let place = match name {
             "drive_mm" => Place::Drive,
+            "precompression_mm" => Place::Precompression,
             "block.length_mm" => Place::Length,
             "block.thickness_mm" => Place::Thickness,
             "block.width_mm" => Place::Width,
@@ -143,6 +145,7 @@ impl Target {
                 material.set(Parameter::Law(parameter), value);
                 return has_it;
             }
+            Place::Precompression => Some(&mut specimen.precompression_mm),
             Place::Length => Some(&mut specimen.block.length_mm),
             Place::Thickness => Some(&mut specimen.block.thickness_mm),
             Place::Width => Some(&mut specimen.block.width_mm),
