@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::design::space::subspaces;
-use crate::design::study::{AngleRange, Range, VaryHoleShapes};
+use crate::design::study::{AngleRange, OffsetRange, Range, VaryHoleShapes};
 use crate::mesh::{mesh_specimen, morphed};
 use crate::sensitivity::Protocol;
 use std::path::Path;
@@ -29,7 +29,7 @@ fn study() -> Study {
 #[test]
 fn every_gradient_passes_the_taylor_test() {
     let mut study = study();
-    study.vary.precompression_mm = Some(Range { min: -1.2, max: 0.4 });
+    study.vary.precompression_mm = Some(OffsetRange { min: -1.2, max: 0.4 });
     let mut specimen = study.base.clone();
     specimen.precompression_mm = -0.5;
     specimen.drive_mm = vec![5.0];

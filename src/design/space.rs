@@ -121,10 +121,11 @@ impl Subspace {
                 ranges.extend([shapes.elongation_mm, Range { min: angle.min, max: angle.max }]);
             }
         }
+        let precompression = vary.precompression_mm.filter(|_| has_plates);
         for (variable, interval) in [
             (Variable::Drive, Some(study.drive_range())),
             (Variable::EarlierScan, vary.earlier_scan_mm),
-            (Variable::Precompression, vary.precompression_mm.filter(|_| has_plates)),
+            (Variable::Precompression, precompression.map(|r| Range { min: r.min, max: r.max })),
             (Variable::Length, vary.length_mm),
             (Variable::Thickness, vary.thickness_mm),
             (Variable::Width, vary.width_mm),

@@ -2,7 +2,7 @@
 //! what is sought and how hard.
 
 use super::aim::Objective;
-use super::study_limits::{AngleDeg, Count, CountOrNone, HoleCount, LengthMm};
+use super::study_limits::{AngleDeg, Count, CountOrNone, HoleCount, LengthMm, OffsetMm};
 use crate::material::Material;
 use crate::sensitivity::{Protocol, ScanSettings};
 use crate::specimen::{HoleAxis, HoleKind, ManufacturingLimits, Specimen, TestKind};
@@ -123,7 +123,7 @@ pub struct Vary {
     /// ones are pulled apart. At most a quarter of the thinnest sample's thickness either way.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
-    pub precompression_mm: Option<Range>,
+    pub precompression_mm: Option<OffsetRange>,
     /// Outlines of holes that are tried beside circles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
@@ -156,6 +156,19 @@ pub struct Range {
     pub min: f64,
     /// Largest.
     #[schema(value_type = LengthMm)]
+    pub max: f64,
+}
+
+/// Two lengths either way, mm, both included.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = OffsetRangeMm)]
+#[serde(deny_unknown_fields)]
+pub struct OffsetRange {
+    /// Smallest.
+    #[schema(value_type = OffsetMm)]
+    pub min: f64,
+    /// Largest.
+    #[schema(value_type = OffsetMm)]
     pub max: f64,
 }
 

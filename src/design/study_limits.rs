@@ -35,6 +35,8 @@ schema_type! {
     pub(super) HoleCount = integer_within(0..=MAX_HOLES_TO_TRY);
     /// A length or a drive, mm.
     pub(super) LengthMm = number_within(MIN_LENGTH_MM..=MAX_LENGTH_MM);
+    /// A length either way, mm.
+    pub(super) OffsetMm = number_within(-MAX_LENGTH_MM..=MAX_LENGTH_MM);
     /// An angle of a hole, degrees.
     pub(super) AngleDeg = number_within(-MAX_HOLE_ANGLE_DEG..=MAX_HOLE_ANGLE_DEG);
     /// A number of designs, steps or draws.
