@@ -58,9 +58,8 @@ pub fn block_in_brief(specimen: &Specimen) -> String {
 
 /// How the plates are before the drive, in words; `None` where they are as far apart as the sample is thick.
 pub fn plates_in_words(specimen: &Specimen) -> Option<String> {
-    let by_mm = specimen.precompression_mm;
-    let way = if by_mm > 0.0 { "pressed together" } else { "pulled apart" };
-    specimen.is_precompressed().then(|| format!("plates {way} by {:.2} mm", by_mm.abs()))
+    let (way, by_mm) = specimen.plates_before_drive()?;
+    Some(format!("plates {way} by {by_mm:.2} mm"))
 }
 
 /// One sample in words: a block of … mm without holes, or with these.

@@ -177,9 +177,9 @@ impl Drawing {
                     true => faces,
                     false => format!("{faces}, moved {}° from x to z", format_mm(specimen.drive_angle_deg)),
                 };
-                match specimen.is_precompressed() {
-                    false => faces,
-                    true => format!("{faces}, pressed together by {}", format_mm(specimen.precompression_mm)),
+                match specimen.plates_before_drive() {
+                    None => faces,
+                    Some((way, by_mm)) => format!("{faces}, {way} by {}", format_mm(by_mm)),
                 }
             }
             TestKind::Uniaxial => format!("Uniaxial, faces x = ±{} bonded", format_mm(0.5 * block.length_mm)),

@@ -60,6 +60,12 @@ impl Specimen {
         self.precompression_mm.abs() > 0.0
     }
 
+    /// What is done to its plates before they are driven, in words, and how far, mm; `None` where nothing is.
+    pub fn plates_before_drive(&self) -> Option<(&'static str, f64)> {
+        let way = if self.precompression_mm > 0.0 { "pressed together" } else { "pulled apart" };
+        self.is_precompressed().then(|| (way, self.precompression_mm.abs()))
+    }
+
     /// Displacement (mm) of the moved plate before it is driven: it stays on.
     pub fn displacement_before_drive_mm(&self) -> [f64; 3] {
         PRECOMPRESSION_DIRECTION.map(|component| component * self.precompression_mm)

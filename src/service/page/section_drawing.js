@@ -78,9 +78,8 @@ function held(model, section, at) {
   const thick = 0.7 * text;
   const farthestDrive = farthest(model.specimen.drive_mm);
   const angle = model.specimen.drive_angle_deg ? ` at ${plain(model.specimen.drive_angle_deg)}° from x to z` : "";
-  const pressed = model.specimen.precompression_mm
-    ? `, pressed together by ${plain(model.specimen.precompression_mm)} mm`
-    : "";
+  const nearer = model.specimen.precompression_mm ?? 0;
+  const pressed = nearer ? `, ${nearer > 0 ? "pressed together" : "pulled apart"} by ${plain(Math.abs(nearer))} mm` : "";
   const drive = `drive ${plain(farthestDrive)} mm${angle}${pressed}`;
   const isWrong = (model.brokenLimits ?? []).some((name) =>
     ["max_drive_mm", "max_force_n", "max_local_stretch"].includes(name),
