@@ -195,8 +195,8 @@ impl Study {
 }
 
 impl Study {
-    /// Whether there are plates where their precompression is to vary, and thick enough a block for it. Designs that are
-    /// too thin for theirs are passed over as ones that cannot be made.
+    /// Whether there are plates where their precompression is to vary, and thick enough a block for it. Designs that
+    /// are too thin for theirs are passed over as ones that cannot be made.
     fn check_precompression(&self, problems: &mut Vec<StudyError>) {
         let Some(range) = self.vary.precompression_mm else { return };
         if !self.tests().contains(&TestKind::DoubleLapShear) {

@@ -151,8 +151,8 @@ impl<'a> Laboratory<'a> {
         self.stations.nominal()
     }
 
-    /// Lets the next prediction of `scene` start from `states`, what `coarse`, in whose mesh ours lies as `nesting` says,
-    /// predicts of it; `known` are equilibria of another scene there and here.
+    /// Lets the next prediction of `scene` start from `states`, what `coarse`, in whose mesh ours lies as `nesting`
+    /// says, predicts of it; `known` are equilibria of another scene there and here.
     ///
     /// # Errors
     /// [`DiagnosisError`]: the scene's specimen cannot be modelled.

@@ -75,8 +75,8 @@ impl MeshDefect {
 }
 
 impl<'a> Finer<'a> {
-    /// Of a laboratory whose element size is `mesh_factor` times the standard one; `None` where that is fine already, or
-    /// the finer one cannot be meshed.
+    /// Of a laboratory whose element size is `mesh_factor` times the standard one; `None` where that is fine already,
+    /// or the finer one cannot be meshed.
     pub fn new(coarse: &Laboratory<'a>, mesh_factor: f64) -> Option<Finer<'a>> {
         let observed = coarse.observed();
         let ratio = FINER.max(FINEST / mesh_factor);

@@ -191,9 +191,9 @@ impl ForwardModel {
         Ok(path)
     }
 
-    /// A start for [`Self::solve`] from `state`, which `coarse` found of the same sample: what it is on this mesh, which
-    /// lies in the other as `nesting` says. With `known`, a state of each of the two for one and the same scene, what
-    /// the coarse mesh gets wrong there is taken off.
+    /// A start for [`Self::solve`] from `state`, which `coarse` found of the same sample: what it is on this mesh,
+    /// which lies in the other as `nesting` says. With `known`, a state of each of the two for one and the same scene,
+    /// what the coarse mesh gets wrong there is taken off.
     pub fn start_from(
         &self,
         coarse: &ForwardModel,

@@ -39,7 +39,8 @@ enum Place {
 }
 
 impl Target {
-    /// Reads `drive_mm`, `precompression_mm`, `block.length_mm`, `block.thickness_mm`, `block.width_mm`, `outline.dumbbell.gauge_width_mm`,
+    /// Reads `drive_mm`, `precompression_mm`, `block.length_mm`, `block.thickness_mm`, `block.width_mm`,
+    /// `outline.dumbbell.gauge_width_mm`,
     /// `outline.dumbbell.gauge_length_mm`, `outline.dumbbell.fillet_radius_mm`, `holes[i].x_mm`,
     /// `holes[i].other_mm` (z of a hole along the thickness, y of one along the width), `holes[i].diameter_mm`,
     /// `holes[i].length_mm` and `holes[i].angle_deg` (of a hole with an outline of its own), `material.bulk_kpa`,
