@@ -73,7 +73,7 @@ fn tested_with_a_hole(study: &Study) -> Vec<Counted> {
     let mut all: Vec<Counted> = Vec::new();
     for axis in study.axes() {
         // Only that there is a hole matters; nothing is meshed.
-        let hole = Hole { axis, center_mm: [0.0; 2], diameter_mm: 1.0, shape: None };
+        let hole = Hole::circle(axis, [0.0; 2], 1.0);
         let holed = Specimen { holes: vec![hole], ..study.base.clone() };
         for (cause, place, parameter) in Registry::standard().tested_parameters(&holed) {
             let found = Counted { cause: cause.as_str().into(), place, parameter };

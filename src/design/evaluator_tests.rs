@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::design::space::subspaces;
-use crate::design::study::{AngleRange, OffsetRange, Range, VaryHoleShapes};
+use crate::design::study::{AngleRange, NotchedSide, OffsetRange, Range, VaryHoleShapes};
 use crate::mesh::{mesh_specimen, morphed};
 use crate::sensitivity::Protocol;
 use std::path::Path;
@@ -69,6 +69,23 @@ fn gradients_of_outlines_pass_the_taylor_test() {
         let variables = [Variable::Diameter(0), Variable::Elongation(0), Variable::Angle(0)];
         check_gradients(&study, &specimen, space, &variables);
     }
+}
+
+/// The same of notches: their radius, their place along the side, and the block's dimensions, with which they go.
+#[test]
+fn gradients_of_notches_pass_the_taylor_test() {
+    use crate::specimen::{Hole, HoleAxis, Symmetry};
+    let mut study = study();
+    study.limits.symmetry = Symmetry::MirrorX;
+    study.vary.notches = vec![NotchedSide::Ends];
+    assert_eq!(study.validate().map_err(|e| e.to_string()), Ok(()));
+    let mut specimen = study.base.clone();
+    specimen.drive_mm = vec![5.0];
+    specimen.holes = [1.0, -1.0].map(|s| Hole::notch(HoleAxis::Thickness, [s * 12.7, 1.5], 4.4)).to_vec();
+    let all = subspaces(&study);
+    let space = all.iter().find(|s| s.vector_of(&specimen, 5.0).is_some()).expect("notches are allowed");
+    let variables = [Variable::Other(0), Variable::Diameter(0), Variable::Length, Variable::Width];
+    check_gradients(&study, &specimen, space, &variables);
 }
 
 /// The same of a dumb-bell's gauge and block.

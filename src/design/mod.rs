@@ -72,8 +72,8 @@ pub use search_run::{Progress, ProgressSink};
 pub use space::{Subspace, Variable, subspaces};
 pub use structure::{Orbit, Structure};
 pub use study::{
-    AngleRange, Budget, CountRange, MaterialPrior, OffsetRange, Range, Study, Vary, VaryHoleShapes, VarySample,
-    VerificationSettings,
+    AngleRange, Budget, CountRange, MaterialPrior, NotchedSide, OffsetRange, Range, Study, Vary, VaryHoleShapes,
+    VarySample, VerificationSettings,
 };
 pub use study_error::StudyError;
 pub use study_hash::study_hash;

@@ -1,7 +1,7 @@
 //! Designs in the steps that a mould maker works to.
 
 use super::explore::is_makeable;
-use crate::specimen::{Block, Hole, ManufacturingLimits, Specimen};
+use crate::specimen::{Block, Hole, HoleAxis, MIRROR_TOLERANCE_MM, ManufacturingLimits, Specimen};
 
 /// The step where limits state none, mm.
 const USUAL_STEP_MM: f64 = 0.1;
@@ -24,11 +24,13 @@ pub(super) fn in_steps(specimen: &Specimen, limits: &ManufacturingLimits, voxel_
         gauge.fillet_radius_mm = multiple(step, (gauge.fillet_radius_mm / step - 1e-9).ceil());
     }
     for (block, holes) in shapes_of(&mut rounded) {
+        let drawn = *block;
         for length in [&mut block.length_mm, &mut block.thickness_mm, &mut block.width_mm] {
             *length = nearest(*length);
         }
         for hole in holes.iter_mut() {
-            hole.center_mm = hole.center_mm.map(nearest);
+            hole.center_mm =
+                if hole.is_notch { notch_center(hole, &drawn, block, nearest) } else { hole.center_mm.map(nearest) };
             hole.shape.iter_mut().for_each(|shape| shape.angle_deg = shape.angle_deg.round());
         }
     }
@@ -60,6 +62,20 @@ pub(super) fn in_steps(specimen: &Specimen, limits: &ManufacturingLimits, voxel_
         .find(|s| is_makeable(s, limits, voxel_mm))
 }
 
+/// The centre of a notch in steps: on the side of the block as rounded, where it was on that of the block as drawn.
+fn notch_center(hole: &Hole, drawn: &Block, rounded: &Block, nearest: impl Fn(f64) -> f64) -> [f64; 2] {
+    let extents = |block: &Block| match hole.axis {
+        HoleAxis::Thickness => [block.length_mm, block.width_mm],
+        HoleAxis::Width => [block.length_mm, block.thickness_mm],
+    };
+    let (before, after) = (extents(drawn), extents(rounded));
+    [0, 1].map(|c| {
+        let value = hole.center_mm[c];
+        let is_on_side = (value.abs() - 0.5 * before[c]).abs() < MIRROR_TOLERANCE_MM;
+        if is_on_side { 0.5 * after[c] * value.signum() } else { nearest(value) }
+    })
+}
+
 /// Block and holes of every sample.
 fn shapes_of(specimen: &mut Specimen) -> impl Iterator<Item = (&mut Block, &mut Vec<Hole>)> {
     let Specimen { block, holes, other_samples, .. } = specimen;
@@ -75,7 +91,6 @@ fn multiple(step: f64, count: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::specimen::HoleAxis;
 
     fn published() -> (Specimen, ManufacturingLimits) {
         let specimen = Specimen::from_json(include_str!("../../geometries/two-hole-shear.json")).expect("a specimen");
@@ -94,6 +109,18 @@ mod tests {
         assert_eq!(made.holes[0].center_mm, [-4.2, 0.0]);
         assert_eq!(made.holes[1].center_mm, [4.2, 0.0]);
         assert_eq!(made.holes[0].diameter_mm, 5.0);
+    }
+
+    /// A notch stays on its side although half of a multiple is none.
+    #[test]
+    fn notches_stay_on_their_sides() {
+        let (mut specimen, limits) = published();
+        specimen.block.length_mm = 28.5413;
+        specimen.holes = [-1.0, 1.0].map(|s| Hole::notch(HoleAxis::Thickness, [s * 0.5 * 28.5413, 0.0], 4.02)).to_vec();
+        let made = in_steps(&specimen, &limits, [1.0; 3]).expect("it can be made");
+        assert_eq!(made.block.length_mm, 28.5);
+        assert_eq!([made.holes[0].center_mm, made.holes[1].center_mm], [[-14.25, 0.0], [14.25, 0.0]]);
+        assert_eq!(made.holes[0].diameter_mm, 4.0);
     }
 
     /// Lengths are multiples too, angles whole degrees, and no hole becomes wider than long.

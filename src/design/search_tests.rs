@@ -223,7 +223,7 @@ fn designs_with_outlines_have_a_vector() {
     });
     let hole = |kind, center_mm, angle_deg| {
         let shape = Some(HoleShape { kind, length_mm: 4.5, angle_deg });
-        Hole { axis: HoleAxis::Thickness, center_mm, diameter_mm: 2.5, shape }
+        Hole { axis: HoleAxis::Thickness, center_mm, diameter_mm: 2.5, shape, is_notch: false }
     };
     for kind in [HoleKind::Ellipse, HoleKind::Slot] {
         for (symmetry, holes) in [
@@ -257,6 +257,61 @@ fn designs_with_outlines_have_a_vector() {
     // Circles, ellipses and slots of every arrangement, and the solid block once.
     let num_arrangements = |kind| subspaces(&study).iter().filter(|s| s.structure.hole_kind == kind).count();
     assert_eq!(num_arrangements(None), num_arrangements(Some(HoleKind::Slot)) + 1);
+}
+
+/// Notches have a vector that gives them back, in the structures of free sides alone, and go with the block.
+#[test]
+fn designs_with_notches_have_a_vector() {
+    use crate::design::study::NotchedSide;
+    use crate::specimen::{Hole, HoleAxis, Symmetry, TestKind};
+    let mut study = small_study();
+    study.limits.punches_mm = None;
+    study.limits.diameter_mm = Some(crate::specimen::DiameterRange { min: 1.0, max: 5.0 });
+    study.limits.symmetry = Symmetry::MirrorXAndZ;
+    study.vary.hole_count = CountRange { min: 0, max: 4 };
+    study.vary.length_mm = Some(Range { min: 20.0, max: 30.0 });
+    study.vary.axes = Some(vec![HoleAxis::Thickness, HoleAxis::Width]);
+    study.vary.tests = vec![TestKind::DoubleLapShear];
+    study.vary.notches = vec![NotchedSide::Ends, NotchedSide::Sides];
+    study.base.drive_mm = vec![3.0];
+    study.vary.drive_mm = Range { min: 1.0, max: 5.0 };
+    assert_eq!(study.validate().map_err(|e| e.to_string()), Ok(()));
+    let notch = |center| Hole::notch(HoleAxis::Thickness, center, 3.0);
+    let half = [0.5 * study.base.block.length_mm, 0.5 * study.base.block.width_mm];
+    for holes in [
+        vec![notch([half[0], 0.0]), notch([-half[0], 0.0])],
+        [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]].map(|s| notch([s[0] * half[0], s[1] * 4.0])).to_vec(),
+        vec![notch([0.0, half[1]]), notch([0.0, -half[1]]), Hole::circle(HoleAxis::Thickness, [0.0, 0.0], 3.0)],
+    ] {
+        let specimen = Specimen { test: TestKind::DoubleLapShear, holes, ..base_at_drive(&study) };
+        assert_eq!(specimen.validate(), Ok(()));
+        let spaces = subspaces(&study);
+        let found: Vec<_> = spaces
+            .iter()
+            .filter_map(|space| Some((space, space.vector_of(&specimen, specimen.drive_mm[0])?)))
+            .collect();
+        let [(space, vector)] = found.as_slice() else { panic!("{} structures", found.len()) };
+        let back = space.specimen(vector);
+        for hole in &specimen.holes {
+            let differences = back.holes.iter().map(|other| hole.difference_mm(other));
+            assert!(differences.fold(f64::INFINITY, f64::min) < 1e-9, "{:?}", back.holes);
+        }
+        // A longer block takes its notches along.
+        let mut longer = vector.clone();
+        let place = space.variables.iter().position(|v| *v == super::space::Variable::Length).expect("it varies");
+        longer[place] = 1.0;
+        assert_eq!(space.specimen(&longer).validate(), Ok(()));
+    }
+    // Along the width, sides are bonded.
+    let spaces = subspaces(&study);
+    let along_width = spaces.iter().filter(|s| s.structure.axis == HoleAxis::Width);
+    assert!(along_width.flat_map(|s| &s.structure.orbits).all(|o| o.notched != Some(NotchedSide::Sides)));
+    // Without a mirror there is no place for them, which is told.
+    study.limits.symmetry = Symmetry::None;
+    assert!(matches!(study.validate(), Err(StudyError::NoPlaceForNotches)));
+    study.limits.symmetry = Symmetry::MirrorXAndZ;
+    study.vary.notches = vec![NotchedSide::Ends, NotchedSide::Ends];
+    assert!(matches!(study.validate(), Err(StudyError::NotchedSides { count: 2 })));
 }
 
 /// A number in [low, high) from a fixed stream: a linear congruence with the constants of Knuth's MMIX.

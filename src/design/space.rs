@@ -101,21 +101,21 @@ impl Subspace {
         let diameter = Range { min: diameter.min, max: widest.max(diameter.min) };
         let (mut variables, mut ranges) = (Vec::new(), Vec::new());
         for (index, orbit) in structure.orbits.iter().enumerate() {
-            if !orbit.on_x {
+            if !orbit.on_x && !orbit.is_on_side(0) {
                 let half = 0.5 * (length - diameter.min) - edge;
                 variables.push(Variable::X(index));
                 // Of a pair through the centre the one with x ≥ 0 stands for both.
                 let is_half = structure.mirrors[0] || structure.is_point_symmetric;
                 ranges.push(Range { min: if is_half { 0.0 } else { -half }, max: half });
             }
-            if !orbit.on_other {
+            if !orbit.on_other && !orbit.is_on_side(1) {
                 let half = (0.5 * (other - diameter.min) - edge).max(0.0);
                 variables.push(Variable::Other(index));
                 ranges.push(Range { min: if structure.mirrors[1] { 0.0 } else { -half }, max: half });
             }
             variables.push(Variable::Diameter(index));
             ranges.push(diameter);
-            if let Some(shapes) = vary.hole_shapes.as_ref().filter(|_| structure.hole_kind.is_some()) {
+            if let Some(shapes) = vary.hole_shapes.as_ref().filter(|_| structure.kind_of(*orbit).is_some()) {
                 let angle = shapes.angle_deg;
                 variables.extend([Variable::Elongation(index), Variable::Angle(index)]);
                 ranges.extend([shapes.elongation_mm, Range { min: angle.min, max: angle.max }]);
@@ -187,10 +187,17 @@ impl Subspace {
         // One beyond the last drive is no earlier one: such a design is not valid.
         specimen.drive_mm.splice(0..0, earlier_mm);
         specimen.holes.clear();
-        for (orbit, (center_mm, diameter_mm, [elongation_mm, angle_deg])) in self.structure.orbits.iter().zip(orbits) {
+        let size_mm = self.section_size(&specimen.block);
+        for (orbit, (mut center_mm, diameter_mm, [elongation_mm, angle_deg])) in
+            self.structure.orbits.iter().zip(orbits)
+        {
             let of_kind = |kind| HoleShape { kind, length_mm: diameter_mm + elongation_mm, angle_deg };
-            let shape = self.structure.hole_kind.map(of_kind);
-            let hole = Hole { axis: self.structure.axis, center_mm, diameter_mm, shape };
+            let shape = self.structure.kind_of(*orbit).map(of_kind);
+            if let Some(side) = orbit.notched {
+                center_mm[side.axis()] = 0.5 * size_mm[side.axis()];
+            }
+            let round = Hole::circle(self.structure.axis, center_mm, diameter_mm);
+            let hole = Hole { shape, is_notch: orbit.notched.is_some(), ..round };
             let images = self.structure.image_signs(*orbit).into_iter();
             specimen.holes.extend(images.map(|signs| hole.mirrored(signs)));
         }
@@ -209,16 +216,28 @@ impl Subspace {
             HoleAxis::Thickness => "thickness",
             HoleAxis::Width => "width",
         };
-        let hole = self.structure.hole_kind.map_or("hole", |of_kind| match of_kind {
-            HoleKind::Ellipse => "elliptic hole",
-            HoleKind::Slot => "slot",
-        });
+        let hole = if specimen.holes.iter().all(|hole| hole.is_notch) {
+            "notch"
+        } else {
+            self.structure.hole_kind.map_or("hole", |of_kind| match of_kind {
+                HoleKind::Ellipse => "elliptic hole",
+                HoleKind::Slot => "slot",
+            })
+        };
         specimen.name = match count {
             0 => format!("{kind}, solid"),
             1 => format!("{kind}, 1 {hole} along the {direction}"),
             n => format!("{kind}, {n} {hole}s along the {direction}"),
         };
         specimen
+    }
+
+    /// Extents of a block's section along x and along the other coordinate of holes, mm.
+    fn section_size(&self, block: &Block) -> [f64; 2] {
+        match self.structure.axis {
+            HoleAxis::Thickness => [block.length_mm, block.width_mm],
+            HoleAxis::Width => [block.length_mm, block.thickness_mm],
+        }
     }
 
     fn nearest_punch(&self, diameter: f64) -> f64 {
@@ -279,13 +298,23 @@ impl Subspace {
                 .map(|(i, signs)| (make(first(orbit) + i), sign(signs)))
                 .collect()
         };
+        // Notches go with the sides that they open to.
+        let of_block = |dimension: DesignVariable, coordinate: usize| -> Vec<_> {
+            let on_side = |o: &usize| self.structure.orbits[*o].is_on_side(coordinate);
+            let notches = (0..self.structure.orbits.len()).filter(on_side).flat_map(|o| match coordinate {
+                0 => of_orbit(o, DesignVariable::HoleX, |signs| 0.5 * signs[0]),
+                _ => of_orbit(o, DesignVariable::HoleOther, |signs| 0.5 * signs[1]),
+            });
+            std::iter::once((dimension, 1.0)).chain(notches).collect()
+        };
+        let is_lateral = |axis: HoleAxis| self.structure.axis == axis;
         match variable {
             Variable::X(o) => of_orbit(o, DesignVariable::HoleX, |signs| signs[0]),
             Variable::Other(o) => of_orbit(o, DesignVariable::HoleOther, |signs| signs[1]),
             Variable::Diameter(o) => {
                 let mut moved = of_orbit(o, DesignVariable::HoleDiameter, |_| 1.0);
                 // The elongation is held, so that the length goes along.
-                if self.structure.hole_kind.is_some() {
+                if self.structure.kind_of(self.structure.orbits[o]).is_some() {
                     moved.extend(of_orbit(o, DesignVariable::HoleLength, |_| 1.0));
                 }
                 moved
@@ -299,8 +328,10 @@ impl Subspace {
             | Variable::OtherLength(_)
             | Variable::OtherThickness(_)
             | Variable::OtherWidth(_) => Vec::new(),
-            Variable::Length => vec![(DesignVariable::BlockLength, 1.0)],
+            Variable::Length => of_block(DesignVariable::BlockLength, 0),
+            Variable::Thickness if is_lateral(HoleAxis::Width) => of_block(DesignVariable::BlockThickness, 1),
             Variable::Thickness => vec![(DesignVariable::BlockThickness, 1.0)],
+            Variable::Width if is_lateral(HoleAxis::Thickness) => of_block(DesignVariable::BlockWidth, 1),
             Variable::Width => vec![(DesignVariable::BlockWidth, 1.0)],
             Variable::GaugeWidth => vec![(DesignVariable::GaugeWidth, 1.0)],
             Variable::GaugeLength => vec![(DesignVariable::GaugeLength, 1.0)],
@@ -314,8 +345,7 @@ impl Subspace {
         if specimen.test != self.structure.test || specimen.holes.len() != self.structure.num_holes() {
             return None;
         }
-        let kind_of = |h: &Hole| h.shape.map(|shape| shape.kind);
-        if specimen.holes.iter().any(|h| h.axis != self.structure.axis || kind_of(h) != self.structure.hole_kind) {
+        if specimen.holes.iter().any(|h| h.axis != self.structure.axis) {
             return None;
         }
         if specimen.other_samples.len() != self.is_like_first.len() {
@@ -327,7 +357,7 @@ impl Subspace {
                 return None;
             }
         }
-        let holes = self.representatives(&specimen.holes)?;
+        let holes = self.representatives(specimen)?;
         let mut vector = Vec::with_capacity(self.variables.len());
         for (variable, range) in self.variables.iter().zip(&self.ranges) {
             let value = match *variable {
@@ -361,19 +391,27 @@ impl Subspace {
 
     /// For each orbit the hole that stands for it (on the positive side of every mirror), where the holes are exactly
     /// the orbits of this structure.
-    fn representatives(&self, holes: &[Hole]) -> Option<Vec<Hole>> {
+    fn representatives(&self, specimen: &Specimen) -> Option<Vec<Hole>> {
         let near = |a: f64, b: f64| (a - b).abs() <= MIRROR_TOLERANCE_MM;
-        let mut left: Vec<Hole> = holes.to_vec();
+        let side_mm = self.section_size(&specimen.block).map(|extent| 0.5 * extent);
+        let mut left: Vec<Hole> = specimen.holes.clone();
         let mut found = Vec::with_capacity(self.structure.orbits.len());
         for orbit in &self.structure.orbits {
             let is_on = [orbit.on_x, orbit.on_other];
             let fits = |hole: &Hole| {
+                let kind = hole.shape.map(|shape| shape.kind);
+                if kind != self.structure.kind_of(*orbit) || hole.is_notch != orbit.notched.is_some() {
+                    return false;
+                }
                 if self.structure.is_point_symmetric {
                     let is_central = hole.center_mm.iter().all(|c| near(*c, 0.0));
                     return is_central == orbit.on_x && hole.center_mm[0] >= 0.0;
                 }
                 (0..2).all(|c| {
                     let value = hole.center_mm[c];
+                    if orbit.is_on_side(c) {
+                        return near(value, side_mm[c]);
+                    }
                     !self.structure.mirrors[c] || if is_on[c] { near(value, 0.0) } else { value > MIRROR_TOLERANCE_MM }
                 })
             };

@@ -128,10 +128,35 @@ pub struct Vary {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub hole_shapes: Option<VaryHoleShapes>,
+    /// Sides of the block in which round notches are tried: free ones, with a symmetry that mirrors one to the other.
+    /// Notches have their centres on the side, and count as holes. None by default.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 2)]
+    pub notches: Vec<NotchedSide>,
     /// The base's further samples, in their order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 7)]
     pub other_samples: Vec<VarySample>,
+}
+
+/// Sides of a block that notches may open to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum NotchedSide {
+    /// Both ends across x.
+    Ends,
+    /// Both sides along x: across z for holes along the thickness, across y for holes along the width.
+    Sides,
+}
+
+impl NotchedSide {
+    /// The coordinate of the section that the sides lie across: 0 for x, 1 for the other.
+    pub fn axis(self) -> usize {
+        match self {
+            NotchedSide::Ends => 0,
+            NotchedSide::Sides => 1,
+        }
+    }
 }
 
 /// Two counts, both included.

@@ -2,6 +2,7 @@
 
 use super::aim::ObjectiveKind;
 use super::detection::{countable, counted};
+use super::structure::can_be_notched;
 use super::study::{MaterialPrior, Range, Study, VaryHoleShapes};
 use super::study_error::StudyError;
 use super::study_limits::{
@@ -180,6 +181,7 @@ impl Study {
             }
         }
         self.check_gauge(problems);
+        self.check_notches(problems);
         self.check_precompression(problems);
         if let Some(shapes) = &vary.hole_shapes {
             let path = || FieldPath::of("vary").name("hole_shapes").name("elongation_mm");
@@ -214,6 +216,18 @@ impl Study {
             let allowed =
                 format!("at least its min, at most {limit_mm:.4} mm, {MAX_PRECOMPRESSION} times the thickness");
             problems.push(StudyError::OutOfRange { field: field("max"), value: range.max, allowed });
+        }
+    }
+
+    /// Whether sides for notches are named once, and a structure can have them.
+    fn check_notches(&self, problems: &mut Vec<StudyError>) {
+        let sides = &self.vary.notches;
+        if sides.iter().enumerate().any(|(i, side)| sides[..i].contains(side)) {
+            problems.push(StudyError::NotchedSides { count: sides.len() });
+        }
+        let is_block = self.base.outline.dumbbell().is_none();
+        if !sides.is_empty() && !(is_block && can_be_notched(self)) {
+            problems.push(StudyError::NoPlaceForNotches);
         }
     }
 

@@ -88,6 +88,18 @@ pub enum StudyError {
         /// How many entries.
         count: usize,
     },
+    /// Sides for notches are named twice.
+    #[error("vary.notches has {count} entries; give ends, sides or both, each once")]
+    NotchedSides {
+        /// How many entries.
+        count: usize,
+    },
+    /// No structure of the study can have notches.
+    #[error(
+        "vary.notches asks for notches, and none is possible: they need a block with a free side of that kind and limits.symmetry \
+         with a mirror that takes it to the other side; set the symmetry, or leave out vary.notches"
+    )]
+    NoPlaceForNotches,
     /// Holes are asked for, but no direction of theirs is allowed.
     #[error(
         "vary.axes is empty and vary.hole_count.max {max_holes}; give directions of the holes, or leave out vary.axes to keep the base's"
@@ -247,6 +259,15 @@ impl StudyError {
                 FieldError::new("/vary/hole_shapes/kinds", format!("a list of {count}"), "ellipse, slot or both, each once")
                     .remedy("leave out hole_shapes to try circles alone")
             }
+            E::NotchedSides { count } => {
+                FieldError::new("/vary/notches", format!("a list of {count}"), "ends, sides or both, each once")
+            }
+            E::NoPlaceForNotches => FieldError::new(
+                "/vary/notches",
+                "notches",
+                "free sides of a block that a mirror of limits.symmetry takes to each other",
+            )
+            .remedy("set limits.symmetry, or leave out vary.notches"),
             E::NoAxes { max_holes } => {
                 FieldError::new("/vary/axes", "[]", format!("a list of directions, as up to {max_holes} holes are asked for"))
                     .remedy("or leave it out to keep the base's direction")

@@ -31,6 +31,7 @@ pub fn holes_in_brief(specimen: &Specimen) -> String {
     let mut groups: Vec<(String, usize)> = Vec::new();
     for hole in &specimen.holes {
         let outline = match hole.shape {
+            None if hole.is_notch => format!("notch R{:.2}", 0.5 * hole.diameter_mm),
             None => format!("⌀{:.1}", hole.diameter_mm),
             Some(shape) => {
                 let (kind, angle) = (shape.kind.name(), shape.angle_deg);
@@ -77,7 +78,13 @@ pub fn sample_in_words(specimen: &Specimen) -> String {
         return format!("{block} without holes");
     }
     let direction = specimen.extrusion_axis().name();
-    let plural = if specimen.holes.len() == 1 { "a hole" } else { "holes" };
+    let plural = match (specimen.holes.len(), specimen.holes.iter().filter(|hole| hole.is_notch).count()) {
+        (1, 0) => "a hole",
+        (_, 0) => "holes",
+        (1, _) => "a notch",
+        (all, notches) if all == notches => "notches",
+        _ => "holes and notches",
+    };
     let brief = holes_in_brief(specimen).replace(" (along the width)", "");
     format!("{block} with {plural} along the {direction}, {brief} mm")
 }

@@ -4,7 +4,7 @@ use super::Mirror;
 use super::error::{LigamentEnd, MeshError};
 use super::options::{MeshOptions, in_range};
 use crate::specimen::dumbbell::{ISO37_WIDTH_MM, Profile};
-use crate::specimen::{HoleAxis, HoleWall, Outline, Specimen, TestKind};
+use crate::specimen::{HoleAxis, HoleWall, Notch, Outline, SectionEdge, Specimen, TestKind};
 
 /// Lengths outside this range, mm, are refused: they are certainly errors of unit.
 const LENGTH_RANGE_MM: [f64; 2] = [1e-3, 1e5];
@@ -23,11 +23,27 @@ pub(super) struct SectionHole {
     pub index: usize,
     /// Centred on the section's mirror line, which cuts it in half.
     pub is_half: bool,
+    /// How a side of the section cuts it open, if it does.
+    pub notch: Option<Notch>,
 }
 
 impl SectionHole {
     pub fn center(&self) -> [f64; 2] {
         self.wall.center_mm()
+    }
+
+    /// Area that it takes away from the meshed part of the section, mm².
+    fn area_mm2(&self) -> f64 {
+        let whole = self.notch.map_or_else(|| self.wall.area_mm2(), |notch| notch.area_mm2());
+        if self.is_half { 0.5 * whole } else { whole }
+    }
+
+    /// Whether a point of the outline lies on the side that the hole opens to, on its own half of the section.
+    pub fn opens_to(&self, half: [f64; 2], p: [f64; 2]) -> bool {
+        self.notch.is_some_and(|notch| {
+            let (axis, sign) = notch.side.axis_and_sign();
+            (half[axis] - sign * p[axis]).abs() < COINCIDENT * half[axis]
+        })
     }
 
     /// Extent across, the diameter of a circle.
@@ -101,6 +117,9 @@ impl Domain {
             if !(finite && h.diameter_mm > 0.0 && h.diameter_mm < high && is_long && is_turned) {
                 return Err(MeshError::InvalidHole { hole, center_mm: h.center_mm, diameter_mm: h.diameter_mm });
             }
+            if let Some(problem) = specimen.notch_problem(h) {
+                return Err(MeshError::BadNotch { hole, problem });
+            }
             if h.axis != specimen.holes[0].axis {
                 return Err(MeshError::MixedHoleAxes { hole });
             }
@@ -118,7 +137,7 @@ impl Domain {
             .holes
             .iter()
             .enumerate()
-            .map(|(index, h)| SectionHole { wall: h.wall(), index, is_half: false })
+            .map(|(index, h)| SectionHole { wall: h.wall(), index, is_half: false, notch: specimen.notch_of(h) })
             .collect();
 
         let uniaxial = specimen.test == TestKind::Uniaxial;
@@ -166,6 +185,7 @@ impl Domain {
             for d in &mut holes {
                 if d.center()[1] < COINCIDENT * scale {
                     d.wall = d.wall.moved_to([d.center()[0], 0.0]);
+                    d.notch = d.notch.map(|notch| Notch { center_mm: [notch.center_mm[0], 0.0], ..notch });
                     d.is_half = true;
                 }
             }
@@ -216,9 +236,22 @@ impl Domain {
         (0..WALL_POINTS).map(|i| self.outline_distance(at(i))).fold(f64::INFINITY, f64::min)
     }
 
+    /// Distance from a point inside the section to the sides of a block but one (mirror line not counted), mm.
+    pub fn distance_to_other_sides(&self, p: [f64; 2], side: SectionEdge) -> f64 {
+        let others = SectionEdge::ALL.into_iter().filter(|other| *other != side);
+        let to = |edge: SectionEdge| {
+            let (axis, sign) = edge.axis_and_sign();
+            self.half[axis] - sign * p[axis]
+        };
+        others.map(to).fold(f64::INFINITY, f64::min)
+    }
+
     fn check_ligaments(&self, holes: &[SectionHole]) -> Result<(), MeshError> {
         for (i, d) in holes.iter().enumerate() {
-            let to_outline = self.wall_to_outline(&d.wall);
+            let to_outline = match d.notch {
+                None => self.wall_to_outline(&d.wall),
+                Some(notch) => self.distance_to_other_sides(d.center(), notch.side) - notch.radius_mm,
+            };
             let check = |to, length_mm: f64, limit_mm: f64| {
                 if length_mm >= limit_mm {
                     return Ok(());
@@ -239,7 +272,7 @@ impl Domain {
         let [a, b] = self.half;
         let whole = self.profile.map_or(4.0 * a * b, |profile| profile.area_mm2());
         let mirrored = self.bottom > -self.half[1];
-        let holes: f64 = self.holes.iter().map(|d| d.wall.area_mm2() * if d.is_half { 0.5 } else { 1.0 }).sum();
+        let holes: f64 = self.holes.iter().map(SectionHole::area_mm2).sum();
         whole * if mirrored { 0.5 } else { 1.0 } - holes
     }
 

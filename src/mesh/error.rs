@@ -56,6 +56,14 @@ pub enum MeshError {
         /// Its diameter, mm.
         diameter_mm: f64,
     },
+    /// A hole that is said to be a notch is none.
+    #[error("hole {hole} {problem}")]
+    BadNotch {
+        /// Index of the hole.
+        hole: usize,
+        /// What is wrong with it.
+        problem: crate::specimen::NotchProblem,
+    },
     /// Holes along different axes cross.
     #[error("hole {hole} has another axis than hole 0; give all holes the same axis")]
     MixedHoleAxes {

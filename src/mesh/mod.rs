@@ -43,6 +43,8 @@ mod triangles;
 #[cfg(test)]
 mod layout_tests;
 #[cfg(test)]
+mod notch_tests;
+#[cfg(test)]
 mod outline_tests;
 #[cfg(test)]
 mod test_specimens;

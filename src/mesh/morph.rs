@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::Mesh;
 use super::locator::extrusion_axis;
 use crate::specimen::dumbbell::{DumbbellDimension, Profile};
-use crate::specimen::{HoleAxis, HoleWall, Outline, Specimen};
+use crate::specimen::{HoleAxis, HoleWall, Notch, NotchRates, Outline, SectionEdge, Specimen};
 
 /// One geometric quantity of a specimen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -43,6 +43,10 @@ pub enum DesignVariable {
 /// distances to the others. A block dimension scales the outline affinely about the origin and leaves the holes'
 /// centres and shapes alone; along the extrusion everything is scaled.
 ///
+/// The wall of a notch stays the arc that its side cuts from its circle, to first order: points keep their share of the
+/// arc, the ends of the mouth slide along the side, and so does the side next to them. A dimension of the block moves a
+/// side and holds the centres of notches, which then lie deeper or less deep in it.
+///
 /// In a mirrored mesh the velocity is that of the meshed half. A hole and its image are moved together by summing their
 /// two variables (with opposite signs for [`DesignVariable::HoleOther`]); the one outside the meshed half contributes
 /// zero. [`DesignVariable::HoleOther`] of a hole centred on the mirror plane gives zero: by symmetry it changes
@@ -69,11 +73,19 @@ pub fn morphed(mesh: &Mesh, velocity: &[[f64; 3]], step: f64) -> Mesh {
     moved
 }
 
+/// A notch with its index among the holes.
+#[derive(Clone, Copy)]
+struct NotchOf {
+    hole: usize,
+    notch: Notch,
+}
+
 struct Field<'a> {
     specimen: &'a Specimen,
     /// The side of a dumb-bell.
     profile: Option<Profile>,
     walls: Vec<HoleWall>,
+    notches: Vec<Option<Notch>>,
     half: [f64; 3],
     /// Coordinate index of the section's second direction and of the extrusion.
     b_axis: usize,
@@ -97,6 +109,7 @@ impl<'a> Field<'a> {
             specimen,
             profile: specimen.profile(),
             walls: specimen.holes.iter().map(|hole| hole.wall()).collect(),
+            notches: specimen.holes.iter().map(|hole| specimen.notch_of(hole)).collect(),
             half,
             b_axis,
             extrusion_axis,
@@ -111,25 +124,48 @@ impl<'a> Field<'a> {
         if distance < self.tolerance { 0.0 } else { distance }
     }
 
-    /// Smooth minimum of the distances to the outline's sides: 0 on it.
-    fn outline_distance(&self, p: [f64; 2]) -> f64 {
-        // Distances along the coordinates are enough: the weight only has to vanish on the outline.
-        let b = self.profile.map_or(self.half[self.b_axis], |profile| profile.half_width_mm(p[0]));
-        let sides = [self.half[0] - p[0], self.half[0] + p[0], b - p[1], b + p[1]];
-        smooth_minimum(sides.into_iter().map(|d| if d < self.tolerance { 0.0 } else { d }))
+    /// Smooth minimum of the distances to the outline's sides, but for one: 0 on them.
+    fn outline_distance(&self, p: [f64; 2], without: Option<SectionEdge>) -> f64 {
+        let sides = SectionEdge::ALL.into_iter().filter(|side| Some(*side) != without);
+        smooth_minimum(sides.map(|side| self.side_distance(p, side)))
+    }
+
+    /// Distance from a side along its normal; at least 0. That is enough of a dumb-bell, too: weights only have to
+    /// vanish on the outline.
+    fn side_distance(&self, p: [f64; 2], side: SectionEdge) -> f64 {
+        let (axis, sign) = side.axis_and_sign();
+        let half = match (axis, self.profile) {
+            (0, _) => self.half[0],
+            (_, None) => self.half[self.b_axis],
+            (_, Some(profile)) => profile.half_width_mm(p[0]),
+        };
+        let distance = half - sign * p[axis];
+        if distance < self.tolerance { 0.0 } else { distance }
     }
 
     fn velocity(&self, node: [f64; 3], variable: DesignVariable) -> [f64; 3] {
         let p = [node[0], node[self.b_axis]];
         let mut v = [0.0; 3];
         match variable {
-            DesignVariable::HoleX(hole) => v[0] = self.hole_weight(hole, p),
-            DesignVariable::HoleOther(hole) => {
-                if !self.is_on_mirror(hole) {
-                    v[self.b_axis] = self.hole_weight(hole, p);
+            DesignVariable::HoleX(hole) => match self.notch(hole) {
+                Some(notch) => {
+                    self.add_notch_motion(&mut v, notch, p, NotchRates { center: [1.0, 0.0], ..NotchRates::default() });
                 }
-            }
-            DesignVariable::HoleDiameter(hole) => self.add_wall_motion(&mut v, hole, p, HoleWall::motion_with_width),
+                None => v[0] = self.hole_weight(hole, p),
+            },
+            DesignVariable::HoleOther(hole) if self.is_on_mirror(hole) => {}
+            DesignVariable::HoleOther(hole) => match self.notch(hole) {
+                Some(notch) => {
+                    self.add_notch_motion(&mut v, notch, p, NotchRates { center: [0.0, 1.0], ..NotchRates::default() });
+                }
+                None => v[self.b_axis] = self.hole_weight(hole, p),
+            },
+            DesignVariable::HoleDiameter(hole) => match self.notch(hole) {
+                Some(notch) => {
+                    self.add_notch_motion(&mut v, notch, p, NotchRates { radius: 0.5, ..NotchRates::default() });
+                }
+                None => self.add_wall_motion(&mut v, hole, p, HoleWall::motion_with_width),
+            },
             DesignVariable::HoleLength(hole) => self.add_wall_motion(&mut v, hole, p, HoleWall::motion_with_length),
             DesignVariable::HoleAngle(hole) => {
                 if !self.is_on_mirror(hole) {
@@ -138,12 +174,12 @@ impl<'a> Field<'a> {
             }
             DesignVariable::BlockLength => match self.profile {
                 Some(profile) => self.add_side_motion(&mut v, profile, p, DumbbellDimension::Length),
-                None => v[0] = self.outline_weight(p) * (0.5 * p[0] / self.half[0]),
+                None => self.add_block_motion(&mut v, node, p, 0),
             },
-            DesignVariable::BlockThickness => v[1] = self.block_rate(node, p, 1),
+            DesignVariable::BlockThickness => self.add_block_motion(&mut v, node, p, 1),
             DesignVariable::BlockWidth => match self.profile {
                 Some(_) => self.add_gauge_motion(&mut v, p, DumbbellDimension::Width),
-                None => v[2] = self.block_rate(node, p, 2),
+                None => self.add_block_motion(&mut v, node, p, 2),
             },
             DesignVariable::GaugeWidth => self.add_gauge_motion(&mut v, p, DumbbellDimension::GaugeWidth),
             DesignVariable::GaugeLength => self.add_gauge_motion(&mut v, p, DumbbellDimension::GaugeLength),
@@ -190,7 +226,8 @@ impl<'a> Field<'a> {
             p[1]
         });
         let others = (0..self.specimen.holes.len()).filter(|&i| i != hole).map(|i| self.hole_distance(i, p));
-        let nearest = smooth_minimum(others.chain(mirror).chain([self.outline_distance(p)]));
+        let open_side = self.notches[hole].map(|notch| notch.side);
+        let nearest = smooth_minimum(others.chain(mirror).chain([self.outline_distance(p, open_side)]));
         if nearest <= 0.0 { 0.0 } else { nearest / (nearest + own) }
     }
 
@@ -199,15 +236,52 @@ impl<'a> Field<'a> {
         self.section_mirrored && self.specimen.holes.get(hole).is_some_and(on_plane)
     }
 
-    /// 1 on the outline, 0 on the holes' walls.
+    /// 1 on the outline, 0 on the holes' walls and at the mouths of notches.
     fn outline_weight(&self, p: [f64; 2]) -> f64 {
         let holes = smooth_minimum((0..self.specimen.holes.len()).map(|i| self.hole_distance(i, p)));
-        if holes.is_infinite() { 1.0 } else { holes / (holes + self.outline_distance(p)) }
+        if holes.is_infinite() {
+            1.0
+        } else if holes <= 0.0 {
+            0.0
+        } else {
+            holes / (holes + self.outline_distance(p, None))
+        }
     }
 
-    fn block_rate(&self, node: [f64; 3], p: [f64; 2], axis: usize) -> f64 {
+    /// The motion of the block's sides across an axis, in proportion to the distance from the middle, fading towards
+    /// holes. Notches in them keep their centres.
+    fn add_block_motion(&self, v: &mut [f64; 3], node: [f64; 3], p: [f64; 2], axis: usize) {
         let affine = 0.5 * node[axis] / self.half[axis];
-        if axis == self.extrusion_axis { affine } else { affine * self.outline_weight(p) }
+        if axis == self.extrusion_axis {
+            v[axis] = affine;
+            return;
+        }
+        v[axis] = affine * self.outline_weight(p);
+        let in_section = usize::from(axis == self.b_axis);
+        for hole in 0..self.notches.len() {
+            if let Some(notch) = self.notch(hole).filter(|notch| notch.notch.side.axis_and_sign().0 == in_section) {
+                self.add_notch_motion(v, notch, p, NotchRates { side: 0.5, ..NotchRates::default() });
+            }
+        }
+    }
+
+    fn notch(&self, hole: usize) -> Option<NotchOf> {
+        self.notches.get(hole).copied().flatten().map(|notch| NotchOf { hole, notch })
+    }
+
+    /// The motion of a notch's wall, fading. Across its side it vanishes on the side, along it it does not.
+    fn add_notch_motion(&self, v: &mut [f64; 3], NotchOf { hole, notch }: NotchOf, p: [f64; 2], rates: NotchRates) {
+        let weight = self.hole_weight(hole, p);
+        if weight > 0.0 {
+            let motion = notch.motion(p, rates);
+            let (own, side) = (self.hole_distance(hole, p), self.side_distance(p, notch.side));
+            // At the ends of the mouth both are zero, and the motion is right as it is.
+            let across = if own > 0.0 { side / (side + own) } else { 1.0 };
+            let (axis, _) = notch.side.axis_and_sign();
+            let in_mesh = [0, self.b_axis];
+            v[in_mesh[axis]] += weight * across * motion[axis];
+            v[in_mesh[1 - axis]] += weight * motion[1 - axis];
+        }
     }
 }
 

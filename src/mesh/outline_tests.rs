@@ -9,7 +9,7 @@ const KINDS: [HoleKind; 2] = [HoleKind::Ellipse, HoleKind::Slot];
 
 fn hole(kind: HoleKind, [x, b]: [f64; 2], [length_mm, diameter_mm]: [f64; 2], angle_deg: f64) -> Hole {
     let shape = Some(HoleShape { kind, length_mm, angle_deg });
-    Hole { axis: HoleAxis::Thickness, center_mm: [x, b], diameter_mm, shape }
+    Hole { axis: HoleAxis::Thickness, center_mm: [x, b], diameter_mm, shape, is_notch: false }
 }
 
 /// The published block with two holes of a kind.

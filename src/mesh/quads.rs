@@ -20,7 +20,7 @@ pub(super) fn quad_section(domain: &Domain, options: &MeshOptions) -> Result<Opt
     if domain.holes.is_empty() {
         return structured_section(domain, options).map(Some);
     }
-    if domain.profile.is_some() {
+    if domain.profile.is_some() || domain.holes.iter().any(|hole| hole.notch.is_some()) {
         return Ok(None);
     }
     let area = domain.area();

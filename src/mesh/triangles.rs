@@ -5,11 +5,11 @@ use std::f64::consts::{PI, TAU};
 
 use spade::{AngleLimit, ConstrainedDelaunayTriangulation, Point2, RefinementParameters, Triangulation};
 
-use super::domain::Domain;
+use super::domain::{Domain, SectionHole};
 use super::error::MeshError;
 use super::options::MeshOptions;
 use super::section::{Section, sub};
-use crate::specimen::HoleWall;
+use crate::specimen::{HoleWall, SectionEdge};
 
 /// Smallest angle asked of the refinement, degrees.
 const ANGLE_LIMIT_DEG: f64 = 30.0;
@@ -102,7 +102,7 @@ pub(super) fn triangle_section(domain: &Domain, options: &MeshOptions) -> Result
 }
 
 fn triangulate(domain: &Domain, options: &MeshOptions, fineness: f64) -> Result<Section, MeshError> {
-    let (points, edges, holes) = divide_boundary(domain, options, fineness)?;
+    let (points, edges, loops) = divide_boundary(domain, options, fineness)?;
     let limit = options.max_elements / options.levels.div_ceil(2);
     let area = 0.5 * options.section_size_mm.powi(2);
     if domain.area() / area > limit as f64 {
@@ -150,7 +150,8 @@ fn triangulate(domain: &Domain, options: &MeshOptions, fineness: f64) -> Result<
         }
         let corners = face.vertices().map(|v| (v.fix().index(), [v.position().x, v.position().y]));
         let center = [0, 1].map(|c| corners.iter().map(|(_, p)| p[c]).sum::<f64>() / 3.0);
-        if has_lines && holes.iter().any(|hole| is_in_polygon(center, hole)) {
+        // Outside of the outline are notches.
+        if has_lines && loops.iter().enumerate().any(|(n, polygon)| is_in_polygon(center, polygon) == (n > 0)) {
             continue;
         }
         let mut cell = [0u32; 7];
@@ -189,12 +190,21 @@ fn push(points: &mut Vec<[f64; 2]>, p: [f64; 2]) -> u32 {
     points.len() as u32 - 1
 }
 
-/// Closed loops of curves: the outline first, then the whole holes.
+/// Closed loops of curves: the outline first, then the holes within it.
 fn boundary_loops(domain: &Domain) -> Vec<Vec<Curve>> {
+    let mut loops = vec![outline_curves(domain)];
+    for (hole, d) in domain.holes.iter().enumerate() {
+        if !d.is_half && d.notch.is_none() {
+            // Two halves: no part may span the whole wall.
+            loops.push(wall_curves(domain, hole, &[TAU, PI, 0.0]));
+        }
+    }
+    loops
+}
+
+/// The outline counter-clockwise, from the lower end at −a.
+fn outline_curves(domain: &Domain) -> Vec<Curve> {
     let ([a, b], bottom) = (domain.half, domain.bottom);
-    let mut outline = Vec::new();
-    let mut halves: Vec<usize> = (0..domain.holes.len()).filter(|&i| domain.holes[i].is_half).collect();
-    halves.sort_by(|&i, &j| domain.holes[i].center()[0].total_cmp(&domain.holes[j].center()[0]));
     // Where lines end on a side parallel to axis `c`, on the given side of the section.
     let ends_on = |c: usize, value: f64| -> Vec<f64> {
         let tolerance = 1e-9 * domain.scale();
@@ -214,33 +224,95 @@ fn boundary_loops(domain: &Domain) -> Vec<Vec<Curve>> {
         all.sort_by(f64::total_cmp);
         all
     };
-    if bottom < 0.0 {
-        outline.extend(with_ends(ends_on(0, -b)).windows(2).map(|w| side(domain, false, w[0], w[1])));
-    } else {
-        let mut from = -a;
-        for hole in halves {
-            let wall = &domain.holes[hole].wall;
-            let (center, reach) = (wall.center_mm()[0], wall.half_extents_mm()[0]);
-            outline.push(Curve::Line([from, 0.0], [center - reach, 0.0]));
-            outline.extend(wall_curves(domain, hole, &[PI, 0.0]));
-            from = center + reach;
-        }
-        outline.push(Curve::Line([from, 0.0], [a, 0.0]));
-    }
     let upright = |x: f64| -> Vec<f64> {
         std::iter::once(bottom).chain(ends_on(1, x).into_iter().filter(|z| *z > bottom)).chain([b]).collect()
     };
-    outline.extend(upright(a).windows(2).map(|w| Curve::Line([a, w[0]], [a, w[1]])));
-    outline.extend(with_ends(ends_on(0, b)).windows(2).rev().map(|w| side(domain, true, w[1], w[0])));
-    outline.extend(upright(-a).windows(2).rev().map(|w| Curve::Line([-a, w[1]], [-a, w[0]])));
-    let mut loops = vec![outline];
-    for (hole, d) in domain.holes.iter().enumerate() {
-        if !d.is_half {
-            // Two halves: no part may span the whole wall.
-            loops.push(wall_curves(domain, hole, &[TAU, PI, 0.0]));
+    let falling = |mut rising: Vec<f64>| {
+        rising.reverse();
+        rising
+    };
+    let mut outline = if bottom < 0.0 {
+        side(domain, SectionEdge::MinusLateral, &with_ends(ends_on(0, -b)))
+    } else {
+        mirror_line(domain)
+    };
+    outline.extend(side(domain, SectionEdge::PlusX, &upright(a)));
+    outline.extend(side(domain, SectionEdge::PlusLateral, &falling(with_ends(ends_on(0, b)))));
+    outline.extend(side(domain, SectionEdge::MinusX, &falling(upright(-a))));
+    outline
+}
+
+/// The mirror line from −a to a, around the holes that it cuts in half.
+fn mirror_line(domain: &Domain) -> Vec<Curve> {
+    let a = domain.half[0];
+    let mut halves: Vec<usize> = (0..domain.holes.len()).filter(|&i| domain.holes[i].is_half).collect();
+    halves.sort_by(|&i, &j| domain.holes[i].center()[0].total_cmp(&domain.holes[j].center()[0]));
+    let (mut line, mut from, mut to) = (Vec::new(), -a, a);
+    for hole in halves {
+        let SectionHole { wall, notch, .. } = &domain.holes[hole];
+        let (center, reach) = (wall.center_mm()[0], wall.half_extents_mm()[0]);
+        match notch.map(|notch| notch.side) {
+            Some(SectionEdge::MinusX) => from = center + reach,
+            Some(_) => to = center - reach,
+            None => {
+                line.push(Curve::Line([from, 0.0], [center - reach, 0.0]));
+                line.extend(wall_curves(domain, hole, &[PI, 0.0]));
+                from = center + reach;
+            }
         }
     }
-    loops
+    line.push(Curve::Line([from, 0.0], [to, 0.0]));
+    line
+}
+
+/// One side of the section along the outline, parted at `knots` (in the order of passing them) and cut open by its
+/// notches.
+fn side(domain: &Domain, edge: SectionEdge, knots: &[f64]) -> Vec<Curve> {
+    let (across, sign) = edge.axis_and_sign();
+    let along = 1 - across;
+    let is_upper = edge == SectionEdge::PlusLateral;
+    if across == 1 && domain.profile.is_some() {
+        return knots.windows(2).map(|w| Curve::Profile { upper: is_upper, from: w[0], to: w[1] }).collect();
+    }
+    let travel = (knots[knots.len() - 1] - knots[0]).signum();
+    let mut notches: Vec<usize> =
+        (0..domain.holes.len()).filter(|&i| domain.holes[i].notch.is_some_and(|notch| notch.side == edge)).collect();
+    let place = |hole: usize| travel * domain.holes[hole].center()[along];
+    notches.sort_by(|&i, &j| place(i).total_cmp(&place(j)));
+    let point = |value: f64| {
+        let mut p = [sign * domain.half[across]; 2];
+        p[along] = value;
+        p
+    };
+    let straight = |curves: &mut Vec<Curve>, from: f64, to: f64| {
+        let between = knots.iter().copied().filter(|k| travel * k > travel * from && travel * k < travel * to);
+        let ends: Vec<f64> = std::iter::once(from).chain(between).chain([to]).collect();
+        curves.extend(ends.windows(2).map(|w| Curve::Line(point(w[0]), point(w[1]))));
+    };
+    let (mut curves, mut from, mut is_open) = (Vec::new(), knots[0], true);
+    for hole in notches {
+        let SectionHole { notch: Some(notch), is_half, .. } = &domain.holes[hole] else { continue };
+        let ([first, last], [enter, leave]) = (notch.wall_angles(), notch.mouth_mm().map(|p| p[along]));
+        // The mirror line cuts a notch of an end where the outline comes from it, or where it goes to it.
+        let middle = notch.inward_angle();
+        match (is_half, edge) {
+            (true, SectionEdge::PlusX) => curves.extend(wall_curves(domain, hole, &[middle, last])),
+            (true, _) => {
+                straight(&mut curves, from, enter);
+                curves.extend(wall_curves(domain, hole, &[first, middle]));
+                is_open = false;
+            }
+            (false, _) => {
+                straight(&mut curves, from, enter);
+                curves.extend(wall_curves(domain, hole, &[first, last]));
+            }
+        }
+        from = leave;
+    }
+    if is_open {
+        straight(&mut curves, from, knots[knots.len() - 1]);
+    }
+    curves
 }
 
 /// The wall of a hole between falling parameters, parted where its curvature jumps.
@@ -251,15 +323,6 @@ fn wall_curves(domain: &Domain, hole: usize, knots: &[f64]) -> Vec<Curve> {
     all.sort_by(|s, t| t.total_cmp(s));
     all.dedup_by(|s, t| (*s - *t).abs() < SAME_PARAMETER);
     all.windows(2).map(|w| Curve::Wall { hole, from: w[0], to: w[1] }).collect()
-}
-
-fn side(domain: &Domain, upper: bool, from: f64, to: f64) -> Curve {
-    if domain.profile.is_some() {
-        Curve::Profile { upper, from, to }
-    } else {
-        let b = if upper { domain.half[1] } else { -domain.half[1] };
-        Curve::Line([from, b], [to, b])
-    }
 }
 
 /// Whether a point lies in a polygon: a ray from it crosses its sides an odd number of times.
@@ -274,14 +337,14 @@ fn is_in_polygon(p: [f64; 2], polygon: &[[f64; 2]]) -> bool {
     is_in
 }
 
-/// Points of the boundary and the lines, the parts between them, and the polygons of whole holes.
+/// Points of the boundary and the lines, the parts between them, and the polygons of the outline and of holes within.
 type Division = (Vec<[f64; 2]>, BoundaryEdges, Vec<Vec<[f64; 2]>>);
 
 /// Boundary points and the parts between them; each part remembers its curve and the parameter of its middle.
 fn divide_boundary(domain: &Domain, options: &MeshOptions, fineness: f64) -> Result<Division, MeshError> {
     let (mut points, mut edges) = (Vec::new(), BoundaryEdges::new());
-    let mut holes = Vec::new();
-    for (n, curves) in boundary_loops(domain).into_iter().enumerate() {
+    let mut loops = Vec::new();
+    for curves in boundary_loops(domain) {
         let first = points.len();
         for &curve in &curves {
             for pair in parameters(domain, options, fineness, curve)?.windows(2) {
@@ -294,10 +357,7 @@ fn divide_boundary(domain: &Domain, options: &MeshOptions, fineness: f64) -> Res
         if let Some(closing) = edges.remove(&(last, last + 1)) {
             edges.insert((first, last), closing);
         }
-        // The outline comes first.
-        if n > 0 {
-            holes.push(points[first..].to_vec());
-        }
+        loops.push(points[first..].to_vec());
     }
     for &[from, to] in &domain.lines {
         let line = Curve::Line(from, to);
@@ -312,7 +372,7 @@ fn divide_boundary(domain: &Domain, options: &MeshOptions, fineness: f64) -> Res
             }
         }
     }
-    Ok((points, edges, holes))
+    Ok((points, edges, loops))
 }
 
 /// The place of a point that may be there already: lines start and end on the outline or on each other.
@@ -369,7 +429,10 @@ fn local_size(domain: &Domain, options: &MeshOptions, fineness: f64, curve: Curv
             own = Some(hole);
             let d = &domain.holes[hole];
             size = size.min(arc(&d.wall));
-            gap = domain.outline_distance(p);
+            gap = match d.notch {
+                None => domain.outline_distance(p),
+                Some(notch) => domain.distance_to_other_sides(p, notch.side),
+            };
             if domain.bottom == 0.0 && !d.is_half {
                 gap = gap.min(p[1]);
             }
@@ -380,8 +443,9 @@ fn local_size(domain: &Domain, options: &MeshOptions, fineness: f64, curve: Curv
     for (i, d) in domain.holes.iter().enumerate() {
         if own != Some(i) {
             let distance = d.wall.distance_mm(p);
-            // On the mirror line the wall of a half hole starts: no gap there.
-            let touches = d.is_half && domain.bottom == 0.0 && p[1].abs() < 1e-12;
+            // On the mirror line the wall of a half hole starts, and on its side that of a notch: no gap there.
+            let is_on_mirror = d.is_half && domain.bottom == 0.0 && p[1].abs() < 1e-12;
+            let touches = is_on_mirror || (own.is_none() && d.opens_to(domain.half, p));
             if touches {
                 size = size.min(arc(&d.wall) + 0.5 * distance.max(0.0));
             } else {

@@ -7,6 +7,7 @@
 use super::drawing_labels::spread;
 use super::drawing_sheet::{Anchor, CHARACTER_WIDTH, Drawing, Layer, Shape, TEXT_HEIGHT, format_mm};
 use super::drawing_table::{ROW_HEIGHT, table_width};
+use super::section_loop::{SectionCurve, outline};
 use super::{HoleAxis, Outline, Specimen, TestKind};
 
 const MARGIN: f64 = 10.0;
@@ -69,37 +70,39 @@ impl Drawing {
         let s = self.scale;
         let [hx, hy, hz] =
             [specimen.block.length_mm, specimen.block.thickness_mm, specimen.block.width_mm].map(|c| 0.5 * s * c);
-        self.rectangle(Layer::Outline, [side[0] - hx, side[1] - hy], [side[0] + hx, side[1] + hy]);
-        let Some(profile) = specimen.profile() else {
-            self.rectangle(Layer::Outline, [front[0] - hx, front[1] - hz], [front[0] + hx, front[1] + hz]);
-            return;
-        };
-        let arcs = profile.arcs();
-        let [narrow, settled] = [arcs[0].start_mm, arcs[1].end_mm];
+        let is_front_section = specimen.extrusion_axis() == HoleAxis::Thickness;
+        let (section, (other, half)) =
+            if is_front_section { (front, (side, [hx, hy])) } else { (side, (front, [hx, hz])) };
+        self.rectangle(Layer::Outline, [0, 1].map(|c| other[c] - half[c]), [0, 1].map(|c| other[c] + half[c]));
+        self.section_outline(specimen, section);
+        let Some(profile) = specimen.profile() else { return };
+        let narrow = profile.arcs()[0].start_mm;
         let at = |x: f64, z: f64| [front[0] + s * x, front[1] + s * z];
-        for side in [-1.0, 1.0] {
-            self.line(Layer::Outline, at(-narrow[0], side * narrow[1]), at(narrow[0], side * narrow[1]));
-            self.line(Layer::Outline, [front[0] + side * hx, front[1] - hz], [front[0] + side * hx, front[1] + hz]);
-            for end in [-1.0, 1.0] {
-                let end_corner = [front[0] + end * hx, front[1] + side * hz];
-                self.line(Layer::Outline, at(end * settled[0], side * settled[1]), end_corner);
-                for arc in arcs {
-                    let angle_of = |p: [f64; 2]| {
-                        let [dx, dz] = [end * (p[0] - arc.center_mm[0]), side * (p[1] - arc.center_mm[1])];
-                        dz.atan2(dx).to_degrees().rem_euclid(360.0)
-                    };
-                    let (a, b) = (angle_of(arc.start_mm), angle_of(arc.end_mm));
-                    // Each mirror reverses the sense: take the way round that is the shorter one.
-                    let (from, to) = if (b - a).rem_euclid(360.0) < 180.0 { (a, b) } else { (b, a) };
-                    let center = at(end * arc.center_mm[0], side * arc.center_mm[1]);
-                    self.push(Layer::Outline, Shape::Arc(center, s * profile.radius_mm(), from, to));
-                }
-            }
-        }
         // The gauge's length, between the view and the overall dimension.
         let above = front[1] + hz + 5.0;
         let ends = [at(-narrow[0], narrow[1]), at(narrow[0], narrow[1])];
         self.dimension_x([ends[0], ends[1]], above, format_mm(2.0 * narrow[0]));
+    }
+
+    /// The outline of the section, as lines and arcs.
+    fn section_outline(&mut self, specimen: &Specimen, center: [f64; 2]) {
+        let s = self.scale;
+        let at = |p: [f64; 2]| [center[0] + s * p[0], center[1] + s * p[1]];
+        let pieces = outline(specimen);
+        for (i, piece) in pieces.iter().enumerate() {
+            let (start, end) = (piece.start_mm, pieces[(i + 1) % pieces.len()].start_mm);
+            match piece.curve {
+                SectionCurve::Line => self.line(Layer::Outline, at(start), at(end)),
+                SectionCurve::Conic { conic, is_counterclockwise } => {
+                    let c = conic.center_mm;
+                    let angle_of = |p: [f64; 2]| (p[1] - c[1]).atan2(p[0] - c[0]).to_degrees().rem_euclid(360.0);
+                    let (from, to) = if is_counterclockwise { (start, end) } else { (end, start) };
+                    // Of an outline all conics are circles.
+                    let shape = Shape::Arc(at(c), s * conic.half_mm[0], angle_of(from), angle_of(to));
+                    self.push(Layer::Outline, shape);
+                }
+            }
+        }
     }
 
     /// Ordinates from the centre lines: x below the view, the lateral coordinate at its right.

@@ -45,6 +45,8 @@ impl Drawing {
         let wall = hole.wall();
         let (center, [a, b]) = (hole.center_mm, wall.half_mm());
         match hole.shape.map(|shape| (shape.kind, shape.angle_deg)) {
+            // The outline shows it.
+            None if hole.is_notch => {}
             None => self.push(Layer::Holes, Shape::Circle(center, b)),
             Some((HoleKind::Ellipse, angle)) => self.push(Layer::Holes, Shape::Ellipse(center, [a, b], angle)),
             Some((HoleKind::Slot, angle)) => {
@@ -69,7 +71,8 @@ impl Drawing {
         for hole in &specimen.holes {
             let x = center[0] + self.scale * hole.center_mm[0];
             let reach = self.scale * hole.wall().half_extents_mm()[0];
-            for wall in [x - reach, x + reach] {
+            let end = 0.5 * self.scale * specimen.block.length_mm;
+            for wall in [x - reach, x + reach].into_iter().filter(|wall| (wall - center[0]).abs() < end) {
                 let shape = Shape::Line([wall, center[1] - half], [wall, center[1] + half]);
                 self.entities.push(Entity { layer: Layer::Holes, is_hidden: true, shape });
             }
@@ -81,6 +84,7 @@ impl Drawing {
 /// What a hole's label says of it; what kind it is the drawing shows and the table says.
 fn size_in_words(hole: &Hole) -> String {
     match hole.shape {
+        None if hole.is_notch => format!("R{}", format_mm(0.5 * hole.diameter_mm)),
         None => format!("⌀{}", format_mm(hole.diameter_mm)),
         Some(HoleShape { length_mm, angle_deg, .. }) => {
             let [length, width] = [length_mm, hole.diameter_mm].map(format_mm);

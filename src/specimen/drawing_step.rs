@@ -2,7 +2,7 @@
 //!
 //! Walls of holes and arcs are cylinders; walls of ellipses are ellipses extruded. Nothing is approximated.
 
-use super::section_loop::{hole_loop, outline, rectangle};
+use super::section_loop::{inner_loops, outline, rectangle};
 use super::solid::{Sense, Solid, SolidBuilder};
 use super::step_file::step_file;
 use super::{Specimen, SpecimenError};
@@ -44,7 +44,7 @@ pub fn mould_to_step(specimen: &Specimen) -> Result<String, SpecimenError> {
 fn specimen_solid(specimen: &Specimen) -> Solid {
     let half = 0.5 * specimen.extrusion_mm();
     let mut loops = vec![outline(specimen)];
-    loops.extend(specimen.holes.iter().map(|hole| hole_loop(&hole.wall())));
+    loops.extend(inner_loops(specimen));
     let count = loops.len();
     let mut builder = SolidBuilder::new(specimen.extrusion_axis(), loops, vec![-half, half]);
     builder.wall(0, [0, 1], Sense::Forward);
@@ -60,7 +60,7 @@ fn mould_solid(specimen: &Specimen) -> Solid {
     let half = 0.5 * specimen.extrusion_mm();
     let outside = rectangle(specimen.section_size().map(|extent| extent + 2.0 * MOULD_WALL_MM));
     let mut loops = vec![outside, outline(specimen)];
-    loops.extend(specimen.holes.iter().map(|hole| hole_loop(&hole.wall())));
+    loops.extend(inner_loops(specimen));
     let count = loops.len();
     // Levels: below the floor, the cavity's floor, the rim.
     let levels = vec![-half - MOULD_WALL_MM, -half, half];

@@ -163,7 +163,7 @@ fn axis_of(specimen: &Specimen) -> [f64; 3] {
 
 /// Faces of the walls of the holes: halves of circles and ellipses, or halves of circles and two planes.
 fn num_wall_faces(specimen: &Specimen) -> usize {
-    specimen.holes.iter().map(|hole| hole_loop(&hole.wall()).len()).sum()
+    inner_loops(specimen).map(|ring| ring.len()).sum()
 }
 
 fn check_specimen(specimen: &Specimen, num_outline_faces: usize) {

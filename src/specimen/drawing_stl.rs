@@ -3,6 +3,7 @@
 //! The section is triangulated (constrained Delaunay, spade) without adding points, capped at both ends and
 //! walled along its boundary. Curves are chords within [`CHORD_ERROR_MM`] of the curve.
 
+use super::section_loop::{SectionCurve, outline};
 use super::{HoleAxis, Specimen};
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
 use std::collections::HashMap;
@@ -77,36 +78,23 @@ fn num_chords(radius: f64, angle: f64) -> usize {
 
 /// The outline in the section (x, lateral), counter-clockwise.
 fn outline_points(specimen: &Specimen) -> Vec<[f64; 2]> {
-    let [length, lateral] = specimen.section_size();
-    let (x, b) = (0.5 * length, 0.5 * lateral);
-    match specimen.profile() {
-        None => vec![[-x, -b], [x, -b], [x, b], [-x, b]],
-        Some(profile) => {
-            // The quarter x > 0, z > 0 from the gauge to the end.
-            let mut quarter = vec![];
-            let (arcs, radius) = (profile.arcs(), profile.radius_mm());
-            for arc in arcs {
-                let chord = (arc.end_mm[0] - arc.start_mm[0]).hypot(arc.end_mm[1] - arc.start_mm[1]);
-                let angle = 2.0 * (0.5 * chord / radius).asin();
-                let n = num_chords(radius, angle);
-                let angle_of = |p: [f64; 2]| (p[1] - arc.center_mm[1]).atan2(p[0] - arc.center_mm[0]);
-                let (from, to) = (angle_of(arc.start_mm), angle_of(arc.end_mm));
-                quarter.push(arc.start_mm);
-                for i in 1..n {
-                    let at = from + (to - from) * i as f64 / n as f64;
-                    quarter.push([arc.center_mm[0] + radius * at.cos(), arc.center_mm[1] + radius * at.sin()]);
-                }
-            }
-            quarter.push(arcs[1].end_mm);
-            quarter.push([x, b]);
-            let mirrored = |sx: f64, sz: f64| quarter.iter().map(move |p| [sx * p[0], sz * p[1]]);
-            let lower_right = mirrored(1.0, -1.0);
-            let upper_right = mirrored(1.0, 1.0).rev();
-            let upper_left = mirrored(-1.0, 1.0);
-            let lower_left = mirrored(-1.0, -1.0).rev();
-            lower_right.chain(upper_right).chain(upper_left).chain(lower_left).collect()
+    let pieces = outline(specimen);
+    let mut points = Vec::with_capacity(pieces.len());
+    for (i, piece) in pieces.iter().enumerate() {
+        points.push(piece.start_mm);
+        let SectionCurve::Conic { conic, is_counterclockwise } = piece.curve else { continue };
+        // Of an outline all conics are circles.
+        let (center, radius) = (conic.center_mm, conic.half_mm[0]);
+        let angle_of = |p: [f64; 2]| (p[1] - center[1]).atan2(p[0] - center[0]);
+        let (from, to) = (angle_of(piece.start_mm), angle_of(pieces[(i + 1) % pieces.len()].start_mm));
+        let turn = if is_counterclockwise { (to - from).rem_euclid(TAU) } else { -(from - to).rem_euclid(TAU) };
+        let n = num_chords(radius, turn.abs());
+        for k in 1..n {
+            let (sin, cos) = (from + turn * k as f64 / n as f64).sin_cos();
+            points.push([center[0] + radius * cos, center[1] + radius * sin]);
         }
     }
+    points
 }
 
 type Section = (Vec<[f64; 2]>, Vec<[usize; 3]>);
@@ -114,7 +102,7 @@ type Section = (Vec<[f64; 2]>, Vec<[usize; 3]>);
 /// Points of the section and its triangles, counter-clockwise in (x, lateral).
 fn triangulate_section(specimen: &Specimen) -> Result<Section, DrawingError> {
     let mut loops = vec![outline_points(specimen)];
-    for hole in &specimen.holes {
+    for hole in specimen.holes.iter().filter(|hole| !hole.is_notch) {
         let wall = hole.wall();
         // Of an ellipse, a circle of half its length that is shortened, and of a slot the half circles take the most.
         let [a, b] = wall.half_mm();

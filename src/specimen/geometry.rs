@@ -100,16 +100,18 @@ impl Specimen {
     pub fn volume_mm3(&self) -> f64 {
         let [length, lateral] = self.section_size();
         let outline_area = self.profile().map_or(length * lateral, |profile| profile.area_mm2());
-        let hole_area: f64 = self.holes.iter().map(|hole| hole.wall().area_mm2()).sum();
+        let hole_area: f64 = self.holes.iter().map(|hole| self.hole_area_mm2(hole)).sum();
         (outline_area - hole_area) * self.extrusion_mm()
     }
 
-    /// Every ligament: each hole to each of the four sides, and each pair of holes. In the order of the holes.
+    /// Every ligament: each hole to each of the four sides (but a notch to its own), and each pair of holes. In the
+    /// order of the holes.
     pub fn ligaments(&self) -> Vec<Ligament> {
         let mut ligaments = Vec::with_capacity(self.holes.len() * (self.holes.len() + 7) / 2);
         for (i, hole) in self.holes.iter().enumerate() {
             let wall = hole.wall();
-            for edge in SectionEdge::ALL {
+            let open_side = self.notch_of(hole).map(|notch| notch.side);
+            for edge in SectionEdge::ALL.into_iter().filter(|edge| Some(*edge) != open_side) {
                 let (length_mm, direction) = self.wall_to_edge(&wall, edge);
                 ligaments.push(Ligament { kind: LigamentKind::HoleEdge(i, edge), length_mm, direction });
             }

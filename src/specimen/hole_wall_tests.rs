@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 fn hole(kind: Option<HoleKind>, center_mm: [f64; 2], diameter_mm: f64, aspect: f64, angle_deg: f64) -> Hole {
     let shape = kind.map(|kind| HoleShape { kind, length_mm: aspect * diameter_mm, angle_deg });
-    Hole { axis: HoleAxis::Thickness, center_mm, diameter_mm, shape }
+    Hole { axis: HoleAxis::Thickness, center_mm, diameter_mm, shape, is_notch: false }
 }
 
 fn any_hole() -> impl Strategy<Value = Hole> {

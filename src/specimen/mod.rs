@@ -4,7 +4,7 @@
 //! y along its thickness, z along its width. Lengths in mm.
 //!
 //! What is supported: a plain block or a dumb-bell ([`Outline`]), with holes that all share one axis: circles, ellipses
-//! and slots ([`HoleShape`]); in a double-lap test further blocks beside it ([`Specimen::samples`]). The mesh is a
+//! and slots ([`HoleShape`]), and round notches in free sides ([`Notch`]); in a double-lap test further blocks beside it ([`Specimen::samples`]). The mesh is a
 //! section extruded along that axis, so holes of two directions in one specimen are refused. Parsing and validation:
 //! [`Specimen::from_json`]. Limits of what can be made: [`ManufacturingLimits`]. Drawings for the mould maker:
 //! [`to_svg`], [`to_dxf`], [`to_stl`], [`to_step`].
@@ -36,6 +36,7 @@ pub(crate) mod json;
 mod ligament;
 mod limits;
 mod limits_error;
+mod notch;
 mod read;
 mod read_error;
 mod samples;
@@ -71,6 +72,7 @@ pub use json::JsonProblem;
 pub use ligament::{Ligament, LigamentKind, SectionEdge};
 pub use limits::{DiameterRange, LimitMargin, ManufacturingLimits, Symmetry};
 pub use limits_error::LimitsError;
+pub use notch::{MAX_NOTCH_INSET, MIN_NOTCH_DEPTH, Notch, NotchProblem, NotchRates};
 pub use read::min_meshable_ligament_mm;
 pub use read_error::SpecimenError;
 
@@ -125,7 +127,7 @@ impl HoleAxis {
     }
 }
 
-/// A hole through the whole block: a circle, or an ellipse or a slot.
+/// A hole through the whole block: a circle, or an ellipse or a slot; or a notch in one of its sides.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = HoleSchema))]
 #[serde(deny_unknown_fields)]
@@ -142,12 +144,20 @@ pub struct Hole {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(value_type = Option<HoleShape>, nullable = false))]
     pub shape: Option<HoleShape>,
+    /// Whether the hole is a notch: round, with its centre near a free side of a block, which cuts it open. `false` by
+    /// default.
+    #[serde(default, skip_serializing_if = "is_whole")]
+    pub is_notch: bool,
+}
+
+fn is_whole(is_notch: &bool) -> bool {
+    !*is_notch
 }
 
 impl Hole {
     /// A circular hole.
     pub fn circle(axis: HoleAxis, center_mm: [f64; 2], diameter_mm: f64) -> Hole {
-        Hole { axis, center_mm, diameter_mm, shape: None }
+        Hole { axis, center_mm, diameter_mm, shape: None, is_notch: false }
     }
 
     /// Extent along the hole, mm; the diameter of a circle.

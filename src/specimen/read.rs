@@ -181,6 +181,11 @@ impl Specimen {
                     problems.push(SpecimenError::NotFinite { field, value });
                 }
             }
+            if hole.diameter_mm > 0.0
+                && let Some(problem) = self.notch_problem(hole)
+            {
+                problems.push(SpecimenError::BadNotch { hole: i, problem });
+            }
             let expected = self.holes[0].axis;
             if hole.axis != expected {
                 problems.push(SpecimenError::MixedHoleAxes { hole: i, axis: hole.axis, expected });

@@ -1,6 +1,6 @@
 //! What can be wrong with a specimen.
 
-use super::{HoleAxis, JsonProblem, LigamentKind};
+use super::{HoleAxis, JsonProblem, LigamentKind, NotchProblem};
 use crate::field::{FieldError, FieldPath};
 
 /// Why a specimen is refused. Every variant carries the value, the limit and what to change.
@@ -77,6 +77,14 @@ pub enum SpecimenError {
         axis: HoleAxis,
         /// The axis of the holes before it.
         expected: HoleAxis,
+    },
+    /// A hole that is said to be a notch is none.
+    #[error("holes[{hole}] {problem}")]
+    BadNotch {
+        /// Which.
+        hole: usize,
+        /// What is wrong with it.
+        problem: NotchProblem,
     },
     /// A hole reaches the outside of the outline.
     #[error(
@@ -302,6 +310,10 @@ impl SpecimenError {
                 let pointer = of_hole(*hole).name("axis").pointer();
                 FieldError::new(pointer, axis.name(), format!("{}, as for the holes before it", expected.name()))
                     .remedy("the mesh is extruded along the holes, so all holes of one specimen share their axis")
+            }
+            E::BadNotch { hole, problem } => {
+                let allowed = "a round hole with its centre near a free side of a block";
+                FieldError::new(of_hole(*hole).pointer(), format!("a notch that {problem}"), allowed)
             }
             E::HoleOutside { between, excess_mm, limit_mm } => {
                 let value = format!("a hole that reaches {excess_mm:.4} mm too far");

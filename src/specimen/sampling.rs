@@ -16,7 +16,7 @@ pub(crate) fn any_layout() -> impl Strategy<Value = Specimen> {
             let place = |(x, b, d, kind, aspect, angle_deg): (f64, f64, f64, Option<HoleKind>, f64, f64)| {
                 let diameter_mm = 0.1 + d * lateral / kind.map_or(1.0, |_| aspect);
                 let shape = kind.map(|kind| HoleShape { kind, length_mm: aspect * diameter_mm, angle_deg });
-                Hole { axis, center_mm: [x * length_mm, b * lateral], diameter_mm, shape }
+                Hole { axis, center_mm: [x * length_mm, b * lateral], diameter_mm, shape, is_notch: false }
             };
             Specimen {
                 name: "random layout".into(),

@@ -3,7 +3,7 @@
 //! Section coordinates are (x, lateral): z where the specimen is extruded along its thickness, y where along its width.
 
 use super::dumbbell::Profile;
-use super::{Block, HoleWall, Specimen};
+use super::{Block, HoleWall, Notch, SectionEdge, Specimen};
 
 /// Straight parts of a slot and differences of an ellipse's axes below this are none, mm: programs for solids take
 /// points that near for one.
@@ -55,9 +55,44 @@ pub(super) fn rectangle([length, lateral]: [f64; 2]) -> SectionLoop {
 /// The outline of a specimen.
 pub(super) fn outline(specimen: &Specimen) -> SectionLoop {
     match specimen.profile() {
-        None => rectangle(specimen.section_size()),
+        None => notched_rectangle(specimen),
         Some(profile) => dumbbell_outline(&profile, &specimen.block),
     }
+}
+
+/// The rectangle of a block, cut open by its notches.
+fn notched_rectangle(specimen: &Specimen) -> SectionLoop {
+    use SectionEdge::{MinusLateral, MinusX, PlusLateral, PlusX};
+    let notches: Vec<Notch> = specimen.holes.iter().filter_map(|hole| specimen.notch_of(hole)).collect();
+    let mut pieces = Vec::with_capacity(4 + 3 * notches.len());
+    for (corner, side) in rectangle(specimen.section_size()).into_iter().zip([MinusLateral, PlusX, PlusLateral, MinusX])
+    {
+        let ((axis, _), travel) = (side.axis_and_sign(), side.travel());
+        let mut of_side: Vec<&Notch> = notches.iter().filter(|notch| notch.side == side).collect();
+        of_side.sort_by(|a, b| (travel * a.center_mm[1 - axis]).total_cmp(&(travel * b.center_mm[1 - axis])));
+        pieces.push(corner);
+        of_side.into_iter().for_each(|notch| pieces.extend(notch_pieces(notch)));
+    }
+    pieces
+}
+
+/// The wall of a notch, in two parts, and the straight line that follows.
+fn notch_pieces(notch: &Notch) -> [Piece; 3] {
+    let half_mm = [notch.radius_mm; 2];
+    let conic = Conic { center_mm: notch.center_mm, half_mm, along: [1.0, 0.0] };
+    let curve = SectionCurve::Conic { conic, is_counterclockwise: false };
+    let ([enter, leave], (sin, cos)) = (notch.mouth_mm(), notch.inward_angle().sin_cos());
+    let deepest = [notch.center_mm[0] + notch.radius_mm * cos, notch.center_mm[1] + notch.radius_mm * sin];
+    [
+        Piece { start_mm: enter, curve },
+        Piece { start_mm: deepest, curve },
+        Piece { start_mm: leave, curve: SectionCurve::Line },
+    ]
+}
+
+/// The walls of the holes within the outline.
+pub(super) fn inner_loops(specimen: &Specimen) -> impl Iterator<Item = SectionLoop> {
+    specimen.holes.iter().filter(|hole| !hole.is_notch).map(|hole| hole_loop(&hole.wall()))
 }
 
 /// A dumb-bell in its block, from the lower end of its right transition on.
@@ -88,7 +123,7 @@ fn dumbbell_outline(profile: &Profile, block: &Block) -> SectionLoop {
 }
 
 /// The wall of a hole: two halves of a circle or an ellipse, or two half circles and two lines.
-pub(super) fn hole_loop(wall: &HoleWall) -> SectionLoop {
+fn hole_loop(wall: &HoleWall) -> SectionLoop {
     let ([a, b], center_mm, along) = (wall.half_mm(), wall.center_mm(), wall.along());
     let half_of = |center_mm: [f64; 2], half_mm: [f64; 2]| SectionCurve::Conic {
         conic: Conic { center_mm, half_mm, along },

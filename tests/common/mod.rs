@@ -65,7 +65,7 @@ pub fn ellipse_and_slot() -> Specimen {
     let mut specimen = specimen(TestKind::DoubleLapShear, SHEAR_BLOCK, HoleAxis::Thickness, &[]);
     let hole = |kind, center_mm, diameter_mm, length_mm, angle_deg| {
         let shape = Some(HoleShape { kind, length_mm, angle_deg });
-        Hole { axis: HoleAxis::Thickness, center_mm, diameter_mm, shape }
+        Hole { axis: HoleAxis::Thickness, center_mm, diameter_mm, shape, is_notch: false }
     };
     specimen.holes =
         vec![hole(HoleKind::Ellipse, [-5.0, 2.0], 3.0, 6.0, 35.0), hole(HoleKind::Slot, [5.0, -1.5], 3.0, 5.5, -60.0)];

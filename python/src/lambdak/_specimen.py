@@ -82,6 +82,8 @@ class HoleShape:
 class Hole:
     """A hole through the whole block: a circle, or with a `shape` an ellipse or a slot.
 
+    A circle with `is_notch` has its centre near a free side of the block, which cuts it open.
+
     Along the thickness it is centred at (x, z), along the width at (x, y), in mm from the block's centre.
     """
 
@@ -89,6 +91,7 @@ class Hole:
     diameter_mm: float
     axis: str = "thickness"
     shape: Optional[HoleShape] = None
+    is_notch: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "center_mm", _tuple(self.center_mm))
@@ -96,12 +99,14 @@ class Hole:
 
     def to_dict(self) -> Dict[str, Any]:
         """As `specimen/1` holds it."""
-        shape = {} if self.shape is None else {"shape": self.shape.to_dict()}
-        return {"axis": self.axis, "center_mm": list(self.center_mm), "diameter_mm": self.diameter_mm, **shape}
+        more: Dict[str, Any] = {} if self.shape is None else {"shape": self.shape.to_dict()}
+        if self.is_notch:
+            more["is_notch"] = True
+        return {"axis": self.axis, "center_mm": list(self.center_mm), "diameter_mm": self.diameter_mm, **more}
 
     @classmethod
     def _of_program(cls, found: Dict[str, Any]) -> "Hole":
-        only_known(found, ("axis", "center_mm", "diameter_mm", "shape"), "a hole")
+        only_known(found, ("axis", "center_mm", "diameter_mm", "shape", "is_notch"), "a hole")
         shape = found.get("shape")
         if shape is not None:
             only_known(shape, ("kind", "length_mm", "angle_deg"), "a hole's shape")

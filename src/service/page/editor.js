@@ -1,7 +1,7 @@
 // The section of a specimen to edit: holes are dragged, or moved by the arrow keys (Shift: ten times as far).
 
 import { h, s } from "./dom.js";
-import { KINDS_OF_HOLES, holeShape, reshape, sizeOf, widen } from "./hole.js";
+import { KINDS_OF_HOLES, holeShape, kindOf, reshape, sizeOf, widen } from "./hole.js";
 import { wrongDiameters } from "./ligaments.js";
 import { plain } from "./numbers.js";
 import { sectionOf } from "./outline.js";
@@ -114,7 +114,7 @@ export function editor(model, change) {
       tabindex: 0,
       role: "button",
       "aria-label":
-        `Hole ${index + 1}, ${hole.shape ? `${hole.shape.kind} ${sizeOf(hole)}, in` : plain(hole.diameter_mm)} mm at ${plain(x)}, ${plain(y)} mm` +
+        `Hole ${index + 1}, ${kindOf(hole) !== "circle" ? `${kindOf(hole)} ${sizeOf(hole)}, in` : plain(hole.diameter_mm)} mm at ${plain(x)}, ${plain(y)} mm` +
         `${wrong ? ", breaks a limit" : ""}`,
       onpointerdown: (event) => {
         const at = toMm(event);
@@ -181,7 +181,7 @@ export function editor(model, change) {
             },
           },
           KINDS_OF_HOLES.map(([kind, words]) =>
-            h("option", { value: kind, selected: kind === (hole.shape?.kind ?? "circle") }, words),
+            h("option", { value: kind, selected: kind === kindOf(hole) }, words),
           ),
         ),
       ),

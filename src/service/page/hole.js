@@ -1,4 +1,4 @@
-// Outlines of holes in the section: circles, ellipses and slots.
+// Outlines of holes in the section: circles, ellipses and slots, and round notches that a side cuts open.
 
 import { s } from "./dom.js";
 import { plain } from "./numbers.js";
@@ -8,7 +8,11 @@ export const KINDS_OF_HOLES = [
   ["circle", "circle"],
   ["ellipse", "ellipse"],
   ["slot", "slot"],
+  ["notch", "notch"],
 ];
+
+/** What a hole is, by the list above. */
+export const kindOf = (hole) => (hole.is_notch ? "notch" : (hole.shape?.kind ?? "circle"));
 
 const unit = (degrees) => [Math.cos((degrees * Math.PI) / 180), Math.sin((degrees * Math.PI) / 180)];
 
@@ -59,14 +63,17 @@ export function holeShape(hole, more = {}) {
 }
 
 /** The size of a hole in words. */
-export function sizeOf({ diameter_mm, shape }) {
+export function sizeOf({ diameter_mm, shape, is_notch }) {
   const width = plain(diameter_mm, 4);
+  if (is_notch) return `R ${plain(diameter_mm / 2, 4)}`;
   return shape ? `${plain(shape.length_mm, 4)} × ${width}, ${plain(shape.angle_deg, 4)}°` : `⌀ ${width}`;
 }
 
 /** Gives a hole another outline; a new one is half as long again as wide. */
 export function reshape(hole, kind) {
-  if (kind === "circle") delete hole.shape;
+  if (kind === "notch") hole.is_notch = true;
+  else delete hole.is_notch;
+  if (kind === "circle" || kind === "notch") delete hole.shape;
   else hole.shape = { length_mm: 1.5 * hole.diameter_mm, angle_deg: 0, ...hole.shape, kind };
 }
 

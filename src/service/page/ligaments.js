@@ -26,12 +26,16 @@ function toEdges(holes, specimen, section, limit) {
     const [x, y] = hole.center_mm;
     const [r, t] = [reachOf(hole, [1, 0]), reachOf(hole, [0, 1])];
     const half = outlineAt(specimen, section, x);
-    return [
+    const toSides = [
       [[x, y + t], [x, half], half - y - t],
       [[x, y - t], [x, -half], half + y - t],
       [[x + r, y], [section.length / 2, y], section.length / 2 - x - r],
       [[x - r, y], [-section.length / 2, y], section.length / 2 + x - r],
-    ]
+    ];
+    // A notch opens to the nearest side.
+    const own = hole.is_notch ? Math.min(...toSides.map(([, , value]) => value)) : null;
+    return toSides
+      .filter(([, , value]) => value !== own)
       .filter(([, , value]) => value < limit - 1e-9)
       .map(([from, to, value]) => broken(from, to, value, limit, [x, y + t]));
   });
