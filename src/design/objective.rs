@@ -171,8 +171,8 @@ impl<'a> Reference<'a> {
             names.extend(guards.map(|p| format!("the guard on the standard deviation of {p}, material \"{name}\"")));
         }
         names.extend(self.study.limits.max_force_n.map(|_| "the largest force".into()));
-        let across = |way: &str| format!("the force across the plates, {way}");
-        let ways = self.study.limits.max_normal_force_n.map(|_| ["together", "apart"].map(across));
+        let ways = ["the force that pulls the plates together", "the force that pushes the plates apart"];
+        let ways = self.study.limits.max_normal_force_n.map(|_| ways.map(String::from));
         names.extend(ways.into_iter().flatten());
         names.extend(self.study.limits.max_local_stretch.map(|_| "the largest local stretch".into()));
         names.get(limit).cloned().unwrap_or_default()

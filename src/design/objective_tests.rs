@@ -103,7 +103,7 @@ fn the_force_across_the_plates_is_limited_either_way() {
             assert!((judged.margin_gradients[0][margin] + sign * 0.2).abs() < 1e-12);
         }
     }
-    assert_eq!(reference.limit_name(0, apart), "the force across the plates, apart");
+    assert_eq!(reference.limit_name(0, apart), "the force that pushes the plates apart");
 }
 
 #[test]
