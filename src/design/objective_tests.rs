@@ -81,8 +81,8 @@ fn limits_are_lowered_by_what_the_confirmation_of_the_base_shows() {
     assert!((margins(4.0)[stretch] - (2.0f64 / 1.5).ln()).abs() < 1e-12);
 }
 
-/// The force across the plates is limited from both sides: 12 N and −12 N break a limit of 10 N by a fifth, and the slope
-/// of each margin is that of the force over the limit, with one sign or the other, where there is no force, too.
+/// The force across the plates is limited from both sides: 12 N and −12 N break a limit of 10 N by a fifth, and the
+/// slope of each margin is that of the force over the limit, with one sign or the other, where there is no force, too.
 #[test]
 fn the_force_across_the_plates_is_limited_either_way() {
     let mut study = study();
