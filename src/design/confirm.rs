@@ -22,7 +22,7 @@ use crate::sensitivity::{
     DriveSelection, Evaluation, EvaluationError, EvaluationMaps, EvaluationOptions, Fixture, MaterialState, SharedTime,
     best_shares, evaluate_fixture,
 };
-use crate::specimen::{LimitMargin, Specimen};
+use crate::specimen::{LimitMargin, Specimen, TestResponse, farthest_from_zero};
 use crate::voxel::Sampling;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -50,7 +50,7 @@ pub struct Confirmed {
     pub mesh_relative_sd: f64,
     /// Gains that make up the objective.
     pub gains: Vec<Gain>,
-    /// Every limit, closest first; force and stretch are the largest over the material samples.
+    /// Every limit, closest first; forces and stretch are the largest over the material samples.
     pub limits: Vec<LimitMargin>,
     /// Whether all of them, and the guard if the study asks for it, are kept with every material sample.
     pub is_within_limits: bool,
@@ -76,6 +76,9 @@ pub struct MaterialEvaluation {
     pub tearing_stretch: f64,
     /// Force, N.
     pub force_n: f64,
+    /// Force across the plates, N: positive where it pulls them together. Absent in tests without plates.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal_force_n: Option<f64>,
     /// Distance of this material's scan from the closest fit of an earlier material to it, in noise standard
     /// deviations; null for the first material, and where the study does not ask to tell materials apart.
     #[serde(default)]
@@ -133,10 +136,13 @@ pub fn confirm(
     }
     let responses = mean_over_meshes(&responses_by_mesh);
     let largest = |f: fn(&Response) -> f64| responses.iter().map(f).fold(f64::NEG_INFINITY, f64::max).exp();
-    let (force, stretch) = (largest(|r| r.log_force), largest(|r| r.log_stretch));
     let mut limits = study.limits.check_geometry(specimen, study.scan.voxel_mm);
-    let drive = specimen.drive_mm.last().copied().unwrap_or(0.0);
-    limits.extend(study.limits.check_response(drive, force, stretch));
+    limits.extend(study.limits.check_response(&TestResponse {
+        drive_mm: specimen.drive_mm.last().copied().unwrap_or(0.0),
+        force_n: largest(|r| r.log_force),
+        normal_force_n: specimen.has_plates().then(|| farthest_from_zero(responses.iter().map(|r| r.normal_force_n))),
+        local_stretch: largest(|r| r.log_stretch),
+    }));
     limits.sort_by(|a, b| a.margin_relative.total_cmp(&b.margin_relative));
     Ok(Confirmed {
         specimen: specimen.clone(),
@@ -337,6 +343,7 @@ fn of_material(
     MaterialEvaluation {
         material: name.into(),
         force_n: evaluation.steps.last().map_or(0.0, |s| s.force_n),
+        normal_force_n: evaluation.steps.last().and_then(|s| s.normal_force_n),
         evaluation,
         relative_sd_by_criterion: CriterionValues { d_optimal: d, a_optimal: a, e_optimal: e, worst_parameter: w },
         tearing_stretch: stretch,
@@ -369,6 +376,7 @@ impl MaterialEvaluation {
             log_separation: log_separation(self.separation_sd),
             log_detectable,
             log_force: self.force_n.abs().max(1e-12).ln(),
+            normal_force_n: self.normal_force_n.unwrap_or(0.0),
             log_stretch: self.tearing_stretch.ln(),
         }
     }
@@ -476,6 +484,7 @@ mod tests {
             log_separation: 0.0,
             log_detectable: vec![Some(x), None],
             log_force: 3.0 * x,
+            normal_force_n: -4.0 * x,
             log_stretch: x,
         };
         let mean = mean_over_meshes(&[vec![response(1.0), response(5.0)], vec![response(3.0), response(7.0)]]);

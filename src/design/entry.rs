@@ -75,9 +75,19 @@ impl DesignEntry {
 
     /// The material that needs the largest force, and that force, N.
     pub fn largest_force(&self) -> Option<(&str, f64)> {
-        let of = |m: &'_ MaterialEvaluation| m.force_n.abs();
-        let material = self.by_material.iter().max_by(|a, b| of(a).total_cmp(&of(b)))?;
-        Some((&material.material, material.force_n))
+        self.largest(|m| Some(m.force_n))
+    }
+
+    /// The material with the largest force across the plates, and that force, N: positive where it pulls them together.
+    /// `None` without plates.
+    pub fn largest_normal_force(&self) -> Option<(&str, f64)> {
+        self.largest(|m| m.normal_force_n)
+    }
+
+    /// The material of which a figure is largest by magnitude, and that figure.
+    fn largest(&self, of: fn(&MaterialEvaluation) -> Option<f64>) -> Option<(&str, f64)> {
+        let known = self.by_material.iter().filter_map(|m| Some((m.material.as_str(), of(m)?)));
+        known.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
     }
 
     /// Largest force over the materials, N.

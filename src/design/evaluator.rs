@@ -121,8 +121,8 @@ impl<'a> Evaluator<'a> {
         let counts = specimen.num_scanned(self.study.protocol.blocks_scanned);
         let (mut blocks, mut solved, mut moves_of_blocks) = (Vec::new(), Vec::new(), Vec::new());
         for (number, (sample, num_scanned)) in samples.iter().zip(counts).enumerate() {
-            let mut block =
-                Block { model: ForwardModel::of_specimen(sample, &self.mesh_options(sample))?, num_scanned };
+            let model = ForwardModel::of_specimen(sample, &self.mesh_options(sample))?;
+            let mut block = Block { model, has_plates: sample.has_plates(), num_scanned };
             let moves: Vec<Move> = subspace
                 .map(|s| s.variables.iter().map(|&v| a_move(&block.model, (sample, number), s, v)).collect())
                 .unwrap_or_default();
@@ -310,6 +310,7 @@ impl<'a> Evaluator<'a> {
             tearing_stretch(points.iter().map(|q| (principal_stretches(&q.deformation_gradient)[0], q.volume_mm3)))
         });
         let force_n: f64 = shown.iter().map(|s| s.states[index].force_n).sum();
+        let with_plates = shown.iter().filter(|s| s.block.has_plates);
         Ok(Response {
             log_integrated: integrated.iter().map(|s| normalised(s, normalisation).max(1e-300).ln()).collect(),
             log_relative_sd: shear.iter().map(|&i| log_or_undetermined(covariance.relative_sd(i))).collect(),
@@ -317,6 +318,7 @@ impl<'a> Evaluator<'a> {
             log_separation: 0.0,
             log_detectable: Vec::new(),
             log_force: force_n.abs().max(1e-12).ln(),
+            normal_force_n: with_plates.map(|s| s.states[index].normal_force_n).sum(),
             log_stretch: stretches.fold(1.0, f64::max).ln(),
         })
     }

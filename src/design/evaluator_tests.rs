@@ -122,7 +122,7 @@ fn check_gradients(study: &Study, specimen: &Specimen, space: &Subspace, variabl
         moved.precompression_mm += nearer_mm;
         let mut model = ForwardModel::new(mesh, &moved).expect("a model");
         let solved = evaluator.solve(&mut model, drive, moves, &|| false).expect("equilibria");
-        let block = Block { model, num_scanned: 1 };
+        let block = Block { model, has_plates: specimen.has_plates(), num_scanned: 1 };
         let responses = evaluator.responses(&[Shown::as_solved(&block, &solved)]).expect("responses");
         (block, solved, responses.iter().map(Response::to_vector).collect::<Vec<_>>())
     };
@@ -160,7 +160,7 @@ fn check_gradients(study: &Study, specimen: &Specimen, space: &Subspace, variabl
                 let fine = (sides[2][i] - sides[3][i]) / h;
                 let limit = (4.0 * fine - coarse) / 3.0;
                 // What extrapolation leaves is O(h⁴); all responses are logarithms, whose slopes are of order 0.01 to 1
-                // per mm.
+                // per mm, but for the force across the plates, of some newtons.
                 assert!(
                     (limit - gradient[i]).abs() < 2e-4 + 2e-3 * gradient[i].abs(),
                     "{variable:?}, response {i}: difference {limit}, gradient {}",
@@ -216,7 +216,7 @@ fn gradients_of_unlike_blocks() {
             let mut model = ForwardModel::new(moved, &thicker).expect("a model");
             let own = if has_gradient { vec![a_move(&model, (sample, number), space, variable)] } else { Vec::new() };
             solved.push(evaluator.solve(&mut model, drive, &own, &|| false).expect("equilibria"));
-            blocks.push(Block { model, num_scanned: 1 });
+            blocks.push(Block { model, has_plates: specimen.has_plates(), num_scanned: 1 });
             of_blocks.push(own);
         }
         let shown: Vec<Shown> = blocks.iter().zip(&solved).map(|(b, s)| Shown::as_solved(b, s)).collect();

@@ -7,6 +7,7 @@ use super::found_sizes::sizes_in_words;
 use super::study::Study;
 use super::words::listed;
 use crate::sensitivity::IDENTIFIABILITY_LIMIT;
+use crate::specimen::way_across_plates;
 
 fn holes(count: usize) -> String {
     match count {
@@ -68,6 +69,7 @@ pub fn findings(
 ) -> Vec<String> {
     let Some(best) = ranked.first() else { return Vec::new() };
     let mut said = vec![winner(base, best)];
+    said.extend(force_across(study, base, best));
     said.extend(which_are_equal(ranked, equals));
     said.extend(what_is_simpler(ranked, equals));
     said.extend(what_size_does(study, base, best));
@@ -125,6 +127,22 @@ fn winner(base: &DesignEntry, best: &DesignEntry) -> String {
         force(best),
         force(base),
     )
+}
+
+/// Where plates are moved before the drive or the force across them is limited: that force.
+fn force_across(study: &Study, base: &DesignEntry, best: &DesignEntry) -> Option<String> {
+    let is_told =
+        study.limits.max_normal_force_n.is_some() || [base, best].iter().any(|e| e.specimen.is_precompressed());
+    let (material, force_n) = best.largest_normal_force().filter(|_| is_told)?;
+    let in_words = |material: &str, force_n: f64| {
+        let way = way_across_plates(force_n);
+        format!("{:.1} N with material \"{material}\", which {way}", force_n.abs())
+    };
+    let of_base = base.largest_normal_force().map_or("no plates".into(), |(m, n)| in_words(m, n));
+    let own = in_words(material, force_n);
+    Some(format!(
+        "The largest force across the plates at that drive is {own} (base: {of_base}); the bonds must bear it."
+    ))
 }
 
 /// What meshes leave open of the winner's gain, and which design to make of those that are as good.

@@ -1,5 +1,6 @@
 //! From responses to the objective and the response limits, all as logarithms of ratios: 0 is the base specimen, or a
-//! limit just met; larger is better.
+//! limit just met; larger is better. The force across the plates, which may have either sign, is limited from both
+//! sides by 1 ∓ F / limit: to first order at the limit the logarithm, and smooth where the force changes its sign.
 
 use super::aim::{Combine, ObjectiveKind};
 use super::detection::log_gains;
@@ -86,7 +87,8 @@ impl<'a> Reference<'a> {
         of_gains.into_iter().map(|w| w / total).collect()
     }
 
-    /// Guards (of a guarded prior one per μᵢ and αᵢ: ln of base over own standard deviation), force, stretch.
+    /// Guards (of a guarded prior one per μᵢ and αᵢ: ln of base over own standard deviation), force, force that pulls
+    /// the plates together, that pushes them apart, stretch.
     fn margins(&self, prior: usize, response: &Response, base: &Response) -> Vec<f64> {
         let limits: &ManufacturingLimits = &self.study.limits;
         let mut margins = Vec::new();
@@ -94,6 +96,8 @@ impl<'a> Reference<'a> {
             margins.extend(base.log_relative_sd.iter().zip(&response.log_relative_sd).map(|(b, r)| b - r));
         }
         margins.extend(limits.max_force_n.map(|limit| limit.ln() - response.log_force));
+        let across = |limit: f64| [1.0, -1.0].map(|sign| 1.0 - sign * response.normal_force_n / limit);
+        margins.extend(limits.max_normal_force_n.map(across).into_iter().flatten());
         margins.extend(limits.max_local_stretch.map(|limit| limit.ln() - response.log_stretch));
         margins
     }
@@ -167,6 +171,9 @@ impl<'a> Reference<'a> {
             names.extend(guards.map(|p| format!("the guard on the standard deviation of {p}, material \"{name}\"")));
         }
         names.extend(self.study.limits.max_force_n.map(|_| "the largest force".into()));
+        let ways = ["the force that pulls the plates together", "the force that pushes the plates apart"];
+        let ways = self.study.limits.max_normal_force_n.map(|_| ways.map(String::from));
+        names.extend(ways.into_iter().flatten());
         names.extend(self.study.limits.max_local_stretch.map(|_| "the largest local stretch".into()));
         names.get(limit).cloned().unwrap_or_default()
     }

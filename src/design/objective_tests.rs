@@ -25,6 +25,7 @@ fn response(integrated: [f64; 2], sd: [f64; 2], force: f64, stretch: f64) -> Res
         log_separation: 0.0,
         log_detectable: Vec::new(),
         log_force: force.ln(),
+        normal_force_n: 0.0,
         log_stretch: stretch.ln(),
     }
 }
@@ -78,6 +79,31 @@ fn limits_are_lowered_by_what_the_confirmation_of_the_base_shows() {
         assert!((margins(in_search)[force] - expected.ln()).abs() < 1e-12, "{in_search} N");
     }
     assert!((margins(4.0)[stretch] - (2.0f64 / 1.5).ln()).abs() < 1e-12);
+}
+
+/// The force across the plates is limited from both sides: 12 N and −12 N break a limit of 10 N by a fifth, and the
+/// slope of each margin is that of the force over the limit, with one sign or the other, where there is no force, too.
+#[test]
+fn the_force_across_the_plates_is_limited_either_way() {
+    let mut study = study();
+    study.materials[0].relative_sd = 0.0;
+    study.limits.max_normal_force_n = Some(10.0);
+    let samples = sample_materials(&study.materials);
+    let of = |normal_force_n: f64| Response { normal_force_n, ..response([1.0, 1.0], [0.1, 0.1], 1.0, 1.5) };
+    let reference = Reference::new(&study, &samples, &[of(0.0)]);
+    let [together, apart] = [3, 4];
+    for force_n in [12.0, -12.0, 0.0] {
+        let mut slope = vec![0.0; of(0.0).to_vector().len()];
+        slope[10] = 2.0;
+        let gradients = vec![vec![slope]];
+        let judged = reference.judge(&Evaluated { responses: vec![of(force_n)], gradients });
+        // Closed forms; rounding only.
+        for (margin, sign) in [(together, 1.0), (apart, -1.0)] {
+            assert!((judged.margins[margin] - (1.0 - sign * force_n / 10.0)).abs() < 1e-12);
+            assert!((judged.margin_gradients[0][margin] + sign * 0.2).abs() < 1e-12);
+        }
+    }
+    assert_eq!(reference.limit_name(0, apart), "the force that pushes the plates apart");
 }
 
 #[test]

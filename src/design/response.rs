@@ -1,4 +1,5 @@
-//! What one design does with one material: the figures that designs are judged by, as logarithms.
+//! What one design does with one material: the figures that designs are judged by, as logarithms but for a force that
+//! may have either sign.
 
 use super::aim::Normalisation;
 use crate::sensitivity::{Covariance, Criterion, IntegratedSensitivity};
@@ -27,6 +28,9 @@ pub struct Response {
     pub log_detectable: Vec<Option<f64>>,
     /// ln of the force in N.
     pub log_force: f64,
+    /// Force across the plates, N; 0 of a test without plates. It may be none or have either sign: no logarithm.
+    #[serde(default)]
+    pub normal_force_n: f64,
     /// ln of the principal stretch exceeded in [`TEARING_FRACTION`] of the volume.
     pub log_stretch: f64,
 }
@@ -53,12 +57,13 @@ pub(super) fn normalised(sensitivity: &IntegratedSensitivity, normalisation: Nor
 
 impl Response {
     /// All numbers in one list, in a fixed order: 𝒮 and the relative standard deviation of every μᵢ and αᵢ, then the
-    /// four criteria, the separation, the force and the stretch, and the sizes of errors (NaN for `None`).
+    /// four criteria, the separation, the force, that across the plates and the stretch, and the sizes of errors (NaN
+    /// for `None`).
     pub fn to_vector(&self) -> Vec<f64> {
         let mut v = self.log_integrated.clone();
         v.extend(&self.log_relative_sd);
         v.extend(self.log_criteria);
-        v.extend([self.log_separation, self.log_force, self.log_stretch]);
+        v.extend([self.log_separation, self.log_force, self.normal_force_n, self.log_stretch]);
         v.extend(self.log_detectable.iter().map(|size| size.unwrap_or(f64::NAN)));
         v
     }
@@ -72,9 +77,10 @@ impl Response {
             log_relative_sd: log_relative_sd.to_vec(),
             log_criteria: [rest[0], rest[1], rest[2], rest[3]],
             log_separation: rest[4],
-            log_detectable: rest[7..].iter().map(|size| size.is_finite().then_some(*size)).collect(),
+            log_detectable: rest[8..].iter().map(|size| size.is_finite().then_some(*size)).collect(),
             log_force: rest[5],
-            log_stretch: rest[6],
+            normal_force_n: rest[6],
+            log_stretch: rest[7],
         }
     }
 }

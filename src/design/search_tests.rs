@@ -2,7 +2,7 @@
 //! made.
 
 use super::*;
-use crate::specimen::Specimen;
+use crate::specimen::{Specimen, TestResponse};
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -408,8 +408,12 @@ fn random_studies_never_return_what_breaks_a_limit() {
                     let mut margins = study.limits.check_geometry(specimen, study.scan.voxel_mm);
                     let of =
                         |f: fn(&MaterialEvaluation) -> f64| confirmed.by_material.iter().map(f).fold(0.0, f64::max);
-                    let (force, stretch) = (of(|m| m.force_n), of(|m| m.tearing_stretch));
-                    margins.extend(study.limits.check_response(specimen.drive_mm[0], force, stretch));
+                    margins.extend(study.limits.check_response(&TestResponse {
+                        drive_mm: specimen.drive_mm[0],
+                        force_n: of(|m| m.force_n),
+                        normal_force_n: None,
+                        local_stretch: of(|m| m.tearing_stretch),
+                    }));
                     assert!(margins.iter().all(|m| m.is_satisfied), "{margins:?} {specimen:?}");
                 }
                 assert!(found.ranked[0].is_within_limits);

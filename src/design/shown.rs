@@ -35,6 +35,8 @@ pub(super) struct Solved {
 /// One kind of sample of a design, meshed.
 pub(super) struct Block {
     pub model: ForwardModel,
+    /// Whether it is held by plates, across which there is a force.
+    pub has_plates: bool,
     /// How many of the kind are scanned.
     pub num_scanned: u32,
 }
@@ -72,6 +74,7 @@ impl<'s> Shown<'s> {
         let follow = |state: &MaterialState, path: &PathSensitivity| MaterialState {
             displacement: shift(&state.displacement, &path.displacement),
             force_n: state.force_n + step * path.force_n,
+            normal_force_n: state.normal_force_n + step * path.normal_force_n,
             sensitivities: state
                 .sensitivities
                 .iter()

@@ -69,7 +69,7 @@ impl Subspace {
     fn new(study: &Study, structure: Structure) -> Subspace {
         let mut template = study.base.clone();
         template.test = structure.test;
-        let has_plates = structure.test == TestKind::DoubleLapShear;
+        let has_plates = template.has_plates();
         if !has_plates {
             template.precompression_mm = 0.0;
         }

@@ -182,7 +182,7 @@ impl Study {
         }
         self.check_gauge(problems);
         self.check_notches(problems);
-        self.check_precompression(problems);
+        self.check_plates(problems);
         if let Some(shapes) = &vary.hole_shapes {
             let path = || FieldPath::of("vary").name("hole_shapes").name("elongation_mm");
             check_range(path, shapes.elongation_mm, problems);
@@ -197,11 +197,15 @@ impl Study {
 }
 
 impl Study {
-    /// Whether there are plates where their precompression is to vary, and thick enough a block for it. Designs that
-    /// are too thin for theirs are passed over as ones that cannot be made.
-    fn check_precompression(&self, problems: &mut Vec<StudyError>) {
+    /// Whether there are plates where the force across them is limited or their precompression is to vary, and thick
+    /// enough a block for it. Designs that are too thin for theirs are passed over as ones that cannot be made.
+    fn check_plates(&self, problems: &mut Vec<StudyError>) {
+        let has_plates = self.tests().contains(&TestKind::DoubleLapShear);
+        if self.limits.max_normal_force_n.is_some() && !has_plates {
+            problems.push(StudyError::NormalForceWithoutPlates);
+        }
         let Some(range) = self.vary.precompression_mm else { return };
-        if !self.tests().contains(&TestKind::DoubleLapShear) {
+        if !has_plates {
             problems.push(StudyError::PrecompressionWithoutPlates);
         }
         let thickest_mm = self.vary.thickness_mm.map_or(self.base.block.thickness_mm, |r| r.max);

@@ -198,6 +198,11 @@ pub enum StudyError {
         "vary.precompression_mm: vary.tests has no double_lap_shear, whose plates could be pressed together; leave it out"
     )]
     PrecompressionWithoutPlates,
+    /// Grips have no force across plates.
+    #[error(
+        "limits.max_normal_force_n: vary.tests has no double_lap_shear, whose plates are pulled together; leave it out"
+    )]
+    NormalForceWithoutPlates,
     /// Unlike samples cannot be pulled side by side.
     #[error("vary.tests has uniaxial and the base other_samples; only a double-lap shear test may hold unlike samples")]
     OtherSamplesInTension,
@@ -325,6 +330,10 @@ impl StudyError {
             E::PrecompressionWithoutPlates => {
                 FieldError::new("/vary/precompression_mm", "given", "left out without a double-lap shear test")
                     .remedy("a bar has grips and no plates that could be pressed together")
+            }
+            E::NormalForceWithoutPlates => {
+                FieldError::new("/limits/max_normal_force_n", "given", "left out without a double-lap shear test")
+                    .remedy("a bar has grips and no plates across which there is a force")
             }
             E::OtherSamplesInTension => {
                 FieldError::new("/vary/tests", "a list with uniaxial", "double_lap_shear where the base has other samples")

@@ -135,6 +135,20 @@ fn precompression_that_varies_has_plates() {
     assert_eq!(found, ["/vary/precompression_mm"]);
 }
 
+/// A force across plates is limited where there are plates, and by more than none.
+#[test]
+fn a_force_across_plates_has_plates() {
+    let limit = |value: f64| ("/limits/max_normal_force_n", json!(value));
+    let mut value = whole();
+    value["limits"]["max_normal_force_n"] = json!(12.0);
+    assert_eq!(Study::from_request(&value).map(|s| s.limits.max_normal_force_n).ok(), Some(Some(12.0)));
+    // It holds for those of the designs that have plates.
+    value["vary"]["tests"] = json!(["uniaxial", "double_lap_shear"]);
+    assert!(Study::from_request(&value).is_ok());
+    assert_eq!(pointers(&[limit(12.0), ("/vary/tests", json!(["uniaxial"]))]), ["/limits/max_normal_force_n"]);
+    assert_eq!(pointers(&[limit(0.0)]), ["/limits/max_normal_force_n"]);
+}
+
 /// Only a dumb-bell of free gauge has one that may vary, and no dumb-bell is sheared.
 #[test]
 fn a_gauge_that_varies_is_there() {

@@ -41,6 +41,7 @@ pub(super) fn state_of(equilibrium: &Equilibrium, tangent: &mut Tangent) -> Resu
     Ok(MaterialState {
         displacement: equilibrium.displacement.clone(),
         force_n: equilibrium.force_n,
+        normal_force_n: equilibrium.normal_force_n,
         sensitivities: tangent.material_sensitivities()?,
     })
 }

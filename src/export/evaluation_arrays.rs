@@ -14,6 +14,10 @@ pub fn evaluation_arrays(evaluation: &Evaluation, maps: &EvaluationMaps) -> Tree
     tree.array("drive_mm", "mm", "drive", &[drives], steps.iter().map(|s| s.drive_mm).collect::<Vec<_>>());
     let forces: Vec<f64> = steps.iter().map(|s| s.force_n).collect();
     tree.array("force_n", "N", "force, all samples together", &[drives], forces);
+    if steps.iter().any(|s| s.normal_force_n.is_some()) {
+        let about = "force across the plates, all samples together; positive where it pulls them together";
+        tree.array("normal_force_n", "N", about, &[drives], or_nan(steps.iter().map(|s| s.normal_force_n)));
+    }
     let promised = &evaluation.promised_sd;
     let parameters = ("parameter", promised.len());
     tree.names("parameters", promised.iter().map(|p| p.parameter.clone()).collect());

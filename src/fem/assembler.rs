@@ -465,10 +465,12 @@ impl Assembler {
         sum
     }
 
-    /// Force (N) of the whole test in the direction of the drive that the residual `residual` (kPa·mm²) puts on the
-    /// moved plate.
-    pub(super) fn force_n(&self, residual: &[[f64; 3]]) -> f64 {
-        self.plates().along(self.reaction(residual)) * self.multiplicity() * 1e-3
+    /// Forces (N) of the whole test on the moved plate, in the direction of the drive and along +y, of what the meshed
+    /// part puts on it (kPa·mm²). Where y is a mirror, the parts' forces along it cancel.
+    pub(super) fn forces_n(&self, reaction: [f64; 3]) -> [f64; 2] {
+        let across = if self.mesh().mirror.y { 0.0 } else { reaction[1] };
+        // kPa·mm² = 10⁻³ N.
+        [self.plates().along(reaction), across].map(|force| force * self.multiplicity() * 1e-3)
     }
 }
 

@@ -52,6 +52,8 @@ pub struct ChangeSensitivity {
     pub displacement: Vec<[f64; 3]>,
     /// dF/dt, N per unit of t.
     pub force_n: f64,
+    /// The same of the force along +y ([`Equilibrium::normal_force_n`](super::Equilibrium::normal_force_n)).
+    pub normal_force_n: f64,
 }
 
 impl Tangent<'_> {
@@ -159,10 +161,11 @@ impl Tangent<'_> {
         let rates: Vec<Rates> = changes.iter().zip(&displacements).map(|(c, u)| c.rates(u)).collect();
         let forces =
             assembler.assemble_rates(&self.configuration(), &rates, driven).map_err(|cause| self.diverged(cause))?;
-        let of_force = |residual: &Vec<[f64; 3]>| assembler.force_n(residual);
-        let forces: Vec<f64> = forces.iter().map(of_force).collect();
-        let found = displacements.into_iter().zip(forces);
-        Ok(found.map(|(displacement, force_n)| ChangeSensitivity { displacement, force_n }).collect())
+        let of_change = |(displacement, residual): (Vec<[f64; 3]>, &Vec<[f64; 3]>)| {
+            let [force_n, normal_force_n] = assembler.forces_n(assembler.reaction(residual));
+            ChangeSensitivity { displacement, force_n, normal_force_n }
+        };
+        Ok(displacements.into_iter().zip(&forces).map(of_change).collect())
     }
 
     fn still(&self) -> Vec<[f64; 3]> {

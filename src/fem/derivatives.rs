@@ -36,6 +36,8 @@ pub struct PathSensitivity {
     pub displacement: Vec<[f64; 3]>,
     /// dF/dt, N per unit of t.
     pub force_n: f64,
+    /// The same of the force along +y ([`Equilibrium::normal_force_n`](super::Equilibrium::normal_force_n)).
+    pub normal_force_n: f64,
     /// d/dt of the sensitivities given, in their order (displacements following each node).
     pub parameters: Vec<ParameterSensitivity>,
 }
@@ -76,7 +78,7 @@ impl Tangent<'_> {
             .map(|((parameter, displacement), f)| ParameterSensitivity {
                 parameter,
                 displacement,
-                force_n: assembler.force_n(f),
+                force_n: assembler.forces_n(assembler.reaction(f))[0],
             })
             .collect())
     }
@@ -108,7 +110,7 @@ impl Tangent<'_> {
     ) -> Result<PathSensitivity, SolveError> {
         let mut found = self.sensitivities(std::slice::from_ref(change))?;
         // One change, one derivative.
-        let ChangeSensitivity { displacement, force_n } = found.swap_remove(0);
+        let ChangeSensitivity { displacement, force_n, normal_force_n } = found.swap_remove(0);
         let assembler = self.assembler.clone();
         let mesh = assembler.mesh();
         let driven = Some(&assembler.plates().driven_elements[..]);
@@ -120,7 +122,7 @@ impl Tangent<'_> {
         for s in sensitivities {
             let g = self.linearisation_along(along, s)?;
             right.push(assembler.collect(&g, -1.0));
-            reactions.push(assembler.plates().along(assembler.reaction(&g)));
+            reactions.push(assembler.forces_n(assembler.reaction(&g))[0]);
         }
         let solutions = self.solve_all(&right, ACCURACY)?;
         let mut buffer = vec![[0.0; 3]; mesh.nodes.len()];
@@ -133,10 +135,10 @@ impl Tangent<'_> {
             parameters.push(ParameterSensitivity {
                 parameter: s.parameter,
                 displacement: change,
-                force_n: (g + assembler.plates().along(assembler.reaction(&buffer))) * assembler.multiplicity() * 1e-3,
+                force_n: g + assembler.forces_n(assembler.reaction(&buffer))[0],
             });
         }
-        Ok(PathSensitivity { displacement, force_n, parameters })
+        Ok(PathSensitivity { displacement, force_n, normal_force_n, parameters })
     }
 
     /// d/dt [∂r/∂ξ + K s] along a path.

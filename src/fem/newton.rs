@@ -293,10 +293,8 @@ pub(super) fn finished(
             sum[i] -= force[i];
         }
     }
-    // kPa·mm² = 10⁻³ N.
+    [state.force_n, state.normal_force_n] = assembler.forces_n(moved);
     let [on_moved, on_fixed] = [moved, fixed].map(|force| assembler.plates().along(force));
-    state.force_n = on_moved * assembler.multiplicity() * 1e-3;
-    state.normal_force_n = if mesh.mirror.y { 0.0 } else { moved[1] * assembler.multiplicity() * 1e-3 };
     state.serial = Some(Serial::next());
     linearisation.stands_at = state.serial;
     state.reaction_imbalance = (on_moved + on_fixed).abs() / on_moved.abs().max(1e-12);

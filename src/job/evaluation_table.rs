@@ -73,6 +73,9 @@ pub(super) fn evaluation_table(entries: &[Entry], pointers: &[String]) -> SweepT
     let step = |get: fn(&EvaluationStep) -> f64| move |r: &Row| r.step.map(get);
     columns.push(numbers("drive_mm".into(), &step(|s| s.drive_mm)));
     columns.push(numbers("force_n".into(), &step(|s| s.force_n)));
+    if rows.iter().any(|r| r.step.is_some_and(|s| s.normal_force_n.is_some())) {
+        columns.push(numbers("normal_force_n".into(), &|r| r.step?.normal_force_n));
+    }
     columns.push(integers("num_voxels", &|r| r.step.map(|s| s.num_voxels)));
     columns.push(numbers("median_stretch".into(), &step(|s| s.median_stretch)));
     columns.push(numbers("median_mode".into(), &|r| r.step?.median_mode));

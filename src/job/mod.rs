@@ -66,7 +66,7 @@ pub use kind::{Job, Kind, Refusal};
 pub use next::NextRequest;
 pub use outcome::{File, MediaType, Outcome, OutcomeError, identifier_of_contents, recording_identifier};
 pub use part::{Part, PartKind};
-pub use quick_response::{NoResponse, QuickResponse, quick_response};
+pub use quick_response::{NoResponse, quick_response};
 pub use reference::reference;
 pub use registry::{KINDS, kind_of_collection, kind_of_command, kind_of_part, kind_of_task};
 pub use request::{Context, RecordingOutline, Request, Run};

@@ -5,19 +5,10 @@ use crate::fem::{ForwardModel, SolveOptions};
 use crate::kinematics::decompose;
 use crate::material::Material;
 use crate::mesh::{MeshOptions, mesh_specimen};
-use crate::specimen::Specimen;
+use crate::specimen::{Specimen, TestResponse};
 
 /// What takes longer is not solved for a check, s.
 const MOST_SECONDS: f64 = 2.0;
-
-/// What a specimen does at its largest drive.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct QuickResponse {
-    /// Force of all samples, N.
-    pub force_n: f64,
-    /// Largest principal stretch at any quadrature point.
-    pub local_stretch: f64,
-}
 
 /// Why there is no response.
 #[derive(Debug, thiserror::Error)]
@@ -39,11 +30,11 @@ pub enum NoResponse {
     Failed(String),
 }
 
-/// Solves `specimen` at its largest drive.
+/// Solves `specimen` at its largest drive; the local stretch is the largest at any quadrature point.
 ///
 /// # Errors
 /// [`NoResponse`].
-pub fn quick_response(specimen: &Specimen, material: &Material) -> Result<QuickResponse, NoResponse> {
+pub fn quick_response(specimen: &Specimen, material: &Material) -> Result<TestResponse, NoResponse> {
     let failed = |e: &dyn std::fmt::Display| NoResponse::Failed(e.to_string());
     let drive = specimen.largest_drive_mm();
     if !(drive.abs() > 0.0) {
@@ -58,12 +49,14 @@ pub fn quick_response(specimen: &Specimen, material: &Material) -> Result<QuickR
     if seconds > MOST_SECONDS {
         return Err(NoResponse::TooSlow { seconds });
     }
-    let mut response = QuickResponse { force_n: 0.0, local_stretch: f64::NEG_INFINITY };
+    let normal_force_n = specimen.has_plates().then_some(0.0);
+    let mut response = TestResponse { drive_mm: drive, force_n: 0.0, normal_force_n, local_stretch: f64::NEG_INFINITY };
     for sample in &samples {
         let options = MeshOptions::search(sample);
         let mut model = ForwardModel::of_specimen(sample, &options).map_err(|e| failed(&e))?;
         let found = model.solve(material, drive, None, &SolveOptions::default(), &|| false).map_err(|e| failed(&e))?;
         response.force_n += found.force_n;
+        response.normal_force_n = response.normal_force_n.map(|sum| sum + found.normal_force_n);
         let stretches = model.quadrature_fields(material, &found);
         let stretches = stretches.iter().map(|q| decompose(&q.deformation_gradient).principal_stretches[0]);
         response.local_stretch = stretches.fold(response.local_stretch, f64::max);

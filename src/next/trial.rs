@@ -10,7 +10,7 @@ use crate::kinematics::{decompose, principal_stretches};
 use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::sensitivity::{EvaluationError, Scanner, unknowns_of};
-use crate::specimen::{LimitMargin, Specimen, farthest_from_zero};
+use crate::specimen::{LimitMargin, Specimen, TestResponse, farthest_from_zero};
 use crate::voxel::Sampling;
 
 /// A drive of a trial.
@@ -40,6 +40,7 @@ pub(super) struct Trial {
 /// A specimen ready to be tried.
 pub(super) struct Bench {
     model: ForwardModel,
+    has_plates: bool,
     scanner: Scanner,
 }
 
@@ -52,7 +53,7 @@ impl Bench {
         plan.study.protocol.suits(specimen, 1).map_err(EvaluationError::from)?;
         let model = ForwardModel::of_specimen(specimen, &MeshOptions::scaled(specimen, mesh_factor))?;
         let scanner = Scanner::new(specimen, model.mesh(), &plan.study.scan, Sampling::default())?;
-        Ok(Bench { model, scanner })
+        Ok(Bench { model, has_plates: specimen.has_plates(), scanner })
     }
 
     /// Tries `material` at `scanned_mm` and at the study's force readings on the way to the last of them.
@@ -140,7 +141,8 @@ impl Bench {
         let points = self.model.quadrature_fields(material, state);
         let stretches = points.iter().map(|q| (principal_stretches(&q.deformation_gradient)[0], q.volume_mm3));
         let (drive_mm, force_n) = (state.drive_mm, state.force_n);
-        let limits = plan.study.limits.check_response(drive_mm, force_n, tearing_stretch(stretches));
-        TrialStep { drive_mm, force_n, limits, scanned }
+        let normal_force_n = self.has_plates.then_some(state.normal_force_n);
+        let response = TestResponse { drive_mm, force_n, normal_force_n, local_stretch: tearing_stretch(stretches) };
+        TrialStep { drive_mm, force_n, limits: plan.study.limits.check_response(&response), scanned }
     }
 }

@@ -74,15 +74,17 @@ fn force_table(result: &DesignResult) -> Table {
     let mut rows = Vec::new();
     for (label, entry) in [("recommended", result.recommended()), ("base", &result.base)] {
         for m in &entry.by_material {
-            let of_scan = m.evaluation.steps.iter().map(|s| (s.drive_mm, s.force_n, "scan"));
-            let on_the_way = m.evaluation.force_steps.iter().map(|s| (s.drive_mm, s.force_n, "force alone"));
-            for (drive_mm, force_n, what) in on_the_way.chain(of_scan) {
+            let of_scan = m.evaluation.steps.iter().map(|s| (s.drive_mm, s.force_n, s.normal_force_n, "scan"));
+            let readings = m.evaluation.force_steps.iter();
+            let on_the_way = readings.map(|s| (s.drive_mm, s.force_n, None, "force alone"));
+            for (drive_mm, force_n, normal_force_n, what) in on_the_way.chain(of_scan) {
                 rows.push(vec![
                     label.into(),
                     m.material.clone(),
                     significant(drive_mm, 3),
                     what.into(),
                     significant(force_n, 3),
+                    show(normal_force_n, 3),
                 ]);
             }
         }
@@ -95,8 +97,10 @@ fn force_table(result: &DesignResult) -> Table {
             Column::numbers("Drive", "mm"),
             Column::words("What is read"),
             Column::numbers("Force", "N"),
+            Column::numbers("Force across the plates", "N"),
         ],
         rows,
+        note: "Across the plates of a double-lap test a positive force pulls them together.".into(),
         ..Table::default()
     }
 }
@@ -297,13 +301,17 @@ fn drives_and_plates(specimen: &Specimen) -> String {
 }
 
 fn ranked_table(result: &DesignResult) -> Table {
+    let of_material = |found: Option<(&str, f64)>| {
+        found.map_or("–".into(), |(material, n)| format!("{} ({material})", significant(n, 3)))
+    };
     let row = |label: String, entry: &DesignEntry| {
         vec![
             label,
             of_samples(entry, holes_in_brief),
             of_samples(entry, block_in_brief),
             drives_and_plates(&entry.specimen),
-            entry.largest_force().map_or("–".into(), |(material, n)| format!("{} ({material})", significant(n, 3))),
+            of_material(entry.largest_force()),
+            of_material(entry.largest_normal_force()),
             format!(
                 "{} ± {}",
                 significant(entry.objective, 4),
@@ -338,6 +346,7 @@ fn ranked_table(result: &DesignResult) -> Table {
             Column::words("Block, mm"),
             Column::numbers("Drive", "mm"),
             Column::numbers("Largest force", "N"),
+            Column::numbers("Force across the plates", "N"),
             Column::numbers("Gain", "×"),
             Column::numbers("Generalised sd", "%"),
             Column::words("Closest limit"),

@@ -113,7 +113,8 @@ pub fn evaluate_fixture(
         time.voxels.push(at.voxels);
         time.forces.push(at.force);
         let drive_mm = at_drive.first().map_or(f64::NAN, |e| e.drive_mm);
-        steps.push(seen.step(drive_mm, &at.forces_n, at.largest_principal_stretch));
+        let normal_force_n = fixture.specimen().has_plates().then_some(at.normal_force_n);
+        steps.push(seen.step(drive_mm, (&at.forces_n, normal_force_n), at.largest_principal_stretch));
         let scanned = samples.iter_mut().filter(|s| s.num_scanned > 0);
         scanned.zip(seen.kinds).for_each(|(sample, (_, observed))| sample.drives.push(observed.maps));
     }
@@ -233,6 +234,8 @@ struct Drive<'a> {
 struct AtDrive {
     /// Force of all samples of each kind, N.
     forces_n: Vec<f64>,
+    /// Force of all samples along +y, N.
+    normal_force_n: f64,
     largest_principal_stretch: f64,
     /// What the voxels tell in the time of a whole scan.
     voxels: JointInformation,
@@ -254,6 +257,7 @@ impl Drive<'_> {
         let mut voxels = JointInformation::none(material, self.nuisances.len());
         let (mut by_parameter, mut by_unknown) = (vec![0.0; num], vec![0.0; self.nuisances.len()]);
         let (mut seen, mut forces_n, mut largest) = (SeenBlocks::default(), Vec::new(), f64::NAN);
+        let mut normal_force_n = 0.0;
         for (part, equilibrium) in fixture.parts_mut().iter_mut().zip(equilibria) {
             largest = largest.max(largest_principal_stretch(&part.model.quadrature_fields(material, equilibrium)));
             let mut tangent = part.model.tangent(material, equilibrium)?;
@@ -265,6 +269,7 @@ impl Drive<'_> {
                 *sum = if *nuisance == Nuisance::ForceZero { unknown.force_n } else { *sum + unknown.force_n };
             }
             forces_n.push(equilibrium.force_n);
+            normal_force_n += equilibrium.normal_force_n;
             if let Some(scanner) = part.scanner.as_ref().filter(|_| self.is_scanned) {
                 let state = DrivenState {
                     drive_mm: equilibrium.drive_mm,
@@ -279,7 +284,7 @@ impl Drive<'_> {
         }
         let mut force = JointInformation::none(material, self.nuisances.len());
         force.add_force(&by_parameter, &by_unknown, scan.force_sd_n);
-        Ok((seen, AtDrive { forces_n, largest_principal_stretch: largest, voxels, force }))
+        Ok((seen, AtDrive { forces_n, normal_force_n, largest_principal_stretch: largest, voxels, force }))
     }
 }
 

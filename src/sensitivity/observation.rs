@@ -32,6 +32,10 @@ pub struct EvaluationStep {
     /// Where there are several kinds of samples: the force of all samples of each kind, N.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub force_by_kind_n: Vec<f64>,
+    /// Force across the plates of a double-lap test, all samples together, N: positive where it pulls them together.
+    /// Absent in other tests.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal_force_n: Option<f64>,
     /// Voxels in the masks of all blocks that are scanned; what follows is over these.
     pub num_voxels: usize,
     /// Median of λ over voxels.
@@ -214,13 +218,19 @@ impl SeenBlocks {
         all
     }
 
-    /// The report's figures of a drive (mm), but for what it promises, with the force of each kind of sample (N) and
-    /// the largest principal stretch in any of them.
-    pub fn step(&self, drive_mm: f64, forces_n: &[f64], largest_principal_stretch: f64) -> EvaluationStep {
+    /// The report's figures of a drive (mm), but for what it promises, with the force of each kind of sample and that
+    /// of all across the plates, where there are any (N), and the largest principal stretch in any of them.
+    pub fn step(
+        &self,
+        drive_mm: f64,
+        (forces_n, normal_force_n): (&[f64], Option<f64>),
+        largest_principal_stretch: f64,
+    ) -> EvaluationStep {
         EvaluationStep {
             drive_mm,
             force_n: forces_n.iter().sum(),
             force_by_kind_n: if forces_n.len() > 1 { forces_n.to_vec() } else { Vec::new() },
+            normal_force_n,
             num_voxels: self.states().count(),
             median_stretch: median(self.states().map(|s| s.stretch_amplitude)).unwrap_or(1.0),
             median_mode: median(self.states().filter_map(|s| s.deformation_mode)),
@@ -272,7 +282,7 @@ mod tests {
         assert_eq!(seen.maps.sensitivities.len(), 2);
         let stretches = scanner.stretches(&displacement).unwrap();
         assert!((median(stretches).unwrap() - lambda).abs() < 1e-11);
-        let alone = SeenBlocks { kinds: vec![(1, seen.clone())] }.step(2.4, &[1.5], stretch);
+        let alone = SeenBlocks { kinds: vec![(1, seen.clone())] }.step(2.4, (&[1.5], None), stretch);
         assert_eq!(alone.num_voxels, 12 * 16 * 12);
         assert!((alone.median_stretch - lambda).abs() < 1e-11);
         assert!((alone.median_mode.unwrap() - 0.5).abs() < 1e-10);
@@ -283,10 +293,12 @@ mod tests {
         let json = serde_json::to_string(&alone).unwrap();
         assert!(json.contains("\"integrated_sensitivity\":[{\"parameter\":\"mu_1\",\"sum\":"), "{json}");
         assert!(!json.contains("force_by_kind_n"), "a specimen of one kind of sample is written as ever: {json}");
+        assert!(!json.contains("normal_force_n"), "a test without plates has no force across them: {json}");
         // Two blocks and one: sums are three times as large, means the same.
         let three = SeenBlocks { kinds: vec![(2, seen.clone()), (1, seen)] };
-        let three = three.step(2.4, &[3.0, 1.5], stretch);
+        let three = three.step(2.4, (&[3.0, 1.5], Some(0.5)), stretch);
         assert_eq!((three.num_voxels, three.force_n), (3 * alone.num_voxels, 4.5));
+        assert_eq!(three.normal_force_n, Some(0.5));
         assert!((three.median_stretch - alone.median_stretch).abs() < 1e-15);
         let of_three = &three.integrated_sensitivity[1];
         let of_one = &alone.integrated_sensitivity[1];
@@ -332,7 +344,7 @@ mod tests {
                     assert!((found.matrix()[(i, j)] / (a * b * told) - 1.0).abs() < 1e-11);
                 }
             }
-            let step = SeenBlocks { kinds: vec![(1, seen)] }.step(4.8, &[1.0], 1.4);
+            let step = SeenBlocks { kinds: vec![(1, seen)] }.step(4.8, (&[1.0], None), 1.4);
             let of_mu = &step.integrated_sensitivity[0];
             assert_eq!((step.num_voxels, of_mu.volume_integral), (192, 0.0));
             assert!((of_mu.surface_integral.unwrap() / (48.0 * of_mu.mean_per_voxel) - 1.0).abs() < 1e-12);

@@ -18,6 +18,8 @@ pub struct MaterialState {
     pub displacement: Vec<[f64; 3]>,
     /// Force, N.
     pub force_n: f64,
+    /// Force along +y on the moved face, N.
+    pub normal_force_n: f64,
     /// Sensitivities to all of its parameters.
     pub sensitivities: Vec<ParameterSensitivity>,
 }

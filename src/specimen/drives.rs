@@ -34,6 +34,11 @@ pub fn farthest_from_zero(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, |a, b| if b.abs() > a.abs() { b } else { a })
 }
 
+/// What a force across the plates (N, along +y on the moved one) does to them, in words.
+pub fn way_across_plates(force_n: f64) -> &'static str {
+    if force_n < 0.0 { "pushes them apart" } else { "pulls them together" }
+}
+
 impl Specimen {
     /// Its largest drive by magnitude, with its sign, mm; zero without drives.
     pub fn largest_drive_mm(&self) -> f64 {
@@ -53,6 +58,11 @@ impl Specimen {
         }
         let (sin, cos) = self.drive_angle_deg.to_radians().sin_cos();
         [cos, 0.0, sin]
+    }
+
+    /// Whether plates hold it, across which there is a force; else grips do.
+    pub fn has_plates(&self) -> bool {
+        self.test == TestKind::DoubleLapShear
     }
 
     /// Whether its plates are pressed together, or pulled apart, before they are driven.

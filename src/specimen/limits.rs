@@ -123,6 +123,11 @@ pub struct ManufacturingLimits {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(value_type = Option<PositiveForceN>, nullable = false))]
     pub max_force_n: Option<f64>,
+    /// Largest force across the plates of a double-lap test, N: what pulls them together or pushes them apart at the
+    /// largest drive, all samples together and either way.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schema(value_type = Option<PositiveForceN>, nullable = false))]
+    pub max_normal_force_n: Option<f64>,
     /// Largest travel of the actuator either way, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(value_type = Option<PositiveMm>, nullable = false))]
@@ -142,6 +147,27 @@ pub struct ManufacturingLimits {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(value_type = Option<PositiveMm>, nullable = false))]
     pub dimension_step_mm: Option<f64>,
+}
+
+/// What a test does at its largest drive, as far as it is limited.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TestResponse {
+    /// The drive, mm.
+    pub drive_mm: f64,
+    /// Force of all samples along the drive, N.
+    pub force_n: f64,
+    /// Force of all samples across the plates, N; `None` of a test without plates.
+    pub normal_force_n: Option<f64>,
+    /// Largest principal stretch anywhere.
+    pub local_stretch: f64,
+}
+
+impl TestResponse {
+    /// What must be at most its limit, in the order of [`ManufacturingLimits::of_response`].
+    pub fn limited(&self) -> [Option<f64>; 4] {
+        let across = self.normal_force_n.map(f64::abs);
+        [Some(self.drive_mm.abs()), Some(self.force_n.abs()), across, Some(self.local_stretch)]
+    }
 }
 
 /// How far a value is from its limit.
@@ -183,6 +209,7 @@ impl LimitMargin {
             "punches_mm" => "hole without a punch",
             "min_voxels_across_ligament" => "voxels across the thinnest wall",
             "max_force_n" => "largest force",
+            "max_normal_force_n" => "force across the plates",
             "max_drive_mm" => "drive",
             "max_local_stretch" => "largest local stretch",
             "max_holes" => "number of holes",
@@ -195,7 +222,7 @@ impl LimitMargin {
     pub fn unit(&self) -> &'static str {
         match self.name.as_str() {
             name if name.ends_with("_mm") || name.starts_with("diameter_mm") || name == "symmetry" => "mm",
-            "max_force_n" => "N",
+            "max_force_n" | "max_normal_force_n" => "N",
             _ => "",
         }
     }
@@ -272,6 +299,7 @@ impl ManufacturingLimits {
         for (name, value, least) in [
             ("min_voxels_across_ligament", self.min_voxels_across_ligament, 0.0),
             ("max_force_n", self.max_force_n, 0.0),
+            ("max_normal_force_n", self.max_normal_force_n, 0.0),
             ("max_drive_mm", self.max_drive_mm, 0.0),
             ("dimension_step_mm", self.dimension_step_mm, 0.0),
             ("max_local_stretch", self.max_local_stretch, UNDEFORMED_STRETCH),
@@ -371,17 +399,22 @@ impl ManufacturingLimits {
         margins
     }
 
-    /// Margins of the limits on what the test does: largest drive, mm; force of all samples at it, N; largest
-    /// principal stretch anywhere. A quantity that is not limited gives no margin.
-    pub fn check_response(&self, drive_mm: f64, force_n: f64, local_stretch: f64) -> Vec<LimitMargin> {
+    /// Margins of the limits on what the test does. A quantity that is not limited gives no margin, nor does one that
+    /// the test has not.
+    pub fn check_response(&self, response: &TestResponse) -> Vec<LimitMargin> {
+        let limits = self.of_response().into_iter().zip(response.limited());
+        limits.filter_map(|((name, limit), value)| Some(LimitMargin::at_most(name, value?, limit?))).collect()
+    }
+
+    /// The limits on what the test does, in the order of [`TestResponse::limited`]: their names and, where they are
+    /// set, values.
+    pub fn of_response(&self) -> [(&'static str, Option<f64>); 4] {
         [
-            ("max_drive_mm", drive_mm.abs(), self.max_drive_mm),
-            ("max_force_n", force_n.abs(), self.max_force_n),
-            ("max_local_stretch", local_stretch, self.max_local_stretch),
+            ("max_drive_mm", self.max_drive_mm),
+            ("max_force_n", self.max_force_n),
+            ("max_normal_force_n", self.max_normal_force_n),
+            ("max_local_stretch", self.max_local_stretch),
         ]
-        .into_iter()
-        .filter_map(|(name, value, limit)| limit.map(|limit| LimitMargin::at_most(name, value, limit)))
-        .collect()
     }
 }
 

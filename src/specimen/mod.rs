@@ -62,7 +62,7 @@ pub use drawing_stl::{DrawingError, to_stl};
 pub use drawing_svg::to_svg;
 pub use drives::{
     MAX_DRIVE_ANGLE_DEG, MAX_DRIVES, MAX_NOMINAL_STRETCH, MAX_PRECOMPRESSION, MAX_SHEAR_STRAIN, MIN_NOMINAL_STRETCH,
-    PRECOMPRESSION_DIRECTION, farthest_from_zero, leads_on,
+    PRECOMPRESSION_DIRECTION, farthest_from_zero, leads_on, way_across_plates,
 };
 pub use dumbbell::Dumbbell;
 pub use geometry::MIRROR_TOLERANCE_MM;
@@ -70,7 +70,7 @@ pub use hole_shape::{HoleKind, HoleShape, MAX_HOLE_ANGLE_DEG, MAX_HOLE_ASPECT};
 pub use hole_wall::HoleWall;
 pub use json::JsonProblem;
 pub use ligament::{Ligament, LigamentKind, SectionEdge};
-pub use limits::{DiameterRange, LimitMargin, ManufacturingLimits, Symmetry};
+pub use limits::{DiameterRange, LimitMargin, ManufacturingLimits, Symmetry, TestResponse};
 pub use limits_error::LimitsError;
 pub use notch::{MAX_NOTCH_INSET, MIN_NOTCH_DEPTH, Notch, NotchProblem, NotchRates};
 pub use read::min_meshable_ligament_mm;

@@ -233,9 +233,20 @@ fn limits_are_measured_against_closed_forms() {
     // Along x between the holes: 3.4666 mm of 1 mm voxels.
     assert!((margin("min_voxels_across_ligament").value - 3.4666).abs() < 1e-9);
     assert!(margin("max_holes").is_satisfied && margin("symmetry").is_satisfied);
-    let response = limits.check_response(7.0, -12.0, 2.0);
-    assert_eq!(response.len(), 1);
-    assert!(!response[0].is_satisfied);
+    let mut response = TestResponse { drive_mm: 7.0, force_n: -12.0, normal_force_n: Some(-28.0), local_stretch: 2.0 };
+    let margins = limits.check_response(&response);
+    assert_eq!(margins.len(), 1);
+    assert!(!margins[0].is_satisfied);
+    // Across the plates either way counts; grips have none.
+    let across = ManufacturingLimits { max_force_n: None, max_normal_force_n: Some(20.0), ..limits.clone() };
+    let margins = across.check_response(&response);
+    assert_eq!((margins.len(), margins[0].is_satisfied), (1, false));
+    assert!((margins[0].margin_relative + 0.4).abs() < 1e-12, "(20 − 28) / 20, to rounding");
+    assert_eq!(margins[0].in_words(), "force across the plates: 28.000 N (limit 20.000 N, margin -40.0 %)");
+    response.normal_force_n = Some(15.0);
+    assert!(across.check_response(&response)[0].is_satisfied);
+    response.normal_force_n = None;
+    assert_eq!(across.check_response(&response), []);
 
     let punched = ManufacturingLimits { diameter_mm: None, punches_mm: Some(vec![3.0, 5.0]), ..limits.clone() };
     assert_eq!(punched.validate(), Ok(()));
@@ -267,6 +278,8 @@ fn refuses_bad_limits() {
     assert!(matches!(read(r#", "punches_mm": [1.0], "max_holes": 65"#), Err(E::TooManyHoles { .. })));
     assert!(matches!(read(r#", "punches_mm": [1.0], "max_local_stretch": 0.9"#), Err(E::OutOfRange { .. })));
     assert!(matches!(read(r#", "punches_mm": [1.0], "max_forces_n": 1"#), Err(E::Json(_))));
+    let across = read(r#", "punches_mm": [1.0], "max_normal_force_n": 0.0"#);
+    assert!(matches!(across, Err(E::OutOfRange { field, .. }) if field.to_string() == "max_normal_force_n"));
 }
 
 /// Least distance between points on a hole's wall and points on another wall or side.

@@ -30,6 +30,7 @@ fn a_check_says_what_it_checked() {
     let mut limits = shipped("studies/two-hole-shear.json")["limits"].clone();
     limits["max_drive_mm"] = json!(7.0);
     limits["max_force_n"] = json!(200.0);
+    limits["max_normal_force_n"] = json!(100.0);
     limits["max_local_stretch"] = json!(1.5);
     let body = json!({ "specimen": specimen, "limits": limits });
     let found = service.post("/v1/specimens/check", &body).json();
@@ -42,7 +43,7 @@ fn a_check_says_what_it_checked() {
     let names = |list: &Value| -> Vec<String> {
         list.as_array().unwrap().iter().map(|u| u["name"].as_str().unwrap().to_string()).collect()
     };
-    assert_eq!(names(&found["unchecked"]), ["max_force_n", "max_local_stretch"]);
+    assert_eq!(names(&found["unchecked"]), ["max_force_n", "max_normal_force_n", "max_local_stretch"]);
     let mut with_material = body;
     with_material["material"] = shipped("materials/ecoflex-0020.json");
     with_material["specimen"]["drive_mm"] = json!([5.0, 6.0]);
@@ -52,6 +53,8 @@ fn a_check_says_what_it_checked() {
     assert_eq!(found["unchecked"], json!([]));
     let force = margin(&found, "max_force_n")["value"].as_f64().unwrap();
     assert!((1.0..100.0).contains(&force), "{force}");
+    let across = margin(&found, "max_normal_force_n")["value"].as_f64().unwrap();
+    assert!((0.01..force).contains(&across), "{across} N across the plates, {force} N along them");
     assert!(margin(&found, "max_local_stretch")["value"].as_f64().unwrap() > 1.5);
     assert_eq!(
         (&found["is_valid"], &margin(&found, "max_local_stretch")["is_satisfied"]),

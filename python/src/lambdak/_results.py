@@ -158,6 +158,8 @@ class EvaluationStep:
     largest_principal_stretch: float
     integrated_sensitivity: Mapping[str, IntegratedSensitivity]
     promised_sd: Mapping[str, PromisedSd]
+    normal_force_n: Optional[float] = None
+    """Across the plates of a double-lap test, positive where it pulls them together."""
 
 
 def _promised(entries: Iterable[Mapping[str, Any]]) -> Dict[str, PromisedSd]:
@@ -177,6 +179,7 @@ def _evaluation_step(step: Mapping[str, Any]) -> EvaluationStep:
         largest_principal_stretch=step["largest_principal_stretch"],
         integrated_sensitivity=sensitivity,
         promised_sd=_promised(step["promised_sd"]),
+        normal_force_n=step.get("normal_force_n"),
     )
 
 

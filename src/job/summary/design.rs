@@ -15,13 +15,21 @@ pub(in crate::job) fn design(result: &DesignResult) -> String {
     for sentence in &result.findings {
         text += &format!("* {sentence}\n");
     }
-    text += "\n  design                                     drive mm   largest force N   gain   closest limit\n";
+    // Bars have no plates, and a table of bars alone no force across them.
+    let has_plates = result.ranked.iter().chain([&result.base]).any(|e| e.specimen.has_plates());
+    let across = |shown: String| if has_plates { format!(" {shown:>16}") } else { String::new() };
+    let name = across("across plates N".into());
+    text += &format!(
+        "\n  design                                     drive mm   largest force N{name}   gain   closest limit\n"
+    );
     let line = |label: &str, e: &DesignEntry| {
+        let normal = e.largest_normal_force().map_or("-".into(), |(_, force_n)| num(force_n, 4));
         format!(
-            "  {:<42} {:>8} {:>17} {:>6}   {}\n",
+            "  {:<42} {:>8} {:>17}{} {:>6}   {}\n",
             label,
             num(e.specimen.drive_mm.last().copied().unwrap_or(0.0), 5),
             num(e.force_n(), 4),
+            across(normal),
             num(e.objective, 4),
             if e.is_within_limits {
                 e.limits.first().map_or("none".into(), LimitMargin::in_words)

@@ -3,6 +3,7 @@
 use super::num;
 use crate::report::{telling, which_of};
 use crate::sensitivity::{DetectableSize, Evaluation, PromisedSd};
+use crate::specimen::way_across_plates;
 
 /// The evaluation as text.
 pub(in crate::job) fn evaluation(name: &str, evaluation: &Evaluation) -> String {
@@ -33,6 +34,10 @@ pub(in crate::job) fn evaluation(name: &str, evaluation: &Evaluation) -> String 
         if !step.force_by_kind_n.is_empty() {
             let forces: Vec<String> = step.force_by_kind_n.iter().map(|f| num(*f, 4)).collect();
             text += &format!("  of this each kind of sample: {} N\n", forces.join(", "));
+        }
+        if let Some(force_n) = step.normal_force_n {
+            let way = way_across_plates(force_n);
+            text += &format!("  force across the plates: {} N, which {way}\n", num(force_n.abs(), 4));
         }
         text += &format!("  parameter   integrated sensitivity: sum   mean per voxel  {integral:>22}\n");
         for s in &step.integrated_sensitivity {

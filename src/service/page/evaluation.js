@@ -9,6 +9,8 @@ import { GLOSSARY } from "./words.js";
 
 export function evaluation(result, files, request) {
   const last = result.steps.at(-1);
+  // Bars have no plates, and no force across them.
+  const across = Number.isFinite(last.normal_force_n) ? [["Across the plates, N", (s) => s.normal_force_n]] : [];
   const maps = [...files.keys()].filter((n) => /^map-sensitivity/.test(n));
   return [
     h(
@@ -21,10 +23,11 @@ export function evaluation(result, files, request) {
         [digits(result.largest_principal_stretch, 3), "largest stretch", GLOSSARY["largest stretch"]],
       ]),
       table(
-        ["Drive, mm", "Force, N", "Voxels", "Median stretch"],
+        ["Drive, mm", "Force, N", ...across.map(([words]) => words), "Voxels", "Median stretch"],
         result.steps.map((s) => [
           digits(s.drive_mm, 3),
           digits(s.force_n, 4),
+          ...across.map(([, of]) => digits(of(s), 4)),
           many(s.num_voxels),
           digits(s.median_stretch, 4),
         ]),

@@ -10,7 +10,7 @@ import { livePanel } from "./live.js";
 import { planBar, undoKeys } from "./plan_bar.js";
 import { materialForm, specimenForm } from "./plan_forms.js";
 import { startJob } from "./start.js";
-import { goalForm, limitsForm, scanForm } from "./study_forms.js";
+import { goalForm, limitsForm, limitsOf, scanForm, varyOf } from "./study_forms.js";
 import { sweepForm } from "./sweep.js";
 import { inWords } from "./words.js";
 
@@ -47,8 +47,8 @@ function study(model) {
     base: model.specimen,
     materials: [{ name: "material", material: model.material, relative_sd: 0, weight: 1 }],
     scan: model.scan,
-    vary: { ...model.vary, tests: [model.specimen.test] },
-    limits: model.limits,
+    vary: varyOf(model),
+    limits: limitsOf(model),
     objective: model.objective,
     budget: model.budget,
     verification: { is_on: model.draws > 0, draws: Math.max(1, model.draws) },
@@ -140,7 +140,8 @@ export async function planView(content, signal, from) {
 
   async function check() {
     const mine = (number += 1);
-    const { specimen, limits, material, scan } = model;
+    const { specimen, material, scan } = model;
+    const limits = limitsOf(model);
     try {
       const found = await post("/v1/specimens/check", { specimen, limits, voxel_mm: scan.voxel_mm, material });
       if (mine !== number) return;

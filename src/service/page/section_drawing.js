@@ -81,9 +81,8 @@ function held(model, section, at) {
   const nearer = model.specimen.precompression_mm ?? 0;
   const pressed = nearer ? `, ${nearer > 0 ? "pressed together" : "pulled apart"} by ${plain(Math.abs(nearer))} mm` : "";
   const drive = `drive ${plain(farthestDrive)} mm${angle}${pressed}`;
-  const isWrong = (model.brokenLimits ?? []).some((name) =>
-    ["max_drive_mm", "max_force_n", "max_local_stretch"].includes(name),
-  );
+  const ofResponse = ["max_drive_mm", "max_force_n", "max_normal_force_n", "max_local_stretch"];
+  const isWrong = (model.brokenLimits ?? []).some((name) => ofResponse.includes(name));
   if (model.specimen.test === "uniaxial") {
     return [
       grips(section, 0, section.height, thick),

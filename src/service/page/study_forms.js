@@ -41,14 +41,33 @@ export const scanForm = (model, edited) =>
     }),
   );
 
+const hasPlates = ({ specimen }) => specimen.test === "double_lap_shear";
+
+/** The limits of a plan, without those that only plates have where there are none. */
+export function limitsOf(model) {
+  const { max_normal_force_n: across, ...limits } = model.limits;
+  return hasPlates(model) && across !== undefined ? { ...limits, max_normal_force_n: across } : limits;
+}
+
+/** What the designs of a plan may have, without what only plates have where there are none. */
+export function varyOf(model) {
+  const { precompression_mm: nearer, ...vary } = { ...model.vary, tests: [model.specimen.test] };
+  return hasPlates(model) && nearer !== undefined ? { ...vary, precompression_mm: nearer } : vary;
+}
+
 /** Limits that may be left out: key, words, an example. */
 const OPTIONAL = [
   ["min_voxels_across_ligament", "Voxels across a ligament", "2"],
   ["max_force_n", "Largest force, N", "40"],
+  ["max_normal_force_n", "Largest force across the plates, N", "30"],
   ["max_drive_mm", "Largest drive, mm", "7"],
   ["max_local_stretch", "Largest local stretch", "3.5"],
   ["max_holes", "Most holes", "5"],
 ];
+
+const MEANINGS = {
+  max_normal_force_n: "What pulls the plates together or pushes them apart at the largest drive, all samples together.",
+};
 
 export function limitsForm(model, edited) {
   const { limits } = model;
@@ -80,7 +99,7 @@ export function limitsForm(model, edited) {
     limit("min_ligament_hole_edge_mm", "Ligament to an edge, mm", "1.2"),
     diameter("min", "Smallest diameter, mm"),
     diameter("max", "Largest diameter, mm"),
-    OPTIONAL.map(([key, label, example]) =>
+    OPTIONAL.filter(([key]) => key !== "max_normal_force_n" || hasPlates(model)).map(([key, label, example]) =>
       field({
         label,
         kind: "optional",
@@ -92,6 +111,7 @@ export function limitsForm(model, edited) {
           else limits[key] = v;
         },
         placeholder: "no limit",
+        meaning: MEANINGS[key],
         changed: edited,
       }),
     ),
@@ -128,6 +148,23 @@ export function goalForm(model, edited) {
       },
       changed: edited,
     });
+  const nearer = (end, label) =>
+    hasPlates(model) &&
+    field({
+      label,
+      kind: "optional",
+      value: vary.precompression_mm?.[end],
+      example: "-1.6",
+      pointer: `/vary/precompression_mm/${end}`,
+      put: (v) => {
+        // With one end alone the range goes to plates that stay where they are; without one there is none.
+        if (v === undefined) delete vary.precompression_mm;
+        else vary.precompression_mm = { min: Math.min(v, 0), max: Math.max(v, 0), ...vary.precompression_mm, [end]: v };
+      },
+      placeholder: "not varied",
+      meaning: "Before they are driven, and kept so. Negative numbers pull them apart.",
+      changed: edited,
+    });
   const holes = (end, label) =>
     count(
       label,
@@ -154,6 +191,8 @@ export function goalForm(model, edited) {
     holes("max", "Holes, at most"),
     drive("min", "Drive, at least, mm"),
     drive("max", "Drive, at most, mm"),
+    nearer("min", "Plates pressed together, at least, mm"),
+    nearer("max", "Plates pressed together, at most, mm"),
     count(
       "Designs sampled",
       budget.explore,

@@ -170,6 +170,7 @@ export const LIMITS = {
   max_holes: ["holes", "", "at most"],
   max_drive_mm: ["drive", "mm", "at most"],
   max_force_n: ["force", "N", "at most"],
+  max_normal_force_n: ["force across the plates", "N", "at most"],
   max_local_stretch: ["local stretch", "", "at most"],
   symmetry: ["symmetry", "", ""],
 };

@@ -2,7 +2,7 @@
 
 use crate::design::Study;
 use crate::field::FieldError;
-use crate::job::{QuickResponse, RequestSchema, defaults, quick_response, seconds_per_drive};
+use crate::job::{RequestSchema, defaults, quick_response, seconds_per_drive};
 use crate::material::Material;
 use crate::mesh::{MeshSize, mesh_specimen};
 use crate::service::access::{Caller, Role};
@@ -34,8 +34,8 @@ pub(super) struct CheckRequest {
     #[serde(default)]
     #[schema(default = MeshSize::default)]
     mesh: MeshSize,
-    /// With a material the specimen is solved at its largest drive on the search's mesh, where a limit on force or
-    /// local stretch asks for it.
+    /// With a material the specimen is solved at its largest drive on the search's mesh, where a limit on a force or
+    /// the local stretch asks for it.
     #[serde(default)]
     material: Option<Material>,
 }
@@ -108,7 +108,7 @@ pub(super) struct Checked {
     is_valid: bool,
     /// What keeps it from being evaluated.
     errors: Vec<FieldProblem>,
-    /// The limits that were checked, closest first. Force and local stretch are those at the largest drive on the
+    /// The limits that were checked, closest first. Forces and local stretch are those at the largest drive on the
     /// search's mesh.
     margins: Vec<Margin>,
     /// The limits that were not checked.
@@ -122,28 +122,27 @@ pub(super) struct Checked {
     cost: Option<Cost>,
 }
 
-/// Adds the limits on what the test does: the drive always, force and local stretch where they can be solved at once.
+/// Adds the limits on what the test does: the drive always, forces and local stretch where they can be solved at once.
 fn check_response(request: &CheckRequest, limits: &ManufacturingLimits, checked: &mut Checked) {
     let drive_mm = request.specimen.largest_drive_mm().abs();
-    if let Some(limit) = limits.max_drive_mm {
-        checked.margins.push(LimitMargin::at_most("max_drive_mm", drive_mm, limit).into());
-    }
+    let solved_for = [limits.max_force_n, limits.max_normal_force_n, limits.max_local_stretch];
     let solved = match &request.material {
+        _ if solved_for.iter().all(Option::is_none) => Err(String::new()),
         None => Err("it is known once the specimen is solved; give a material, or start an evaluation".to_string()),
-        Some(_) if limits.max_force_n.is_none() && limits.max_local_stretch.is_none() => return,
         Some(material) => quick_response(&request.specimen, material).map_err(|e| e.to_string()),
     };
-    let value = |of: fn(&QuickResponse) -> f64| solved.as_ref().map(of);
-    for (name, limit, value) in [
-        ("max_force_n", limits.max_force_n, value(|r| r.force_n.abs())),
-        ("max_local_stretch", limits.max_local_stretch, value(|r| r.local_stretch)),
-    ] {
+    let values = match solved {
+        Ok(response) => response.limited().map(|value| value.ok_or_else(|| "the test has grips and no plates".into())),
+        Err(detail) => {
+            let unknown = || Err(detail.clone());
+            [Ok(drive_mm), unknown(), unknown(), unknown()]
+        }
+    };
+    for ((name, limit), value) in limits.of_response().into_iter().zip(values) {
         match (limit, value) {
             (None, _) => {}
             (Some(limit), Ok(value)) => checked.margins.push(LimitMargin::at_most(name, value, limit).into()),
-            (Some(limit), Err(detail)) => {
-                checked.unchecked.push(Unchecked { name, limit, detail: detail.clone() });
-            }
+            (Some(limit), Err(detail)) => checked.unchecked.push(Unchecked { name, limit, detail }),
         }
     }
 }
