@@ -1,7 +1,7 @@
 //! Names of the table's columns that a variable may not take.
 
 /// Columns before the variables and after them that do not depend on the material.
-const FIXED: [&str; 19] = [
+const FIXED: [&str; 20] = [
     "task",
     "design",
     "material",
@@ -11,6 +11,7 @@ const FIXED: [&str; 19] = [
     "step",
     "step_drive_mm",
     "force_n",
+    "normal_force_n",
     "volume_mm3",
     "num_voxels",
     "median_stretch",

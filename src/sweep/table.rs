@@ -176,6 +176,7 @@ fn identification(study: &SweepStudy, rows: &[Row], columns: &mut Vec<TableColum
 
 fn responses(rows: &[Row], columns: &mut Vec<TableColumn>) {
     columns.push(numbers("force_n", rows, |r| r.step.map(|s| s.1.force_n)));
+    columns.push(numbers("normal_force_n", rows, |r| r.step.and_then(|s| s.1.normal_force_n)));
     columns.push(numbers("volume_mm3", rows, |r| r.figures().map(|f| f.volume_mm3)));
     columns.push(integers("num_voxels", rows, |r| r.step.map(|s| s.1.num_voxels)));
     columns.push(integers("num_voxels_without_mode", rows, |r| r.step.map(|s| s.1.num_voxels_without_mode)));
