@@ -98,8 +98,8 @@ impl Notch {
         })
     }
 
-    /// How the wall's points move, each at its share of the arc, so that the ends of the mouth stay on the side. Off the
-    /// wall the field continues by the polar angle of `p`.
+    /// How the wall's points move, each at its share of the arc, so that the ends of the mouth stay on the side. Off
+    /// the wall the field continues by the polar angle of `p`.
     ///
     /// With φ the angle from the inward normal, points lie at (r cos φ, r sin φ) inwards and along from the centre;
     /// φ/β is held, and −r sin β β' = (d r' − d' r)/r with d' of side and centre.
