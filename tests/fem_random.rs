@@ -1,4 +1,4 @@
-//! 200 random makeable specimens with random stable materials, driven to their limits: each converges or fails typed,
+//! A hundred random makeable specimens with random stable materials, driven to their limits: each converges or fails typed,
 //! none hangs or panics.
 //!
 //! With LAMBDAK_EXPLAIN set, each failure is followed up to the last drive that converges and the smallest principal
@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-const NUM_SPECIMENS: usize = 200;
+const NUM_SPECIMENS: usize = 100;
 
 /// A specimen that takes longer hangs. The slowest takes a few seconds on one busy core.
 const PATIENCE: Duration = Duration::from_secs(60);
