@@ -35,8 +35,9 @@ class Parts(Scratch):
         bent = bar(holes=[lk.Hole((1.5, 0.25), 2.0, axis="width")], outline="block")
         slot = lk.Hole((1.5, 0.25), 2.0, shape=lk.HoleShape("slot", 4.0, angle_deg=30))
         slotted = bar(holes=[slot], outline="block")
+        notched = bar(holes=[lk.Hole((0, s * 6.0), 3.0, is_notch=True) for s in (-1, 1)], outline="block")
         necked = bar(holes=[], outline=lk.Dumbbell(6, 8, 5))
-        for part in (bar(), block(), bent, slotted, necked, block().replace(other_samples=[thicker])):
+        for part in (bar(), block(), bent, slotted, notched, necked, block().replace(other_samples=[thicker])):
             self.assertEqual(type(part).from_json(part.to_json()), part)
             part.to_json(self.folder / "part.json")
             self.assertEqual(type(part).from_json(self.folder / "part.json"), part)

@@ -133,6 +133,14 @@ export function limitsForm(model, edited) {
   );
 }
 
+/** Sides for notches, as the study lists them. */
+const NOTCHES = [
+  ["none", "none"],
+  ["ends", "in the ends"],
+  ["sides", "in the sides"],
+  ["ends+sides", "in ends and sides"],
+];
+
 export function goalForm(model, edited) {
   const count = (label, value, put, pointer, meaning) =>
     field({ label, kind: "whole", value, put, pointer, example: "4", meaning, changed: edited });
@@ -189,6 +197,17 @@ export function goalForm(model, edited) {
     }),
     holes("min", "Holes, at least"),
     holes("max", "Holes, at most"),
+    choice({
+      label: "Notches in free sides",
+      value: (vary.notches ?? []).join("+") || "none",
+      options: NOTCHES,
+      put: (v) => {
+        if (v === "none") delete vary.notches;
+        else vary.notches = v.split("+");
+      },
+      meaning: "Round, with their centres on the side; they count as holes. The symmetry must take one side to the other.",
+      changed: edited,
+    }),
     drive("min", "Drive, at least, mm"),
     drive("max", "Drive, at most, mm"),
     nearer("min", "Plates pressed together, at least, mm"),
