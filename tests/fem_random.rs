@@ -1,5 +1,5 @@
-//! A hundred random makeable specimens with random stable materials, driven to their limits: each converges or fails typed,
-//! none hangs or panics.
+//! A hundred random makeable specimens with random stable materials, driven to their limits: each converges or fails
+//! typed, none hangs or panics.
 //!
 //! With LAMBDAK_EXPLAIN set, each failure is followed up to the last drive that converges and the smallest principal
 //! stretch there, anywhere in the specimen, is printed. A free surface of an incompressible neo-Hookean solid under

@@ -268,6 +268,7 @@ fn designs_with_notches_have_a_vector() {
     study.limits.punches_mm = None;
     study.limits.diameter_mm = Some(crate::specimen::DiameterRange { min: 1.0, max: 5.0 });
     study.limits.symmetry = Symmetry::MirrorXAndZ;
+    study.limits.max_holes = None;
     study.vary.hole_count = CountRange { min: 0, max: 4 };
     study.vary.length_mm = Some(Range { min: 30.0, max: 50.0 });
     study.vary.axes = Some(vec![HoleAxis::Thickness, HoleAxis::Width]);
