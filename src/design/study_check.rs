@@ -230,7 +230,7 @@ impl Study {
             problems.push(StudyError::NotchedSides { count: sides.len() });
         }
         let is_block = self.base.outline.dumbbell().is_none();
-        if !sides.is_empty() && !(is_block && can_be_notched(self)) {
+        if !sides.is_empty() && (!is_block || !can_be_notched(self)) {
             problems.push(StudyError::NoPlaceForNotches);
         }
     }
