@@ -281,7 +281,7 @@ fn designs_with_notches_have_a_vector() {
     let half = [0.5 * study.base.block.length_mm, 0.5 * study.base.block.width_mm];
     for holes in [
         vec![notch([half[0], 0.0]), notch([-half[0], 0.0])],
-        [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]].map(|s| notch([s[0] * half[0], s[1] * 4.0])).to_vec(),
+        [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]].map(|s| notch([s[0] * half[0], s[1] * 2.5])).to_vec(),
         vec![notch([0.0, half[1]]), notch([0.0, -half[1]]), Hole::circle(HoleAxis::Thickness, [0.0, 0.0], 3.0)],
     ] {
         let specimen = Specimen { test: TestKind::DoubleLapShear, holes, ..base_at_drive(&study) };
