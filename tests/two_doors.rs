@@ -69,7 +69,7 @@ fn small_study() -> Value {
     study["materials"] = json!([{ "name": "one term", "material": shipped("materials/ecoflex-0020.json") }]);
     study["scan"]["voxel_mm"] = json!([2.0, 0.8, 2.0]);
     study["vary"]["hole_count"] = json!({ "min": 0, "max": 0 });
-    study["budget"] = json!({ "explore": 4, "refine": 1, "iterations": 1, "confirm": 1 });
+    study["budget"] = json!({ "explore": 4, "refine": 1, "iterations": 1, "propose": 2, "confirm": 1 });
     study["verification"] = json!({ "is_on": false });
     study
 }
