@@ -216,18 +216,16 @@ impl Subspace {
             HoleAxis::Thickness => "thickness",
             HoleAxis::Width => "width",
         };
-        let hole = if specimen.holes.iter().all(|hole| hole.is_notch) {
-            "notch"
-        } else {
-            self.structure.hole_kind.map_or("hole", |of_kind| match of_kind {
-                HoleKind::Ellipse => "elliptic hole",
-                HoleKind::Slot => "slot",
-            })
+        let (hole, holes) = match self.structure.hole_kind {
+            _ if specimen.holes.iter().all(|hole| hole.is_notch) => ("notch", "notches"),
+            None => ("hole", "holes"),
+            Some(HoleKind::Ellipse) => ("elliptic hole", "elliptic holes"),
+            Some(HoleKind::Slot) => ("slot", "slots"),
         };
         specimen.name = match count {
             0 => format!("{kind}, solid"),
             1 => format!("{kind}, 1 {hole} along the {direction}"),
-            n => format!("{kind}, {n} {hole}s along the {direction}"),
+            n => format!("{kind}, {n} {holes} along the {direction}"),
         };
         specimen
     }
