@@ -1,7 +1,7 @@
 //! Designs in the steps that a mould maker works to.
 
 use super::explore::is_makeable;
-use crate::specimen::{Block, Hole, HoleAxis, MIRROR_TOLERANCE_MM, ManufacturingLimits, Specimen};
+use crate::specimen::{Block, Hole, MIRROR_TOLERANCE_MM, ManufacturingLimits, Specimen};
 
 /// The step where limits state none, mm.
 const USUAL_STEP_MM: f64 = 0.1;
@@ -64,11 +64,7 @@ pub(super) fn in_steps(specimen: &Specimen, limits: &ManufacturingLimits, voxel_
 
 /// The centre of a notch in steps: on the side of the block as rounded, where it was on that of the block as drawn.
 fn notch_center(hole: &Hole, drawn: &Block, rounded: &Block, nearest: impl Fn(f64) -> f64) -> [f64; 2] {
-    let extents = |block: &Block| match hole.axis {
-        HoleAxis::Thickness => [block.length_mm, block.width_mm],
-        HoleAxis::Width => [block.length_mm, block.thickness_mm],
-    };
-    let (before, after) = (extents(drawn), extents(rounded));
+    let [before, after] = [drawn, rounded].map(|block| hole.axis.section_of(block));
     [0, 1].map(|c| {
         let value = hole.center_mm[c];
         let is_on_side = (value.abs() - 0.5 * before[c]).abs() < MIRROR_TOLERANCE_MM;
@@ -91,6 +87,7 @@ fn multiple(step: f64, count: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::specimen::HoleAxis;
 
     fn published() -> (Specimen, ManufacturingLimits) {
         let specimen = Specimen::from_json(include_str!("../../geometries/two-hole-shear.json")).expect("a specimen");

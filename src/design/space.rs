@@ -187,7 +187,7 @@ impl Subspace {
         // One beyond the last drive is no earlier one: such a design is not valid.
         specimen.drive_mm.splice(0..0, earlier_mm);
         specimen.holes.clear();
-        let size_mm = self.section_size(&specimen.block);
+        let size_mm = self.structure.axis.section_of(&specimen.block);
         for (orbit, (mut center_mm, diameter_mm, [elongation_mm, angle_deg])) in
             self.structure.orbits.iter().zip(orbits)
         {
@@ -228,14 +228,6 @@ impl Subspace {
             n => format!("{kind}, {n} {holes} along the {direction}"),
         };
         specimen
-    }
-
-    /// Extents of a block's section along x and along the other coordinate of holes, mm.
-    fn section_size(&self, block: &Block) -> [f64; 2] {
-        match self.structure.axis {
-            HoleAxis::Thickness => [block.length_mm, block.width_mm],
-            HoleAxis::Width => [block.length_mm, block.thickness_mm],
-        }
     }
 
     fn nearest_punch(&self, diameter: f64) -> f64 {
@@ -391,7 +383,7 @@ impl Subspace {
     /// the orbits of this structure.
     fn representatives(&self, specimen: &Specimen) -> Option<Vec<Hole>> {
         let near = |a: f64, b: f64| (a - b).abs() <= MIRROR_TOLERANCE_MM;
-        let side_mm = self.section_size(&specimen.block).map(|extent| 0.5 * extent);
+        let side_mm = self.structure.axis.section_of(&specimen.block).map(|extent| 0.5 * extent);
         let mut left: Vec<Hole> = specimen.holes.clone();
         let mut found = Vec::with_capacity(self.structure.orbits.len());
         for orbit in &self.structure.orbits {

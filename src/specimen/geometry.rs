@@ -53,10 +53,7 @@ impl Specimen {
     /// Extents of the section along x and along the lateral direction, mm: (length, width) for holes along the
     /// thickness and without holes, (length, thickness) for holes along the width.
     pub fn section_size(&self) -> [f64; 2] {
-        match self.extrusion_axis() {
-            HoleAxis::Thickness => [self.block.length_mm, self.block.width_mm],
-            HoleAxis::Width => [self.block.length_mm, self.block.thickness_mm],
-        }
+        self.extrusion_axis().section_of(&self.block)
     }
 
     /// Extent across the section, mm.

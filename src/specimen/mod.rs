@@ -125,6 +125,14 @@ impl HoleAxis {
             HoleAxis::Width => "width",
         }
     }
+
+    /// Extents of a block across the axis, mm: along x, and along z for the thickness, y for the width.
+    pub fn section_of(self, block: &Block) -> [f64; 2] {
+        match self {
+            HoleAxis::Thickness => [block.length_mm, block.width_mm],
+            HoleAxis::Width => [block.length_mm, block.thickness_mm],
+        }
+    }
 }
 
 /// A hole through the whole block: a circle, or an ellipse or a slot; or a notch in one of its sides.
