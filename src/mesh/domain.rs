@@ -38,14 +38,6 @@ impl SectionHole {
         if self.is_half { 0.5 * whole } else { whole }
     }
 
-    /// Whether a point of the outline lies on the side that the hole opens to, on its own half of the section.
-    pub fn opens_to(&self, half: [f64; 2], p: [f64; 2]) -> bool {
-        self.notch.is_some_and(|notch| {
-            let (axis, sign) = notch.side.axis_and_sign();
-            (half[axis] - sign * p[axis]).abs() < COINCIDENT * half[axis]
-        })
-    }
-
     /// Extent across, the diameter of a circle.
     fn width(&self) -> f64 {
         2.0 * self.wall.half_mm()[1]

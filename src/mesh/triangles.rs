@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 
 use spade::{AngleLimit, ConstrainedDelaunayTriangulation, Point2, RefinementParameters, Triangulation};
 
-use super::domain::{Domain, SectionHole};
+use super::domain::{COINCIDENT, Domain, SectionHole};
 use super::error::MeshError;
 use super::options::MeshOptions;
 use super::section::{Section, sub};
@@ -416,6 +416,14 @@ fn parameters(domain: &Domain, options: &MeshOptions, fineness: f64, curve: Curv
     Ok(parameters)
 }
 
+/// Whether a point of the outline lies on the side that a hole opens to.
+fn is_on_open_side(domain: &Domain, hole: &SectionHole, p: [f64; 2]) -> bool {
+    hole.notch.is_some_and(|notch| {
+        let ((axis, sign), half) = (notch.side.axis_and_sign(), domain.half);
+        (half[axis] - sign * p[axis]).abs() < COINCIDENT * half[axis]
+    })
+}
+
 /// Length wanted for a part of `curve` at `p`: the element size (finer on graded sides), the holes' own resolution, and
 /// no more than the gap to the next wall.
 fn local_size(domain: &Domain, options: &MeshOptions, fineness: f64, curve: Curve, p: [f64; 2]) -> f64 {
@@ -445,7 +453,7 @@ fn local_size(domain: &Domain, options: &MeshOptions, fineness: f64, curve: Curv
             let distance = d.wall.distance_mm(p);
             // On the mirror line the wall of a half hole starts, and on its side that of a notch: no gap there.
             let is_on_mirror = d.is_half && domain.bottom == 0.0 && p[1].abs() < 1e-12;
-            let touches = is_on_mirror || (own.is_none() && d.opens_to(domain.half, p));
+            let touches = is_on_mirror || (own.is_none() && is_on_open_side(domain, d, p));
             if touches {
                 size = size.min(arc(&d.wall) + 0.5 * distance.max(0.0));
             } else {
