@@ -82,6 +82,9 @@ fn styles(domain: &Domain, size: f64) -> Vec<Style> {
 /// where the ends are hardly wider, and at most where they are far wider.
 const LEAST_SHORTER: f64 = 0.75;
 const MOST_SHORTER: f64 = 2.0;
+/// An arc shorter than this many element sizes is one element long, where others are at least two: half of it would be
+/// the edge of a sliver, and a quadratic edge follows an arc of at most 60° well.
+const SHORT_ARC: f64 = 0.2;
 
 /// Block or dumb-bell without holes.
 fn structured_section(domain: &Domain, options: &MeshOptions) -> Result<Section, MeshError> {
@@ -94,8 +97,9 @@ fn structured_section(domain: &Domain, options: &MeshOptions) -> Result<Section,
         let shorter = (profile.widening() / 3.0).clamp(LEAST_SHORTER, MOST_SHORTER);
         let n = |length: f64, factor: f64| count(length * factor * shorter, options);
         let end = line(x2, a, count(a - x2, options)?, 1.0, grading.ends);
-        let outer = line(x1, x2, n(x2 - x1, 1.2)?.max(2), 1.0, 1.0);
-        let inner = line(x0, x1, n(x1 - x0, 1.4)?.max(2), 1.0, 1.0);
+        let least = if x1 - x0 < SHORT_ARC * options.section_size_mm { 1 } else { 2 };
+        let outer = line(x1, x2, n(x2 - x1, 1.2)?.max(least), 1.0, 1.0);
+        let inner = line(x0, x1, n(x1 - x0, 1.4)?.max(least), 1.0, 1.0);
         let narrow = line(-x0, x0, 2 * n(x0, 1.4)?, 1.0, 1.0);
         let mut all: Vec<f64> = end.iter().rev().chain(outer.iter().rev().skip(1)).map(|x| -x).collect();
         all.extend(inner.iter().rev().skip(1).map(|x| -x));
