@@ -9,6 +9,7 @@ use super::allowance::{Allowance, ERROR_OVER_SHIFT};
 use super::calibrate_options::{CalibrateOptions, TermCount};
 use super::contours::contours;
 use super::error::CalibrationError;
+use super::interval::interval_95;
 use super::observed::Observed;
 use super::outcome::{Calibration, Estimate, MeshComparison};
 use super::problem::CalibrationProblem;
@@ -188,10 +189,7 @@ fn estimate(fit: &RecordingFit, parameter: Parameter, value: f64, mesh_error: f6
     let is_identifiable = sd.is_some_and(|sd| sd < IDENTIFIABILITY_LIMIT * value.abs());
     let discretisation_sd = factor * mesh_error;
     let interval_95 = match sd.filter(|_| is_identifiable) {
-        Some(sd) => [-1.0, 1.0].map(|s| {
-            let half = half_width(sd, discretisation_sd, possible_shift);
-            Some(if parameter == Parameter::Kappa { value * (s * half / value).exp() } else { value + s * half })
-        }),
+        Some(sd) => interval_95(parameter, value, half_width(sd, discretisation_sd, possible_shift)).map(Some),
         None => [None; 2],
     };
     Estimate { parameter, value, sd, mesh_error, discretisation_sd, possible_shift, interval_95, is_identifiable }

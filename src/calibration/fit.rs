@@ -107,17 +107,10 @@ impl FitStart {
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Fit, CalibrationError> {
         let options = &self.options;
-        data.check(bench.num_voxels(), self.prediction.states.len().saturating_sub(data.on_the_way.len()))?;
-        let drives_mm = data.all_drives_mm();
-        let targets = [Target::of_measurement(data, scan)];
-        let mut predict = |material: &Material, near: &[Prediction]| {
-            Ok(vec![bench.predict(&drives_mm, material, near.first(), &options.solve, is_cancelled)?])
-        };
-        let system = |p: &[Prediction]| NormalSystem::new(p, &targets, options.bulk, options.held);
-        let start = Start { predictions: vec![self.prediction.clone()], path: self.path.clone() };
-        let (expected, num_data) = targets[0].expectation();
+        let target = Target::of_measurement(data, scan);
+        let (_, num_data) = target.expectation();
         let Descent { mut predictions, system, iterations, distance, reached, .. } =
-            descend(&self.constraints, options, start, expected, &mut predict, &system)?.converged(options)?;
+            self.descent(bench, target, data, is_cancelled)?;
         let held = options.held.count() + usize::from(options.bulk == Bulk::Held);
         let fitted = system.parameters.len() - held;
         let prior = usize::from(matches!(options.bulk, Bulk::LogPrior { .. }));
@@ -137,6 +130,51 @@ impl FitStart {
             forces_n: prediction.forces_n,
             is_bulk_held: options.bulk == Bulk::Held,
         })
+    }
+
+    /// A start at the estimate that `data` lead to from here, for other data of the same drives; this start itself where
+    /// they lead to none, or to a limit.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] that is not of the data.
+    pub(super) fn led_by(
+        &self,
+        bench: &mut Bench,
+        scan: &ScanSettings,
+        data: &Measurement,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<FitStart, CalibrationError> {
+        let found = match self.descent(bench, Target::of_measurement(data, scan), data, is_cancelled) {
+            Err(error) if !error.is_of_the_data() => return Err(error),
+            other => other.ok().filter(|found| found.reached.is_empty()),
+        };
+        let Some(prediction) = found.and_then(|found| found.predictions.into_iter().next()) else {
+            return Ok(self.clone());
+        };
+        let constraints = Constraints::new(&prediction.material, &self.options)?;
+        let path = bench.stress_path(&prediction.material, &prediction);
+        Ok(FitStart { constraints, prediction, path, options: self.options })
+    }
+
+    /// The way from here to the optimum of `target`, which is that of `data`.
+    fn descent(
+        &self,
+        bench: &mut Bench,
+        target: Target,
+        data: &Measurement,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Descent, CalibrationError> {
+        let options = &self.options;
+        data.check(bench.num_voxels(), self.prediction.states.len().saturating_sub(data.on_the_way.len()))?;
+        let drives_mm = data.all_drives_mm();
+        let (expected, _) = target.expectation();
+        let targets = [target];
+        let mut predict = |material: &Material, near: &[Prediction]| {
+            Ok(vec![bench.predict(&drives_mm, material, near.first(), &options.solve, is_cancelled)?])
+        };
+        let system = |p: &[Prediction]| NormalSystem::new(p, &targets, options.bulk, options.held);
+        let start = Start { predictions: vec![self.prediction.clone()], path: self.path.clone() };
+        descend(&self.constraints, options, start, expected, &mut predict, &system)?.converged(options)
     }
 }
 

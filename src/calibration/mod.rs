@@ -13,6 +13,7 @@ mod doubt;
 mod error;
 mod fit;
 mod force_readings;
+mod interval;
 mod measured_boundary;
 mod mesh_correction;
 mod noise;

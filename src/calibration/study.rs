@@ -15,6 +15,7 @@ use super::allowance::ERROR_OVER_SHIFT;
 use super::calibrate::MESH_RATIO;
 use super::calibrate_options::CalibrateOptions;
 use super::error::CalibrationError;
+use super::interval::interval_95;
 use super::observed::Observed;
 use super::problem::CalibrationProblem;
 use super::profile::TWO_SIDED_95;
@@ -310,7 +311,10 @@ fn summarise(draws: &[Draw], truth: &Material, noiseless: &RecordingFit, coarse:
             let stated = || fitted.iter().filter_map(|d| d.1[i].map(|sd| (d.0[i], sd)));
             let discretisation_sd = factor * ERROR_OVER_SHIFT * (at - coarse.material.value(parameter)).abs();
             let true_value = truth.value(parameter);
-            let covers = |v: f64, center: f64, sd: f64| f64::from(u8::from((v - center).abs() <= TWO_SIDED_95 * sd));
+            let covers = |v: f64, center: f64, sd: f64| {
+                let [low, high] = interval_95(parameter, v, TWO_SIDED_95 * sd);
+                f64::from(u8::from(low <= center && center <= high))
+            };
             StudyRow {
                 parameter: parameter.name(),
                 truth: truth.value(parameter),

@@ -5,17 +5,9 @@ use super::disagreement::{Disagreement, information_gain, integrated_gain};
 use super::entry::DesignEntry;
 use super::found_sizes::sizes_in_words;
 use super::study::Study;
-use super::words::listed;
+use super::words::{holes_in_words, listed};
 use crate::sensitivity::IDENTIFIABILITY_LIMIT;
 use crate::specimen::way_across_plates;
-
-fn holes(count: usize) -> String {
-    match count {
-        0 => "no hole".into(),
-        1 => "one hole".into(),
-        n => format!("{n} holes"),
-    }
-}
 
 /// "12 % more" or "8 % less".
 fn more_or_less(ratio: f64) -> String {
@@ -161,7 +153,7 @@ fn which_are_equal(ranked: &[DesignEntry], Equals { equal_to_best, simplest }: E
             "Number {} (\"{}\", {}, objective {:.3}) is the simplest to make of them, and the one that we recommend.",
             simplest + 1,
             chosen.specimen.name,
-            holes(chosen.specimen.holes.len()),
+            holes_in_words(&chosen.specimen),
             chosen.objective
         )
     };
@@ -186,9 +178,9 @@ fn what_is_simpler(ranked: &[DesignEntry], equals: Equals) -> Option<String> {
             }
         }
     }
-    let each = simpler.iter().rev().map(|(count, (place, entry))| {
+    let each = simpler.values().rev().map(|(place, entry)| {
         let less = 100.0 * (1.0 - entry.objective / chosen.objective);
-        format!("number {} with {} is {less:.1} % worse", place + 1, holes(*count))
+        format!("number {} with {} is {less:.1} % worse", place + 1, holes_in_words(&entry.specimen))
     });
     let each: Vec<String> = each.collect();
     (!each.is_empty()).then(|| format!("Simpler to make within the limits: {}.", listed(&each)))
@@ -260,54 +252,58 @@ fn gains_of_material(best: &DesignEntry, material: &str) -> Option<String> {
     Some(text)
 }
 
-/// The best of every number of holes, by both measures, against the solid block: designs that keep every limit of
-/// mould, rig and material, whether or not they keep the guard, so that like is compared with like.
+/// The best design with holes, by both measures, against the solid block: designs that keep every limit of mould, rig and
+/// material, whether or not they keep the guard, so that like is compared with like.
 fn what_holes_do(base: &DesignEntry, ranked: &[DesignEntry], index: usize, material: &str) -> Vec<String> {
-    let mut by_count: std::collections::BTreeMap<usize, (f64, f64)> = std::collections::BTreeMap::new();
-    for entry in ranked.iter().filter(|e| e.limits.iter().all(|limit| limit.is_satisfied)) {
-        let slot = by_count.entry(num_holes(entry)).or_insert((0.0, 0.0));
-        slot.0 = slot.0.max(integrated_gain(entry, material));
-        slot.1 = slot.1.max(information_gain(entry, base, index).unwrap_or(0.0));
-    }
-    let Some(&(solid_sum, solid_information)) = by_count.get(&0) else {
+    let kept = ranked.iter().filter(|e| e.limits.iter().all(|limit| limit.is_satisfied));
+    let (solid, holed): (Vec<&DesignEntry>, Vec<&DesignEntry>) = kept.partition(|e| num_holes(e) == 0);
+    if solid.is_empty() {
         let was_tried = index == 0 && ranked.iter().any(|e| num_holes(e) == 0);
         let said = "No solid block kept every limit at confirmation, so that nothing is said of what holes do.";
         return was_tried.then(|| said.to_string()).into_iter().collect();
+    }
+    // The best of some designs by a measure, and what that is.
+    fn best_of<'a>(
+        designs: &[&'a DesignEntry],
+        measure: &dyn Fn(&DesignEntry) -> f64,
+    ) -> Option<(&'a DesignEntry, f64)> {
+        designs.iter().map(|e| (*e, measure(e))).max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+    let ratio = |measure: &dyn Fn(&DesignEntry) -> f64| {
+        let ((_, of_solid), (best, of_holed)) = (best_of(&solid, measure)?, best_of(&holed, measure)?);
+        Some((best, of_holed / of_solid))
     };
-    let holed: Vec<_> = by_count.iter().filter(|(count, _)| **count > 0).collect();
+    let has_notches = holed.iter().any(|e| e.specimen.samples().iter().flat_map(|s| &s.holes).any(|h| h.is_notch));
+    let noun = if has_notches { "holes or notches" } else { "holes" };
     let mut said = Vec::new();
-    if let Some((count, (sum, _))) = holed.iter().max_by(|a, b| a.1.0.total_cmp(&b.1.0)) {
-        let ratio = sum / solid_sum;
-        let verdict = if ratio > 1.005 {
-            "holes help the integrated sensitivity"
-        } else {
-            "holes do not help the integrated sensitivity"
-        };
-        let reason = if ratio > 1.005 { "" } else { ": a removed voxel is a lost measurement" };
+    if let Some((best, ratio)) = ratio(&|e| integrated_gain(e, material)) {
+        let (verb, reason) =
+            if ratio > 1.005 { ("help", "") } else { ("do not help", ": a removed voxel is a lost measurement") };
         said.push(format!(
-            "Material \"{material}\": {verdict}. The best confirmed specimen with holes ({}) has {} of it than the best solid block within the same limits{reason}.",
-            holes(**count),
+            "Material \"{material}\": {noun} {verb} the integrated sensitivity. The best confirmed specimen with {noun} ({}) has {} of it \
+             than the best solid block within the same limits{reason}.",
+            holes_in_words(&best.specimen),
             more_or_less(ratio).replace("as much", "no more and no less")
         ));
     }
-    if let Some((count, (_, information))) = holed.iter().max_by(|a, b| a.1.1.total_cmp(&b.1.1)) {
+    if let Some((best, gain)) = ratio(&|e| information_gain(e, base, index).unwrap_or(0.0)) {
         // A standard deviation; smaller is better.
-        let ratio = solid_information / information;
+        let ratio = 1.0 / gain;
         said.push(if !ratio.is_finite() {
             format!("Material \"{material}\": the standard deviations of the confirmed designs are not determined.")
-        } else if ratio < 0.995 {
-            format!(
-                "Material \"{material}\": holes help to tell the parameters apart. The best confirmed specimen with holes ({}) promises a \
-                 generalised standard deviation {:.0} % smaller than the best solid block's within the same limits.",
-                holes(**count),
-                100.0 * (1.0 - ratio)
-            )
         } else {
+            let percent = 100.0 * (ratio - 1.0).abs();
+            let (verb, much) = if ratio < 0.995 {
+                ("help", format!("{percent:.0} % smaller"))
+            } else if ratio < 1.005 {
+                ("do not help", "no smaller".to_string())
+            } else {
+                ("do not help", format!("{percent:.0} % larger"))
+            };
             format!(
-                "Material \"{material}\": holes do not help to tell the parameters apart. The best confirmed specimen with holes ({}) \
-                 promises a generalised standard deviation {} than the best solid block's within the same limits.",
-                holes(**count),
-                if ratio < 1.005 { "no smaller".to_string() } else { format!("{:.0} % larger", 100.0 * (ratio - 1.0)) }
+                "Material \"{material}\": {noun} {verb} to tell the parameters apart. The best confirmed specimen with {noun} ({}) promises \
+                 a generalised standard deviation {much} than the best solid block's within the same limits.",
+                holes_in_words(&best.specimen)
             )
         });
     }

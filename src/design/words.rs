@@ -51,6 +51,23 @@ pub fn holes_in_brief(specimen: &Specimen) -> String {
     }
 }
 
+/// How many holes and notches all samples have together: "no hole", "one hole", "2 holes and one notch".
+pub(super) fn holes_in_words(specimen: &Specimen) -> String {
+    let samples = specimen.samples();
+    let [notches, holes] =
+        [true, false].map(|is_notch| samples.iter().flat_map(|s| &s.holes).filter(|h| h.is_notch == is_notch).count());
+    let of_kind = |(count, one, several): (usize, &str, &str)| match count {
+        0 => None,
+        1 => Some(format!("one {one}")),
+        n => Some(format!("{n} {several}")),
+    };
+    match [(holes, "hole", "holes"), (notches, "notch", "notches")].into_iter().filter_map(of_kind).collect::<Vec<_>>()
+    {
+        none if none.is_empty() => "no hole".into(),
+        some => listed(&some),
+    }
+}
+
 /// The block of one sample: length × thickness × width, mm.
 pub fn block_in_brief(specimen: &Specimen) -> String {
     let b = &specimen.block;
@@ -114,8 +131,11 @@ mod tests {
         let shape = HoleShape { kind: HoleKind::Slot, length_mm: 8.0, angle_deg: 30.0 };
         specimen.holes[0].shape = Some(shape);
         assert_eq!(holes_in_brief(&specimen), "slot 8.0 × 5.0 at 30° + ⌀5.0");
+        assert_eq!(holes_in_words(&specimen), "2 holes");
+        specimen.holes[0].is_notch = true;
+        assert_eq!(holes_in_words(&specimen), "one hole and one notch");
         specimen.holes.clear();
-        assert_eq!(holes_in_brief(&specimen), "solid");
+        assert_eq!([holes_in_brief(&specimen), holes_in_words(&specimen)], ["solid", "no hole"]);
         assert!(sample_in_words(&specimen).ends_with("without holes"));
     }
 }

@@ -37,7 +37,9 @@ pub struct CrossPrediction {
     #[serde(default)]
     pub chi2_per_datum: Option<BeforeAfter>,
     /// The same with the plates' shifts at each step fitted (how far they went, and where zero is), which no other
-    /// recording tells, and nothing else; null where the parts of a set-up are not looked for.
+    /// recording tells, and nothing else; what is the rig's or the scanner's is then what the fitted recording says of
+    /// it with its own shifts alone, because a rotation of the rig and turns of the plates share what they explain. Null
+    /// where the parts of a set-up are not looked for.
     #[serde(default)]
     pub chi2_per_datum_with_own_shifts: Option<BeforeAfter>,
     /// The same with the plates' rotations at each step fitted as well.
@@ -73,17 +75,23 @@ impl Predictor<'_> {
         to: usize,
     ) -> Result<CrossPrediction, DiagnosisError> {
         let teacher = cases[from].found;
-        let causes = self.carried(cases, from, to);
+        let carried = self.carried(cases, from, to);
+        let beside_shifts = match from == to {
+            true => None,
+            false => self.rig_beside_shifts(&mut cases[from], &carried)?,
+        };
+        let beside_shifts = beside_shifts.unwrap_or_else(|| carried.clone());
         let case = &mut cases[to];
         case.laboratory.forget();
-        let models: [(&Material, &[Supposed]); 2] =
-            [(&teacher.nominal.material, &[]), (&teacher.corrected.material, &causes)];
+        let [nominal, corrected] = [&teacher.nominal.material, &teacher.corrected.material];
         let own = if from == to { None } else { own_motions(&case.found.observed) };
         let (mut plain, mut shifted, mut moved) = (Vec::new(), Vec::new(), Vec::new());
-        for (material, causes) in models {
-            plain.push(self.misfit(case, material, causes)?);
+        let nothing = Carried::default();
+        for (material, causes, beside_shifts) in [(nominal, &nothing, &nothing), (corrected, &carried, &beside_shifts)]
+        {
+            plain.push(self.misfit(case, material, &causes.all())?);
             if let Some([shifts, motions]) = &own {
-                shifted.push(self.with_own(shifts, case, material, causes)?);
+                shifted.push(self.with_own(shifts, case, material, beside_shifts)?);
                 moved.push(self.with_own(motions, case, material, causes)?);
             }
         }
@@ -105,10 +113,10 @@ impl Predictor<'_> {
     /// The causes of case `from` that hold for case `to`. Artefacts belong to one recording alone. What is the rig's or
     /// the scanner's goes with them. Samples of one drawing may be one sample or two: a cause of the sample is carried
     /// over unless both have it and differ in it. A recording of another drawing shares neither places nor plates.
-    fn carried(&self, cases: &[Case], from: usize, to: usize) -> Vec<Supposed> {
+    fn carried(&self, cases: &[Case], from: usize, to: usize) -> Carried {
         let teacher = cases[from].found;
         if from == to {
-            return teacher.corrected.causes.clone();
+            return Carried { others: teacher.corrected.causes.clone(), of_rig: Vec::new() };
         }
         let is_same_drawing = {
             let [a, b] = [from, to].map(|n| &cases[n].found.observed.specimen);
@@ -119,26 +127,32 @@ impl Predictor<'_> {
             let is_carried = is_same_drawing || c.cause.category() == Category::Material && !located;
             is_carried && !self.refused.contains(&c.cause.identity())
         };
-        let held_to_rig = |c: &Supposed| {
-            let mut values = c.cause.start();
-            for ((value, found), p) in values.iter_mut().zip(&c.values).zip(c.cause.parameters()) {
-                if p.is_of_rig {
-                    *value = *found;
-                }
-            }
-            Supposed { cause: c.cause.clone(), values }
-        };
         let own_of_a_step = |c: &Supposed| c.cause.parameters().iter().any(|p| p.only_step.is_some());
-        teacher
-            .corrected
-            .causes
-            .iter()
-            .filter(|c| !c.cause.is_artefact() && !own_of_a_step(c))
-            .filter_map(|c| match c.cause.parameters().iter().any(|p| p.is_of_rig) {
-                true => Some(held_to_rig(c)),
-                false => is_samples(c).then(|| c.clone()),
-            })
-            .collect()
+        let known = teacher.corrected.causes.iter().filter(|c| !c.cause.is_artefact() && !own_of_a_step(c));
+        let (of_rig, others): (Vec<&Supposed>, Vec<&Supposed>) =
+            known.partition(|c| c.cause.parameters().iter().any(|p| p.is_of_rig));
+        Carried {
+            others: others.into_iter().filter(|c| is_samples(c)).cloned().collect(),
+            of_rig: of_rig.into_iter().map(held_to_rig).collect(),
+        }
+    }
+
+    /// What is carried of a recording, the rig's and the scanner's part of it as its own plates' shifts leave it, and
+    /// nothing else of its set-up; `None` where nothing is the rig's or there is no such fit.
+    fn rig_beside_shifts(&self, case: &mut Case, carried: &Carried) -> Result<Option<Carried>, DiagnosisError> {
+        let Some([shifts, _]) = own_motions(&case.found.observed).filter(|_| !carried.of_rig.is_empty()) else {
+            return Ok(None);
+        };
+        case.laboratory.forget();
+        let material = &case.found.corrected.material;
+        let mut all = carried.all();
+        all.push(Supposed { values: shifts.start(), cause: shifts });
+        let num_held = carried.others.len();
+        let Some(all) = self.fitted(case, material, all, num_held, Weighed::ByWhatIsLeft)? else {
+            return Ok(None);
+        };
+        let of_rig = all[num_held..all.len() - 1].iter().map(held_to_rig).collect();
+        Ok(Some(Carried { others: carried.others.clone(), of_rig }))
     }
 
     /// A prediction; `None` where the model has no equilibrium.
@@ -170,27 +184,90 @@ impl Predictor<'_> {
         own: &Arc<dyn Cause>,
         case: &mut Case,
         material: &Material,
-        causes: &[Supposed],
+        causes: &Carried,
     ) -> Result<Option<Misfit>, DiagnosisError> {
-        let mut all = causes.to_vec();
+        let mut all = causes.all();
+        let num_held = all.len();
         all.push(Supposed { values: own.start(), cause: own.clone() });
+        match self.fitted(case, material, all, num_held, Weighed::ByNoise)? {
+            Some(all) => self.misfit(case, material, &all),
+            None => Ok(None),
+        }
+    }
+
+    /// Causes of which those after the first `num_held` are fitted, material and the others as they are; `None` where
+    /// there is no equilibrium on the way.
+    fn fitted(
+        &self,
+        case: &mut Case,
+        material: &Material,
+        mut all: Vec<Supposed>,
+        num_held: usize,
+        weighed: Weighed,
+    ) -> Result<Option<Vec<Supposed>>, DiagnosisError> {
+        let num_free: usize = all[num_held..].iter().map(|c| c.values.len()).sum();
         for _ in 0..NUM_STEPS {
             let Some(prediction) = self.predict(case, material, &all)? else { return Ok(None) };
             let Ok(columns) = derivatives(&mut case.laboratory, material, &all, &prediction) else { return Ok(None) };
+            let metric = match weighed {
+                Weighed::ByNoise => case.noise.clone(),
+                Weighed::ByWhatIsLeft => {
+                    let residual = case.measured.plus(-1.0, &prediction.trace);
+                    let left = leftover(&case.found.observed, &residual, &case.noise);
+                    case.noise.clone().with_variance(left.variance_mm2(case.found.allowance_mm))
+                }
+            };
             let (matrix, gradient) =
-                normal_system(&case.noise, &case.measured, &prediction, material, &all, &case.found.settings, &columns);
-            let Some(own) = all.last_mut() else { return Ok(None) };
-            let (num, num_own) = (matrix.nrows(), own.values.len());
-            let first = num - num_own;
-            let block = matrix.view((first, first), (num_own, num_own)).into_owned();
+                normal_system(&metric, &case.measured, &prediction, material, &all, &case.found.settings, &columns);
+            let first = matrix.nrows() - num_free;
+            let block = matrix.view((first, first), (num_free, num_free)).into_owned();
             let Some(factor) = block.cholesky() else { return Ok(None) };
-            let step = factor.solve(&gradient.rows(first, num_own).into_owned());
-            for ((value, p), s) in own.values.iter_mut().zip(own.cause.parameters()).zip(step.iter()) {
-                *value = (*value + s * p.scale).clamp(p.range[0], p.range[1]);
+            let step = factor.solve(&gradient.rows(first, num_free).into_owned());
+            let mut steps = step.iter();
+            for free in &mut all[num_held..] {
+                for ((value, p), s) in free.values.iter_mut().zip(free.cause.parameters()).zip(steps.by_ref()) {
+                    *value = (*value + s * p.scale).clamp(p.range[0], p.range[1]);
+                }
             }
         }
-        self.misfit(case, material, &all)
+        Ok(Some(all))
     }
+}
+
+/// What holds for another recording, too.
+#[derive(Clone, Default)]
+struct Carried {
+    /// The material's and the sample's.
+    others: Vec<Supposed>,
+    /// The rig's and the scanner's.
+    of_rig: Vec<Supposed>,
+}
+
+impl Carried {
+    /// The rig's last.
+    fn all(&self) -> Vec<Supposed> {
+        self.others.iter().chain(&self.of_rig).cloned().collect()
+    }
+}
+
+/// Of a cause what is the rig's; its other numbers as if nothing were known of them.
+fn held_to_rig(c: &Supposed) -> Supposed {
+    let mut values = c.cause.start();
+    for ((value, found), p) in values.iter_mut().zip(&c.values).zip(c.cause.parameters()) {
+        if p.is_of_rig {
+            *value = *found;
+        }
+    }
+    Supposed { cause: c.cause.clone(), values }
+}
+
+/// By what the misfit of a fit is weighed.
+#[derive(Clone, Copy, PartialEq)]
+enum Weighed {
+    /// By the noise alone, as χ² is.
+    ByNoise,
+    /// By what the fit leaves as well, so that what is believed counts.
+    ByWhatIsLeft,
 }
 
 /// The plates' shifts at each step, and their shifts and rotations; `None` where the parts of a set-up are not looked

@@ -66,9 +66,7 @@ impl<'a> Inference<'a> {
     /// be exact is fitted to its own errors, and whatever is believed of its parameters counts for nothing.
     pub(super) fn accept_discrepancy(&mut self, residual: &Trace) {
         let left = leftover(self.laboratory.observed(), residual, &self.metric);
-        let size_mm = |structured_mm: f64| structured_mm.max(self.allowance_mm);
-        self.discrepancy_mm2 = left.structured_by_component_mm.map(|mm| size_mm(mm).powi(2) * left.voxels_per_box);
-        self.metric = self.metric_of(&|_| true);
+        self.weigh_by(left.variance_mm2(self.allowance_mm));
     }
 
     /// Weighs misfits by noise and allowance alone again.

@@ -20,6 +20,14 @@ pub struct Leftover {
     pub location: Option<Location>,
 }
 
+impl Leftover {
+    /// The variance (mm²) that each component of every voxel is given so that means over boxes have the standard
+    /// deviation that they are seen to have, or `least_mm` where that is larger.
+    pub(super) fn variance_mm2(&self, least_mm: f64) -> [f64; 3] {
+        self.structured_by_component_mm.map(|mm| mm.max(least_mm).powi(2) * self.voxels_per_box)
+    }
+}
+
 /// Root mean square of what the means over boxes show of a change of the displacement without noise, mm: what
 /// [`Leftover::structured_rms_mm`] is expected to be where that change is left.
 pub(super) fn structure_of(observed: &Observed, change: &Trace, metric: &Metric) -> f64 {

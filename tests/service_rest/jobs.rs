@@ -12,7 +12,7 @@ fn a_design_reports_progress_and_can_be_cancelled_and_resumed() {
     let service = Service::start(folder.path(), &[]);
     let library = service.get("/v1/library").json();
     let mut study = library["studies"][1].clone();
-    study["budget"] = json!({ "explore": 6, "refine": 1, "iterations": 1, "confirm": 1 });
+    study["budget"] = json!({ "explore": 6, "refine": 1, "iterations": 1, "propose": 4, "confirm": 1 });
     study["verification"] = json!({ "is_on": false, "draws": 1 });
     let job = service.submit("designs", &study);
     let started = std::time::Instant::now();
@@ -87,7 +87,7 @@ fn a_shutdown_keeps_the_checkpoint_of_a_running_design() {
     let folder = tempfile::tempdir().unwrap();
     let mut service = Service::start(folder.path(), &[]);
     let mut study = service.get("/v1/library").json()["studies"][1].clone();
-    study["budget"] = json!({ "explore": 8, "refine": 1, "iterations": 1, "confirm": 1 });
+    study["budget"] = json!({ "explore": 8, "refine": 1, "iterations": 1, "propose": 4, "confirm": 1 });
     study["verification"] = json!({ "is_on": false, "draws": 1 });
     let job = service.submit("designs", &study);
     let started = std::time::Instant::now();

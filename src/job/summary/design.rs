@@ -1,7 +1,7 @@
 //! A design search as text.
 
 use super::num;
-use crate::design::{DesignEntry, DesignResult};
+use crate::design::{DesignEntry, DesignResult, plates_in_words};
 use crate::report::{ComparedSize, compared_sizes};
 use crate::specimen::LimitMargin;
 
@@ -24,8 +24,9 @@ pub(in crate::job) fn design(result: &DesignResult) -> String {
     );
     let line = |label: &str, e: &DesignEntry| {
         let normal = e.largest_normal_force().map_or("-".into(), |(_, force_n)| num(force_n, 4));
+        let plates = plates_in_words(&e.specimen).map_or(String::new(), |plates| format!("; {plates}"));
         format!(
-            "  {:<42} {:>8} {:>17}{} {:>6}   {}\n",
+            "  {:<42} {:>8} {:>17}{} {:>6}   {}{plates}\n",
             label,
             num(e.specimen.drive_mm.last().copied().unwrap_or(0.0), 5),
             num(e.force_n(), 4),

@@ -109,7 +109,7 @@ export function editor(model, change) {
   function outline(hole, index, wrong) {
     const classes = ["hole", index === model.chosen ? "chosen" : "", wrong ? "wrong" : ""].join(" ");
     const [x, y] = hole.center_mm;
-    return holeShape(hole, {
+    return holeShape(hole, sectionOf(model.specimen), {
       class: classes,
       tabindex: 0,
       role: "button",

@@ -52,11 +52,34 @@ export function gapOf(one, other) {
   return best;
 }
 
-/** A hole as an element, y down. */
-export function holeShape(hole, more = {}) {
+/** Room for a line beside what is drawn, as a part of a section's length. */
+const LINE = 0.01;
+
+/** Draws of a notch what lies in the block: the circle as far as its sides. */
+function cutOpen(circle, hole, section) {
+  const beyond = (center, half) => center + hole.diameter_mm / 2 - half;
+  const [x, y] = hole.center_mm;
+  const line = LINE * section.length;
+  const sides = [
+    beyond(y, section.height / 2),
+    beyond(x, section.length / 2),
+    beyond(-y, section.height / 2),
+    beyond(-x, section.length / 2),
+  ];
+  // A line's width beyond the side, so that the side's own line is gone, and beyond the circle's own line elsewhere.
+  const insets = sides.map((over) => `${(Math.max(over, 0) - line).toFixed(3)}px`);
+  circle.style.setProperty("clip-path", `inset(${insets.join(" ")}) fill-box`);
+  return circle;
+}
+
+/** A hole of a section as an element, y down. */
+export function holeShape(hole, section, more = {}) {
   const [x, y] = hole.center_mm;
   const { a, b, kind } = axesOf(hole);
-  if (kind === "circle") return s("circle", { cx: x, cy: -y, r: b, ...more });
+  if (kind === "circle") {
+    const circle = s("circle", { cx: x, cy: -y, r: b, ...more });
+    return hole.is_notch ? cutOpen(circle, hole, section) : circle;
+  }
   const transform = `translate(${x} ${-y}) rotate(${-hole.shape.angle_deg})`;
   if (kind === "ellipse") return s("ellipse", { rx: a, ry: b, transform, ...more });
   return s("rect", { x: -a, y: -b, width: 2 * a, height: 2 * b, rx: b, transform, ...more });

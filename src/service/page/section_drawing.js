@@ -42,8 +42,7 @@ function dimension(size, from, to, text) {
   ];
 }
 
-/** An arrow to the right with words above it. */
-/** An arrow along x from its middle line's start, or towards that start where it points back. */
+/** An arrow along x from its middle line's start, or towards that start where it points back, with words above it. */
 function arrow(size, [x, y], length, text, isWrong, isBack) {
   const cls = isWrong ? "drive wrong" : "drive";
   const tip = (isBack ? -0.6 : 0.6) * size;
@@ -129,10 +128,11 @@ function sideView(model, section, { text, side }) {
   return [
     s("rect", { class: "outline", x: -length / 2, y: top, width: length, height: depth }),
     model.specimen.holes.flatMap((hole) =>
-      [-1, 1].map((e) => {
-        const x = hole.center_mm[0] + e * reachOf(hole, [1, 0]);
-        return line("concealed", [x, top], [x, top + depth]);
-      }),
+      [-1, 1]
+        .map((e) => hole.center_mm[0] + e * reachOf(hole, [1, 0]))
+        // A notch in an end ends there.
+        .filter((x) => Math.abs(x) < length / 2)
+        .map((x) => line("concealed", [x, top], [x, top + depth])),
     ),
     dimension(
       text,
@@ -165,7 +165,8 @@ export function sectionPicture(exact, label) {
   const specimen = rounded(exact);
   const svg = s("svg", { class: "section still", role: "img", "aria-label": label });
   const { under, over } = drawSection(svg, { specimen, limits: {} });
-  const holes = specimen.holes.map((hole) => holeShape(hole, { class: "hole" }));
+  const section = sectionOf(specimen);
+  const holes = specimen.holes.map((hole) => holeShape(hole, section, { class: "hole" }));
   svg.append(...[under, holes, over].flat(Infinity));
   return svg;
 }
