@@ -133,21 +133,33 @@ export function editor(model, change) {
     const { under, over, text } = drawSection(svg, model);
     const sizes = wrongDiameters(model);
     const holes = model.specimen.holes.map((hole, i) => outline(hole, i, sizes.has(i) || model.wrong?.has(i)));
-    const labels = model.specimen.holes.map((hole, i) =>
-      s(
+    const labels = model.specimen.holes.map((hole, i) => {
+      const [x, y] = labelled(hole, text);
+      return s(
         "text",
         {
           class: "in-hole",
-          x: hole.center_mm[0],
-          y: -hole.center_mm[1] + text / 3,
-          "font-size": Math.min(text, hole.diameter_mm / 3.2),
+          x,
+          y: -y + text / 3,
+          "font-size": hole.is_notch ? text : Math.min(text, hole.diameter_mm / 3.2),
           "text-anchor": "middle",
         },
         `${i + 1}: ${sizeOf(hole)}`,
-      ),
-    );
+      );
+    });
     svg.replaceChildren(...[under, holes, labels, over].flat(Infinity));
     table();
+  }
+
+  /** Where a hole is named: at its centre, a notch beside its wall, in the material. */
+  function labelled(hole, text) {
+    const section = sectionOf(model.specimen);
+    if (!hole.is_notch) return hole.center_mm;
+    const halves = [section.length / 2, section.height / 2];
+    const inset = hole.center_mm.map((x, k) => halves[k] - Math.abs(x));
+    const across = inset[0] <= inset[1] ? 0 : 1;
+    const beside = hole.diameter_mm / 2 + (across === 0 ? 2.4 : 0.9) * text;
+    return hole.center_mm.map((x, k) => (k === across ? x - Math.sign(x) * beside : x));
   }
 
   function table() {
