@@ -9,11 +9,11 @@ use super::allowance::{Allowance, ERROR_OVER_SHIFT};
 use super::calibrate_options::{CalibrateOptions, TermCount};
 use super::contours::contours;
 use super::error::CalibrationError;
-use super::interval::interval_95;
+use super::interval::{TWO_SIDED_95, interval_95};
 use super::observed::Observed;
 use super::outcome::{Calibration, Estimate, MeshComparison};
 use super::problem::CalibrationProblem;
-use super::profile::{TWO_SIDED_95, bulk_lower_bound_kpa, profile};
+use super::profile::{bulk_lower_bound_kpa, profile};
 use super::recording_fit::RecordingFit;
 use super::run::{Run, with_falling_exponents};
 use super::starts::Candidates;
@@ -189,7 +189,7 @@ fn estimate(fit: &RecordingFit, parameter: Parameter, value: f64, mesh_error: f6
     let is_identifiable = sd.is_some_and(|sd| sd < IDENTIFIABILITY_LIMIT * value.abs());
     let discretisation_sd = factor * mesh_error;
     let interval_95 = match sd.filter(|_| is_identifiable) {
-        Some(sd) => interval_95(parameter, value, half_width(sd, discretisation_sd, possible_shift)).map(Some),
+        Some(sd) => interval_95(parameter, value, sd.hypot(discretisation_sd), possible_shift).map(Some),
         None => [None; 2],
     };
     Estimate { parameter, value, sd, mesh_error, discretisation_sd, possible_shift, interval_95, is_identifiable }

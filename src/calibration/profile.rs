@@ -1,6 +1,7 @@
 //! Profile likelihood: what the objective loses when one parameter is held off its optimum and all others follow.
 
 use super::error::CalibrationError;
+use super::interval::TWO_SIDED_95;
 use super::options::FitOptions;
 use super::problem::CalibrationProblem;
 use super::recording_fit::RecordingFit;
@@ -10,8 +11,6 @@ use utoipa::ToSchema;
 
 /// Distances from the optimum, in standard deviations.
 const PLACES: [f64; 6] = [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0];
-/// 97.5 % point of the standard normal distribution.
-pub const TWO_SIDED_95: f64 = 1.959_964;
 /// 95 % point: one-sided bounds.
 pub const ONE_SIDED_95: f64 = 1.644_854;
 /// Most halvings of κ on the way to its bound.

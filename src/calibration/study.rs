@@ -18,7 +18,6 @@ use super::error::CalibrationError;
 use super::interval::interval_95;
 use super::observed::Observed;
 use super::problem::CalibrationProblem;
-use super::profile::TWO_SIDED_95;
 use super::recording_fit::RecordingFit;
 use super::run::{Run, with_falling_exponents};
 use super::starts::Candidates;
@@ -312,7 +311,7 @@ fn summarise(draws: &[Draw], truth: &Material, noiseless: &RecordingFit, coarse:
             let discretisation_sd = factor * ERROR_OVER_SHIFT * (at - coarse.material.value(parameter)).abs();
             let true_value = truth.value(parameter);
             let covers = |v: f64, center: f64, sd: f64| {
-                let [low, high] = interval_95(parameter, v, TWO_SIDED_95 * sd);
+                let [low, high] = interval_95(parameter, v, sd, 0.0);
                 f64::from(u8::from(low <= center && center <= high))
             };
             StudyRow {
