@@ -243,8 +243,8 @@ fn two_recordings_agree_on_material_and_encoding() {
         // The noise, and the meshes' difference of 0.01 mm.
         assert!(rms.after < 1.1 * NOISE_MM && rms.before > 1.5 * NOISE_MM, "{p:?}");
         if p.from != p.to {
-            // With the plates' own shifts, too, the encoding comes from the other recording. A shift of the plates takes
-            // a part of what it does, so that less than before is left to it.
+            // With the plates' own shifts, too, the encoding comes from the other recording. A shift of the plates
+            // takes a part of what it does, so that less than before is left to it.
             let [plain, shifted] = [p.chi2_per_datum, p.chi2_per_datum_with_own_shifts].map(Option::unwrap);
             assert!(shifted.before < plain.before && shifted.after < 1.02 * plain.after, "{p:?}");
         }

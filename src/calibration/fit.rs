@@ -132,8 +132,8 @@ impl FitStart {
         })
     }
 
-    /// A start at the estimate that `data` lead to from here, for other data of the same drives; this start itself where
-    /// they lead to none, or to a limit.
+    /// A start at the estimate that `data` lead to from here, for other data of the same drives; this start itself
+    /// where they lead to none, or to a limit.
     ///
     /// # Errors
     /// [`CalibrationError`] that is not of the data.

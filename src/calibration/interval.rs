@@ -5,14 +5,14 @@ use crate::material::Parameter;
 /// 97.5 % point of the standard normal distribution.
 pub(super) const TWO_SIDED_95: f64 = 1.959_964;
 
-/// The interval of a parameter about its estimate: 1.96 standard deviations, and in squares the furthest that an error of
-/// the size of the misfit could shift it.
+/// The interval of a parameter about its estimate: 1.96 standard deviations, and in squares the furthest that an error
+/// of the size of the misfit could shift it.
 ///
 /// κ is fitted by its logarithm, and its interval is symmetric in that. The moduli of Ogden's terms keep their sign;
-/// where they are hardly known, too, it is their logarithm that scatters like a Gaussian: an estimate that comes out low
-/// promises a standard deviation lower by the same factor, so that symmetric intervals about low estimates are too short.
-/// What they scatter by is therefore taken in their logarithm, which changes nothing where it is small; what shifts them
-/// is a shift of the modulus itself.
+/// where they are hardly known it is their logarithm, too, that scatters like a Gaussian: an estimate that comes out
+/// low promises a standard deviation lower by the same factor, so that symmetric intervals about low estimates are too
+/// short. What they scatter by is therefore taken in their logarithm, which changes nothing where it is small; what
+/// shifts them is a shift of the modulus itself.
 pub(super) fn interval_95(parameter: Parameter, value: f64, sd: f64, possible_shift: f64) -> [f64; 2] {
     let scatter = TWO_SIDED_95 * sd;
     let in_logarithm = |side: f64, half_width: f64| {

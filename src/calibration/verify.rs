@@ -2,9 +2,10 @@
 //! promised.
 //!
 //! The truth is solved on a finer and different mesh. The fits to the noiseless scan and to one more noisy scan begin
-//! blind, off the truth in every parameter; the draws begin where the latter ended, as a laboratory would begin that has
-//! calibrated one such scan before. Two errors are told apart: the scatter over the draws, which the Fisher information
-//! promises, and the shift that the fitting mesh makes, which is what a fit to the noiseless scan misses the truth by.
+//! blind, off the truth in every parameter; the draws begin where the latter ended, as a laboratory would begin that
+//! has calibrated one such scan before. Two errors are told apart: the scatter over the draws, which the Fisher
+//! information promises, and the shift that the fitting mesh makes, which is what a fit to the noiseless scan misses
+//! the truth by.
 
 use super::bench::Bench;
 use super::error::CalibrationError;

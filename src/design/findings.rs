@@ -252,8 +252,8 @@ fn gains_of_material(best: &DesignEntry, material: &str) -> Option<String> {
     Some(text)
 }
 
-/// The best design with holes, by both measures, against the solid block: designs that keep every limit of mould, rig and
-/// material, whether or not they keep the guard, so that like is compared with like.
+/// The best design with holes, by both measures, against the solid block: designs that keep every limit of mould, rig
+/// and material, whether or not they keep the guard, so that like is compared with like.
 fn what_holes_do(base: &DesignEntry, ranked: &[DesignEntry], index: usize, material: &str) -> Vec<String> {
     let kept = ranked.iter().filter(|e| e.limits.iter().all(|limit| limit.is_satisfied));
     let (solid, holed): (Vec<&DesignEntry>, Vec<&DesignEntry>) = kept.partition(|e| num_holes(e) == 0);

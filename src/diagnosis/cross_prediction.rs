@@ -38,8 +38,8 @@ pub struct CrossPrediction {
     pub chi2_per_datum: Option<BeforeAfter>,
     /// The same with the plates' shifts at each step fitted (how far they went, and where zero is), which no other
     /// recording tells, and nothing else; what is the rig's or the scanner's is then what the fitted recording says of
-    /// it with its own shifts alone, because a rotation of the rig and turns of the plates share what they explain. Null
-    /// where the parts of a set-up are not looked for.
+    /// it with its own shifts alone, because a rotation of the rig and turns of the plates share what they explain.
+    /// Null where the parts of a set-up are not looked for.
     #[serde(default)]
     pub chi2_per_datum_with_own_shifts: Option<BeforeAfter>,
     /// The same with the plates' rotations at each step fitted as well.
