@@ -7,12 +7,12 @@
 
 mod common;
 
-use common::{Random, ogden, specimen};
+use common::{Random, random_material, random_specimen};
 use lambdak::fem::{ForwardModel, SolveError, SolveOptions};
 use lambdak::kinematics::principal_stretches;
 use lambdak::material::Material;
 use lambdak::mesh::{MeshError, MeshOptions, mesh_specimen};
-use lambdak::specimen::{HoleAxis, Specimen, TestKind};
+use lambdak::specimen::Specimen;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -21,53 +21,6 @@ const NUM_SPECIMENS: usize = 100;
 
 /// A specimen that takes longer hangs. The slowest takes a few seconds on one busy core.
 const PATIENCE: Duration = Duration::from_secs(60);
-
-fn random_specimen(random: &mut Random) -> Specimen {
-    loop {
-        let test = [TestKind::DoubleLapShear, TestKind::Uniaxial][random.below(2)];
-        let axis = [HoleAxis::Thickness, HoleAxis::Width][random.below(2)];
-        let extents = match test {
-            TestKind::DoubleLapShear => {
-                [random.between(12.0, 40.0), random.between(4.0, 10.0), random.between(8.0, 30.0)]
-            }
-            TestKind::Uniaxial => [random.between(20.0, 60.0), random.between(2.0, 8.0), random.between(6.0, 20.0)],
-        };
-        let across = if axis == HoleAxis::Thickness { extents[2] } else { extents[1] };
-        let holes: Vec<[f64; 3]> = (0..random.below(6))
-            .map(|_| {
-                let diameter = random.between(0.15, 0.6) * across;
-                let reach = |extent: f64| 0.5 * extent - 0.5 * diameter - 0.5;
-                let is_central = random.below(3) == 0;
-                let b = reach(across).max(0.0);
-                let x = reach(extents[0]).max(0.0);
-                let other = if is_central { 0.0 } else { random.between(-b, b) };
-                [random.between(-x, x), other, diameter]
-            })
-            .collect();
-        let mut s = specimen(test, extents, axis, &holes);
-        s.name = "random".into();
-        s.drive_mm = vec![s.drive_limit_mm()];
-        if s.validate().is_ok() {
-            return s;
-        }
-    }
-}
-
-/// One to three terms, each with μα > 0 (so the sum is stable); κ/μ from 5 to 10⁴, uniform in its logarithm.
-fn random_material(random: &mut Random) -> Material {
-    let terms: Vec<(f64, f64)> = (0..=random.below(3))
-        .map(|i| {
-            let alpha =
-                random.between(0.8, if i == 0 { 4.0 } else { 9.0 }) * if random.below(3) == 0 { -1.0 } else { 1.0 };
-            let share = if i == 0 { 1.0 } else { 0.1 / alpha.abs() };
-            (random.between(5.0, 50.0) * share * f64::signum(alpha), alpha)
-        })
-        .collect();
-    let shear: f64 = 0.5 * terms.iter().map(|t| t.0 * t.1).sum::<f64>();
-    let material = ogden(shear * random.between(5f64.ln(), 1e4f64.ln()).exp(), &terms);
-    material.validate().expect("stable by construction");
-    material
-}
 
 fn outcome(s: &Specimen, material: &Material) -> (String, Option<f64>) {
     // Coarse, and at most four levels: convergence is asked, not accuracy. Coarser ones lose definiteness earlier.

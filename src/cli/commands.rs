@@ -60,6 +60,7 @@ const SOLVE: &[Flag] = &[
     Flag::of("drive", "drive_mm"),
     Flag::of("mesh", "mesh"),
     Flag::of("full", "is_whole"),
+    Flag::read("one-mesh", "has_discretisation", Off),
     Flag::of("fields", "fields"),
     Flag::of("arrays", "arrays"),
 ];
@@ -68,6 +69,7 @@ const EVALUATE: &[Flag] = &[
     Flag::of("drive", "drive_mm"),
     Flag::of("mesh", "mesh"),
     Flag::of("full", "is_whole"),
+    Flag::read("one-mesh", "has_discretisation", Off),
     Flag::of("median-stretch", "median_stretch"),
     Flag::of("voxel", "scan/voxel_mm"),
     Flag::read("surface", "scan/surface", FaceSeen),

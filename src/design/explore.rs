@@ -33,14 +33,14 @@ pub fn is_makeable(specimen: &Specimen, limits: &ManufacturingLimits, voxel_mm: 
     specimen.validate().is_ok() && limits.check_geometry(specimen, voxel_mm).iter().all(|m| m.is_satisfied)
 }
 
-/// Up to `count` makeable vectors of a subspace. The stream depends on `seed` and `stream` alone.
+/// Up to `count` makeable vectors of a subspace, of which every other one takes what is `known` of its variables. The
+/// random numbers depend on `seed` and `stream` alone.
 pub fn sample(
     subspace: &Subspace,
-    limits: &ManufacturingLimits,
-    voxel_mm: [f64; 3],
+    (limits, voxel_mm): (&ManufacturingLimits, [f64; 3]),
     count: usize,
-    seed: u64,
-    stream: u64,
+    (seed, stream): (u64, u64),
+    known: &[(Variable, f64)],
 ) -> Vec<Vec<f64>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(stream);
@@ -60,6 +60,9 @@ pub fn sample(
                 // The largest drive is nearly always best: three of four samples take it.
                 if *variable == Variable::Drive && index % 4 != 3 {
                     vector[v] = 1.0;
+                }
+                if let Some((_, value)) = known.iter().find(|(k, _)| k == variable && index % 2 == 0) {
+                    vector[v] = *value;
                 }
             }
             if let Some(vector) = shrink(subspace, vector, limits, voxel_mm) {

@@ -1,9 +1,10 @@
 //! Proposals: the structures that did best in the samples are improved by what their designs so far have taught.
 //!
-//! A [`Surrogate`] of each structure's gains and margins says where the next designs promise most; they are evaluated,
-//! and it learns from them. Every round halves the structures that are left and doubles what each of them gets, until
-//! one is left. All structures race on the coarse mesh, where a design costs little; the best of them then on the fine
-//! one, whose surrogate corrects what the coarse one has taught.
+//! A [`Surrogate`] of each structure's gains and margins says where the next designs promise most, and how much at
+//! most: an upper confidence bound (Srinivas et al., IEEE Trans. Inf. Theory 58 (2012) 3250), by which structures
+//! compete for the next evaluations. So none is given up for a few poor samples while it may still hold the best
+//! design, and none that cannot gets more. All structures race on the coarse mesh, where a design costs little; the
+//! best of them then on the fine one, whose surrogate corrects what the coarse one has taught.
 
 use super::explore::is_makeable;
 use super::fidelity::Fidelity;
@@ -25,13 +26,17 @@ use std::sync::atomic::{self, AtomicUsize};
 pub(super) struct RaceRules {
     /// Where it is told.
     pub stage: &'static str,
-    /// Structures in the first round.
+    /// Structures that compete.
     pub most_structures: usize,
     /// Designs that a structure proposes at once: by as many standard deviations each is the surrogate believed to be
     /// too low. The first takes what looks best, the last looks where little is known.
     optimism: &'static [f64],
+    /// How many of the proposals of each optimism are evaluated at once.
+    at_once: usize,
     /// Evaluations.
     pub total: usize,
+    /// Evaluations that were made in the stage before, and all that it makes: for display only.
+    pub counted: (usize, usize),
     /// The structures that race; the best of all where it is `None`.
     structures: Option<Vec<usize>>,
 }
@@ -42,23 +47,25 @@ const PART_OF_SOLID: usize = 6;
 const LEAST_OF_SOLID: usize = 8;
 
 impl RaceRules {
-    /// Of all structures, on the coarse mesh.
-    pub fn of_samples(total: usize) -> RaceRules {
-        let (stage, optimism) = ("explore", &[0.0, 1.0]);
-        RaceRules { stage, most_structures: usize::MAX, optimism, total, structures: None }
+    /// Of all structures, or of these, on the coarse mesh.
+    pub fn of_samples(total: usize, structures: Option<Vec<usize>>, counted: (usize, usize)) -> RaceRules {
+        let (stage, optimism) = ("explore", &[0.0, 1.0, 2.0]);
+        RaceRules { stage, most_structures: usize::MAX, optimism, at_once: 2, total, counted, structures }
     }
 
     /// Of the best structures, on the fine mesh.
     pub fn of_proposals(total: usize) -> RaceRules {
         let (stage, optimism) = ("propose", &[0.0, 0.5, 1.0, 2.0]);
-        RaceRules { stage, most_structures: 6, optimism, total, structures: None }
+        RaceRules { stage, most_structures: 6, optimism, at_once: 1, total, counted: (0, total), structures: None }
     }
 
     /// Of the structures without holes, on the fine mesh, beside `proposals` of all.
     pub fn of_solid(proposals: usize, spaces: &[Subspace]) -> RaceRules {
         let solid = (0..spaces.len()).filter(|&s| spaces[s].structure.num_holes() == 0).collect();
         let total = (proposals / PART_OF_SOLID).max(LEAST_OF_SOLID).min(proposals);
-        RaceRules { stage: "solid", optimism: &[0.0, 1.0], total, structures: Some(solid), ..RaceRules::of_samples(0) }
+        let (stage, optimism) = ("solid", &[0.0, 1.0]);
+        let (counted, structures) = ((0, total), Some(solid));
+        RaceRules { stage, most_structures: usize::MAX, optimism, at_once: 1, total, counted, structures }
     }
 }
 
@@ -91,8 +98,19 @@ struct Race {
     best: Best,
     /// What the designs were proposed by.
     surrogate: Option<Surrogate>,
-    /// Whether nothing new is proposed any more.
-    is_settled: bool,
+    /// What it proposes by now: of each optimism one at most.
+    proposals: Vec<Proposal>,
+    /// Whether it has learnt something since.
+    has_learnt: bool,
+}
+
+/// A design that a structure proposes.
+struct Proposal {
+    /// By which optimism, an index.
+    optimism: usize,
+    point: Vec<f64>,
+    /// The merit that this optimism expects.
+    expected: f64,
 }
 
 /// The best design of a race.
@@ -139,22 +157,34 @@ impl Race {
         let values = seen.iter().map(|(_, _, judged)| values_of(judged)).collect();
         let design = |(point, fidelity, _): (&Vec<f64>, Fidelity, _)| Seen { point: point.clone(), fidelity };
         let seen = seen.into_iter().map(design).collect();
-        Some(Race { space, fidelity: *fidelity, rng, seen, values, best, surrogate: None, is_settled: false })
+        Some(Race {
+            space,
+            fidelity: *fidelity,
+            rng,
+            seen,
+            values,
+            best,
+            surrogate: None,
+            proposals: Vec::new(),
+            has_learnt: true,
+        })
     }
 
-    /// Designs that promise most; none where the surrogate has settled.
-    fn proposals(
+    /// Proposes anew where something was learnt; nothing that was seen already.
+    fn propose(
         &mut self,
         run: &SearchRun,
         (reference, like): (&Reference, &Judged),
         space: &Subspace,
         optimism: &[f64],
-    ) -> Vec<Vec<f64>> {
-        let mut found: Vec<Vec<f64>> = Vec::new();
-        self.surrogate = Surrogate::fit(&self.seen, &self.values);
-        let Some(surrogate) = self.surrogate.take() else { return found };
+    ) {
+        if !std::mem::replace(&mut self.has_learnt, false) {
+            return;
+        }
+        self.proposals.clear();
+        let Some(surrogate) = Surrogate::fit(&self.seen, &self.values) else { return };
         let fidelity = self.fidelity;
-        for optimism in optimism {
+        for (index, optimism) in optimism.iter().enumerate() {
             let merit = |x: &[f64]| {
                 let predicted = surrogate.predict(x, fidelity);
                 let (gains, margins) = predicted.split_at(like.gains.len());
@@ -162,21 +192,17 @@ impl Race {
                 let margins = margins.iter().map(|(mean, _)| *mean).collect();
                 merit_of(reference, &Judged { gains, margins, ..like.clone() })
             };
-            let point = self.climb(run, space, &merit);
-            let is_new = |p: &[f64]| {
-                let apart = |o: &Vec<f64>| o.iter().zip(p).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
-                surrogate.nearest(p, fidelity) > NEAREST && found.iter().all(|o| apart(o) > NEAREST)
-            };
-            if let Some(point) = point.filter(|p| is_new(p)) {
-                found.push(point);
+            let Some((expected, point)) = self.climb(run, space, &merit) else { continue };
+            let apart = |o: &Proposal| o.point.iter().zip(&point).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+            if surrogate.nearest(&point, fidelity) > NEAREST && self.proposals.iter().all(|o| apart(o) > NEAREST) {
+                self.proposals.push(Proposal { optimism: index, point, expected });
             }
         }
         self.surrogate = Some(surrogate);
-        found
     }
 
     /// The makeable point of largest `merit`, from the best design seen.
-    fn climb(&mut self, run: &SearchRun, space: &Subspace, merit: &dyn Fn(&[f64]) -> f64) -> Option<Vec<f64>> {
+    fn climb(&mut self, run: &SearchRun, space: &Subspace, merit: &dyn Fn(&[f64]) -> f64) -> Option<(f64, Vec<f64>)> {
         let (limits, voxel_mm) = (&run.study.limits, run.study.scan.voxel_mm);
         let mut best: Option<(f64, Vec<f64>)> = None;
         for step in FIRST_STEPS {
@@ -201,7 +227,7 @@ impl Race {
                 evolution.learn(&ranked);
             }
         }
-        best.map(|(_, point)| point)
+        best
     }
 
     /// Learns what became of a proposal. Of one without an equilibrium the rest is supposed as predicted, so that a
@@ -223,7 +249,40 @@ impl Race {
             }
         }
         self.seen.push(Seen { point, fidelity: self.fidelity });
+        self.has_learnt = true;
     }
+
+    /// Takes the proposal of an optimism out.
+    fn take(&mut self, optimism: usize) -> Option<Vec<f64>> {
+        let place = self.proposals.iter().position(|p| p.optimism == optimism)?;
+        // What is left was proposed in the light of what this one will teach.
+        self.has_learnt = true;
+        Some(self.proposals.remove(place).point)
+    }
+}
+
+/// The next designs, each with its race: what looks best of every race that has none solved as finely as proposals
+/// are, else of every optimism those that promise most.
+fn next_designs(races: &mut [Race], rules: &RaceRules) -> Vec<(usize, Vec<f64>)> {
+    let mut designs: Vec<(usize, Vec<f64>)> = Vec::new();
+    for (index, race) in races.iter_mut().enumerate() {
+        if !race.best.is_as_fine {
+            designs.extend(race.take(0).map(|point| (index, point)));
+        }
+    }
+    if !designs.is_empty() {
+        return designs;
+    }
+    for optimism in 0..rules.optimism.len() {
+        let promise = |race: &Race| Some(race.proposals.iter().find(|p| p.optimism == optimism)?.expected);
+        let mut ranked: Vec<(f64, usize)> =
+            races.iter().enumerate().filter_map(|(index, race)| Some((promise(race)?, index))).collect();
+        ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        for (_, index) in ranked.into_iter().take(rules.at_once) {
+            designs.extend(races[index].take(optimism).map(|point| (index, point)));
+        }
+    }
+    designs
 }
 
 impl SearchRun<'_> {
@@ -245,58 +304,44 @@ impl SearchRun<'_> {
             races.extend(best.into_iter().filter_map(|space| Race::of(self, judge, state, space)));
         }
         let Some(like) = state.first_judged().filter(|_| !races.is_empty()).cloned() else { return Ok(()) };
-        let num_rounds = races.len().next_power_of_two().ilog2() as usize + 1;
         let done = AtomicUsize::new(0);
-        for round in 0..num_rounds {
-            let end = total * (round + 1) / num_rounds;
-            while done.load(atomic::Ordering::Relaxed) < end && races.iter().any(|r| !r.is_settled) {
-                self.evaluate_proposals(&mut races, (rules, judge, &like), spaces, &done, state)?;
+        let reference = &judge.reference;
+        while done.load(atomic::Ordering::Relaxed) < total {
+            races.par_iter_mut().for_each(|r| r.propose(self, (reference, &like), &spaces[r.space], rules.optimism));
+            let designs = next_designs(&mut races, rules);
+            if designs.is_empty() {
+                break;
             }
-            races.sort_by(|a, b| b.best.compare(&a.best).then(a.space.cmp(&b.space)));
-            races.truncate(races.len().div_ceil(2));
+            self.evaluate_designs(&mut races, designs, (rules, judge), spaces, &done, state)?;
         }
         Ok(())
     }
 
-    /// The next proposals of every structure that has not settled, evaluated and learnt from.
-    fn evaluate_proposals(
+    /// Designs of some races, evaluated and learnt from.
+    fn evaluate_designs(
         &self,
         races: &mut [Race],
-        (rules, judge, like): (&RaceRules, &Judge, &Judged),
+        designs: Vec<(usize, Vec<f64>)>,
+        (rules, judge): (&RaceRules, &Judge),
         spaces: &[Subspace],
         done: &AtomicUsize,
         state: &mut State,
     ) -> Result<(), SearchError> {
         let reference = &judge.reference;
-        let proposed: Vec<Vec<Vec<f64>>> = races
-            .par_iter_mut()
-            .map(|r| {
-                if r.is_settled {
-                    Vec::new()
-                } else {
-                    r.proposals(self, (reference, like), &spaces[r.space], rules.optimism)
-                }
-            })
-            .collect();
-        let mut batch: Vec<(usize, Vec<f64>)> = Vec::new();
-        for (index, (race, points)) in races.iter_mut().zip(proposed).enumerate() {
-            race.is_settled = points.is_empty();
-            batch.extend(points.into_iter().map(|point| (index, point)));
-        }
         let (best, leader) = (state.history.last().copied(), state.leader());
-        let total = rules.total;
+        let (before, total) = rules.counted;
         let places: Vec<usize> = races.iter().map(|r| r.space).collect();
-        let results: Vec<Option<Attempt>> = batch
+        let results: Vec<Option<Attempt>> = designs
             .par_iter()
             .map(|(race, point)| {
                 let attempt = self.estimated(&spaces[places[*race]].specimen(point), judge.fidelity);
-                let done = (done.fetch_add(1, atomic::Ordering::Relaxed) + 1).min(total);
+                let done = (before + done.fetch_add(1, atomic::Ordering::Relaxed) + 1).min(total);
                 (self.progress)(&Progress { stage: rules.stage, done, total, best, leader: leader.clone() });
                 attempt
             })
             .collect();
         let mut was_stopped = false;
-        for ((race, point), result) in batch.into_iter().zip(results) {
+        for ((race, point), result) in designs.into_iter().zip(results) {
             let space = races[race].space;
             let specimen = spaces[space].specimen(&point);
             let judged = match result {
@@ -317,5 +362,44 @@ impl SearchRun<'_> {
             races[race].learn(reference, point, judged.as_ref());
         }
         if was_stopped { Err(state.stopped(self.study, rules.stage)) } else { Ok(()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn race(space: usize, is_as_fine: bool, expected: &[f64]) -> Race {
+        let proposals = expected.iter().enumerate().map(|(optimism, &expected)| {
+            let point = vec![space as f64, optimism as f64];
+            Proposal { optimism, point, expected }
+        });
+        Race {
+            space,
+            fidelity: Fidelity::Fine,
+            rng: ChaCha8Rng::seed_from_u64(1),
+            seen: Vec::new(),
+            values: Vec::new(),
+            best: Best { is_as_fine, merit: 0.0, point: Vec::new() },
+            surrogate: None,
+            proposals: proposals.collect(),
+            has_learnt: false,
+        }
+    }
+
+    /// What has no fine design gets one first; then what looks best is evaluated, and what could be best, of whatever
+    /// structure.
+    #[test]
+    fn structures_compete_by_what_they_promise() {
+        let rules = RaceRules { optimism: &[0.0, 2.0], ..RaceRules::of_proposals(9) };
+        let mut races = vec![race(0, true, &[0.3, 0.4]), race(1, false, &[0.1, 0.2]), race(2, true, &[0.2, 0.9])];
+        assert_eq!(next_designs(&mut races, &rules), [(1, vec![1.0, 0.0])]);
+        // Only what lost a proposal proposes anew.
+        assert_eq!(races.iter().map(|r| r.has_learnt).collect::<Vec<_>>(), [false, true, false]);
+        races[1].best.is_as_fine = true;
+        assert_eq!(next_designs(&mut races, &rules), [(0, vec![0.0, 0.0]), (2, vec![2.0, 1.0])]);
+        assert_eq!(next_designs(&mut races, &rules), [(2, vec![2.0, 0.0]), (0, vec![0.0, 1.0])]);
+        assert_eq!(next_designs(&mut races, &rules), [(1, vec![1.0, 1.0])]);
+        assert!(next_designs(&mut races, &rules).is_empty());
     }
 }

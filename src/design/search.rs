@@ -15,7 +15,7 @@ use super::objective::Reference;
 use super::propose::RaceRules;
 use super::search_error::SearchError;
 use super::search_run::{Attempt, Judge, Progress, ProgressSink, SearchRun};
-use super::space::{Subspace, subspaces};
+use super::space::{Subspace, Variable, subspaces};
 use super::state::State;
 use super::structure_problem::StructureProblem;
 use super::study::Study;
@@ -23,6 +23,9 @@ use super::unfinished::Unfinished;
 use crate::specimen::Specimen;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Proposals of the solid blocks before anything else is sampled.
+const SOLID_PROPOSALS: usize = 10;
 
 /// What the search found, best first.
 #[derive(Clone, Debug)]
@@ -163,7 +166,7 @@ impl SearchRun<'_> {
     ) -> Result<(), SearchError> {
         let study = self.study;
         let total = study.budget.explore;
-        // The base at every drive limit, if it can be made, and samples of all structures alike; then the race.
+        // The base at every drive limit, if it can be made, and samples of the solid blocks.
         let mut batch: Vec<(usize, Vec<f64>)> = Vec::new();
         for (index, space) in spaces.iter().enumerate() {
             for drive in [base.drive_mm[0], study.drive_range().max] {
@@ -175,14 +178,31 @@ impl SearchRun<'_> {
             }
         }
         let quota = (total / 2).div_ceil(spaces.len().max(1)).max(1);
-        for (index, space) in spaces.iter().enumerate() {
-            for vector in sample(space, &study.limits, study.scan.voxel_mm, quota, study.seed, index as u64) {
-                batch.push((index, vector));
-            }
-        }
+        let is_solid = |space: &Subspace| space.structure.num_holes() == 0;
+        let sampled = |index: usize, known: &[(Variable, f64)]| {
+            let made = (&study.limits, study.scan.voxel_mm);
+            let vectors = sample(&spaces[index], made, quota, (study.seed, index as u64), known);
+            vectors.into_iter().map(move |vector| (index, vector)).collect::<Vec<_>>()
+        };
+        let (solid, holed): (Vec<usize>, Vec<usize>) = (0..spaces.len()).partition(|&s| is_solid(&spaces[s]));
+        batch.extend(solid.iter().flat_map(|&s| sampled(s, &[])));
         self.evaluate_batch(judge, spaces, ("explore", &batch, total), state)?;
-        let left = total.saturating_sub(state.num_evaluations);
-        self.race(&RaceRules::of_samples(left), judge, spaces, state)
+        if !holed.is_empty() {
+            // A good solid block is soon found, and holes do best in a block like it: half of the samples of the other
+            // structures have its dimensions and drive.
+            let (proposals, counted) = (SOLID_PROPOSALS.min(total / 6), (state.num_evaluations, total));
+            self.race(&RaceRules::of_samples(proposals, Some(solid.clone()), counted), judge, spaces, state)?;
+        }
+        let known_of = |index: usize| {
+            let alike = solid.iter().find(|&&s| spaces[s].structure.test == spaces[index].structure.test);
+            alike.and_then(|&s| Some((s, state.best_of(s)?))).map_or(Vec::new(), |(s, vector)| {
+                spaces[s].variables.iter().copied().zip(vector.iter().copied()).collect::<Vec<_>>()
+            })
+        };
+        let batch: Vec<(usize, Vec<f64>)> = holed.iter().flat_map(|&s| sampled(s, &known_of(s))).collect();
+        self.evaluate_batch(judge, spaces, ("explore", &batch, total), state)?;
+        let so_far = state.num_evaluations;
+        self.race(&RaceRules::of_samples(total.saturating_sub(so_far), None, (so_far, total)), judge, spaces, state)
     }
 
     fn evaluate_batch(

@@ -66,11 +66,21 @@ fn threads_and_stops_do_not_change_the_result() {
     assert!(stops > 0, "the run was never stopped");
 }
 
-/// Every design that the search proposes keeps every geometry limit.
+/// Every design that the search proposes keeps every geometry limit; what it tells of its progress grows.
 #[test]
 fn proposals_keep_the_limits() {
     let study = small_study();
-    let found = search(&study, &Checkpoint::in_memory(), &quiet, &|| false).expect("the search succeeds");
+    let told = std::sync::Mutex::new(Vec::new());
+    let listener = |p: &Progress| told.lock().expect("no thread panicked").push((p.stage, p.done, p.total));
+    // One thread tells it in order.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
+    let found =
+        pool.install(|| search(&study, &Checkpoint::in_memory(), &listener, &|| false)).expect("the search succeeds");
+    for pair in told.into_inner().expect("no thread panicked").windows(2) {
+        let [(stage, before, of), (next, after, of_next)] = [pair[0], pair[1]];
+        assert!(stage != next || before < after && of == of_next || before == of, "{pair:?}");
+        assert!(after <= of_next, "{pair:?}");
+    }
     for candidate in &found.candidates {
         assert!(is_makeable(&candidate.specimen, &study.limits, study.scan.voxel_mm), "{:?}", candidate.specimen);
     }
@@ -374,7 +384,7 @@ fn random_studies_propose_only_what_can_be_made() {
         let study = random_study(&mut draw);
         for (stream, space) in subspaces(&study).iter().enumerate() {
             assert!(space.structure.num_holes() <= study.limits.max_holes.unwrap_or(usize::MAX));
-            for vector in sample(space, &study.limits, study.scan.voxel_mm, 4, study.seed, stream as u64) {
+            for vector in sample(space, (&study.limits, study.scan.voxel_mm), 4, (study.seed, stream as u64), &[]) {
                 let specimen = space.specimen(&vector);
                 let margins = study.limits.check_geometry(&specimen, study.scan.voxel_mm);
                 assert!(margins.iter().all(|m| m.is_satisfied), "{margins:?} {specimen:?}");

@@ -119,6 +119,11 @@ impl State {
         found
     }
 
+    /// The best design of a structure.
+    pub fn best_of(&self, space: usize) -> Option<&Vec<f64>> {
+        self.order().into_iter().find(|&index| self.points[index].0 == space).map(|index| &self.points[index].1)
+    }
+
     /// The designs of a structure, how finely they were solved and what they were judged, in order.
     pub fn seen_of(&self, space: usize) -> Vec<(&Vec<f64>, Fidelity, &Judged)> {
         let of_space = (0..self.points.len()).filter(|&index| self.points[index].0 == space);

@@ -13,12 +13,18 @@ use super::trace::Trace;
 use crate::calibration::Observed;
 use crate::material::Material;
 use crate::rate::BeforeAfter;
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use utoipa::ToSchema;
 
 /// Steps of the fit of a recording's own motions: Gauss and Newton's on a nearly quadratic form.
 const NUM_STEPS: usize = 4;
+
+/// A number of the rig of which the plates' shifts leave less than this part of the information stays as the whole fit
+/// found it: a rotation about the plates' normal turns the drive within their plane, which shifts do as well (on the
+/// published blocks a hundredth is left of it, and a half or more of the two others).
+const LEAST_INFORMATION: f64 = 0.1;
 
 /// What one recording's model says of another recording.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -221,8 +227,10 @@ impl Predictor<'_> {
                 normal_system(&metric, &case.measured, &prediction, material, &all, &case.found.settings, &columns);
             let first = matrix.nrows() - num_free;
             let block = matrix.view((first, first), (num_free, num_free)).into_owned();
-            let Some(factor) = block.cholesky() else { return Ok(None) };
-            let step = factor.solve(&gradient.rows(first, num_free).into_owned());
+            let is_of_rig = all[num_held..].iter().flat_map(|c| c.cause.parameters()).map(|p| p.is_of_rig);
+            let Some(step) = step_of(block, gradient.rows(first, num_free).into_owned(), is_of_rig) else {
+                return Ok(None);
+            };
             let mut steps = step.iter();
             for free in &mut all[num_held..] {
                 for ((value, p), s) in free.values.iter_mut().zip(free.cause.parameters()).zip(steps.by_ref()) {
@@ -232,6 +240,26 @@ impl Predictor<'_> {
         }
         Ok(Some(all))
     }
+}
+
+/// The step of a fit with this normal system; numbers of the rig that the others imitate do not move
+/// ([`LEAST_INFORMATION`]). `None` where the system is singular.
+fn step_of(
+    mut matrix: DMatrix<f64>,
+    mut slope: DVector<f64>,
+    is_of_rig: impl Iterator<Item = bool>,
+) -> Option<DVector<f64>> {
+    let covariance = matrix.clone().cholesky()?.inverse();
+    for (i, of_rig) in is_of_rig.enumerate() {
+        let own = 1.0 / (matrix[(i, i)] * covariance[(i, i)]);
+        if of_rig && own < LEAST_INFORMATION {
+            slope[i] = 0.0;
+            matrix.row_mut(i).fill(0.0);
+            matrix.column_mut(i).fill(0.0);
+            matrix[(i, i)] = 1.0;
+        }
+    }
+    Some(matrix.cholesky()?.solve(&slope))
 }
 
 /// What holds for another recording, too.
@@ -294,4 +322,23 @@ fn misfit(case: &Case, predicted: &Trace) -> Misfit {
         .reduce(f64::max);
     let chi2_per_datum = leftover(&case.found.observed, &left, &case.metric).chi2_per_datum;
     Misfit { rms_mm: (sum / count.max(1) as f64).sqrt(), force_relative, chi2_per_datum }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A number of the rig that another one imitates stays, one that nothing imitates moves, and so does one that is not
+    /// the rig's.
+    #[test]
+    fn what_shifts_imitate_stays() {
+        let matrix = DMatrix::from_row_slice(3, 3, &[1.0, 0.0, 0.99, 0.0, 2.0, 0.0, 0.99, 0.0, 1.0]);
+        let slope = DVector::from_column_slice(&[1.0, 4.0, 0.5]);
+        let step = step_of(matrix.clone(), slope.clone(), [true, true, false].into_iter()).expect("regular");
+        // 1 − 0.99² = 0.02 of the first is its own.
+        assert_eq!(step.as_slice(), [0.0, 2.0, 0.5]);
+        let free = step_of(matrix.clone(), slope.clone(), [false; 3].into_iter()).expect("regular");
+        assert!((&matrix * free - slope).amax() < 1e-12);
+        assert!(step_of(DMatrix::zeros(2, 2), DVector::zeros(2), [true; 2].into_iter()).is_none());
+    }
 }

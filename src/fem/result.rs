@@ -4,6 +4,7 @@ use super::contact::Contact;
 use super::equilibrium::Equilibrium;
 use super::forward_model::ForwardModel;
 use super::options::Statistics;
+use crate::mesh::discretisation_bound;
 use serde::{Deserialize, Serialize};
 
 /// Forces at each drive, with what they rest on.
@@ -40,11 +41,17 @@ pub struct SolveStep {
     pub drive_mm: f64,
     /// Force in the direction of the drive on the moved face, all samples together, N.
     pub force_n: f64,
+    /// What the mesh may put the force wrong by, N: in 95 of 100 cases no more. Absent where no coarser mesh was solved.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force_discretisation_n: Option<f64>,
     /// Where there are several kinds of samples: the force of all samples of each kind, N.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub force_by_kind_n: Vec<f64>,
     /// Force along +y on the moved face, all samples together, N.
     pub normal_force_n: f64,
+    /// What the mesh may put the force along +y wrong by, N, as `force_discretisation_n`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal_force_discretisation_n: Option<f64>,
     /// |sum of the forces on both faces| / |force|.
     pub reaction_imbalance: f64,
     /// Largest principal stretch at a quadrature point.
@@ -93,13 +100,28 @@ impl SolveResult {
         all
     }
 
+    /// Bounds what the mesh puts the forces wrong by; `coarser` are the forces (along the drive and along +y) at every
+    /// drive on the meshes of [`crate::mesh::COARSER`], `None` where such a mesh has no solution.
+    pub fn bound_forces(&mut self, coarser: &[Option<Vec<[f64; 2]>>; 2]) {
+        for (index, step) in self.steps.iter_mut().enumerate() {
+            let on_coarser = |axis: usize| {
+                let of_mesh = |forces: &Option<Vec<[f64; 2]>>| Some(forces.as_ref()?.get(index)?[axis]);
+                [of_mesh(&coarser[0]), of_mesh(&coarser[1])]
+            };
+            step.force_discretisation_n = discretisation_bound(step.force_n, on_coarser(0));
+            step.normal_force_discretisation_n = discretisation_bound(step.normal_force_n, on_coarser(1));
+        }
+    }
+
     /// Adds an equilibrium; `extremes` are the largest principal stretch, the smallest and the largest det F.
     pub fn push(&mut self, equilibrium: &Equilibrium, extremes: [f64; 3], contact: Contact, statistics: Statistics) {
         self.steps.push(SolveStep {
             drive_mm: equilibrium.drive_mm,
             force_n: equilibrium.force_n,
+            force_discretisation_n: None,
             force_by_kind_n: Vec::new(),
             normal_force_n: equilibrium.normal_force_n,
+            normal_force_discretisation_n: None,
             reaction_imbalance: equilibrium.reaction_imbalance,
             largest_principal_stretch: extremes[0],
             jacobian_range: [extremes[1], extremes[2]],

@@ -5,7 +5,7 @@
 //! the processor seconds of a whole job over those of one equilibrium at each of its drives.
 
 use super::request::RecordingOutline;
-use crate::mesh::{MeshOptions, mesh_specimen};
+use crate::mesh::{MeshOptions, coarser_meshes, mesh_specimen};
 use crate::specimen::Specimen;
 use crate::voxel::{Surface, VoxelGrid};
 
@@ -51,6 +51,17 @@ pub(super) fn seconds(
         Some(seconds_per_drive(num_nodes, num_voxels) * num_drives as f64)
     };
     specimen.samples().iter().map(of_sample).sum()
+}
+
+/// The same on the coarser meshes that say what `mesh` may put the results wrong by; nothing where a sample cannot be
+/// meshed so coarsely.
+pub(super) fn of_coarser_meshes(
+    specimen: &Specimen,
+    mesh: &MeshOptions,
+    scan: Option<([f64; 3], Option<Surface>)>,
+    num_drives: usize,
+) -> f64 {
+    coarser_meshes(mesh, specimen).iter().filter_map(|mesh| seconds(specimen, mesh, scan, num_drives)).sum()
 }
 
 /// Processor seconds of `count` tasks, of which `of` estimates one by its index: from the first, the middle and the

@@ -14,7 +14,7 @@ use crate::report::{
 };
 use crate::sensitivity::{
     DriveSelection, Evaluation, EvaluationError, EvaluationMaps, EvaluationOptions, Fixture, Protocol, ScanSettings,
-    evaluate_fixture,
+    bound_discretisation, evaluate_fixture,
 };
 use crate::specimen::Specimen;
 use crate::voxel::VoxelError;
@@ -64,6 +64,10 @@ pub struct EvaluationRequest {
     /// probability (`detectable`). It takes one more equilibrium of the whole sample at every drive.
     #[serde(default)]
     pub has_detectable: bool,
+    /// Whether coarser meshes say what the mesh may put the numbers wrong by. It takes about half as long again.
+    #[serde(default = "defaults::yes")]
+    #[schema(default = defaults::yes)]
+    pub has_discretisation: bool,
     /// Whether pictures, fields and drawings are made; without them there are numbers alone.
     #[serde(default = "defaults::yes")]
     #[schema(default = defaults::yes)]
@@ -170,6 +174,7 @@ impl CheckedEvaluation {
         serde_json::json!({
             "specimen": r.specimen, "material": r.material, "scan": r.scan, "drives": self.drives,
             "mesh": self.options().mesh, "protocol": r.protocol, "has_detectable": r.has_detectable,
+            "has_discretisation": r.has_discretisation,
         })
     }
 
@@ -197,8 +202,12 @@ impl Run for CheckedEvaluation {
             DriveSelection::MedianStretch(_) => MEDIAN_STRETCH_SOLVES,
         };
         let EvaluationRequest { specimen, scan, has_detectable, .. } = &self.request;
-        let evaluation =
-            cost::seconds(specimen, &self.options().mesh, Some((scan.voxel_mm, scan.surface)), num_drives)?;
+        let seen = Some((scan.voxel_mm, scan.surface));
+        let mesh = self.options().mesh;
+        let mut evaluation = cost::seconds(specimen, &mesh, seen, num_drives)?;
+        if self.request.has_discretisation {
+            evaluation += cost::of_coarser_meshes(specimen, &mesh, seen, self.drives.count());
+        }
         let detection = if *has_detectable { detection_seconds(specimen, scan, self.drives.count())? } else { 0.0 };
         Some(evaluation + detection)
     }
@@ -231,6 +240,11 @@ impl Run for CheckedEvaluation {
                 .remedy(other.to_string())
                 .into(),
         })?;
+        if self.request.has_discretisation {
+            context.step("coarser meshes", 1, 2);
+            bound_discretisation(&mut evaluation, specimen, material, &options, &cancelled);
+            context.stop_if_cancelled()?;
+        }
         if self.request.has_detectable {
             context.step("what would be found", 1, 2);
             evaluation.detectable = detectable_sizes(specimen, material, protocol, &evaluation, context)?;

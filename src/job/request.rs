@@ -140,6 +140,14 @@ impl Context<'_> {
         self.progress(&Progress::new(stage, done, total));
     }
 
+    /// Ends a job that was cancelled.
+    ///
+    /// # Errors
+    /// It was.
+    pub fn stop_if_cancelled(&self) -> Result<(), JobError> {
+        if self.is_cancelled() { Err(JobError::stopped()) } else { Ok(()) }
+    }
+
     /// A failed computation, or a stop where the job was cancelled.
     pub fn failed(&self, error: &dyn std::fmt::Display) -> JobError {
         JobError::unless_cancelled(self.is_cancelled(), error)

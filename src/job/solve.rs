@@ -4,11 +4,11 @@ use super::array_files::{add_arrays, array_formats};
 use super::subject::{check_meshes, driven, model_of, name_of_sample};
 use super::{Context, JobError, Outcome, RecordingOutline, Request, ResultSchema, Run, cost, defaults, summary};
 use crate::export::{FieldFormat, FieldSeries, solution_arrays, vtkhdf_file};
-use crate::fem::{Equilibrium, QuadraturePoint, SolveOptions, SolveResult};
+use crate::fem::{Equilibrium, ForwardModel, QuadraturePoint, SolveOptions, SolveResult};
 use crate::field::FieldError;
 use crate::kinematics::decompose;
 use crate::material::Material;
-use crate::mesh::{Mesh, MeshSize};
+use crate::mesh::{Mesh, MeshOptions, MeshSize, coarser_meshes};
 use crate::report::{deformed_picture, pvd, solution_fields, vtu_of};
 use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
@@ -48,6 +48,10 @@ pub struct SolveRequest {
     /// Mesh the whole specimen even where it has mirror planes.
     #[serde(default)]
     pub is_whole: bool,
+    /// Whether coarser meshes say what the mesh may put the forces wrong by. It takes about half as long again.
+    #[serde(default = "defaults::yes")]
+    #[schema(default = defaults::yes)]
+    pub has_discretisation: bool,
     /// Drives at which the fields are written: every one (at most 100), or the last.
     #[serde(default)]
     #[schema(default = FieldDrives::default)]
@@ -101,16 +105,25 @@ impl Run for CheckedSolve {
     }
 
     fn estimated_seconds(&self, _: &[RecordingOutline]) -> Option<f64> {
-        let mut mesh = self.request.mesh.options(&self.specimen);
-        mesh.use_mirror &= !self.request.is_whole;
-        cost::seconds(&self.specimen, &mesh, None, self.specimen.drive_mm.len())
+        let mesh = self.mesh_options(&self.specimen);
+        let num_drives = self.specimen.drive_mm.len();
+        let coarser = match self.request.has_discretisation {
+            true => cost::of_coarser_meshes(&self.specimen, &mesh, None, num_drives),
+            false => 0.0,
+        };
+        Some(cost::seconds(&self.specimen, &mesh, None, num_drives)? + coarser)
     }
 
     fn run(&self, context: &Context) -> Result<Outcome, JobError> {
         let samples = self.specimen.samples();
         let solved = samples.iter().map(|s| self.solve(s, samples.len(), context)).collect::<Result<Vec<_>, _>>()?;
         let (results, solved): (Vec<SolveResult>, Vec<Solved>) = solved.into_iter().unzip();
-        let result = SolveResult::of_samples(results, &context.input_hash);
+        let mut result = SolveResult::of_samples(results, &context.input_hash);
+        if self.request.has_discretisation {
+            context.step("coarser meshes", self.specimen.drive_mm.len(), self.specimen.drive_mm.len());
+            result.bound_forces(&self.forces_on_coarser_meshes(&samples, context));
+            context.stop_if_cancelled()?;
+        }
         let mut outcome = Outcome::new("solve.json", &result, summary::solve(&self.specimen.name, &result))?;
         for (index, sample) in solved.iter().enumerate() {
             let name = |stem: &str| name_of_sample(stem, index);
@@ -149,6 +162,35 @@ struct Solved {
 }
 
 impl CheckedSolve {
+    /// How one of the samples is meshed.
+    fn mesh_options(&self, sample: &Specimen) -> MeshOptions {
+        let options = self.request.mesh.options(sample);
+        MeshOptions { use_mirror: options.use_mirror && !self.request.is_whole, ..options }
+    }
+
+    /// Forces of all samples together, along the drive and along +y, at every drive on the meshes of
+    /// [`crate::mesh::COARSER`]; `None` where such a mesh has no solution.
+    fn forces_on_coarser_meshes(&self, samples: &[Specimen], context: &Context) -> [Option<Vec<[f64; 2]>>; 2] {
+        let on_mesh = |coarser: usize| {
+            let mut forces = vec![[0.0; 2]; self.specimen.drive_mm.len()];
+            for sample in samples {
+                let mesh = coarser_meshes(&self.mesh_options(sample), sample)[coarser];
+                let mut model = ForwardModel::of_specimen(sample, &mesh).ok()?;
+                let mut last: Option<Equilibrium> = None;
+                for (sum, &drive) in forces.iter_mut().zip(&sample.drive_mm) {
+                    let (material, options) = (&self.request.material, SolveOptions::default());
+                    let found =
+                        model.solve(material, drive, last.as_ref(), &options, &|| context.is_cancelled()).ok()?;
+                    sum[0] += found.force_n;
+                    sum[1] += found.normal_force_n;
+                    last = Some(found);
+                }
+            }
+            Some(forces)
+        };
+        rayon::join(|| on_mesh(0), || on_mesh(1)).into()
+    }
+
     /// One of `num_samples` kinds of samples at all drives.
     fn solve(
         &self,
@@ -157,9 +199,7 @@ impl CheckedSolve {
         context: &Context,
     ) -> Result<(SolveResult, Solved), JobError> {
         let material = &self.request.material;
-        let mut options = self.request.mesh.options(sample);
-        options.use_mirror &= !self.request.is_whole;
-        let mut model = model_of(sample, &options, context)?;
+        let mut model = model_of(sample, &self.mesh_options(sample), context)?;
         let mut result = SolveResult::new(&model, context.input_hash.clone());
         let mut last: Option<Equilibrium> = None;
         let (mut fields_of_drives, num_drives) = (Vec::new(), sample.drive_mm.len());

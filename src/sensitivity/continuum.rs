@@ -45,6 +45,7 @@ pub fn integrate_over_quadrature(
                 mean_per_voxel: integral / volume,
                 volume_integral: integral,
                 surface_integral: None,
+                discretisation_relative: None,
             }
         })
         .collect()

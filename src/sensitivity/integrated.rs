@@ -25,6 +25,10 @@ pub struct IntegratedSensitivity {
     /// the volume.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub surface_integral: Option<f64>,
+    /// What the mesh may put 𝒮 wrong by, relative to it: in 95 of 100 cases no more. Absent where no coarser mesh was
+    /// solved.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub discretisation_relative: Option<f64>,
 }
 
 impl IntegratedSensitivity {
@@ -32,7 +36,14 @@ impl IntegratedSensitivity {
     pub(super) fn zero_like(like: &IntegratedSensitivity) -> IntegratedSensitivity {
         let surface_integral = like.surface_integral.map(|_| 0.0);
         let parameter = like.parameter.clone();
-        IntegratedSensitivity { parameter, sum: 0.0, mean_per_voxel: 0.0, volume_integral: 0.0, surface_integral }
+        IntegratedSensitivity {
+            parameter,
+            sum: 0.0,
+            mean_per_voxel: 0.0,
+            volume_integral: 0.0,
+            surface_integral,
+            discretisation_relative: None,
+        }
     }
 
     /// Adds the sums and integrals of `count` blocks like `other`'s; means are left as they are.
@@ -100,6 +111,7 @@ pub fn integrate_over_voxels(
                 mean_per_voxel: sum / states.len().max(1) as f64,
                 volume_integral: integral * voxel_volume,
                 surface_integral: subset_area.map(|area| integral * area),
+                discretisation_relative: None,
             }
         })
         .collect()

@@ -3,6 +3,7 @@
 mod continuum;
 mod covariance;
 mod detectable_size;
+mod discretisation;
 mod drives;
 mod error;
 mod evaluation;
@@ -25,6 +26,7 @@ pub use continuum::{
 };
 pub use covariance::{Covariance, Criterion, IDENTIFIABILITY_LIMIT, PromisedSd};
 pub use detectable_size::{DetectableSize, DetectionLimit};
+pub use discretisation::bound_discretisation;
 pub use drives::DriveSelection;
 pub use error::EvaluationError;
 pub use evaluation::{EvaluationMaps, SampleMaps, evaluate, evaluate_fixture, unknowns_of};

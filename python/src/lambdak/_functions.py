@@ -102,6 +102,7 @@ def solve(
     fields: Optional[str] = None,
     arrays: Optional[Sequence[str]] = None,
     is_whole: Optional[bool] = None,
+    has_discretisation: Optional[bool] = None,
     folder: Optional[PathLike] = None,
     threads: Optional[int] = None,
     on_progress: Optional[OnProgress] = None,
@@ -118,6 +119,7 @@ def solve(
         fields=fields,
         arrays=_listed(arrays),
         is_whole=is_whole,
+        has_discretisation=has_discretisation,
     )
     done = _run("solve", request, folder, threads, on_progress)
     return Solution.of(done.result, done.folder)
@@ -136,6 +138,7 @@ def evaluate(
     has_files: Optional[bool] = None,
     arrays: Optional[Sequence[str]] = None,
     is_whole: Optional[bool] = None,
+    has_discretisation: Optional[bool] = None,
     folder: Optional[PathLike] = None,
     threads: Optional[int] = None,
     on_progress: Optional[OnProgress] = None,
@@ -144,7 +147,8 @@ def evaluate(
 
     `has_files=False` makes numbers alone, for loops over designs. `has_detectable=True` says how small errors of the
     experiment may be and still be named by a diagnosis (`detectable` of the result). `arrays` names further files in
-    `folder`: `"mat"`, `"hdf5"`, `"vtkhdf"`.
+    `folder`: `"mat"`, `"hdf5"`, `"vtkhdf"`. `has_discretisation=False` leaves out the coarser meshes that say what the
+    mesh may put the numbers wrong by.
     """
     request = given(
         specimen=specimen,
@@ -158,6 +162,7 @@ def evaluate(
         has_files=has_files,
         arrays=_listed(arrays),
         is_whole=is_whole,
+        has_discretisation=has_discretisation,
     )
     done = _run("evaluate", request, folder, threads, on_progress)
     return Evaluation.of(done.result, done.folder)

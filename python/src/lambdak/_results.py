@@ -107,6 +107,8 @@ class SolveStep:
     force_n: float
     normal_force_n: float
     largest_principal_stretch: float
+    force_discretisation_n: Optional[float] = None
+    """What the mesh may put the force wrong by."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +121,9 @@ class Solution(Result):
     def of(cls, raw: Mapping[str, Any], folder: Path) -> "Solution":
         """From the program's JSON."""
         names = ("drive_mm", "force_n", "normal_force_n", "largest_principal_stretch")
-        return cls(raw, folder, (), steps=tuple(SolveStep(*(step[name] for name in names)) for step in raw["steps"]))
+        bound = "force_discretisation_n"
+        steps = tuple(SolveStep(*(step[name] for name in names), step.get(bound)) for step in raw["steps"])
+        return cls(raw, folder, (), steps=steps)
 
     def _rows(self) -> List[Row]:
         return [dict(vars(step)) for step in self.steps]
@@ -133,6 +137,8 @@ class PromisedSd:
     value: float
     relative_sd: float
     identifiable: bool
+    discretisation_relative: Optional[float] = None
+    """What the mesh may put it wrong by, relative to it."""
 
 
 @dataclass(frozen=True)
@@ -145,6 +151,8 @@ class IntegratedSensitivity:
     volume_integral: float
     surface_integral: Optional[float] = None
     """Where cameras see a face: over its area in place of a volume."""
+    discretisation_relative: Optional[float] = None
+    """What the mesh may put them wrong by, relative to them."""
 
 
 @dataclass(frozen=True)
@@ -160,11 +168,19 @@ class EvaluationStep:
     promised_sd: Mapping[str, PromisedSd]
     normal_force_n: Optional[float] = None
     """Across the plates of a double-lap test, positive where it pulls them together."""
+    force_discretisation_n: Optional[float] = None
+    """What the mesh may put the force wrong by."""
 
 
 def _promised(entries: Iterable[Mapping[str, Any]]) -> Dict[str, PromisedSd]:
     return {
-        p["parameter"]: PromisedSd(p["parameter"], _number(p["value"]), _number(p["relative_sd"]), p["identifiable"])
+        p["parameter"]: PromisedSd(
+            p["parameter"],
+            _number(p["value"]),
+            _number(p["relative_sd"]),
+            p["identifiable"],
+            p.get("discretisation_relative"),
+        )
         for p in entries
     }
 
@@ -180,6 +196,7 @@ def _evaluation_step(step: Mapping[str, Any]) -> EvaluationStep:
         integrated_sensitivity=sensitivity,
         promised_sd=_promised(step["promised_sd"]),
         normal_force_n=step.get("normal_force_n"),
+        force_discretisation_n=step.get("force_discretisation_n"),
     )
 
 

@@ -21,9 +21,10 @@ pub(in crate::job) fn evaluation(name: &str, evaluation: &Evaluation) -> String 
     }
     for (index, step) in evaluation.steps.iter().enumerate() {
         text += &format!(
-            "\ndrive {} mm: force {} N, {} {seen}, median stretch {}, largest {}\n",
+            "\ndrive {} mm: force {} N{}, {} {seen}, median stretch {}, largest {}\n",
             step.drive_mm,
             num(step.force_n, 4),
+            step.force_discretisation_n.map_or_else(String::new, |bound| format!(" (mesh ± {} N)", num(bound, 2))),
             step.num_voxels,
             num(step.median_stretch, 4),
             num(step.largest_voxel_stretch, 4)
@@ -39,14 +40,15 @@ pub(in crate::job) fn evaluation(name: &str, evaluation: &Evaluation) -> String 
             let way = way_across_plates(force_n);
             text += &format!("  force across the plates: {} N, which {way}\n", num(force_n.abs(), 4));
         }
-        text += &format!("  parameter   integrated sensitivity: sum   mean per voxel  {integral:>22}\n");
+        text += &format!("  parameter   integrated sensitivity: sum   mean per voxel  {integral:>22}   mesh\n");
         for s in &step.integrated_sensitivity {
             text += &format!(
-                "  {:<10} {:>29} {:>16} {:>23}\n",
+                "  {:<10} {:>29} {:>16} {:>23}   {}\n",
                 s.parameter,
                 num(s.sum, 4),
                 num(s.mean_per_voxel, 5),
-                num(s.surface_integral.unwrap_or(s.volume_integral), 4)
+                num(s.surface_integral.unwrap_or(s.volume_integral), 4),
+                within(s.discretisation_relative)
             );
         }
     }
@@ -87,14 +89,20 @@ fn promised(list: &[PromisedSd]) -> String {
     for p in list {
         text += &match (p.value, p.relative_sd) {
             (Some(sd), Some(relative)) => format!(
-                "  {:<10} {:>12} ({} %){}\n",
+                "  {:<10} {:>12} ({} %{}){}\n",
                 p.parameter,
                 num(sd, 5),
                 num(100.0 * relative, 4),
+                p.discretisation_relative.map_or_else(String::new, |bound| format!("; mesh {}", within(Some(bound)))),
                 if p.identifiable { "" } else { "  not identifiable" }
             ),
             _ => format!("  {:<10} not determined by these data\n", p.parameter),
         };
     }
     text
+}
+
+/// A bound of the mesh's error relative to the number that it stands behind.
+fn within(bound: Option<f64>) -> String {
+    bound.map_or_else(String::new, |bound| format!("± {} %", num(100.0 * bound, 2)))
 }

@@ -11,6 +11,8 @@ export function evaluation(result, files, request) {
   const last = result.steps.at(-1);
   // Bars have no plates, and no force across them.
   const across = Number.isFinite(last.normal_force_n) ? [["Across the plates, N", (s) => s.normal_force_n]] : [];
+  const isBounded = result.steps.some((s) => Number.isFinite(s.force_discretisation_n));
+  const mesh = isBounded ? [[term("Mesh, N", GLOSSARY["mesh error"]), (s) => `± ${digits(s.force_discretisation_n, 2)}`]] : [];
   const maps = [...files.keys()].filter((n) => /^map-sensitivity/.test(n));
   return [
     h(
@@ -23,10 +25,18 @@ export function evaluation(result, files, request) {
         [digits(result.largest_principal_stretch, 3), "largest stretch", GLOSSARY["largest stretch"]],
       ]),
       table(
-        ["Drive, mm", "Force, N", ...across.map(([words]) => words), "Voxels", "Median stretch"],
+        [
+          "Drive, mm",
+          "Force, N",
+          ...mesh.map(([words]) => words),
+          ...across.map(([words]) => words),
+          "Voxels",
+          "Median stretch",
+        ],
         result.steps.map((s) => [
           digits(s.drive_mm, 3),
           digits(s.force_n, 4),
+          ...mesh.map(([, of]) => of(s)),
           ...across.map(([, of]) => digits(of(s), 4)),
           many(s.num_voxels),
           digits(s.median_stretch, 4),

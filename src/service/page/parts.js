@@ -59,25 +59,42 @@ export const numbered = (files, pattern) =>
     .filter(Boolean)
     .sort((a, b) => a[0].localeCompare(b[0], "en", { numeric: true }));
 
+/** A column of what the mesh may put the rows' numbers wrong by, where it is known. */
+function meshColumn(rows) {
+  const isKnown = rows.some((row) => Number.isFinite(row.discretisation_relative));
+  return isKnown
+    ? { heads: [term("Mesh", GLOSSARY["mesh error"])], cells: (row) => [`± ${percent(row.discretisation_relative, 2)}`] }
+    : { heads: [], cells: () => [] };
+}
+
 /** Promised standard deviations. */
 export function promised(list) {
   const meaning = GLOSSARY["promised deviation"];
+  const mesh = meshColumn(list);
   return table(
-    ["Parameter", term("Promised deviation", meaning), "Relative", ""],
+    ["Parameter", term("Promised deviation", meaning), "Relative", ...mesh.heads, ""],
     list.map((p) => [
       symbol(p.parameter),
       withUnit(digits(p.value, 2), unitOf(p.parameter)),
       percent(p.relative_sd, 2),
+      ...mesh.cells(p),
       p.identifiable ? "" : h("span", { class: "bad" }, "not identifiable"),
     ]),
-    [3],
+    [3 + mesh.heads.length],
   );
 }
 
 /** Integrated sensitivities of a drive. */
 export function sensitivities(step) {
+  const mesh = meshColumn(step.integrated_sensitivity);
   return table(
-    ["Parameter", term("𝒮, sum", GLOSSARY["integrated sensitivity 𝒮"]), "Mean per voxel", "Volume integral"],
+    [
+      "Parameter",
+      term("𝒮, sum", GLOSSARY["integrated sensitivity 𝒮"]),
+      "Mean per voxel",
+      "Volume integral",
+      ...mesh.heads,
+    ],
     step.integrated_sensitivity.map((v) => [
       symbol(v.parameter),
       withUnit(digits(v.sum, 3), sensitivityUnit(v.parameter)),
@@ -86,6 +103,7 @@ export function sensitivities(step) {
         digits(v.surface_integral ?? v.volume_integral, 3),
         [sensitivityUnit(v.parameter), v.surface_integral === undefined ? "mm³" : "mm²"].filter(Boolean).join(" "),
       ),
+      ...mesh.cells(v),
     ]),
   );
 }

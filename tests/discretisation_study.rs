@@ -1,0 +1,116 @@
+//! How often the bounds of discretisation hold, over random specimens, materials and drives; the table is in
+//! docs/verification.md. `cargo test --test discretisation_study -- --ignored --nocapture` (an hour of two cores); CASES
+//! sets how many, SEED which.
+
+mod common;
+
+use common::{Random, random_material, random_specimen};
+use lambdak::material::Material;
+use lambdak::mesh::MeshOptions;
+use lambdak::sensitivity::{
+    DriveSelection, Evaluation, EvaluationOptions, Fixture, PartialVoxels, ScanSettings, bound_discretisation,
+    evaluate_fixture,
+};
+use lambdak::specimen::Specimen;
+use rayon::prelude::*;
+use std::time::{Duration, Instant};
+
+/// Element size of the mesh that the standard one is compared with.
+const REFERENCE: f64 = 0.6;
+
+/// What is left of an error of the second order, that of forces here, is REFERENCE² of it: the difference to the
+/// reference is this part of the error.
+const PART_SEEN: f64 = 1.0 - REFERENCE * REFERENCE;
+
+/// A case whose reference takes longer is left out and counted.
+const PATIENCE: Duration = Duration::from_secs(200);
+
+/// A figure: which kind it is, its relative error, and its bound.
+struct Bounded {
+    kind: &'static str,
+    error: f64,
+    bound: f64,
+}
+
+const KINDS: [&str; 3] = ["force", "integrated sensitivity", "promised standard deviation"];
+
+/// One or two terms (one scan tells no three apart), at most two holes, a quarter to four fifths of the largest drive.
+fn random_case(random: &mut Random) -> (Specimen, Material) {
+    loop {
+        let (mut specimen, material) = (random_specimen(random), random_material(random));
+        if material.terms.len() < 3 && specimen.holes.len() < 3 {
+            specimen.drive_mm[0] *= random.between(0.25, 0.8);
+            return (specimen, material);
+        }
+    }
+}
+
+fn evaluated(specimen: &Specimen, material: &Material, options: &EvaluationOptions) -> Option<Evaluation> {
+    let scan = ScanSettings {
+        voxel_mm: [1.0, 0.1875, 0.75],
+        noise_sd_mm: [0.05; 3],
+        force_sd_n: 0.02,
+        partial_voxels: PartialVoxels::Uniform,
+        surface: None,
+    };
+    let start = Instant::now();
+    let is_over = || start.elapsed() > PATIENCE;
+    let mut fixture = Fixture::new(specimen, &scan, options).ok()?;
+    let drives = DriveSelection::DriveMm(specimen.drive_mm.clone());
+    evaluate_fixture(&mut fixture, material, &drives, &[], options, &is_over).ok().map(|(evaluation, _)| evaluation)
+}
+
+/// The figures of a case; `None` where the standard mesh or the reference has no equilibrium.
+fn figures((specimen, material): &(Specimen, Material)) -> Option<Vec<Bounded>> {
+    let options = EvaluationOptions::standard(specimen);
+    let mut own = evaluated(specimen, material, &options)?;
+    bound_discretisation(&mut own, specimen, material, &options, &|| false);
+    let mesh = MeshOptions { max_elements: 1_000_000, ..MeshOptions::scaled(specimen, REFERENCE) };
+    let reference = evaluated(specimen, material, &EvaluationOptions { mesh, ..options })?;
+    let error = |own: f64, fine: f64| ((own - fine) / (PART_SEEN * own)).abs();
+    let (step, fine) = (&own.steps[0], &reference.steps[0]);
+    let bound = step.force_discretisation_n.map(|b| b / step.force_n.abs());
+    let mut figures = vec![(KINDS[0], error(step.force_n, fine.force_n), bound)];
+    for (own, fine) in step.integrated_sensitivity.iter().zip(&fine.integrated_sensitivity) {
+        figures.push((KINDS[1], error(own.volume_integral, fine.volume_integral), own.discretisation_relative));
+    }
+    for (own, fine) in own.promised_sd.iter().zip(&reference.promised_sd).filter(|(p, _)| p.parameter != "kappa") {
+        if let (Some(sd), Some(of_fine)) = (own.value, fine.value) {
+            figures.push((KINDS[2], error(sd, of_fine), own.discretisation_relative));
+        }
+    }
+    // Where neither coarser mesh has an equilibrium there is no bound to judge.
+    Some(figures.into_iter().filter_map(|(kind, error, bound)| Some(Bounded { kind, error, bound: bound? })).collect())
+}
+
+#[test]
+#[ignore = "an hour of computing"]
+fn random_cases() {
+    let stated = |name: &str| std::env::var(name).ok().and_then(|v| v.parse().ok());
+    let mut random = Random::new(stated("SEED").unwrap_or(2));
+    let cases: Vec<_> = (0..stated("CASES").unwrap_or(120)).map(|_| random_case(&mut random)).collect();
+    let found: Vec<Vec<Bounded>> = cases.par_iter().filter_map(figures).collect();
+    println!("{} of {} cases with a reference", found.len(), cases.len());
+    let all: Vec<&Bounded> = found.iter().flatten().collect();
+    for kind in KINDS {
+        let of_kind: Vec<&&Bounded> = all.iter().filter(|f| f.kind == kind).collect();
+        let median = |of: fn(&Bounded) -> f64| {
+            let mut values: Vec<f64> = of_kind.iter().map(|f| of(f)).collect();
+            values.sort_by(f64::total_cmp);
+            values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+        };
+        let held = of_kind.iter().filter(|f| f.error <= f.bound).count();
+        println!(
+            "{kind}: {held} of {} within the bound ({:.1} %), median error {:.2e}, median bound {:.2e}",
+            of_kind.len(),
+            100.0 * held as f64 / of_kind.len() as f64,
+            median(|f| f.error),
+            median(|f| f.bound)
+        );
+    }
+    let held = all.iter().filter(|f| f.error <= f.bound).count();
+    let part = held as f64 / all.len() as f64;
+    println!("all: {held} of {} ({:.1} %)", all.len(), 100.0 * part);
+    // Of a hundred cases with several figures each, alike within a case, two parts in a hundred are chance.
+    assert!(part > 0.93, "{part}");
+}
