@@ -1,6 +1,6 @@
 //! How often the bounds of discretisation hold, over random specimens, materials and drives; the table is in
-//! docs/verification.md. `cargo test --test discretisation_study -- --ignored --nocapture` (an hour of two cores); CASES
-//! sets how many, SEED which.
+//! docs/verification.md. `cargo test --test discretisation_study -- --ignored --nocapture` (an hour of one core);
+//! CASES sets how many, SEED which.
 
 mod common;
 

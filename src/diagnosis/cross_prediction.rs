@@ -328,8 +328,8 @@ fn misfit(case: &Case, predicted: &Trace) -> Misfit {
 mod tests {
     use super::*;
 
-    /// A number of the rig that another one imitates stays, one that nothing imitates moves, and so does one that is not
-    /// the rig's.
+    /// A number of the rig that another one imitates stays, one that nothing imitates moves, and so does one that is
+    /// not the rig's.
     #[test]
     fn what_shifts_imitate_stays() {
         let matrix = DMatrix::from_row_slice(3, 3, &[1.0, 0.0, 0.99, 0.0, 2.0, 0.0, 0.99, 0.0, 1.0]);

@@ -29,7 +29,8 @@ pub struct EvaluationStep {
     pub drive_mm: f64,
     /// Force of all samples together, N.
     pub force_n: f64,
-    /// What the mesh may put the force wrong by, N: in 95 of 100 cases no more. Absent where no coarser mesh was solved.
+    /// What the mesh may put the force wrong by, N: in 95 of 100 cases no more. Absent where no coarser mesh was
+    /// solved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_discretisation_n: Option<f64>,
     /// Where there are several kinds of samples: the force of all samples of each kind, N.
