@@ -61,7 +61,8 @@ pub(super) fn of_coarser_meshes(
     scan: Option<([f64; 3], Option<Surface>)>,
     num_drives: usize,
 ) -> f64 {
-    coarser_meshes(mesh, specimen).iter().filter_map(|mesh| seconds(specimen, mesh, scan, num_drives)).sum()
+    let meshes = coarser_meshes(mesh, specimen).into_iter().flatten();
+    meshes.filter_map(|mesh| seconds(specimen, &mesh, scan, num_drives)).sum()
 }
 
 /// Processor seconds of `count` tasks, of which `of` estimates one by its index: from the first, the middle and the

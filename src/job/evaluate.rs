@@ -64,7 +64,8 @@ pub struct EvaluationRequest {
     /// probability (`detectable`). It takes one more equilibrium of the whole sample at every drive.
     #[serde(default)]
     pub has_detectable: bool,
-    /// Whether coarser meshes say what the mesh may put the numbers wrong by. It takes about half as long again.
+    /// Whether coarser meshes say what the mesh may put the numbers wrong by. It takes about half as
+    /// long again; of a mesh of more than 1.25 times the standard element size they say nothing.
     #[serde(default = "defaults::yes")]
     #[schema(default = defaults::yes)]
     pub has_discretisation: bool,

@@ -48,7 +48,8 @@ pub struct SolveRequest {
     /// Mesh the whole specimen even where it has mirror planes.
     #[serde(default)]
     pub is_whole: bool,
-    /// Whether coarser meshes say what the mesh may put the forces wrong by. It takes about half as long again.
+    /// Whether coarser meshes say what the mesh may put the forces wrong by. It takes about half as
+    /// long again; of a mesh of more than 1.25 times the standard element size they say nothing.
     #[serde(default = "defaults::yes")]
     #[schema(default = defaults::yes)]
     pub has_discretisation: bool,
@@ -174,7 +175,7 @@ impl CheckedSolve {
         let on_mesh = |coarser: usize| {
             let mut forces = vec![[0.0; 2]; self.specimen.drive_mm.len()];
             for sample in samples {
-                let mesh = coarser_meshes(&self.mesh_options(sample), sample)[coarser];
+                let mesh = coarser_meshes(&self.mesh_options(sample), sample)?[coarser];
                 let mut model = ForwardModel::of_specimen(sample, &mesh).ok()?;
                 let mut last: Option<Equilibrium> = None;
                 for (sum, &drive) in forces.iter_mut().zip(&sample.drive_mm) {

@@ -15,9 +15,14 @@ pub const COARSER: [f64; 2] = [1.6, 2.0];
 /// Factor of safety: with it the bound holds in 95 of 100 cases.
 const SAFETY: f64 = 1.75;
 
-/// The coarser meshes of [`COARSER`].
-pub fn coarser_meshes(mesh: &MeshOptions, specimen: &Specimen) -> [MeshOptions; 2] {
-    COARSER.map(|ratio| mesh.refined_by(ratio, specimen, 0.0))
+/// Largest element size, as a factor on the standard one, of a mesh that is bounded: twice the elements of a coarser
+/// one are too large for errors that follow their size, and agree with it by chance.
+const COARSEST_BOUNDED: f64 = 1.25;
+
+/// The coarser meshes of [`COARSER`]; `None` where the mesh itself is too coarse for them to tell anything.
+pub fn coarser_meshes(mesh: &MeshOptions, specimen: &Specimen) -> Option<[MeshOptions; 2]> {
+    let is_fine = mesh.section_size_mm <= COARSEST_BOUNDED * MeshOptions::standard(specimen).section_size_mm;
+    is_fine.then(|| COARSER.map(|ratio| mesh.refined_by(ratio, specimen, 0.0)))
 }
 
 /// What `value` may differ by from its limit on fine meshes, in 95 of 100 cases no more; `coarser` are the same on the
@@ -59,9 +64,10 @@ mod tests {
     fn coarser_meshes_are_coarser_and_else_alike() {
         let specimen = Specimen::from_json(include_str!("../../geometries/two-hole-shear.json")).expect("shipped");
         let whole = MeshOptions { use_mirror: false, ..MeshOptions::fine(&specimen) };
-        for (ratio, mesh) in COARSER.into_iter().zip(coarser_meshes(&whole, &specimen)) {
+        for (ratio, mesh) in COARSER.into_iter().zip(coarser_meshes(&whole, &specimen).expect("fine enough")) {
             assert!((mesh.section_size_mm / whole.section_size_mm - ratio).abs() < 1e-12);
             assert!(!mesh.use_mirror && mesh.levels < whole.levels);
         }
+        assert!(coarser_meshes(&MeshOptions::search(&specimen), &specimen).is_none());
     }
 }

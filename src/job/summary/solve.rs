@@ -39,5 +39,6 @@ pub(in crate::job) fn solve(name: &str, result: &SolveResult) -> String {
 
 /// A bound of the mesh's error, as it stands behind a number.
 fn within(bound: Option<f64>) -> String {
-    bound.map_or_else(String::new, |bound| format!("± {}", num(bound, 2)))
+    // Of what is zero by symmetry there is nothing to say.
+    bound.filter(|b| *b > 0.0).map_or_else(String::new, |bound| format!("± {}", num(bound, 2)))
 }

@@ -104,8 +104,6 @@ export function livePanel(model, signal, isSound) {
     material: model.material,
     scan: model.scan,
     mesh: "search",
-    // Figures that follow every edit do not wait for coarser meshes.
-    has_discretisation: false,
     has_files,
   });
 
