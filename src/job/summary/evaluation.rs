@@ -40,15 +40,17 @@ pub(in crate::job) fn evaluation(name: &str, evaluation: &Evaluation) -> String 
             let way = way_across_plates(force_n);
             text += &format!("  force across the plates: {} N, which {way}\n", num(force_n.abs(), 4));
         }
-        text += &format!("  parameter   integrated sensitivity: sum   mean per voxel  {integral:>22}   mesh\n");
+        let is_bounded = step.integrated_sensitivity.iter().any(|s| s.discretisation_relative.is_some());
+        let mesh = if is_bounded { "   mesh" } else { "" };
+        text += &format!("  parameter   integrated sensitivity: sum   mean per voxel  {integral:>22}{mesh}\n");
         for s in &step.integrated_sensitivity {
             text += &format!(
-                "  {:<10} {:>29} {:>16} {:>23}   {}\n",
+                "  {:<10} {:>29} {:>16} {:>23}{}\n",
                 s.parameter,
                 num(s.sum, 4),
                 num(s.mean_per_voxel, 5),
                 num(s.surface_integral.unwrap_or(s.volume_integral), 4),
-                within(s.discretisation_relative)
+                s.discretisation_relative.map_or_else(String::new, |bound| format!("   {}", within(bound)))
             );
         }
     }
@@ -93,7 +95,7 @@ fn promised(list: &[PromisedSd]) -> String {
                 p.parameter,
                 num(sd, 5),
                 num(100.0 * relative, 4),
-                p.discretisation_relative.map_or_else(String::new, |bound| format!("; mesh {}", within(Some(bound)))),
+                p.discretisation_relative.map_or_else(String::new, |bound| format!("; mesh {}", within(bound))),
                 if p.identifiable { "" } else { "  not identifiable" }
             ),
             _ => format!("  {:<10} not determined by these data\n", p.parameter),
@@ -103,6 +105,6 @@ fn promised(list: &[PromisedSd]) -> String {
 }
 
 /// A bound of the mesh's error relative to the number that it stands behind.
-fn within(bound: Option<f64>) -> String {
-    bound.map_or_else(String::new, |bound| format!("± {} %", num(100.0 * bound, 2)))
+fn within(bound: f64) -> String {
+    format!("± {} %", num(100.0 * bound, 2))
 }
