@@ -120,9 +120,16 @@ class Solution(Result):
     @classmethod
     def of(cls, raw: Mapping[str, Any], folder: Path) -> "Solution":
         """From the program's JSON."""
-        names = ("drive_mm", "force_n", "normal_force_n", "largest_principal_stretch")
-        bound = "force_discretisation_n"
-        steps = tuple(SolveStep(*(step[name] for name in names), step.get(bound)) for step in raw["steps"])
+        steps = tuple(
+            SolveStep(
+                step["drive_mm"],
+                step["force_n"],
+                step["normal_force_n"],
+                step["largest_principal_stretch"],
+                step.get("force_discretisation_n"),
+            )
+            for step in raw["steps"]
+        )
         return cls(raw, folder, (), steps=steps)
 
     def _rows(self) -> List[Row]:
