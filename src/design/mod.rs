@@ -46,6 +46,7 @@ mod study_tests;
 mod surrogate;
 mod tell_apart;
 mod ties;
+mod trend;
 mod unfinished;
 mod words;
 

@@ -1,10 +1,10 @@
 //! Proposals: the structures that did best in the samples are improved by what their designs so far have taught.
 //!
-//! A [`Surrogate`] of each structure's gains and margins says where the next designs promise most, and how much at
-//! most: an upper confidence bound (Srinivas et al., IEEE Trans. Inf. Theory 58 (2012) 3250), by which structures
-//! compete for the next evaluations. So none is given up for a few poor samples while it may still hold the best
-//! design, and none that cannot gets more. All structures race on the coarse mesh, where a design costs little; the
-//! best of them then on the fine one, whose surrogate corrects what the coarse one has taught.
+//! What is believed of each structure's gains and margins ([`Belief`]) says where the next designs promise most, and
+//! how much at most: an upper confidence bound (Srinivas et al., IEEE Trans. Inf. Theory 58 (2012) 3250), by which
+//! structures compete for the next evaluations. So none is given up for a few poor samples while it may still hold the
+//! best design, and none that cannot gets more. All structures race on the coarse mesh, where a design costs little;
+//! the best of them then on the fine one, where the same processes learn what the coarse mesh got wrong.
 
 use super::explore::is_makeable;
 use super::fidelity::Fidelity;
@@ -14,12 +14,14 @@ use super::search_run::{Attempt, Judge, Progress, SearchRun};
 use super::space::Subspace;
 use super::state::State;
 use super::structure_problem::RESERVE;
-use super::surrogate::{Seen, Surrogate};
+use super::surrogate::Seen;
+use super::trend::{Belief, Trend};
 use crate::optimise::Evolution;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::cmp::Ordering;
+use std::sync::Arc;
 use std::sync::atomic::{self, AtomicUsize};
 
 /// How a race goes.
@@ -91,13 +93,15 @@ struct Race {
     /// How finely proposals are solved.
     fidelity: Fidelity,
     rng: ChaCha8Rng,
+    /// What other structures teach of this one.
+    trend: Option<Arc<Trend>>,
     /// Designs seen, their gains and margins, cut.
     seen: Vec<Seen>,
     values: Vec<Vec<f64>>,
     /// The best of them: of those solved as finely as proposals, if there are any.
     best: Best,
     /// What the designs were proposed by.
-    surrogate: Option<Surrogate>,
+    belief: Option<Belief>,
     /// What it proposes by now: of each optimism one at most.
     proposals: Vec<Proposal>,
     /// Whether it has learnt something since.
@@ -129,7 +133,7 @@ impl Best {
 }
 
 /// Gains, then margins, cut; last, that there is an equilibrium.
-fn values_of(judged: &Judged) -> Vec<f64> {
+pub(super) fn values_of(judged: &Judged) -> Vec<f64> {
     let values = judged.gains.iter().chain(&judged.margins).map(|v| v.clamp(LOWEST, -LOWEST));
     values.chain([SOLVED]).collect()
 }
@@ -142,7 +146,7 @@ fn merit_of(reference: &Reference, judged: &Judged) -> f64 {
 }
 
 impl Race {
-    fn of(run: &SearchRun, judge: &Judge, state: &State, space: usize) -> Option<Race> {
+    fn of(run: &SearchRun, judge: &Judge, state: &State, spaces: &[Subspace], space: usize) -> Option<Race> {
         let Judge { fidelity, reference } = judge;
         let seen = state.seen_of(space);
         let of = |(point, solved, judged): &(&Vec<f64>, Fidelity, &Judged)| Best {
@@ -164,7 +168,8 @@ impl Race {
             seen,
             values,
             best,
-            surrogate: None,
+            trend: Trend::of_others(state, spaces, space).map(Arc::new),
+            belief: None,
             proposals: Vec::new(),
             has_learnt: true,
         })
@@ -182,11 +187,11 @@ impl Race {
             return;
         }
         self.proposals.clear();
-        let Some(surrogate) = Surrogate::fit(&self.seen, &self.values) else { return };
+        let Some(belief) = Belief::of(self.trend.clone(), space, &self.seen, &self.values) else { return };
         let fidelity = self.fidelity;
         for (index, optimism) in optimism.iter().enumerate() {
             let merit = |x: &[f64]| {
-                let predicted = surrogate.predict(x, fidelity);
+                let predicted = belief.predict(space, x, fidelity);
                 let (gains, margins) = predicted.split_at(like.gains.len());
                 let gains = gains.iter().map(|(mean, sd)| mean + optimism * sd).collect();
                 let margins = margins.iter().map(|(mean, _)| *mean).collect();
@@ -194,11 +199,11 @@ impl Race {
             };
             let Some((expected, point)) = self.climb(run, space, &merit) else { continue };
             let apart = |o: &Proposal| o.point.iter().zip(&point).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
-            if surrogate.nearest(&point, fidelity) > NEAREST && self.proposals.iter().all(|o| apart(o) > NEAREST) {
+            if belief.nearest(&point, fidelity) > NEAREST && self.proposals.iter().all(|o| apart(o) > NEAREST) {
                 self.proposals.push(Proposal { optimism: index, point, expected });
             }
         }
-        self.surrogate = Some(surrogate);
+        self.belief = Some(belief);
     }
 
     /// The makeable point of largest `merit`, from the best design seen.
@@ -232,9 +237,9 @@ impl Race {
 
     /// Learns what became of a proposal. Of one without an equilibrium the rest is supposed as predicted, so that a
     /// wall of failures does not bend what is known beside it.
-    fn learn(&mut self, reference: &Reference, point: Vec<f64>, judged: Option<&Judged>) {
+    fn learn(&mut self, reference: &Reference, space: &Subspace, point: Vec<f64>, judged: Option<&Judged>) {
         let failed = || {
-            let predicted = self.surrogate.as_ref().map(|s| s.predict(&point, self.fidelity)).unwrap_or_default();
+            let predicted = self.belief.as_ref().map(|b| b.predict(space, &point, self.fidelity)).unwrap_or_default();
             let mut values: Vec<f64> = predicted.into_iter().map(|(mean, _)| mean).collect();
             values.pop();
             values.push(-SOLVED);
@@ -301,7 +306,7 @@ impl SearchRun<'_> {
                 Some(structures) => structures.clone(),
                 None => state.best_structures(rules.most_structures),
             };
-            races.extend(best.into_iter().filter_map(|space| Race::of(self, judge, state, space)));
+            races.extend(best.into_iter().filter_map(|space| Race::of(self, judge, state, spaces, space)));
         }
         let Some(like) = state.first_judged().filter(|_| !races.is_empty()).cloned() else { return Ok(()) };
         let done = AtomicUsize::new(0);
@@ -359,7 +364,7 @@ impl SearchRun<'_> {
                     None
                 }
             };
-            races[race].learn(reference, point, judged.as_ref());
+            races[race].learn(reference, &spaces[space], point, judged.as_ref());
         }
         if was_stopped { Err(state.stopped(self.study, rules.stage)) } else { Ok(()) }
     }
@@ -381,8 +386,9 @@ mod tests {
             seen: Vec::new(),
             values: Vec::new(),
             best: Best { is_as_fine, merit: 0.0, point: Vec::new() },
-            surrogate: None,
+            belief: None,
             proposals: proposals.collect(),
+            trend: None,
             has_learnt: false,
         }
     }

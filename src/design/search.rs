@@ -188,19 +188,27 @@ impl SearchRun<'_> {
         batch.extend(solid.iter().flat_map(|&s| sampled(s, &[])));
         self.evaluate_batch(judge, spaces, ("explore", &batch, total), state)?;
         if !holed.is_empty() {
-            // A good solid block is soon found, and holes do best in a block like it: half of the samples of the other
-            // structures have its dimensions and drive.
+            // A good solid block is soon found, and shows where to begin with holes.
             let (proposals, counted) = (SOLID_PROPOSALS.min(total / 6), (state.num_evaluations, total));
             self.race(&RaceRules::of_samples(proposals, Some(solid.clone()), counted), judge, spaces, state)?;
         }
-        let known_of = |index: usize| {
-            let alike = solid.iter().find(|&&s| spaces[s].structure.test == spaces[index].structure.test);
-            alike.and_then(|&s| Some((s, state.best_of(s)?))).map_or(Vec::new(), |(s, vector)| {
-                spaces[s].variables.iter().copied().zip(vector.iter().copied()).collect::<Vec<_>>()
-            })
-        };
-        let batch: Vec<(usize, Vec<f64>)> = holed.iter().flat_map(|&s| sampled(s, &known_of(s))).collect();
-        self.evaluate_batch(judge, spaces, ("explore", &batch, total), state)?;
+        // Half of the samples of a structure have the dimensions and the drive of the best design with fewer holes.
+        let num_holes = |space: usize| spaces[space].structure.num_holes();
+        let mut counts: Vec<usize> = holed.iter().map(|&s| num_holes(s)).collect();
+        counts.dedup();
+        for count in counts {
+            let known_of = |index: usize| {
+                let test = spaces[index].structure.test;
+                let alike = |s: usize| num_holes(s) < count && spaces[s].structure.test == test;
+                state.best_among(&alike).map_or(Vec::new(), |(s, vector)| {
+                    let values = spaces[*s].variables.iter().copied().zip(vector.iter().copied());
+                    values.filter(|(variable, _)| !variable.is_of_holes()).collect::<Vec<_>>()
+                })
+            };
+            let with_count = holed.iter().filter(|&&s| num_holes(s) == count);
+            let batch: Vec<(usize, Vec<f64>)> = with_count.flat_map(|&s| sampled(s, &known_of(s))).collect();
+            self.evaluate_batch(judge, spaces, ("explore", &batch, total), state)?;
+        }
         let so_far = state.num_evaluations;
         self.race(&RaceRules::of_samples(total.saturating_sub(so_far), None, (so_far, total)), judge, spaces, state)
     }

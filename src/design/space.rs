@@ -44,6 +44,14 @@ pub enum Variable {
     OtherWidth(usize),
 }
 
+impl Variable {
+    /// Whether it says where a hole is, how large or of what shape.
+    pub(super) fn is_of_holes(self) -> bool {
+        use Variable::{Angle, Diameter, Elongation, Other, X};
+        matches!(self, X(_) | Other(_) | Diameter(_) | Elongation(_) | Angle(_))
+    }
+}
+
 /// A structure with the ranges of its variables.
 #[derive(Clone, Debug)]
 pub struct Subspace {

@@ -119,9 +119,9 @@ impl State {
         found
     }
 
-    /// The best design of a structure.
-    pub fn best_of(&self, space: usize) -> Option<&Vec<f64>> {
-        self.order().into_iter().find(|&index| self.points[index].0 == space).map(|index| &self.points[index].1)
+    /// The best design of the structures that `counts` admits, with its structure.
+    pub fn best_among(&self, counts: &dyn Fn(usize) -> bool) -> Option<&(usize, Vec<f64>)> {
+        self.order().into_iter().map(|index| &self.points[index]).find(|(space, _)| counts(*space))
     }
 
     /// The designs of a structure, how finely they were solved and what they were judged, in order.

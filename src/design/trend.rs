@@ -1,0 +1,157 @@
+//! What structures have in common: how gains and limits go with the block, the drive and how much of the block is cut
+//! away, wherever the holes are.
+//!
+//! When structures begin to compete for evaluations, one of them has been tried some ten times, all others together far
+//! more often. What the others teach is therefore the mean of a structure's own processes, which learn what its holes
+//! do beside that (in the field's words: kriging with an external trend).
+
+use super::fidelity::Fidelity;
+use super::propose::values_of;
+use super::space::{Subspace, Variable};
+use super::state::State;
+use super::surrogate::{Seen, Surrogate};
+use std::sync::Arc;
+
+/// Designs without which nothing is supposed to be common.
+const FEWEST: usize = 12;
+/// The part of the block that holes take, in ranges of a variable: a quarter of it is as much as a block is varied by.
+const PER_PART_CUT: f64 = 4.0;
+
+/// Gains and margins over what all structures share.
+pub(super) struct Trend(Surrogate);
+
+impl Trend {
+    /// By the designs of all other structures that have the same test and holes of the same direction or none; `None`
+    /// where there are too few.
+    pub fn of_others(state: &State, spaces: &[Subspace], space: usize) -> Option<Trend> {
+        let own = &spaces[space];
+        let is_alike = |other: &Subspace| {
+            let are_along = |s: &Subspace| s.structure.num_holes() == 0 || s.structure.axis == own.structure.axis;
+            other.structure.test == own.structure.test
+                && (are_along(other) || own.structure.num_holes() == 0)
+                && shared(other).eq(shared(own))
+        };
+        let (mut seen, mut values) = (Vec::new(), Vec::new());
+        for (index, other) in spaces.iter().enumerate().filter(|(index, other)| *index != space && is_alike(other)) {
+            for (point, fidelity, judged) in state.seen_of(index) {
+                seen.push(Seen { point: features(other, point), fidelity });
+                values.push(values_of(judged));
+            }
+        }
+        if seen.len() < FEWEST { None } else { Surrogate::fit(&seen, &values).map(Trend) }
+    }
+
+    /// What a solution as fine as `at` is expected to give of a design of `space`.
+    pub fn means(&self, space: &Subspace, point: &[f64], at: Fidelity) -> Vec<f64> {
+        self.0.means(&features(space, point), at)
+    }
+}
+
+/// What is believed of one structure: the trend, if there is one, and its own processes about it.
+pub(super) struct Belief {
+    trend: Option<Arc<Trend>>,
+    own: Surrogate,
+}
+
+impl Belief {
+    /// From designs of `space` and their values; `None` without any.
+    pub fn of(trend: Option<Arc<Trend>>, space: &Subspace, seen: &[Seen], values: &[Vec<f64>]) -> Option<Belief> {
+        let over_trend = |(design, values): (&Seen, &Vec<f64>)| match &trend {
+            None => values.clone(),
+            Some(trend) => {
+                let expected = trend.means(space, &design.point, design.fidelity);
+                values.iter().zip(expected).map(|(value, expected)| value - expected).collect()
+            }
+        };
+        let over_trend: Vec<Vec<f64>> = seen.iter().zip(values).map(over_trend).collect();
+        let own = Surrogate::fit(seen, &over_trend)?;
+        Some(Belief { trend, own })
+    }
+
+    /// Mean and standard deviation of what a solution as fine as `at` would give, of each value at a point of `space`.
+    pub fn predict(&self, space: &Subspace, point: &[f64], at: Fidelity) -> Vec<(f64, f64)> {
+        let mut predicted = self.own.predict(point, at);
+        if let Some(trend) = &self.trend {
+            predicted.iter_mut().zip(trend.means(space, point, at)).for_each(|((mean, _), of_trend)| *mean += of_trend);
+        }
+        predicted
+    }
+
+    /// As [`Surrogate::nearest`].
+    pub fn nearest(&self, point: &[f64], at: Fidelity) -> f64 {
+        self.own.nearest(point, at)
+    }
+}
+
+/// The variables that are no hole's.
+fn shared(space: &Subspace) -> impl Iterator<Item = Variable> {
+    space.variables.iter().copied().filter(|v| !v.is_of_holes())
+}
+
+fn features(space: &Subspace, point: &[f64]) -> Vec<f64> {
+    let specimen = space.specimen(point);
+    let block = &specimen.block;
+    let part_cut = 1.0 - specimen.volume_mm3() / (block.length_mm * block.thickness_mm * block.width_mm);
+    let of_block = space.variables.iter().zip(point).filter(|(v, _)| !v.is_of_holes()).map(|(_, value)| *value);
+    of_block.chain([PER_PART_CUT * part_cut]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::space::subspaces;
+    use super::super::study::Study;
+    use super::*;
+    use std::path::Path;
+
+    fn spaces() -> Vec<Subspace> {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("geometries/studies");
+        let text = std::fs::read_to_string(folder.join("two-hole-shear.json")).expect("the study is there");
+        subspaces(&Study::from_json(&text, &folder).expect("the study is valid"))
+    }
+
+    /// Points with every variable at `holes` or, of the block and the drive, at each of `blocks` in turn.
+    fn points(space: &Subspace, holes: f64, blocks: &[f64]) -> Vec<Vec<f64>> {
+        let of = |block: f64| space.variables.iter().map(|v| if v.is_of_holes() { holes } else { block }).collect();
+        blocks.iter().map(|&block| of(block)).collect()
+    }
+
+    /// A gain that grows with the block in every structure and is larger by a twentieth where there is one hole. Of one
+    /// hole two small blocks are known, of four holes many: what one hole gains in a large block is then met to a
+    /// fiftieth, and without the others it is not.
+    #[test]
+    fn what_others_show_is_expected_here() {
+        let spaces = spaces();
+        let of_holes = |number: usize| {
+            let found = spaces.iter().find(|s| s.structure.num_holes() == number && !s.structure.orbits[0].on_x);
+            found.or(spaces.iter().find(|s| s.structure.num_holes() == number)).expect("the study has it")
+        };
+        let (one, four) = (of_holes(1), of_holes(4));
+        let gain = |space: &Subspace, point: &[f64], own: f64| {
+            let block = features(space, point);
+            vec![0.3 * (block[1] + block[3]) - 0.2 * (block[2] - 0.4).powi(2) + own]
+        };
+        let designs = |space: &Subspace, holes: f64, blocks: &[f64], own: f64| {
+            let points = points(space, holes, blocks);
+            let values: Vec<Vec<f64>> = points.iter().map(|p| gain(space, p, own)).collect();
+            let seen = points.into_iter().map(|point| Seen { point, fidelity: Fidelity::Coarse });
+            (seen.collect::<Vec<_>>(), values)
+        };
+        let everywhere: Vec<f64> = (0..=12).map(|i| f64::from(i) / 12.0).collect();
+        let (mut others, mut of_others) = (Vec::new(), Vec::new());
+        for holes in [0.0, 0.15] {
+            let (seen, values) = designs(four, holes, &everywhere, 0.0);
+            let as_features = |s: Seen| Seen { point: features(four, &s.point), ..s };
+            others.extend(seen.into_iter().map(as_features));
+            of_others.extend(values);
+        }
+        let trend = Surrogate::fit(&others, &of_others).map(|fitted| Arc::new(Trend(fitted)));
+        let (seen, values) = designs(one, 0.2, &[0.1, 0.2], 0.05);
+        let large = &points(one, 0.2, &[0.9])[0];
+        let off = |trend: Option<Arc<Trend>>| {
+            let belief = Belief::of(trend, one, &seen, &values).expect("there are designs");
+            (belief.predict(one, large, Fidelity::Coarse)[0].0 - gain(one, large, 0.05)[0]).abs()
+        };
+        let (with, without) = (off(trend), off(None));
+        assert!(with < 0.02 && without > 0.1, "{with} {without}");
+    }
+}
