@@ -73,6 +73,9 @@ impl RaceRules {
 
 /// A proposal this close to a design seen, in ranges of the variables, teaches nothing new.
 const NEAREST: f64 = 4e-3;
+/// A structure of which so many proposals one after the other have no equilibrium makes no more: where it promises most
+/// it does not stand the drive, and what it takes is missing where designs can be improved.
+const MOST_FAILURES_IN_A_ROW: usize = 4;
 /// Values below this, and above its negative, are cut: of designs that are far too poor it does not matter by how much,
 /// and the surrogate would bend for them.
 const LOWEST: f64 = -0.7;
@@ -106,6 +109,8 @@ struct Race {
     proposals: Vec<Proposal>,
     /// Whether it has learnt something since.
     has_learnt: bool,
+    /// Proposals without an equilibrium since the last one with one.
+    failures_in_a_row: usize,
 }
 
 /// A design that a structure proposes.
@@ -172,6 +177,7 @@ impl Race {
             belief: None,
             proposals: Vec::new(),
             has_learnt: true,
+            failures_in_a_row: 0,
         })
     }
 
@@ -187,6 +193,9 @@ impl Race {
             return;
         }
         self.proposals.clear();
+        if self.failures_in_a_row >= MOST_FAILURES_IN_A_ROW {
+            return;
+        }
         let Some(belief) = Belief::of(self.trend.clone(), space, &self.seen, &self.values) else { return };
         let fidelity = self.fidelity;
         for (index, optimism) in optimism.iter().enumerate() {
@@ -246,6 +255,7 @@ impl Race {
             values
         };
         self.values.push(judged.map_or_else(failed, values_of));
+        self.failures_in_a_row = if judged.is_some() { 0 } else { self.failures_in_a_row + 1 };
         if let Some(judged) = judged {
             let merit = merit_of(reference, judged);
             let found = Best { is_as_fine: true, merit, point: point.clone() };
@@ -390,6 +400,7 @@ mod tests {
             proposals: proposals.collect(),
             trend: None,
             has_learnt: false,
+            failures_in_a_row: 0,
         }
     }
 
@@ -407,5 +418,38 @@ mod tests {
         assert_eq!(next_designs(&mut races, &rules), [(2, vec![2.0, 0.0]), (0, vec![0.0, 1.0])]);
         assert_eq!(next_designs(&mut races, &rules), [(1, vec![1.0, 1.0])]);
         assert!(next_designs(&mut races, &rules).is_empty());
+    }
+
+    /// A structure that fails again and again leaves the evaluations to others; one success, and it goes on.
+    #[test]
+    fn a_structure_that_keeps_failing_makes_no_more_proposals() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("geometries/studies");
+        let text = std::fs::read_to_string(folder.join("uniaxial-bar.json")).expect("the study is there");
+        let study = super::super::study::Study::from_json(&text, &folder).expect("the study is valid");
+        let evaluator = super::super::evaluator::Evaluator::new(&study);
+        let checkpoint = super::super::checkpoint::Checkpoint::in_memory();
+        let run =
+            SearchRun { study: &study, evaluator, checkpoint: &checkpoint, is_cancelled: &|| false, progress: &|_| {} };
+        let (state, base) = (State::default(), super::super::search::base_at_drive(&study));
+        let reference = run.in_integrals(&base, &state).expect("the base has an equilibrium");
+        let spaces = super::super::space::subspaces(&study);
+        let space = &spaces[0];
+        let n = space.variables.len();
+        let evaluated = run.evaluated(&base, None).and_then(Result::ok).expect("it is evaluated");
+        let judged = reference.judge(&evaluated);
+        let mut race = race(0, false, &[]);
+        race.best.point = vec![0.5; n];
+        let at = |i: usize| vec![0.1 * i as f64; n];
+        race.learn(&reference, space, at(0), Some(&judged));
+        for failures in 1..=MOST_FAILURES_IN_A_ROW {
+            race.propose(&run, (&reference, &judged), space, &[0.0]);
+            assert_eq!(race.proposals.len(), 1, "after {} failures", failures - 1);
+            race.learn(&reference, space, at(failures), None);
+        }
+        race.propose(&run, (&reference, &judged), space, &[0.0]);
+        assert!(race.proposals.is_empty());
+        race.learn(&reference, space, at(9), Some(&judged));
+        race.propose(&run, (&reference, &judged), space, &[0.0]);
+        assert_eq!(race.proposals.len(), 1);
     }
 }
