@@ -15,7 +15,7 @@ use super::space::Subspace;
 use super::state::State;
 use super::structure_problem::RESERVE;
 use super::surrogate::Seen;
-use super::trend::{Belief, Trend};
+use super::trend::{Belief, SOLVED, Trend, values_of};
 use crate::optimise::Evolution;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -76,11 +76,6 @@ const NEAREST: f64 = 4e-3;
 /// A structure of which so many proposals one after the other have no equilibrium makes no more: where it promises most
 /// it does not stand the drive, and what it takes is missing where designs can be improved.
 const MOST_FAILURES_IN_A_ROW: usize = 4;
-/// Values below this, and above its negative, are cut: of designs that are far too poor it does not matter by how much,
-/// and the surrogate would bend for them.
-const LOWEST: f64 = -0.7;
-/// What the surrogate learns of whether a design has an equilibrium: this where it has one, its negative where not.
-const SOLVED: f64 = 0.3;
 /// Standard deviations of the first points around a start of the climb on a surrogate.
 const FIRST_STEPS: [f64; 2] = [0.05, 0.25];
 /// Generations of a climb.
@@ -135,12 +130,6 @@ impl Best {
     fn compare(&self, other: &Best) -> Ordering {
         self.is_as_fine.cmp(&other.is_as_fine).then(self.merit.total_cmp(&other.merit))
     }
-}
-
-/// Gains, then margins, cut; last, that there is an equilibrium.
-pub(super) fn values_of(judged: &Judged) -> Vec<f64> {
-    let values = judged.gains.iter().chain(&judged.margins).map(|v| v.clamp(LOWEST, -LOWEST));
-    values.chain([SOLVED]).collect()
 }
 
 /// The merit of a design as it counts here: a little inside the limits.
@@ -433,7 +422,7 @@ mod tests {
         let (state, base) = (State::default(), super::super::search::base_at_drive(&study));
         let reference = run.in_integrals(&base, &state).expect("the base has an equilibrium");
         let spaces = super::super::space::subspaces(&study);
-        let space = &spaces[0];
+        let space = spaces.iter().find(|s| s.structure.num_holes() == 1).expect("the study has one hole");
         let n = space.variables.len();
         let evaluated = run.evaluated(&base, None).and_then(Result::ok).expect("it is evaluated");
         let judged = reference.judge(&evaluated);

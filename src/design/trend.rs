@@ -6,16 +6,27 @@
 //! do beside that (in the field's words: kriging with an external trend).
 
 use super::fidelity::Fidelity;
-use super::propose::values_of;
+use super::objective::Judged;
 use super::space::{Subspace, Variable};
 use super::state::State;
 use super::surrogate::{Seen, Surrogate};
 use std::sync::Arc;
 
+/// Values below this, and above its negative, are cut: of designs that are far too poor it does not matter by how much,
+/// and the surrogate would bend for them.
+const LOWEST: f64 = -0.7;
+/// What the surrogate learns of whether a design has an equilibrium: this where it has one, its negative where not.
+pub(super) const SOLVED: f64 = 0.3;
 /// Designs without which nothing is supposed to be common.
 const FEWEST: usize = 12;
 /// The part of the block that holes take, in ranges of a variable: a quarter of it is as much as a block is varied by.
 const PER_PART_CUT: f64 = 4.0;
+
+/// Gains, then margins, cut; last, that there is an equilibrium.
+pub(super) fn values_of(judged: &Judged) -> Vec<f64> {
+    let values = judged.gains.iter().chain(&judged.margins).map(|v| v.clamp(LOWEST, -LOWEST));
+    values.chain([SOLVED]).collect()
+}
 
 /// Gains and margins over what all structures share.
 pub(super) struct Trend(Surrogate);
