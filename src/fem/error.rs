@@ -2,7 +2,7 @@
 
 use crate::mesh::MeshError;
 
-/// The matrix has no Cholesky factor.
+/// Why a linear system was not solved.
 #[derive(Clone, Copy, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LinearError {
@@ -17,6 +17,16 @@ pub enum LinearError {
     OutOfMemory {
         /// Size of the system.
         num_unknowns: usize,
+    },
+    /// Conjugate gradients did not reach what was asked.
+    #[error(
+        "conjugate gradients stopped after {iterations} iterations short of a relative residual of {tolerance:.1e}"
+    )]
+    NotConverged {
+        /// Iterations made.
+        iterations: usize,
+        /// Relative residual asked for.
+        tolerance: f64,
     },
 }
 

@@ -1,110 +1,106 @@
-//! The linear solver: a supernodal Cholesky factor in single precision as preconditioner of double-precision conjugate
-//! gradients, with a double-precision factor where that is not enough.
+//! The linear solver: double-precision conjugate gradients with one of two preconditioners.
 //!
-//! Symbolic work is done once per mesh. Measured on these matrices (κ/μ ≈ 130–800): the single-precision factor takes
-//! half the time and memory, and one iteration of conjugate gradients gains four to five digits.
+//! Mostly it is a direct factor ([`super::direct`]); large refined meshes are preconditioned by patches and their coarse
+//! mesh ([`super::levels`]).
 
 use super::crew::{Crew, Seat};
+use super::direct::{Direct, DirectFactor, Workspace};
 use super::dot::dot;
 use super::error::LinearError;
-use super::fronts::Fronts;
-use super::multifrontal::{Arenas, Lower, NonPositivePivot, Real, factorise};
-use super::substitution::FactorByFronts;
+use super::levels::{Levels, LevelsFactor};
 use super::topology::Topology;
-use faer::Side;
-use faer::sparse::SymbolicSparseColMatRef;
-use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
-};
+use std::ops::Range;
 use std::sync::Arc;
 
-/// Pattern and symbolic factorisation of the tangents of one mesh: made once, shared by all systems of that mesh.
-struct Analysis {
-    topology: Arc<Topology>,
-    symbolic: SymbolicCholesky<usize>,
-    fronts: Fronts,
+/// How the systems of one mesh are preconditioned: made once, shared by all of them.
+#[derive(Clone)]
+enum Method {
+    /// By a factor of the matrix.
+    Direct(Arc<Direct>),
+    /// By patches and a coarse mesh.
+    Levels(Arc<Levels>),
 }
 
-impl Analysis {
-    fn supernodal(&self) -> &SymbolicSupernodalCholesky<usize> {
-        supernodal(&self.symbolic)
-    }
-}
-
-/// The supernodes, which [`LinearSystem::new`] asked for.
-fn supernodal(symbolic: &SymbolicCholesky<usize>) -> &SymbolicSupernodalCholesky<usize> {
-    match symbolic.raw() {
-        SymbolicCholeskyRaw::Supernodal(supernodal) => supernodal,
-        SymbolicCholeskyRaw::Simplicial(_) => unreachable!("supernodes were asked for"),
-    }
-}
-
-/// A factor in one precision.
+/// The preconditioner of one matrix.
 enum Factor {
-    Single(Vec<f32>),
-    Double(Vec<f64>),
+    Direct(DirectFactor),
+    Levels(LevelsFactor),
 }
 
-/// Values and factor of a symmetric positive definite matrix (lower triangle, elimination order).
+/// Values and preconditioner of a symmetric positive definite matrix (lower triangle, elimination order).
 pub(super) struct LinearSystem {
-    analysis: Arc<Analysis>,
+    topology: Arc<Topology>,
+    method: Method,
     /// 3×3 blocks of the lower triangle (columns of a block one after the other), in the block pattern of [`Topology`].
     blocks: Arc<Vec<[f64; 9]>>,
     factor: Option<Arc<Factor>>,
-    single_values: Vec<f32>,
-    /// Memory of the factorisation in single precision.
-    arenas: Arenas<f32>,
+    workspace: Workspace,
     num_factorisations: usize,
 }
 
-/// Iterations after which a single-precision factor is given up.
+/// Iterations after which a direct factor in single precision is given up.
 const MAX_ITERATIONS: usize = 40;
 
-/// Factorisations of more operations are worth the time that it takes to call for help: a tenth of a millisecond.
-const WORTH_HELP: f64 = 1e8;
+/// Iterations after which the preconditioner by levels is: those it needs are counted in docs/verification.md.
+const MAX_ITERATIONS_BY_LEVELS: usize = 300;
 
-/// Substitutions with a factor of more entries are worth it.
-const ENTRIES_WORTH_HELP: usize = 1_500_000;
+/// Conjugate-gradient iterations that an earlier factor is given: they cost as much as a new one.
+const REUSE_ITERATIONS: usize = 10;
+
+/// The same by levels, which take several iterations to a digit.
+const REUSE_ITERATIONS_BY_LEVELS: usize = 45;
+
+/// For accuracies below this one levels are made anew: that costs as much as some 15 iterations, and saves more.
+const REUSED_LEVELS_ACCURACY: f64 = 2e-3;
+
+/// Matrices of fewer blocks are multiplied by one thread.
+const BLOCKS_WORTH_HELP: usize = 300_000;
+
+/// Parts of a product with a larger one, whatever the number of threads.
+const PARTS_OF_PRODUCT: usize = 4;
 
 /// Right-hand sides that are solved for at once.
 pub(super) const MAX_COLUMNS: usize = 4;
 
 impl LinearSystem {
-    /// Symbolic analysis; no values yet.
+    /// A system with a direct factor; no values yet.
     ///
     /// # Errors
     /// [`LinearError::OutOfMemory`].
     pub(super) fn new(topology: Arc<Topology>) -> Result<LinearSystem, LinearError> {
-        let n = topology.num_unknowns();
-        // With the identity ordering the analysis reads the *upper* triangle, the numeric call the lower one.
-        let (upper_pointers, upper_rows) = transpose(n, &topology.column_pointers, &topology.row_indices);
-        let upper = SymbolicSparseColMatRef::new_checked(n, n, &upper_pointers, None, &upper_rows);
-        let parameters = CholeskySymbolicParams {
-            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
-            ..Default::default()
-        };
-        let symbolic = factorize_symbolic_cholesky(upper, Side::Upper, SymmetricOrdering::Identity, parameters)
-            .map_err(|_| LinearError::OutOfMemory { num_unknowns: n })?;
-        let fronts = Fronts::new(supernodal(&symbolic));
-        Ok(LinearSystem::of(Arc::new(Analysis { topology, symbolic, fronts })))
+        let direct = Direct::new(topology.clone())?;
+        Ok(LinearSystem::of(topology, Method::Direct(Arc::new(direct))))
     }
 
-    fn of(analysis: Arc<Analysis>) -> LinearSystem {
+    /// A system of a mesh that refines the mesh of `coarse`, of which `levels` makes the preconditioner with the direct
+    /// factor there; `None` where the coarse one has none.
+    pub(super) fn refining(
+        topology: Arc<Topology>,
+        coarse: &LinearSystem,
+        levels: impl FnOnce(Arc<Direct>) -> Levels,
+    ) -> Option<LinearSystem> {
+        match &coarse.method {
+            Method::Direct(direct) => {
+                Some(LinearSystem::of(topology, Method::Levels(Arc::new(levels(direct.clone())))))
+            }
+            Method::Levels(_) => None,
+        }
+    }
+
+    fn of(topology: Arc<Topology>, method: Method) -> LinearSystem {
         LinearSystem {
-            analysis,
+            topology,
+            method,
             blocks: Arc::default(),
             factor: None,
-            single_values: Vec::new(),
-            arenas: Arenas::default(),
+            workspace: Workspace::default(),
             num_factorisations: 0,
         }
     }
 
     /// A system of the same mesh without values and factor; only the symbolic work is shared.
     pub(super) fn empty_like(&self) -> LinearSystem {
-        LinearSystem::of(self.analysis.clone())
+        LinearSystem::of(self.topology.clone(), self.method.clone())
     }
 
     /// The present values and factor as a system of its own. Nothing is copied: whichever of the two is assembled or
@@ -115,7 +111,7 @@ impl LinearSystem {
 
     /// Zeroes the values, for an assembly to add to. The factor stays.
     pub(super) fn zeroed_blocks(&mut self) -> &mut [[f64; 9]] {
-        let len = self.analysis.topology.block_rows.len();
+        let len = self.topology.block_rows.len();
         match Arc::get_mut(&mut self.blocks) {
             Some(blocks) if blocks.len() == len => blocks.fill([0.0; 9]),
             _ => self.blocks = Arc::new(vec![[0.0; 9]; len]),
@@ -126,7 +122,7 @@ impl LinearSystem {
 
     /// Unknowns, those pinned by mirrors included.
     pub(super) fn num_unknowns(&self) -> usize {
-        self.analysis.topology.num_unknowns()
+        self.topology.num_unknowns()
     }
 
     /// Calls of [`LinearSystem::factorise`] so far.
@@ -134,37 +130,25 @@ impl LinearSystem {
         self.num_factorisations
     }
 
-    /// Factorises the present values, in single precision unless that fails.
+    /// Makes the preconditioner of the present values.
     ///
     /// # Errors
     /// [`LinearError`].
     pub(super) fn factorise(&mut self) -> Result<(), LinearError> {
         self.num_factorisations += 1;
         // The memory of the last factor is used again unless someone else still holds it.
-        let mut l = match self.factor.take().and_then(Arc::into_inner) {
-            Some(Factor::Single(l)) => l,
-            _ => vec![0.0; self.analysis.symbolic.len_val()],
+        let old = self.factor.take().and_then(Arc::into_inner);
+        let made = match (&self.method, old) {
+            (Method::Direct(direct), old) => {
+                let old = old.and_then(|old| if let Factor::Direct(old) = old { Some(old) } else { None });
+                Factor::Direct(direct.factorise(&self.blocks, old, &mut self.workspace)?)
+            }
+            (Method::Levels(levels), old) => {
+                let old = old.and_then(|old| if let Factor::Levels(old) = old { Some(old) } else { None });
+                Factor::Levels(levels.factorise(&self.blocks, old, &mut self.workspace)?)
+            }
         };
-        self.analysis.topology.to_scalar(&self.blocks, |x| x as f32, &mut self.single_values);
-        let result = factor_of(&self.analysis, &self.single_values, &mut l, &mut self.arenas);
-        if result.is_ok() && l.iter().step_by(97).all(|x| x.is_finite()) {
-            self.factor = Some(Arc::new(Factor::Single(l)));
-            return Ok(());
-        }
-        self.factorise_double()
-    }
-
-    /// Factorises the present values in double precision.
-    ///
-    /// # Errors
-    /// [`LinearError`].
-    fn factorise_double(&mut self) -> Result<(), LinearError> {
-        self.factor = None;
-        let mut l = vec![0.0f64; self.analysis.symbolic.len_val()];
-        let mut values = Vec::new();
-        self.analysis.topology.to_scalar(&self.blocks, |x| x, &mut values);
-        factor_of(&self.analysis, &values, &mut l, &mut Arenas::default())?;
-        self.factor = Some(Arc::new(Factor::Double(l)));
+        self.factor = Some(Arc::new(made));
         Ok(())
     }
 
@@ -175,34 +159,37 @@ impl LinearSystem {
 
     /// x ← (factor)⁻¹ x for several right-hand sides, one after the other.
     fn precondition(&self, x: &mut [f64], crew: &Crew) {
-        let (fronts, symbolic) = (&self.analysis.fronts, self.analysis.supernodal());
-        match self.factor.as_deref() {
-            None => {}
-            Some(Factor::Single(values)) => {
-                let mut single: Vec<f32> = x.iter().map(|&v| v as f32).collect();
-                FactorByFronts { fronts, symbolic, values }.solve(&mut single, crew);
-                for (a, &b) in x.iter_mut().zip(&single) {
-                    *a = f64::from(b);
-                }
-            }
-            Some(Factor::Double(values)) => FactorByFronts { fronts, symbolic, values }.solve(x, crew),
+        match (&self.method, self.factor.as_deref()) {
+            (Method::Direct(direct), Some(Factor::Direct(factor))) => direct.solve(factor, x, crew),
+            (Method::Levels(levels), Some(Factor::Levels(factor))) => levels.solve(factor, x, crew),
+            // Without a factor these are plain conjugate gradients.
+            _ => {}
         }
     }
 
     /// Solves K X = B for up to four columns at once by preconditioned conjugate gradients, each to
-    /// ‖residual‖ ≤ `tolerance` ‖b‖. Falls back on a fresh double-precision factor.
+    /// ‖residual‖ ≤ `tolerance` ‖b‖. A direct factor in single precision that is not enough is replaced by one in double
+    /// precision.
     ///
     /// # Errors
-    /// [`LinearError::NotPositiveDefinite`].
+    /// [`LinearError`].
     pub(super) fn solve(
         &mut self,
         right_hand_sides: &[Vec<f64>],
         tolerance: f64,
     ) -> Result<Vec<Vec<f64>>, LinearError> {
+        let direct = match &self.method {
+            Method::Direct(direct) => direct.clone(),
+            Method::Levels(_) => {
+                let found = self.iterate(right_hand_sides, tolerance, MAX_ITERATIONS_BY_LEVELS)?;
+                return found.ok_or(LinearError::NotConverged { iterations: MAX_ITERATIONS_BY_LEVELS, tolerance });
+            }
+        };
         if let Some(x) = self.iterate(right_hand_sides, tolerance, MAX_ITERATIONS)? {
             return Ok(x);
         }
-        self.factorise_double()?;
+        self.factor = None;
+        self.factor = Some(Arc::new(Factor::Direct(direct.factorise_double(&self.blocks)?)));
         match self.iterate(right_hand_sides, tolerance, MAX_ITERATIONS)? {
             Some(x) => Ok(x),
             // With an exact factor the iteration refines to rounding; what is left is the matrix's condition.
@@ -216,24 +203,54 @@ impl LinearSystem {
         }
     }
 
+    /// As [`LinearSystem::solve`] with the factor of an earlier matrix, as long as that costs less than a new one;
+    /// `None` where it does not.
+    pub(super) fn solve_with_earlier_factor(
+        &self,
+        right_hand_sides: &[Vec<f64>],
+        tolerance: f64,
+    ) -> Option<Vec<Vec<f64>>> {
+        let iterations = match self.method {
+            Method::Direct(_) => REUSE_ITERATIONS,
+            Method::Levels(_) if tolerance < REUSED_LEVELS_ACCURACY => return None,
+            Method::Levels(_) => REUSE_ITERATIONS_BY_LEVELS,
+        };
+        self.iterate(right_hand_sides, tolerance, iterations).ok().flatten()
+    }
+
+    /// Whether one iteration with a factor of the present values gains four to five digits, as with a direct one.
+    pub(super) fn gains_digits_at_once(&self) -> bool {
+        matches!(self.method, Method::Direct(_))
+    }
+
+    /// Whether so many iterations suffice.
+    #[cfg(test)]
+    pub(super) fn solves_within(&self, right: &[f64], tolerance: f64, iterations: usize) -> bool {
+        matches!(self.iterate(&[right.to_vec()], tolerance, iterations), Ok(Some(_)))
+    }
+
     /// Conjugate gradients with the factor at hand, which may be that of a nearby matrix; `None` where `max_iterations`
     /// do not suffice.
     ///
     /// # Errors
     /// [`LinearError::NotPositiveDefinite`] where a direction of negative curvature is met.
-    pub(super) fn iterate(
+    fn iterate(
         &self,
         right_hand_sides: &[Vec<f64>],
         tolerance: f64,
         max_iterations: usize,
     ) -> Result<Option<Vec<Vec<f64>>>, LinearError> {
-        let topology = &self.analysis.topology;
+        let topology = &*self.topology;
         let n = topology.num_unknowns();
         let m = right_hand_sides.len();
         let mut x = vec![0.0; n * m];
         let mut r: Vec<f64> = right_hand_sides.iter().flatten().copied().collect();
         let _seat = Seat::take();
-        let crew = if self.analysis.symbolic.len_val() < ENTRIES_WORTH_HELP { Crew::alone() } else { Crew::gather() };
+        let is_worth_help = match &self.method {
+            Method::Direct(direct) => direct.is_worth_help(),
+            Method::Levels(_) => true,
+        };
+        let crew = if is_worth_help { Crew::gather() } else { Crew::alone() };
         let mut z = r.clone();
         self.precondition(&mut z, &crew);
         let mut p = z.clone();
@@ -253,7 +270,7 @@ impl LinearSystem {
                     continue;
                 }
                 let range = c * n..(c + 1) * n;
-                multiply(topology, &self.blocks, &p[range.clone()], &mut ap);
+                multiply(topology, &self.blocks, &p[range.clone()], &mut ap, &crew);
                 let curvature = dot(&p[range.clone()], &ap);
                 if !(curvature > 0.0) {
                     return Err(LinearError::NotPositiveDefinite { index: 0 });
@@ -287,30 +304,37 @@ impl LinearSystem {
     }
 }
 
-/// Factorises the matrix of these `values` (the lower triangle in the pattern of the unknowns) into `l`, with the help
-/// of whoever is idle.
-///
-/// # Errors
-/// [`LinearError::NotPositiveDefinite`].
-fn factor_of<T: Real>(
-    analysis: &Analysis,
-    values: &[T],
-    l: &mut [T],
-    arenas: &mut Arenas<T>,
-) -> Result<(), LinearError> {
-    let Analysis { topology, fronts, .. } = analysis;
-    let lower = Lower { pointers: &topology.column_pointers, rows: &topology.row_indices, values };
-    let _seat = Seat::take();
-    let crew = if fronts.work < WORTH_HELP { Crew::alone() } else { Crew::gather() };
-    factorise(fronts, analysis.supernodal(), &lower, l, arenas, &crew)
-        .map_err(|NonPositivePivot(index)| LinearError::NotPositiveDefinite { index })
+/// y = K x with the lower triangle. The parts into which a large product is divided do not depend on the threads, so
+/// that its rounding does not.
+fn multiply(topology: &Topology, blocks: &[[f64; 9]], x: &[f64], y: &mut [f64], crew: &Crew) {
+    let num = topology.block_pointers.len() - 1;
+    if blocks.len() < BLOCKS_WORTH_HELP {
+        y.fill(0.0);
+        return multiply_columns(topology, blocks, x, y, 0..num);
+    }
+    // As many blocks in each part.
+    let bound = |part: usize| {
+        let target = (blocks.len() / PARTS_OF_PRODUCT * part) as u32;
+        if part == PARTS_OF_PRODUCT { num } else { topology.block_pointers.partition_point(|&p| p < target) }
+    };
+    let mut sums = vec![vec![0.0; y.len()]; PARTS_OF_PRODUCT];
+    let items = sums.iter_mut().enumerate().collect();
+    crew.share(
+        items,
+        || (),
+        |(), (part, sum): (usize, &mut Vec<f64>)| {
+            multiply_columns(topology, blocks, x, sum, bound(part)..bound(part + 1));
+        },
+    );
+    for (i, y) in y.iter_mut().enumerate() {
+        *y = sums.iter().map(|sum| sum[i]).sum();
+    }
 }
 
-/// y = K x with the lower triangle.
-fn multiply(topology: &Topology, blocks: &[[f64; 9]], x: &[f64], y: &mut [f64]) {
-    y.fill(0.0);
-    for (j, pair) in topology.block_pointers.windows(2).enumerate() {
-        let (start, end) = (pair[0] as usize, pair[1] as usize);
+/// y += what columns of the lower triangle and their mirror images do to x.
+fn multiply_columns(topology: &Topology, blocks: &[[f64; 9]], x: &[f64], y: &mut [f64], columns: Range<usize>) {
+    for j in columns {
+        let (start, end) = (topology.block_pointers[j] as usize, topology.block_pointers[j + 1] as usize);
         let xj = [x[3 * j], x[3 * j + 1], x[3 * j + 2]];
         // The diagonal block: its lower triangle.
         let d = &blocks[start];
@@ -333,24 +357,4 @@ fn multiply(topology: &Topology, blocks: &[[f64; 9]], x: &[f64], y: &mut [f64]) 
             y[3 * j + c] += s;
         }
     }
-}
-
-/// Pattern of the transpose.
-fn transpose(n: usize, pointers: &[usize], rows: &[usize]) -> (Vec<usize>, Vec<usize>) {
-    let mut out_pointers = vec![0usize; n + 1];
-    for &r in rows {
-        out_pointers[r + 1] += 1;
-    }
-    for i in 0..n {
-        out_pointers[i + 1] += out_pointers[i];
-    }
-    let mut cursor = out_pointers.clone();
-    let mut out_rows = vec![0usize; rows.len()];
-    for j in 0..n {
-        for &r in &rows[pointers[j]..pointers[j + 1]] {
-            out_rows[cursor[r]] = j;
-            cursor[r] += 1;
-        }
-    }
-    (out_pointers, out_rows)
 }

@@ -1,16 +1,19 @@
 //! A model of one mesh: an assembler and the linear system that its tangents are assembled in.
 
 use super::assembler::Assembler;
+use super::coarse_space::CoarseSpace;
 use super::departures::Departures;
 use super::equilibrium::Equilibrium;
 use super::error::SolveError;
+use super::levels::Levels;
 use super::linear::LinearSystem;
 use super::linearisation::Linearisation;
 use super::newton::{KEEP_TANGENT_BELOW, Newton};
 use super::options::{SolveOptions, Statistics};
+use super::patches::Patches;
 use super::tangent::Tangent;
 use crate::material::Material;
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, Refinement};
 use crate::specimen::Specimen;
 
 /// An assembler with the matrix and factor of its last tangent.
@@ -31,6 +34,31 @@ impl MeshModel {
     ) -> Result<MeshModel, SolveError> {
         let assembler = Assembler::new(mesh, specimen, is_released)?;
         let system = LinearSystem::new(assembler.topology().clone())?;
+        Ok(MeshModel { assembler, linearisation: Linearisation::new(system) })
+    }
+
+    /// For the refinement of the mesh of `coarse`, both of `specimen`, with a preconditioner that needs no factor of the
+    /// fine mesh.
+    ///
+    /// # Errors
+    /// As [`MeshModel::new`].
+    pub(super) fn refining(
+        coarse: &MeshModel,
+        refinement: &Refinement,
+        specimen: &Specimen,
+    ) -> Result<MeshModel, SolveError> {
+        let assembler = Assembler::new(refinement.mesh.clone(), specimen, &|_, _| false)?;
+        let (topology, mesh) = (assembler.topology(), assembler.mesh());
+        let levels = |direct| {
+            let (coarse_mesh, coarse_topology) = (coarse.assembler.mesh(), coarse.assembler.topology());
+            let meshes = [mesh, coarse_mesh];
+            let space = CoarseSpace::new(meshes, [topology, coarse_topology], &refinement.nodes, &refinement.parents);
+            Levels::new(topology.clone(), Patches::new(mesh, topology), space, direct)
+        };
+        let system = match LinearSystem::refining(topology.clone(), &coarse.linearisation.system, levels) {
+            Some(system) => system,
+            None => LinearSystem::new(topology.clone())?,
+        };
         Ok(MeshModel { assembler, linearisation: Linearisation::new(system) })
     }
 

@@ -11,6 +11,7 @@
 mod adjoint;
 mod assembler;
 mod change;
+mod coarse_space;
 mod condensation;
 mod contact;
 mod crew;
@@ -19,6 +20,7 @@ mod departures_on_mesh;
 #[cfg(test)]
 mod departures_tests;
 mod derivatives;
+mod direct;
 mod dot;
 mod element_data;
 mod equilibrium;
@@ -33,6 +35,9 @@ mod kernel;
 mod kernels;
 mod law_correction;
 mod law_kernel;
+mod levels;
+#[cfg(test)]
+mod levels_tests;
 mod lifting;
 mod linear;
 mod linearisation;
@@ -45,6 +50,7 @@ mod nesting;
 mod newton;
 mod options;
 mod ordering;
+mod patches;
 mod plates;
 mod rates;
 mod result;

@@ -17,8 +17,8 @@ const REUSE_BELOW: f64 = 0.1;
 /// Relative residual from which a Newton step reaches the tolerance.
 const LAST_STEP_BELOW: f64 = 1e-4;
 
-/// Conjugate-gradient iterations that such a factor is given: they cost as much as a new one.
-const REUSE_ITERATIONS: usize = 10;
+/// The loosest that a step is solved: it is then shorter or longer than it should be by a hundredth.
+const LOOSE_STEP: f64 = 1e-2;
 
 /// Relative residual below which the tangent at hand is kept for the steps that follow (the chord method): it hardly
 /// changes any more, and a residual alone costs an eighth of residual and tangent.
@@ -233,26 +233,26 @@ impl Newton<'_> {
     /// K⁻¹ `right` for the tangent K just assembled, to the accuracy that a relative residual of `residual` is worth; a
     /// factor of an earlier iterate is tried first where the solution `is_near`.
     fn newton_step(&mut self, right: Vec<f64>, residual: f64, is_near: bool) -> Result<Vec<f64>, StepFailure> {
-        let system = &mut self.linearisation.system;
         let right = [right];
-        let mut x = None;
+        let system = &mut self.linearisation.system;
         // Quadratic convergence leaves residual² at best: the linear solve need not be better than a tenth of it.
         let of_step = 0.1 * residual;
-        if is_near {
-            // The last step is to be the last.
-            let accuracy = if residual < LAST_STEP_BELOW { 0.3 * self.options.tolerance / residual } else { of_step };
-            let accuracy = accuracy.clamp(1e-7, 1e-2);
-            x = system.iterate(&right, accuracy, REUSE_ITERATIONS).ok().flatten();
-        }
-        let mut x = match x {
-            Some(x) => x,
-            None => {
-                system.factorise().map_err(StepFailure::Linear)?;
-                self.linearisation.factorised_at = residual;
-                let system = &mut self.linearisation.system;
-                system.solve(&right, of_step.clamp(1e-9, 1e-3)).map_err(StepFailure::Linear)?
-            }
+        // With this accuracy the step is the last.
+        let of_last_step = 0.3 * self.options.tolerance / residual;
+        let (near, anew) = if system.gains_digits_at_once() {
+            let near = if residual < LAST_STEP_BELOW { of_last_step } else { of_step };
+            (near.clamp(1e-7, LOOSE_STEP), of_step.clamp(1e-9, 1e-3))
+        } else {
+            // Every digit costs iterations.
+            let accuracy = of_step.max(of_last_step).min(LOOSE_STEP);
+            (accuracy, accuracy)
         };
+        if is_near && let Some(mut x) = system.solve_with_earlier_factor(&right, near) {
+            return Ok(x.swap_remove(0));
+        }
+        system.factorise().map_err(StepFailure::Linear)?;
+        self.linearisation.factorised_at = residual;
+        let mut x = self.linearisation.system.solve(&right, anew).map_err(StepFailure::Linear)?;
         Ok(x.swap_remove(0))
     }
 

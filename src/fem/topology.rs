@@ -19,10 +19,6 @@ pub struct Topology {
     pub node_at: Vec<u32>,
     /// Unknowns fixed to zero by a mirror plane.
     pub is_pinned: Vec<bool>,
-    /// Column pointers of the lower triangle (scalar unknowns).
-    pub column_pointers: Vec<usize>,
-    /// Row indices, increasing in each column, the diagonal first.
-    pub row_indices: Vec<usize>,
     /// First 3×3 block of each node's column; the diagonal block comes first.
     pub block_pointers: Vec<u32>,
     /// Row (node place) of each block.
@@ -80,8 +76,6 @@ impl Topology {
             place,
             node_at,
             is_pinned,
-            column_pointers: vec![0],
-            row_indices: Vec::new(),
             block_pointers: vec![0],
             block_rows: Vec::new(),
             element_order: Vec::new(),
@@ -107,7 +101,7 @@ impl Topology {
         self.is_pinned.iter().filter(|p| !**p).count()
     }
 
-    /// The 3×3 block pattern: rows ≥ column, sorted, per column; fills the scalar pattern.
+    /// The 3×3 block pattern: rows ≥ column, sorted, per column.
     fn build_pattern(&mut self, graph: &Graph, order: &[u32], place_of_compact: &[u32]) {
         for (k, &v) in order.iter().enumerate() {
             let mut rows: Vec<u32> = vec![k as u32];
@@ -118,14 +112,6 @@ impl Topology {
                 }
             }
             rows.sort_unstable();
-            for c in 0..3 {
-                for (r, &row) in rows.iter().enumerate() {
-                    for i in if r == 0 { c } else { 0 }..3 {
-                        self.row_indices.push(3 * row as usize + i);
-                    }
-                }
-                self.column_pointers.push(self.row_indices.len());
-            }
             self.block_rows.extend_from_slice(&rows);
             self.block_pointers.push(self.block_rows.len() as u32);
         }
@@ -160,10 +146,32 @@ impl Topology {
         &self.pair_block[element * self.pairs_per_element..(element + 1) * self.pairs_per_element]
     }
 
+    /// The pattern of scalar unknowns: column pointers of the lower triangle, and row indices, increasing in each column,
+    /// the diagonal first.
+    pub fn scalar_pattern(&self) -> (Vec<usize>, Vec<usize>) {
+        let mut pointers = vec![0];
+        let mut indices = Vec::with_capacity(self.num_lower_entries());
+        for pair in self.block_pointers.windows(2) {
+            let rows = &self.block_rows[pair[0] as usize..pair[1] as usize];
+            for c in 0..3 {
+                for (r, &row) in rows.iter().enumerate() {
+                    indices.extend((if r == 0 { c } else { 0 }..3).map(|i| 3 * row as usize + i));
+                }
+                pointers.push(indices.len());
+            }
+        }
+        (pointers, indices)
+    }
+
+    /// Entries of the lower triangle: nine of each block, of those on the diagonal six.
+    fn num_lower_entries(&self) -> usize {
+        9 * self.block_rows.len() - 3 * self.node_at.len()
+    }
+
     /// Writes the lower triangle of `blocks` (3×3, column by column) in the scalar pattern.
     pub fn to_scalar<T>(&self, blocks: &[[f64; 9]], convert: impl Fn(f64) -> T, out: &mut Vec<T>) {
         out.clear();
-        out.reserve(self.row_indices.len());
+        out.reserve(self.num_lower_entries());
         for pair in self.block_pointers.windows(2) {
             let column = &blocks[pair[0] as usize..pair[1] as usize];
             for k in 0..3 {
