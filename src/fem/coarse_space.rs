@@ -1,4 +1,4 @@
-//! The coarse space inside a refined mesh: fields of the coarse mesh, continued into its elements with the least energy.
+//! The coarse space inside a refined mesh: fields of the coarse mesh, continued into its elements with least energy.
 //!
 //! The refined mesh resists changes of volume in each of its elements, the coarse one only on the average: a coarse
 //! field taken as it is would be stiffer by the ratio of bulk and shear modulus. Only its values on the faces of the

@@ -37,8 +37,8 @@ impl MeshModel {
         Ok(MeshModel { assembler, linearisation: Linearisation::new(system) })
     }
 
-    /// For the refinement of the mesh of `coarse`, both of `specimen`, with a preconditioner that needs no factor of the
-    /// fine mesh.
+    /// For the refinement of the mesh of `coarse`, both of `specimen`, with a preconditioner that needs no factor of
+    /// the fine mesh.
     ///
     /// # Errors
     /// As [`MeshModel::new`].

@@ -146,8 +146,8 @@ impl Topology {
         &self.pair_block[element * self.pairs_per_element..(element + 1) * self.pairs_per_element]
     }
 
-    /// The pattern of scalar unknowns: column pointers of the lower triangle, and row indices, increasing in each column,
-    /// the diagonal first.
+    /// The pattern of scalar unknowns: column pointers of the lower triangle, and row indices, increasing in each
+    /// column, the diagonal first.
     pub fn scalar_pattern(&self) -> (Vec<usize>, Vec<usize>) {
         let mut pointers = vec![0];
         let mut indices = Vec::with_capacity(self.num_lower_entries());
