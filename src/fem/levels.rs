@@ -21,12 +21,16 @@ pub(super) struct Levels {
 
 /// What is made for every matrix.
 pub(super) struct LevelsFactor {
+    /// Of the patches.
     inverses: Vec<f32>,
+    /// Of coarse fields into the coarse elements.
     continuation: Continuation,
+    /// Of the matrix of the coarse space.
     coarse: DirectFactor,
 }
 
 impl Levels {
+    /// Of the numbering and the patches of the fine mesh, how the coarse one lies in it, and the direct method there.
     pub(super) fn new(topology: Arc<Topology>, patches: Patches, space: CoarseSpace, coarse: Arc<Direct>) -> Levels {
         Levels { topology, patches, space, coarse }
     }

@@ -138,13 +138,13 @@ impl LinearSystem {
         self.num_factorisations += 1;
         // The memory of the last factor is used again unless someone else still holds it.
         let old = self.factor.take().and_then(Arc::into_inner);
-        let made = match (&self.method, old) {
-            (Method::Direct(direct), old) => {
-                let old = old.and_then(|old| if let Factor::Direct(old) = old { Some(old) } else { None });
+        let made = match &self.method {
+            Method::Direct(direct) => {
+                let old = if let Some(Factor::Direct(old)) = old { Some(old) } else { None };
                 Factor::Direct(direct.factorise(&self.blocks, old, &mut self.workspace)?)
             }
-            (Method::Levels(levels), old) => {
-                let old = old.and_then(|old| if let Factor::Levels(old) = old { Some(old) } else { None });
+            Method::Levels(levels) => {
+                let old = if let Some(Factor::Levels(old)) = old { Some(old) } else { None };
                 Factor::Levels(levels.factorise(&self.blocks, old, &mut self.workspace)?)
             }
         };
