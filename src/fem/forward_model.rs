@@ -172,8 +172,8 @@ impl ForwardModel {
         let mut newton = self.fine.newton(material, options, is_cancelled);
         // A start at the same drive is nearer than what the coarse mesh finds.
         let guide = self.guide.as_mut().filter(|_| start.is_none_or(|s| s.drive_mm != drive_mm));
-        let found = match guide.and_then(|guide| guide.lead(&mut newton, drive_mm, start)) {
-            Some(found) => Ok(found),
+        let found = match guide {
+            Some(guide) => guide.solve(&mut newton, drive_mm, start),
             None => newton.solve(drive_mm, start),
         };
         self.statistics = newton.statistics;

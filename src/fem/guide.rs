@@ -4,6 +4,7 @@
 //! takes one to three. The coarse model costs a few percent of one fine factorisation.
 
 use super::equilibrium::Equilibrium;
+use super::error::SolveError;
 use super::mesh_model::MeshModel;
 use super::nesting::Nesting;
 use super::newton::Newton;
@@ -36,17 +37,37 @@ impl Guide {
         Guide { coarse: self.coarse.departed(self.coarse.assembler.departures()), nesting: self.nesting.clone() }
     }
 
+    /// Solves `fine` at a drive (mm) in one guided load step where that succeeds; else in two; else in steps of its own
+    /// from as far as it came.
+    ///
+    /// # Errors
+    /// As [`Newton::solve`].
+    pub(super) fn solve(
+        &mut self,
+        fine: &mut Newton,
+        drive_mm: f64,
+        start: Option<&Equilibrium>,
+    ) -> Result<Equilibrium, SolveError> {
+        if let Some(found) = self.lead(fine, drive_mm, start) {
+            return Ok(found);
+        }
+        let from_mm = start.map_or(0.0, |s| s.drive_mm);
+        // What the coarse mesh gets wrong halfway is known when the other half is led.
+        let Some(halfway) = self.lead(fine, 0.5 * (from_mm + drive_mm), start) else {
+            return fine.solve(drive_mm, start);
+        };
+        match self.lead(fine, drive_mm, Some(&halfway)) {
+            Some(found) => Ok(found),
+            None => fine.solve(drive_mm, Some(&halfway)),
+        }
+    }
+
     /// Takes `fine` to a drive (mm) in one load step from the coarse equilibrium there; `None` where either fails.
     ///
     /// With an equilibrium of the fine mesh at another drive of the same direction as `start`, what the coarse mesh
     /// gets wrong there is taken off in proportion to the drive: the error of a mesh changes far more slowly than what
     /// it is the error of. Two factorisations are left of four or five.
-    pub(super) fn lead(
-        &mut self,
-        fine: &mut Newton,
-        drive_mm: f64,
-        start: Option<&Equilibrium>,
-    ) -> Option<Equilibrium> {
+    fn lead(&mut self, fine: &mut Newton, drive_mm: f64, start: Option<&Equilibrium>) -> Option<Equilibrium> {
         // A loose coarse solution is enough: its error is the mesh's.
         let loose = SolveOptions { tolerance: 1e-4, ..*fine.options };
         let mut coarse = self.coarse.newton(fine.material, &loose, fine.is_cancelled);
