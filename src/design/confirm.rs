@@ -29,7 +29,7 @@ use utoipa::ToSchema;
 
 /// Element sizes along the plates of a confirmation ([`MeshOptions::graded`]), as factors on the standard one; the
 /// last is the one that is reported.
-const MESHES: [f64; 3] = [1.6, 1.4, 1.2];
+const MESHES: [f64; 3] = [1.8, 1.6, 1.4];
 
 /// A confirmed design.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Element size along the plates of the coarse mesh, as a factor on the standard one.
 const COARSE_FACTOR: f64 = 2.5;
 /// Of the fine one: the middle one of a confirmation.
-const FINE_FACTOR: f64 = 1.4;
+const FINE_FACTOR: f64 = 1.6;
 
 /// How finely a design is solved while it is searched for. Integrated sensitivities hardly differ between the two;
 /// promised standard deviations of several terms do, and not by the same from design to design. Samples are coarse,
@@ -30,13 +30,10 @@ impl Fidelity {
         }
     }
 
-    /// The mesh. The fine one is graded toward the plates as a confirmation's: what the edges do to a coarser grading
-    /// is not what they do there.
+    /// The mesh, graded and layered as a confirmation's: what edges and free faces do on other meshes is not what they
+    /// do there.
     pub fn mesh_options(self, specimen: &Specimen) -> MeshOptions {
-        let options = match self {
-            Fidelity::Coarse => MeshOptions::scaled(specimen, self.factor()),
-            Fidelity::Fine => MeshOptions::graded(specimen, self.factor()),
-        };
+        let options = MeshOptions::graded(specimen, self.factor());
         MeshOptions { hole_segments: 8, ..options }
     }
 }

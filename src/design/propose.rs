@@ -162,12 +162,20 @@ impl Race {
             seen,
             values,
             best,
-            trend: Trend::of_others(state, spaces, space).map(Arc::new),
+            trend: Trend::of_others(state, spaces, space, run.study.scan.voxel_mm).map(Arc::new),
             belief: None,
             proposals: Vec::new(),
             has_learnt: true,
             failures_in_a_row: 0,
         })
+    }
+
+    /// Takes what the other structures have taught since.
+    fn renew_trend(&mut self, state: &State, spaces: &[Subspace], voxel_mm: [f64; 3]) {
+        if self.trend.as_ref().is_some_and(|trend| trend.is_outdated(state)) {
+            self.trend = Trend::of_others(state, spaces, self.space, voxel_mm).map(Arc::new);
+            self.has_learnt = true;
+        }
     }
 
     /// Proposes anew where something was learnt; nothing that was seen already.
@@ -185,7 +193,8 @@ impl Race {
         if self.failures_in_a_row >= MOST_FAILURES_IN_A_ROW {
             return;
         }
-        let Some(belief) = Belief::of(self.trend.clone(), space, &self.seen, &self.values) else { return };
+        let known = (&self.seen[..], &self.values[..]);
+        let Some(belief) = Belief::of(self.trend.clone(), space, known, run.study.scan.voxel_mm) else { return };
         let fidelity = self.fidelity;
         for (index, optimism) in optimism.iter().enumerate() {
             let merit = |x: &[f64]| {
@@ -197,7 +206,7 @@ impl Race {
             };
             let Some((expected, point)) = self.climb(run, space, &merit) else { continue };
             let apart = |o: &Proposal| o.point.iter().zip(&point).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
-            if belief.nearest(&point, fidelity) > NEAREST && self.proposals.iter().all(|o| apart(o) > NEAREST) {
+            if belief.nearest(space, &point, fidelity) > NEAREST && self.proposals.iter().all(|o| apart(o) > NEAREST) {
                 self.proposals.push(Proposal { optimism: index, point, expected });
             }
         }
@@ -311,7 +320,10 @@ impl SearchRun<'_> {
         let done = AtomicUsize::new(0);
         let reference = &judge.reference;
         while done.load(atomic::Ordering::Relaxed) < total {
-            races.par_iter_mut().for_each(|r| r.propose(self, (reference, &like), &spaces[r.space], rules.optimism));
+            races.par_iter_mut().for_each(|r| {
+                r.renew_trend(state, spaces, self.study.scan.voxel_mm);
+                r.propose(self, (reference, &like), &spaces[r.space], rules.optimism);
+            });
             let designs = next_designs(&mut races, rules);
             if designs.is_empty() {
                 break;

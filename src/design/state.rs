@@ -130,6 +130,11 @@ impl State {
         of_space.map(|index| (&self.points[index].1, self.fidelities[index], &self.judged[index])).collect()
     }
 
+    /// Designs that were solved, of all structures.
+    pub fn num_seen(&self) -> usize {
+        self.points.len()
+    }
+
     /// What the first design was judged.
     pub fn first_judged(&self) -> Option<&Judged> {
         self.judged.first()

@@ -1,5 +1,5 @@
-//! What structures have in common: how gains and limits go with the block, the drive and how much of the block is cut
-//! away, wherever the holes are.
+//! What structures have in common: how gains and limits go with the block, the drive, how much of the block is cut away
+//! and how far out, however many holes do it.
 //!
 //! When structures begin to compete for evaluations, one of them has been tried some ten times, all others together far
 //! more often. What the others teach is therefore the mean of a structure's own processes, which learn what its holes
@@ -10,6 +10,8 @@ use super::objective::Judged;
 use super::space::{Subspace, Variable};
 use super::state::State;
 use super::surrogate::{Seen, Surrogate};
+use crate::specimen::{HoleAxis, Specimen};
+use crate::voxel::VoxelGrid;
 use std::sync::Arc;
 
 /// Values below this, and above its negative, are cut: of designs that are far too poor it does not matter by how much,
@@ -19,6 +21,8 @@ const LOWEST: f64 = -0.7;
 pub(super) const SOLVED: f64 = 0.3;
 /// Designs without which nothing is supposed to be common.
 const FEWEST: usize = 12;
+/// Designs after which a trend is fitted again.
+const RENEWED_AFTER: usize = 24;
 /// The part of the block that holes take, in ranges of a variable: a quarter of it is as much as a block is varied by.
 const PER_PART_CUT: f64 = 4.0;
 
@@ -29,12 +33,18 @@ pub(super) fn values_of(judged: &Judged) -> Vec<f64> {
 }
 
 /// Gains and margins over what all structures share.
-pub(super) struct Trend(Surrogate);
+pub(super) struct Trend {
+    fitted: Surrogate,
+    /// Of the scan.
+    voxel_mm: [f64; 3],
+    /// Designs of all structures that were known when it was fitted.
+    num_known: usize,
+}
 
 impl Trend {
     /// By the designs of all other structures that have the same test and holes of the same direction or none; `None`
     /// where there are too few.
-    pub fn of_others(state: &State, spaces: &[Subspace], space: usize) -> Option<Trend> {
+    pub fn of_others(state: &State, spaces: &[Subspace], space: usize, voxel_mm: [f64; 3]) -> Option<Trend> {
         let own = &spaces[space];
         let is_alike = |other: &Subspace| {
             let are_along = |s: &Subspace| s.structure.num_holes() == 0 || s.structure.axis == own.structure.axis;
@@ -45,16 +55,25 @@ impl Trend {
         let (mut seen, mut values) = (Vec::new(), Vec::new());
         for (index, other) in spaces.iter().enumerate().filter(|(index, other)| *index != space && is_alike(other)) {
             for (point, fidelity, judged) in state.seen_of(index) {
-                seen.push(Seen { point: features(other, point), fidelity });
+                seen.push(Seen { point: features(other, point, voxel_mm), fidelity });
                 values.push(values_of(judged));
             }
         }
-        if seen.len() < FEWEST { None } else { Surrogate::fit(&seen, &values).map(Trend) }
+        if seen.len() < FEWEST {
+            return None;
+        }
+        let fitted = Surrogate::fit(&seen, &values)?;
+        Some(Trend { fitted, voxel_mm, num_known: state.num_seen() })
+    }
+
+    /// Whether so much was learnt since it was fitted that it is worth fitting again.
+    pub fn is_outdated(&self, state: &State) -> bool {
+        state.num_seen() >= self.num_known + RENEWED_AFTER
     }
 
     /// What a solution as fine as `at` is expected to give of a design of `space`.
     pub fn means(&self, space: &Subspace, point: &[f64], at: Fidelity) -> Vec<f64> {
-        self.0.means(&features(space, point), at)
+        self.fitted.means(&features(space, point, self.voxel_mm), at)
     }
 }
 
@@ -62,11 +81,18 @@ impl Trend {
 pub(super) struct Belief {
     trend: Option<Arc<Trend>>,
     own: Surrogate,
+    /// Of the scan.
+    voxel_mm: [f64; 3],
 }
 
 impl Belief {
     /// From designs of `space` and their values; `None` without any.
-    pub fn of(trend: Option<Arc<Trend>>, space: &Subspace, seen: &[Seen], values: &[Vec<f64>]) -> Option<Belief> {
+    pub fn of(
+        trend: Option<Arc<Trend>>,
+        space: &Subspace,
+        (seen, values): (&[Seen], &[Vec<f64>]),
+        voxel_mm: [f64; 3],
+    ) -> Option<Belief> {
         let over_trend = |(design, values): (&Seen, &Vec<f64>)| match &trend {
             None => values.clone(),
             Some(trend) => {
@@ -75,13 +101,14 @@ impl Belief {
             }
         };
         let over_trend: Vec<Vec<f64>> = seen.iter().zip(values).map(over_trend).collect();
-        let own = Surrogate::fit(seen, &over_trend)?;
-        Some(Belief { trend, own })
+        let described = |s: &Seen| Seen { point: described(space, &s.point, voxel_mm), ..*s };
+        let own = Surrogate::fit(&seen.iter().map(described).collect::<Vec<_>>(), &over_trend)?;
+        Some(Belief { trend, own, voxel_mm })
     }
 
     /// Mean and standard deviation of what a solution as fine as `at` would give, of each value at a point of `space`.
     pub fn predict(&self, space: &Subspace, point: &[f64], at: Fidelity) -> Vec<(f64, f64)> {
-        let mut predicted = self.own.predict(point, at);
+        let mut predicted = self.own.predict(&described(space, point, self.voxel_mm), at);
         if let Some(trend) = &self.trend {
             predicted.iter_mut().zip(trend.means(space, point, at)).for_each(|((mean, _), of_trend)| *mean += of_trend);
         }
@@ -89,8 +116,8 @@ impl Belief {
     }
 
     /// As [`Surrogate::nearest`].
-    pub fn nearest(&self, point: &[f64], at: Fidelity) -> f64 {
-        self.own.nearest(point, at)
+    pub fn nearest(&self, space: &Subspace, point: &[f64], at: Fidelity) -> f64 {
+        self.own.nearest(&described(space, point, self.voxel_mm), at)
     }
 }
 
@@ -99,12 +126,40 @@ fn shared(space: &Subspace) -> impl Iterator<Item = Variable> {
     space.variables.iter().copied().filter(|v| !v.is_of_holes())
 }
 
-fn features(space: &Subspace, point: &[f64]) -> Vec<f64> {
+/// How the block's free faces along its length and its width lie among the voxels of a scan: from 0, where a row of
+/// voxels has just come in at each side, to 1, where the next ones are about to. Much is seen at free faces: what a scan
+/// tells falls as more material lies beyond the voxels, and jumps up where rows come in, alike for all structures.
+fn beyond_voxels(specimen: &Specimen, voxel_mm: [f64; 3]) -> [f64; 2] {
+    let extents_mm = [specimen.block.length_mm, specimen.block.width_mm];
+    VoxelGrid::covering(specimen, voxel_mm).map_or([0.5; 2], |grid| {
+        let beyond = |extent_mm: f64, axis: usize| extent_mm / voxel_mm[axis] - grid.shape[axis] as f64 + 0.5;
+        [beyond(extents_mm[0], 0), beyond(extents_mm[1], 2)]
+    })
+}
+
+/// A point of `space`, and how its free faces lie among the voxels.
+fn described(space: &Subspace, point: &[f64], voxel_mm: [f64; 3]) -> Vec<f64> {
+    point.iter().copied().chain(beyond_voxels(&space.specimen(point), voxel_mm)).collect()
+}
+
+/// The block and the drive, how its free faces lie among the voxels, the part of it that is cut away, and how far out
+/// along the holes' plane that is: parts that are cut at the ends of an axis and not around the middle.
+fn features(space: &Subspace, point: &[f64], voxel_mm: [f64; 3]) -> Vec<f64> {
     let specimen = space.specimen(point);
     let block = &specimen.block;
     let part_cut = 1.0 - specimen.volume_mm3() / (block.length_mm * block.thickness_mm * block.width_mm);
+    let mut far_out = [0.0; 2];
+    for hole in &specimen.holes {
+        let across_mm = if hole.axis == HoleAxis::Width { block.thickness_mm } else { block.width_mm };
+        let extents_mm = [block.length_mm, across_mm];
+        let part = hole.wall().area_mm2() / (extents_mm[0] * extents_mm[1]);
+        for (axis, sum) in far_out.iter_mut().enumerate() {
+            *sum += part * (2.0 * hole.center_mm[axis] / extents_mm[axis]).powi(2);
+        }
+    }
     let of_block = space.variables.iter().zip(point).filter(|(v, _)| !v.is_of_holes()).map(|(_, value)| *value);
-    of_block.chain([PER_PART_CUT * part_cut]).collect()
+    let cut = [part_cut, far_out[0], far_out[1]].map(|part| PER_PART_CUT * part);
+    of_block.chain(beyond_voxels(&specimen, voxel_mm)).chain(cut).collect()
 }
 
 #[cfg(test)]
@@ -113,6 +168,8 @@ mod tests {
     use super::super::study::Study;
     use super::*;
     use std::path::Path;
+
+    const VOXEL_MM: [f64; 3] = [1.0, 0.1875, 0.75];
 
     fn spaces() -> Vec<Subspace> {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("geometries/studies");
@@ -138,7 +195,7 @@ mod tests {
         };
         let (one, four) = (of_holes(1), of_holes(4));
         let gain = |space: &Subspace, point: &[f64], own: f64| {
-            let block = features(space, point);
+            let block = features(space, point, VOXEL_MM);
             vec![0.3 * (block[1] + block[3]) - 0.2 * (block[2] - 0.4).powi(2) + own]
         };
         let designs = |space: &Subspace, holes: f64, blocks: &[f64], own: f64| {
@@ -151,15 +208,16 @@ mod tests {
         let (mut others, mut of_others) = (Vec::new(), Vec::new());
         for holes in [0.0, 0.15] {
             let (seen, values) = designs(four, holes, &everywhere, 0.0);
-            let as_features = |s: Seen| Seen { point: features(four, &s.point), ..s };
+            let as_features = |s: Seen| Seen { point: features(four, &s.point, VOXEL_MM), ..s };
             others.extend(seen.into_iter().map(as_features));
             of_others.extend(values);
         }
-        let trend = Surrogate::fit(&others, &of_others).map(|fitted| Arc::new(Trend(fitted)));
+        let trend = Surrogate::fit(&others, &of_others)
+            .map(|fitted| Arc::new(Trend { fitted, voxel_mm: VOXEL_MM, num_known: 0 }));
         let (seen, values) = designs(one, 0.2, &[0.1, 0.2], 0.05);
         let large = &points(one, 0.2, &[0.9])[0];
         let off = |trend: Option<Arc<Trend>>| {
-            let belief = Belief::of(trend, one, &seen, &values).expect("there are designs");
+            let belief = Belief::of(trend, one, (&seen, &values), VOXEL_MM).expect("there are designs");
             (belief.predict(one, large, Fidelity::Coarse)[0].0 - gain(one, large, 0.05)[0]).abs()
         };
         let (with, without) = (off(trend), off(None));

@@ -4,6 +4,7 @@ use super::check::orient_and_limit;
 use super::domain::Domain;
 use super::error::MeshError;
 use super::grading::{divide, with_middles};
+use super::grid::layered;
 use super::node_sets::{nodes_on_plane, pull_axis};
 use super::options::MeshOptions;
 use super::parting::part;
@@ -70,13 +71,13 @@ pub(super) fn mesh_specimen_parted(
 
 fn extrude(domain: &Domain, options: &MeshOptions, section: &Section) -> Result<Mesh, MeshError> {
     let half = domain.extrusion_half;
-    let ratio = domain.grading.extrusion;
+    let (inner_half, ratio) = (domain.inner_extrusion_half, domain.grading.extrusion);
     let mut levels: Vec<f64> = if domain.extrusion_mirrored {
-        divide(options.levels.div_ceil(2), 1.0, ratio).iter().map(|u| half * u).collect()
+        divide(options.levels.div_ceil(2), 1.0, ratio).iter().map(|u| inner_half * u).collect()
     } else {
-        divide(options.levels, ratio, ratio).iter().map(|u| half * (2.0 * u - 1.0)).collect()
+        divide(options.levels, ratio, ratio).iter().map(|u| inner_half * (2.0 * u - 1.0)).collect()
     };
-    levels = with_middles(&levels);
+    levels = layered(with_middles(&levels), half, !domain.extrusion_mirrored);
     if domain.extrusion_axis == 1 {
         // (x, z, −y) is right-handed: go down in y so that Jacobians are positive.
         levels.reverse();

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use super::domain::Domain;
 use super::error::MeshError;
 use super::grading::{divide, with_middles};
-use super::grid::{Builder, count, limit_cells, line};
+use super::grid::{Builder, count, layered, limit_cells, line};
 use super::options::MeshOptions;
 use super::power::{PowerDiagram, Rectangle};
 use super::section::{Section, dot, sub};
@@ -70,9 +70,10 @@ impl Layout<'_> {
         1e-7 * self.domain.scale()
     }
 
-    /// Bits of the block's graded outer sides that a point lies on (mirror line not counted).
+    /// Bits of the graded outer sides, within the layers along free ones, that a point lies on (mirror line not
+    /// counted).
     fn outer_sides(&self, p: [f64; 2]) -> u8 {
-        let [a, b] = self.domain.half;
+        let [a, b] = self.domain.inner_half;
         let outer = Rectangle { low: [-a, -b], high: [a, b] };
         outer.sides(p, self.tolerance())
     }
@@ -240,16 +241,30 @@ impl Layout<'_> {
     fn strips(&self, edges: &EdgePoints, builder: &mut Builder) -> Result<(), MeshError> {
         let domain = self.domain;
         let (low, high) = ([-domain.half[0], domain.bottom], domain.half);
+        let (within_low, within_high) = ([-domain.inner_half[0], domain.inner_bottom()], domain.inner_half);
         let lower_ratio = if domain.bottom < 0.0 { domain.grading.sides } else { 1.0 };
         let ratios = [[domain.grading.ends, domain.grading.ends], [lower_ratio, domain.grading.sides]];
         let strip = |c: usize, upper: bool| -> Result<Option<Vec<f64>>, MeshError> {
-            let (from, to) = if upper { (self.inner.high[c], high[c]) } else { (low[c], self.inner.low[c]) };
-            if to - from < self.tolerance() {
+            // Outward from the inner rectangle: graded elements, and the layer.
+            let (from, to, end) = if upper {
+                (self.inner.high[c], within_high[c], high[c])
+            } else {
+                (-self.inner.low[c], -within_low[c], -low[c])
+            };
+            let mut positions = vec![from];
+            if to - from > self.tolerance() {
+                let n = count(to - from, self.options)?;
+                positions = line(from, to, n, 1.0, ratios[c][usize::from(upper)]);
+            }
+            positions = layered(positions, end, false);
+            if positions.len() < 2 {
                 return Ok(None);
             }
-            let n = count(to - from, self.options)?;
-            let ratio = ratios[c][usize::from(upper)];
-            Ok(Some(if upper { line(from, to, n, 1.0, ratio) } else { line(from, to, n, ratio, 1.0) }))
+            if !upper {
+                positions.reverse();
+                positions.iter_mut().for_each(|p| *p = -*p);
+            }
+            Ok(Some(positions))
         };
         // Positions along a side of the inner rectangle, increasing.
         let side = |bit: u8, c: usize| -> Vec<f64> {

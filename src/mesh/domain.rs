@@ -10,6 +10,8 @@ use crate::specimen::{HoleAxis, HoleWall, Notch, Outline, SectionEdge, Specimen,
 const LENGTH_RANGE_MM: [f64; 2] = [1e-3, 1e5];
 /// Ligaments below this fraction of the smaller hole's diameter are not meshed.
 const MIN_LIGAMENT_RATIO: f64 = 0.02;
+/// A layer along a free side takes no more than this part of what the closest hole leaves there.
+const LAYER_OF_ROOM: f64 = 0.4;
 /// Points of an ellipse or a slot at which its distance from a dumb-bell's outline is looked at.
 const WALL_POINTS: usize = 96;
 /// Two positions closer than this fraction of the block's size are the same.
@@ -64,6 +66,10 @@ pub(super) struct Domain {
     pub half: [f64; 2],
     /// −half₁, or 0 if the section is mirrored at b = 0.
     pub bottom: f64,
+    /// Half extents of what the layers along free sides enclose; where there is no layer, those of the section and of
+    /// its extrusion.
+    pub inner_half: [f64; 2],
+    pub inner_extrusion_half: f64,
     /// The side of a dumb-bell; none of a block.
     pub profile: Option<Profile>,
     pub holes: Vec<SectionHole>,
@@ -151,6 +157,8 @@ impl Domain {
         let ratio = options.grading;
         let domain = Domain {
             half: domain_half,
+            inner_half: domain_half,
+            inner_extrusion_half: 0.5 * extents[extrusion_axis],
             bottom: if section_mirrored { 0.0 } else { -domain_half[1] },
             profile,
             holes: Vec::new(),
@@ -183,7 +191,37 @@ impl Domain {
             }
         }
         domain.holes = holes;
+        if shear && profile.is_none() {
+            domain.add_layers(options.free_layer_mm);
+        }
         Ok(domain)
+    }
+
+    /// Lays layers along the free sides of a sheared block, of a depth in mm, or of a part of what holes leave there.
+    fn add_layers(&mut self, depth_mm: f64) {
+        let reach = |hole: &SectionHole, c: usize| hole.center()[c].abs() + hole.wall.half_extents_mm()[c];
+        let room = |c: usize| self.half[c] - self.holes.iter().map(|hole| reach(hole, c)).fold(0.0, f64::max);
+        let [along, across] = [0, 1].map(|c| depth_mm.min(LAYER_OF_ROOM * room(c)));
+        // A graded side keeps the lesser half of its grading, in logarithms: the layer is the finest.
+        let lay = |inner: &mut f64, ratio: &mut f64, depth: f64| {
+            if depth > 0.0 {
+                *inner -= depth;
+                *ratio = ratio.sqrt();
+            }
+        };
+        lay(&mut self.inner_half[0], &mut self.grading.ends, along);
+        // The plates lie at y = ±half, the free sides at z = ±half.
+        if self.b_axis == 2 {
+            lay(&mut self.inner_half[1], &mut self.grading.sides, across);
+        } else {
+            let depth = depth_mm.min(LAYER_OF_ROOM * self.extrusion_half);
+            lay(&mut self.inner_extrusion_half, &mut self.grading.extrusion, depth);
+        }
+    }
+
+    /// Lower bound of b of what the layers enclose.
+    pub fn inner_bottom(&self) -> f64 {
+        if self.bottom < 0.0 { -self.inner_half[1] } else { self.bottom }
     }
 
     /// Half-width of the section's outline at `a`.

@@ -1,6 +1,6 @@
 //! Structured grids of quadrilaterals, collected into a section.
 
-use super::domain::Domain;
+use super::domain::{COINCIDENT, Domain};
 use super::error::MeshError;
 use super::grading::{divide, with_middles};
 use super::options::MeshOptions;
@@ -26,6 +26,20 @@ pub(super) fn limit_cells(cells: usize, options: &MeshOptions) -> Result<(), Mes
 /// `low` to `high` in `n` graded parts, with middles.
 pub(super) fn line(low: f64, high: f64, n: usize, start: f64, end: f64) -> Vec<f64> {
     with_middles(&divide(n, start, end)).iter().map(|u| low + (high - low) * u).collect()
+}
+
+/// Positions with middles, and one more part up to `end` where they do not reach it; `on_both_sides` from −`end` as
+/// well.
+pub(super) fn layered(mut positions: Vec<f64>, end: f64, on_both_sides: bool) -> Vec<f64> {
+    let last = positions.last().copied().unwrap_or(end);
+    if end - last > COINCIDENT * end {
+        let layer = [0.5 * (last + end), end];
+        if on_both_sides {
+            positions.splice(0..0, layer.map(|p| -p).into_iter().rev());
+        }
+        positions.extend(layer);
+    }
+    positions
 }
 
 /// Collects grids into a section.

@@ -49,8 +49,12 @@ fn random_layouts_conform() {
     for case in 0..200 {
         let specimen = random_layout(&mut random);
         for use_mirror in [true, false] {
-            for scale in [1.8, 1.0] {
-                let options = MeshOptions { use_mirror, ..MeshOptions::scaled(&specimen, scale) };
+            for options in [
+                MeshOptions::scaled(&specimen, 1.8),
+                MeshOptions::scaled(&specimen, 1.0),
+                MeshOptions::graded(&specimen, 1.6),
+            ] {
+                let options = MeshOptions { use_mirror, ..options };
                 match mesh_specimen(&specimen, &options) {
                     Ok(mesh) => {
                         let checked = mesh.check(&specimen);
@@ -74,6 +78,51 @@ fn random_layouts_conform() {
     // All layouts are makeable: none may be refused, and quadrilaterals must be the rule.
     assert_eq!(refused, 0);
     assert!(quads > 3 * prisms);
+}
+
+/// Next to every free face of a sheared block lies one layer of elements of the depth asked for, whatever the holes and
+/// the element size; plates and mirror planes have none.
+#[test]
+fn layers_lie_along_free_faces() {
+    for specimen in [solid(), two_holes(), off_axis(), width_holes()] {
+        let half = [specimen.block.length_mm, specimen.block.thickness_mm, specimen.block.width_mm].map(|e| 0.5 * e);
+        for (factor, use_mirror) in [(2.5, true), (1.6, false), (1.0, true)] {
+            let options = MeshOptions { use_mirror, ..MeshOptions::graded(&specimen, factor) };
+            let mesh = mesh_specimen(&specimen, &options).unwrap();
+            mesh.check(&specimen).unwrap();
+            assert_eq!(mesh.element_kind, ElementKind::Hex27);
+            for axis in [0, 2] {
+                for sign in [-1.0, 1.0] {
+                    let is_mirrored_off = axis == 2 && mesh.mirror.z && sign < 0.0;
+                    let depths = mesh.nodes.iter().map(|p| half[axis] - sign * p[axis]);
+                    // Corners and middles of the layer; rounding only.
+                    let in_layer = depths.filter(|d| *d < options.free_layer_mm - 1e-9);
+                    let mut parts: Vec<f64> = in_layer.map(|d| d / options.free_layer_mm).collect();
+                    parts.sort_by(f64::total_cmp);
+                    parts.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
+                    if is_mirrored_off {
+                        assert!(parts.is_empty());
+                        continue;
+                    }
+                    let name = &specimen.name;
+                    assert_eq!(parts.len(), 2, "{name}, factor {factor}, axis {axis}: {parts:?}");
+                    assert!(parts[0].abs() < 1e-9 && (parts[1] - 0.5).abs() < 1e-9, "{name}: {parts:?}");
+                }
+            }
+        }
+    }
+}
+
+/// A hole closer to a free face than two layers leaves a thinner one.
+#[test]
+fn layers_give_way_to_holes() {
+    let near = specimen(TestKind::DoubleLapShear, [25.4, 6.4, 19.1], HoleAxis::Thickness, &[[0.0, 6.4, 5.0]]);
+    let options = MeshOptions::graded(&near, 1.6);
+    let mesh = mesh_specimen(&near, &options).unwrap();
+    mesh.check(&near).unwrap();
+    let depths = mesh.nodes.iter().map(|p| 9.55 - p[2]).filter(|d| *d > 1e-9);
+    // Half of two fifths of 0.65 mm: the layer's middle nodes.
+    assert!((depths.fold(f64::INFINITY, f64::min) - 0.13).abs() < 1e-9);
 }
 
 #[test]

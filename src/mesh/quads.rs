@@ -3,7 +3,7 @@
 use super::cells::{Style, holed_section};
 use super::domain::Domain;
 use super::error::MeshError;
-use super::grid::{Builder, count, limit_cells, line};
+use super::grid::{Builder, count, layered, limit_cells, line};
 use super::options::MeshOptions;
 use super::power::Rectangle;
 use super::section::Section;
@@ -109,12 +109,17 @@ fn structured_section(domain: &Domain, options: &MeshOptions) -> Result<Section,
         }
         all
     } else {
-        line(-a, a, count(2.0 * a, options)?.max(2), grading.ends, grading.ends)
+        let a = domain.inner_half[0];
+        let within = line(-a, a, count(2.0 * a, options)?.max(2), grading.ends, grading.ends);
+        layered(within, domain.half[0], true)
     };
     let lower = if domain.bottom < 0.0 { grading.sides } else { 1.0 };
-    let width = b - domain.bottom;
+    let (inner_bottom, inner_b) = (domain.inner_bottom(), domain.inner_half[1]);
+    let width = inner_b - inner_bottom;
     let across_count = if domain.profile.is_some() { count(width, options)?.max(2) } else { count(width, options)? };
-    let across = line(domain.bottom / b, 1.0, across_count, lower, grading.sides);
+    let within = line(inner_bottom, inner_b, across_count, lower, grading.sides);
+    let mut across = layered(within, b, domain.bottom < 0.0);
+    across.iter_mut().for_each(|p| *p /= b);
     limit_cells((along.len() / 2) * (across.len() / 2), options)?;
     let mut builder = Builder::new(domain);
     builder.grid(along.len(), across.len(), |i, j| [along[i], across[j] * domain.half_width(along[i])]);
@@ -125,7 +130,7 @@ fn structured_section(domain: &Domain, options: &MeshOptions) -> Result<Section,
 /// (of one that is no circle, of the radius of the circle of its area).
 fn inner_rectangles(domain: &Domain, size: f64) -> Vec<Rectangle> {
     const RADII: [f64; 4] = [f64::INFINITY, 3.4, 2.5, 1.8];
-    let outer = Rectangle { low: [-domain.half[0], domain.bottom], high: domain.half };
+    let outer = Rectangle { low: [-domain.inner_half[0], domain.inner_bottom()], high: domain.inner_half };
     let reach = |c: usize, sign: f64, k: f64| {
         domain.holes.iter().map(|d| sign * d.center()[c] + d.reach_of_radii(c, k)).fold(f64::NEG_INFINITY, f64::max)
     };
