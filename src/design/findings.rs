@@ -6,8 +6,12 @@ use super::entry::DesignEntry;
 use super::found_sizes::sizes_in_words;
 use super::study::Study;
 use super::words::{holes_in_words, listed};
-use crate::sensitivity::IDENTIFIABILITY_LIMIT;
-use crate::specimen::way_across_plates;
+use crate::sensitivity::{IDENTIFIABILITY_LIMIT, ScanSettings};
+use crate::specimen::{Specimen, way_across_plates};
+use crate::voxel::VoxelGrid;
+
+/// A mould maker holds a dimension to about this, mm.
+const CLOSE_TO_A_ROW_MM: f64 = 0.1;
 
 /// "12 % more" or "8 % less".
 fn more_or_less(ratio: f64) -> String {
@@ -50,7 +54,7 @@ pub struct Equals<'a> {
     pub simplest: usize,
 }
 
-/// Sentences for the report: first the winner, its equals and its gains, then what holes do for each material, then
+/// Sentences for the report: first the winner, its equals and its gains, then what hangs on the scan's grid, then what holes do for each material, then
 /// where the two measures disagree, then what can and cannot be seen, then what happened at confirmation.
 pub fn findings(
     study: &Study,
@@ -65,6 +69,7 @@ pub fn findings(
     said.extend(which_are_equal(ranked, equals));
     said.extend(what_is_simpler(ranked, equals));
     said.extend(what_size_does(study, base, best));
+    said.extend(where_voxels_end(&best.specimen, study.scan));
     said.extend(how_far_apart(base, best));
     if study.objective.kind == ObjectiveKind::Detect {
         said.extend(sizes_in_words(study, base, best));
@@ -213,6 +218,30 @@ fn what_size_does(study: &Study, base: &DesignEntry, best: &DesignEntry) -> Opti
         size(base),
         ratio,
         ratio.sqrt()
+    ))
+}
+
+/// A block whose free faces hardly reach the outermost rows of the scan's voxels: much is seen there, and lost if the
+/// block comes out smaller or lies elsewhere.
+fn where_voxels_end(specimen: &Specimen, scan: ScanSettings) -> Option<String> {
+    if scan.surface.is_some() {
+        return None;
+    }
+    let spare_mm = VoxelGrid::spare_mm(specimen, scan.voxel_mm).ok()?;
+    let extents = [("length", specimen.block.length_mm), ("width", specimen.block.width_mm)];
+    let close = extents.into_iter().zip([0, 2]).filter(|(_, axis)| spare_mm[*axis] < CLOSE_TO_A_ROW_MM);
+    let named: Vec<String> = close
+        .map(|((name, extent_mm), axis)| format!("its {name} ({extent_mm:.1} mm) by {:.2} mm", spare_mm[axis].max(0.0)))
+        .collect();
+    if named.is_empty() {
+        return None;
+    }
+    Some(format!(
+        "Part of this factor hangs on where the scan's voxels lie: the free faces hardly reach the outermost voxels, and a \
+         row of them is lost where the block misses {}, or lies off the middle of the grid. Much of what tells the \
+         parameters apart is seen at free faces. Evaluate a block that is {CLOSE_TO_A_ROW_MM} mm smaller before this one \
+         is made.",
+        listed(&named)
     ))
 }
 
@@ -403,5 +432,23 @@ mod tests {
         assert_eq!(more_or_less(1.12), "12 % more");
         assert_eq!(more_or_less(0.92), "8 % less");
         assert_eq!(more_or_less(1.001), "as much");
+    }
+
+    /// 29.5 mm are 29.5 voxels, of which the outermost are kept by a hair; of 29.8 mm there is enough.
+    #[test]
+    fn factors_that_hang_on_the_grid_are_said() {
+        let scan = ScanSettings {
+            voxel_mm: [1.0, 0.1875, 0.75],
+            noise_sd_mm: [0.05; 3],
+            force_sd_n: 0.02,
+            partial_voxels: Default::default(),
+            surface: None,
+        };
+        let mut specimen = Specimen::from_json(include_str!("../../geometries/solid-shear.json")).expect("valid");
+        (specimen.block.length_mm, specimen.block.width_mm) = (29.5, 21.75);
+        let said = where_voxels_end(&specimen, scan).expect("the length is close");
+        assert!(said.contains("its length (29.5 mm) by 0.00 mm") && !said.contains("its width"), "{said}");
+        specimen.block.length_mm = 29.8;
+        assert_eq!(where_voxels_end(&specimen, scan), None);
     }
 }

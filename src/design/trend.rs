@@ -130,11 +130,8 @@ fn shared(space: &Subspace) -> impl Iterator<Item = Variable> {
 /// voxels has just come in at each side, to 1, where the next ones are about to. Much is seen at free faces: what a scan
 /// tells falls as more material lies beyond the voxels, and jumps up where rows come in, alike for all structures.
 fn beyond_voxels(specimen: &Specimen, voxel_mm: [f64; 3]) -> [f64; 2] {
-    let extents_mm = [specimen.block.length_mm, specimen.block.width_mm];
-    VoxelGrid::covering(specimen, voxel_mm).map_or([0.5; 2], |grid| {
-        let beyond = |extent_mm: f64, axis: usize| extent_mm / voxel_mm[axis] - grid.shape[axis] as f64 + 0.5;
-        [beyond(extents_mm[0], 0), beyond(extents_mm[1], 2)]
-    })
+    let spare = VoxelGrid::spare_mm(specimen, voxel_mm);
+    spare.map_or([0.5; 2], |spare_mm| [0, 2].map(|axis| spare_mm[axis] / voxel_mm[axis]))
 }
 
 /// A point of `space`, and how its free faces lie among the voxels.

@@ -55,6 +55,17 @@ impl VoxelGrid {
         Ok(VoxelGrid { origin_mm, voxel_mm, shape: count.map(|n| n as usize), surface: None })
     }
 
+    /// By how much less the block may extend along x, y and z before [`Self::covering`] has a row of voxels less there,
+    /// mm.
+    ///
+    /// # Errors
+    /// As [`Self::covering`].
+    pub fn spare_mm(specimen: &Specimen, voxel_mm: [f64; 3]) -> Result<[f64; 3], VoxelError> {
+        let grid = Self::covering(specimen, voxel_mm)?;
+        let extent = [specimen.block.length_mm, specimen.block.thickness_mm, specimen.block.width_mm];
+        Ok([0, 1, 2].map(|a| extent[a] - (grid.shape[a] as f64 - 0.5) * voxel_mm[a]))
+    }
+
     /// The grid of a planned measurement: [`Self::covering`], of the volume or of a surface. The subsets of a surface
     /// lie side by side and have the two edges of `voxel_mm` in the face.
     ///
@@ -188,6 +199,18 @@ mod tests {
             // Rounding of coordinates of order ten.
             assert!((first[a] + last[a]).abs() < 1e-13);
         }
+    }
+
+    /// 25.4, 6.4 and 19.1 mm are 25.4, 34.13 and 25.47 voxels, of which 25, 34 and 25 are kept down to half a voxel less.
+    #[test]
+    fn a_row_of_voxels_is_lost_where_half_of_it_is_empty() {
+        let spare_mm = VoxelGrid::spare_mm(&solid(), PUBLISHED_VOXEL).unwrap();
+        let expected = [0.9, 6.4 - 33.5 * 0.1875, 19.1 - 24.5 * 0.75];
+        // Rounding of lengths of order ten.
+        assert!((0..3).all(|a| (spare_mm[a] - expected[a]).abs() < 1e-12), "{spare_mm:?}");
+        let mut smaller = solid();
+        smaller.block.length_mm -= spare_mm[0] + 1e-9;
+        assert_eq!(VoxelGrid::covering(&smaller, PUBLISHED_VOXEL).unwrap().shape, [24, 34, 25]);
     }
 
     /// A surface's grid is one layer on the face with the subsets of a volume's grid in its plane.
