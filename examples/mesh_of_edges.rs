@@ -59,15 +59,9 @@ fn information(specimen: &Specimen, mesh: &MeshOptions) -> Result<(f64, usize), 
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let published = Specimen::from_json(include_str!("../geometries/two-hole-shear.json"))?;
-    println!("size  layers  grading  elements  information of the displacements about ln alpha");
-    for (factor, levels, grading) in MESHES {
-        let mesh = MeshOptions { levels, grading, ..MeshOptions::scaled(&published, factor) };
-        match information(&published, &mesh) {
-            Ok((found, elements)) => println!("{factor:<5} {levels:>6}  {grading:>7}  {elements:>8}  {found:.0}"),
-            Err(error) => println!("{factor:<5} {levels:>6}  {grading:>7}            {error}"),
-        }
-    }
-    println!("\nThe same over the first block's, without and with a layer along the free faces, at sizes {FACTORS:?}");
+    println!(
+        "Information about ln alpha over the first block's, without | with a layer along free faces, sizes {FACTORS:?}"
+    );
     let mut of_first = [[f64::NAN; FACTORS.len()]; 2];
     for (block, (extents_mm, place_mm, diameter_mm)) in BLOCKS.into_iter().enumerate() {
         let mut specimen = published.clone();
@@ -88,6 +82,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 print!("  {:.3}", found / *of_first);
             }
             print!("{}", if kind == 0 { "  |" } else { "\n" });
+        }
+    }
+    println!("\nsize  layers  grading  elements  information of the displacements about ln alpha");
+    for (factor, levels, grading) in MESHES {
+        let mesh = MeshOptions { levels, grading, ..MeshOptions::scaled(&published, factor) };
+        match information(&published, &mesh) {
+            Ok((found, elements)) => println!("{factor:<5} {levels:>6}  {grading:>7}  {elements:>8}  {found:.0}"),
+            Err(error) => println!("{factor:<5} {levels:>6}  {grading:>7}            {error}"),
         }
     }
     Ok(())

@@ -54,8 +54,9 @@ pub struct Equals<'a> {
     pub simplest: usize,
 }
 
-/// Sentences for the report: first the winner, its equals and its gains, then what hangs on the scan's grid, then what holes do for each material, then
-/// where the two measures disagree, then what can and cannot be seen, then what happened at confirmation.
+/// Sentences for the report: first the winner, its equals and its gains, then what hangs on the scan's grid, then what
+/// holes do for each material, then where the two measures disagree, then what can and cannot be seen, then what
+/// happened at confirmation.
 pub fn findings(
     study: &Study,
     base: &DesignEntry,

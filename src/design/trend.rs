@@ -127,8 +127,8 @@ fn shared(space: &Subspace) -> impl Iterator<Item = Variable> {
 }
 
 /// How the block's free faces along its length and its width lie among the voxels of a scan: from 0, where a row of
-/// voxels has just come in at each side, to 1, where the next ones are about to. Much is seen at free faces: what a scan
-/// tells falls as more material lies beyond the voxels, and jumps up where rows come in, alike for all structures.
+/// voxels has just come in at each side, to 1, where the next ones are about to. Much is seen at free faces: what a
+/// scan tells falls as more material lies beyond the voxels, and jumps up where rows come in, alike for all structures.
 fn beyond_voxels(specimen: &Specimen, voxel_mm: [f64; 3]) -> [f64; 2] {
     let spare = VoxelGrid::spare_mm(specimen, voxel_mm);
     spare.map_or([0.5; 2], |spare_mm| [0, 2].map(|axis| spare_mm[axis] / voxel_mm[axis]))

@@ -201,7 +201,8 @@ mod tests {
         }
     }
 
-    /// 25.4, 6.4 and 19.1 mm are 25.4, 34.13 and 25.47 voxels, of which 25, 34 and 25 are kept down to half a voxel less.
+    /// 25.4, 6.4 and 19.1 mm are 25.4, 34.13 and 25.47 voxels, of which 25, 34 and 25 are kept down to half a voxel
+    /// less.
     #[test]
     fn a_row_of_voxels_is_lost_where_half_of_it_is_empty() {
         let spare_mm = VoxelGrid::spare_mm(&solid(), PUBLISHED_VOXEL).unwrap();
