@@ -10,7 +10,7 @@ use lambdak::fem::SolveOptions;
 use lambdak::material::Material;
 use lambdak::mesh::MeshOptions;
 use lambdak::recording::Filter;
-use lambdak::sensitivity::{PartialVoxels, ScanSettings};
+use lambdak::sensitivity::ScanSettings;
 use lambdak::specimen::Specimen;
 
 /// CPU seconds of this thread so far; wall time where the system does not say.
@@ -30,8 +30,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         voxel_mm: [1.0, 0.1875, 0.75],
         noise_sd_mm: [0.05; 3],
         force_sd_n: 0.02,
-        partial_voxels: PartialVoxels::Uniform,
-        surface: None,
+        ..ScanSettings::default()
     };
     let never = || false;
     let cases = [

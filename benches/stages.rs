@@ -7,7 +7,7 @@
 use lambdak::fem::{ForwardModel, SolveOptions};
 use lambdak::material::Material;
 use lambdak::mesh::{DesignVariable, MeshOptions, mesh_specimen, shape_velocity};
-use lambdak::sensitivity::{DriveSelection, EvaluationOptions, PartialVoxels, ScanSettings, Scanner, evaluate};
+use lambdak::sensitivity::{DriveSelection, EvaluationOptions, ScanSettings, Scanner, evaluate};
 use lambdak::specimen::Specimen;
 use lambdak::voxel::Sampling;
 use std::hint::black_box;
@@ -32,8 +32,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         voxel_mm: [1.0, 0.1875, 0.75],
         noise_sd_mm: [0.05; 3],
         force_sd_n: 0.02,
-        partial_voxels: PartialVoxels::default(),
-        surface: None,
+        ..ScanSettings::default()
     };
     let chosen: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     for (label, factor, runs) in [("search", 1.8, 9), ("20k", 1.15, 5), ("70k", 0.73, 3), ("200k", 0.5, 1)] {

@@ -44,8 +44,7 @@ fn information(specimen: &Specimen, mesh: &MeshOptions) -> Result<(f64, usize), 
         voxel_mm: [1.0, 0.1875, 0.75],
         noise_sd_mm: [NOISE_SD_MM; 3],
         force_sd_n: 0.02,
-        partial_voxels: PartialVoxels::default(),
-        surface: None,
+        ..ScanSettings::default()
     };
     let mut model = ForwardModel::of_specimen(specimen, mesh)?;
     let scanner = Scanner::new(specimen, model.mesh(), &scan, Sampling::default())?;

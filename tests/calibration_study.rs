@@ -8,7 +8,7 @@ use common::ogden;
 use lambdak::calibration::{CalibrateOptions, StudyCase, TermCount, study};
 use lambdak::mesh::MeshOptions;
 use lambdak::recording::Filter;
-use lambdak::sensitivity::{PartialVoxels, ScanSettings};
+use lambdak::sensitivity::ScanSettings;
 use lambdak::specimen::Specimen;
 
 #[test]
@@ -48,8 +48,7 @@ fn published_scan() {
                 voxel_mm: [1.0, 0.1875, 0.75],
                 noise_sd_mm: [0.05; 3],
                 force_sd_n: 0.02,
-                partial_voxels: PartialVoxels::Uniform,
-                surface: None,
+                ..ScanSettings::default()
             },
             options: CalibrateOptions {
                 terms: TermCount::Auto { max: num_terms + 1 },

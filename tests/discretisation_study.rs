@@ -8,8 +8,7 @@ use common::{Random, random_material, random_specimen};
 use lambdak::material::Material;
 use lambdak::mesh::MeshOptions;
 use lambdak::sensitivity::{
-    DriveSelection, Evaluation, EvaluationOptions, Fixture, PartialVoxels, ScanSettings, bound_discretisation,
-    evaluate_fixture,
+    DriveSelection, Evaluation, EvaluationOptions, Fixture, ScanSettings, bound_discretisation, evaluate_fixture,
 };
 use lambdak::specimen::Specimen;
 use rayon::prelude::*;
@@ -50,8 +49,7 @@ fn evaluated(specimen: &Specimen, material: &Material, options: &EvaluationOptio
         voxel_mm: [1.0, 0.1875, 0.75],
         noise_sd_mm: [0.05; 3],
         force_sd_n: 0.02,
-        partial_voxels: PartialVoxels::Uniform,
-        surface: None,
+        ..ScanSettings::default()
     };
     let start = Instant::now();
     let is_over = || start.elapsed() > PATIENCE;

@@ -6,7 +6,7 @@ use crate::fem::{ForwardModel, SolveOptions};
 use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::recording::{Filter, LoadCurve, RecordedStep, Recording};
-use crate::sensitivity::{Protocol, ScanSettings};
+use crate::sensitivity::{Protocol, ScanSettings, ScannedVoxels};
 use crate::specimen::Specimen;
 use crate::voxel::{HammingFilter, Sampling, VoxelMask, VoxelOperator};
 use rand::SeedableRng;
@@ -94,6 +94,8 @@ pub struct SyntheticScan {
     other_masks: Vec<Option<VoxelMask>>,
     /// Grid and noise.
     pub scan: ScanSettings,
+    /// For how many voxels of one scan each of the mask's stands.
+    voxels_each: f64,
     truth: Measurement,
 }
 
@@ -143,21 +145,21 @@ impl SyntheticScan {
                 masks.push(None);
                 continue;
             }
-            let mask = scan.mask(sample)?;
+            let ScannedVoxels { mask, weights, voxels_each } = scan.voxels(sample)?;
             let operator = VoxelOperator::new(sample, model.mesh(), &mask, Sampling::default())?;
             for (voxels, state) in truth.displacements.iter_mut().zip(&path) {
                 voxels.extend(operator.average(&state.displacement)?);
             }
-            truth.weights.extend(scan.partial_voxels.weights(&mask).iter().map(|w| f64::from(count) * w));
-            masks.push(Some(mask));
+            truth.weights.extend(weights.iter().map(|w| f64::from(count) * w));
+            masks.push(Some((mask, voxels_each)));
         }
-        let other_masks = masks.split_off(1);
+        let other_masks = masks.split_off(1).into_iter().map(|of_kind| Some(of_kind?.0)).collect();
         // The first block is always scanned.
-        let Some(mask) = masks.pop().flatten() else {
+        let Some((mask, voxels_each)) = masks.pop().flatten() else {
             let name = "the number of scanned blocks";
             return Err(CalibrationError::InvalidValue { name, value: 0.0, requirement: "positive" });
         };
-        Ok(SyntheticScan { mask, other_masks, scan: *scan, truth })
+        Ok(SyntheticScan { mask, other_masks, scan: *scan, voxels_each, truth })
     }
 
     /// Voxels measured of each kind of sample; `None` where none is scanned.
@@ -203,8 +205,8 @@ impl SyntheticScan {
                 displacement,
             });
         }
-        let noise =
-            self.scan.noise().displacement_sd_mm.map(|sd| if hamming.is_some() { sd / 8f64.sqrt() } else { sd });
+        let num_averaged = if hamming.is_some() { 8.0 } else { 1.0 };
+        let noise = self.scan.noise().displacement_sd_mm.map(|sd| sd / (num_averaged * self.voxels_each).sqrt());
         Ok(Recording {
             id: id.into(),
             specimen: specimen.clone(),

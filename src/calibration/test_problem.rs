@@ -6,7 +6,7 @@ use super::synthetic::SyntheticScan;
 use crate::fem::{ForwardModel, SolveOptions};
 use crate::material::{Material, OgdenTerm};
 use crate::mesh::MeshOptions;
-use crate::sensitivity::{PartialVoxels, Protocol, ScanSettings};
+use crate::sensitivity::{Protocol, ScanSettings};
 use crate::specimen::{Block, Outline, Specimen, TestKind};
 use crate::voxel::{Sampling, VoxelOperator};
 
@@ -39,8 +39,7 @@ pub(super) fn scan() -> ScanSettings {
         voxel_mm: [1.0, 0.5, 1.0],
         noise_sd_mm: [0.02, 0.03, 0.04],
         force_sd_n: 0.01,
-        partial_voxels: PartialVoxels::Uniform,
-        surface: None,
+        ..ScanSettings::default()
     }
 }
 

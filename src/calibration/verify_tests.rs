@@ -201,8 +201,7 @@ fn measure_two_hole_shear() {
         voxel_mm: [1.0, 0.1875, 0.75],
         noise_sd_mm: [0.05; 3],
         force_sd_n: 0.02,
-        partial_voxels: crate::sensitivity::PartialVoxels::Uniform,
-        surface: None,
+        ..ScanSettings::default()
     };
     let one = include_str!("../../geometries/materials/ecoflex-0020.json");
     let two = include_str!("../../geometries/materials/ecoflex-0020-two-term.json");

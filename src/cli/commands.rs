@@ -72,6 +72,7 @@ const EVALUATE: &[Flag] = &[
     Flag::read("one-mesh", "has_discretisation", Off),
     Flag::of("median-stretch", "median_stretch"),
     Flag::of("voxel", "scan/voxel_mm"),
+    Flag::of("grid", "scan/grid"),
     Flag::read("surface", "scan/surface", FaceSeen),
     Flag::of("noise", "scan/noise_sd_mm"),
     Flag::of("force-sd", "scan/force_sd_n"),

@@ -74,6 +74,7 @@ fn conditions_of(e: &Evaluation) -> Vec<(String, String)> {
         ("noise of the displacement in mm", format!("{:?}", scan.noise_sd_mm)),
         ("noise of the force in N", format!("{}", scan.force_sd_n)),
         ("weight of partly filled voxels", format!("{:?}", scan.partial_voxels)),
+        ("where the scan's grid lies", format!("{:?}", scan.grid)),
         ("normalisation of the sensitivities", e.notes.integrated_sensitivity.clone()),
         ("meaning of the promised standard deviations", e.notes.promised_sd.clone()),
         ("parameters of the material", parameters.join(", ")),

@@ -51,7 +51,7 @@ const MAX_BYTES: u64 = 1 << 34;
 
 /// What the evaluations hold. Those of another meaning must not be read: their lists of derivatives are told apart by
 /// place alone.
-const FORMAT: &str = "evaluations/3";
+const FORMAT: &str = "evaluations/4";
 
 #[derive(Serialize, Deserialize)]
 struct Line {

@@ -82,7 +82,7 @@ impl SearchRun<'_> {
         for (finalist, result) in finalists.iter().zip(results) {
             match result {
                 None => return Err(state.stopped(study, "confirm")),
-                Some(Err(cause)) => state.fail(&finalist.specimen, &cause),
+                Some(Err(cause)) => state.fail(&finalist.specimen, None, &cause),
                 Some(Ok(mut confirmed)) => {
                     confirmed.compare(study, base);
                     if !confirmed.is_within_limits && finalist.is_within_limits {

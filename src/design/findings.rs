@@ -6,7 +6,7 @@ use super::entry::DesignEntry;
 use super::found_sizes::sizes_in_words;
 use super::study::Study;
 use super::words::{holes_in_words, listed};
-use crate::sensitivity::{IDENTIFIABILITY_LIMIT, ScanSettings};
+use crate::sensitivity::{GridPlace, IDENTIFIABILITY_LIMIT, ScanSettings};
 use crate::specimen::{Specimen, way_across_plates};
 use crate::voxel::VoxelGrid;
 
@@ -63,6 +63,7 @@ pub fn findings(
     ranked: &[DesignEntry],
     disagreement: &[Disagreement],
     equals: Equals,
+    gain_anywhere: Option<f64>,
 ) -> Vec<String> {
     let Some(best) = ranked.first() else { return Vec::new() };
     let mut said = vec![winner(base, best)];
@@ -70,6 +71,7 @@ pub fn findings(
     said.extend(which_are_equal(ranked, equals));
     said.extend(what_is_simpler(ranked, equals));
     said.extend(what_size_does(study, base, best));
+    said.extend(gain_anywhere.map(|gain| where_the_grid_lies(best.objective, gain)));
     said.extend(where_voxels_end(&best.specimen, study.scan));
     said.extend(how_far_apart(base, best));
     if study.objective.kind == ObjectiveKind::Detect {
@@ -222,10 +224,19 @@ fn what_size_does(study: &Study, base: &DesignEntry, best: &DesignEntry) -> Opti
     ))
 }
 
+/// What is left of the winner's factor where the scan's grid lies anywhere.
+fn where_the_grid_lies(centred: f64, anywhere: f64) -> String {
+    format!(
+        "The factor of {centred:.3} is of a grid on the middle of each specimen. On average over all places where the grid may \
+         lie it is {anywhere:.3}: how many rows of voxels come in at the free faces then decides nothing. A study whose scan has \
+         \"grid\": \"anywhere\" searches for that."
+    )
+}
+
 /// A block whose free faces hardly reach the outermost rows of the scan's voxels: much is seen there, and lost if the
 /// block comes out smaller or lies elsewhere.
 fn where_voxels_end(specimen: &Specimen, scan: ScanSettings) -> Option<String> {
-    if scan.surface.is_some() {
+    if scan.surface.is_some() || scan.grid != GridPlace::Centred {
         return None;
     }
     let spare_mm = VoxelGrid::spare_mm(specimen, scan.voxel_mm).ok()?;
@@ -442,8 +453,7 @@ mod tests {
             voxel_mm: [1.0, 0.1875, 0.75],
             noise_sd_mm: [0.05; 3],
             force_sd_n: 0.02,
-            partial_voxels: Default::default(),
-            surface: None,
+            ..ScanSettings::default()
         };
         let mut specimen = Specimen::from_json(include_str!("../../geometries/solid-shear.json")).expect("valid");
         (specimen.block.length_mm, specimen.block.width_mm) = (29.5, 21.75);
@@ -451,5 +461,7 @@ mod tests {
         assert!(said.contains("its length (29.5 mm) by 0.00 mm") && !said.contains("its width"), "{said}");
         specimen.block.length_mm = 29.8;
         assert_eq!(where_voxels_end(&specimen, scan), None);
+        specimen.block.length_mm = 29.5;
+        assert_eq!(where_voxels_end(&specimen, ScanSettings { grid: GridPlace::Anywhere, ..scan }), None);
     }
 }

@@ -17,6 +17,7 @@ use super::structure_problem::RESERVE;
 use super::surrogate::Seen;
 use super::trend::{Belief, SOLVED, Trend, values_of};
 use crate::optimise::Evolution;
+use crate::sensitivity::ScanSettings;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -73,9 +74,9 @@ impl RaceRules {
 
 /// A proposal this close to a design seen, in ranges of the variables, teaches nothing new.
 const NEAREST: f64 = 4e-3;
-/// A structure of which so many proposals one after the other have no equilibrium makes no more: where it promises most
-/// it does not stand the drive, and what it takes is missing where designs can be improved.
-const MOST_FAILURES_IN_A_ROW: usize = 4;
+/// A structure of which so many designs, and more than were solved, have no equilibrium makes no more proposals: where
+/// it promises most it does not stand the drive, and what it takes is missing where designs can be improved.
+const FEWEST_FAILURES: usize = 4;
 /// Standard deviations of the first points around a start of the climb on a surrogate.
 const FIRST_STEPS: [f64; 2] = [0.05, 0.25];
 /// Generations of a climb.
@@ -104,8 +105,8 @@ struct Race {
     proposals: Vec<Proposal>,
     /// Whether it has learnt something since.
     has_learnt: bool,
-    /// Proposals without an equilibrium since the last one with one.
-    failures_in_a_row: usize,
+    /// Designs without an equilibrium.
+    num_failed: usize,
 }
 
 /// A design that a structure proposes.
@@ -152,28 +153,36 @@ impl Race {
         let mut rng = ChaCha8Rng::seed_from_u64(run.study.seed);
         let streams = if *fidelity == Fidelity::Coarse { FIRST_STREAM } else { 2 * FIRST_STREAM };
         rng.set_stream(streams + space as u64);
-        let values = seen.iter().map(|(_, _, judged)| values_of(judged)).collect();
+        let values: Vec<Vec<f64>> = seen.iter().map(|(_, _, judged)| values_of(judged)).collect();
         let design = |(point, fidelity, _): (&Vec<f64>, Fidelity, _)| Seen { point: point.clone(), fidelity };
-        let seen = seen.into_iter().map(design).collect();
-        Some(Race {
+        let seen: Vec<Seen> = seen.into_iter().map(design).collect();
+        let trend = Trend::of_others(state, spaces, space, run.study.scan).map(Arc::new);
+        let belief = Belief::of(trend.clone(), &spaces[space], (&seen, &values), run.study.scan);
+        let mut race = Race {
             space,
             fidelity: *fidelity,
             rng,
             seen,
             values,
             best,
-            trend: Trend::of_others(state, spaces, space, run.study.scan.voxel_mm).map(Arc::new),
-            belief: None,
+            trend,
+            belief,
             proposals: Vec::new(),
             has_learnt: true,
-            failures_in_a_row: 0,
-        })
+            num_failed: 0,
+        };
+        for (point, fidelity) in state.failed_of(space) {
+            race.learn_failure(&spaces[space], point.clone(), fidelity);
+        }
+        Some(race)
     }
 
     /// Takes what the other structures have taught since.
-    fn renew_trend(&mut self, state: &State, spaces: &[Subspace], voxel_mm: [f64; 3]) {
-        if self.trend.as_ref().is_some_and(|trend| trend.is_outdated(state)) {
-            self.trend = Trend::of_others(state, spaces, self.space, voxel_mm).map(Arc::new);
+    fn renew_trend(&mut self, state: &State, spaces: &[Subspace], scan: ScanSettings) {
+        if self.trend.as_ref().is_none_or(|trend| trend.is_outdated(state))
+            && let Some(trend) = Trend::of_others(state, spaces, self.space, scan)
+        {
+            self.trend = Some(Arc::new(trend));
             self.has_learnt = true;
         }
     }
@@ -190,18 +199,22 @@ impl Race {
             return;
         }
         self.proposals.clear();
-        if self.failures_in_a_row >= MOST_FAILURES_IN_A_ROW {
+        let num_solved = self.seen.len() - self.num_failed;
+        if self.num_failed >= FEWEST_FAILURES.max(num_solved + 1) {
             return;
         }
         let known = (&self.seen[..], &self.values[..]);
-        let Some(belief) = Belief::of(self.trend.clone(), space, known, run.study.scan.voxel_mm) else { return };
+        let Some(belief) = Belief::of(self.trend.clone(), space, known, run.study.scan) else { return };
         let fidelity = self.fidelity;
         for (index, optimism) in optimism.iter().enumerate() {
             let merit = |x: &[f64]| {
                 let predicted = belief.predict(space, x, fidelity);
                 let (gains, margins) = predicted.split_at(like.gains.len());
                 let gains = gains.iter().map(|(mean, sd)| mean + optimism * sd).collect();
-                let margins = margins.iter().map(|(mean, _)| *mean).collect();
+                let mut margins: Vec<f64> = margins.iter().map(|(mean, _)| *mean).collect();
+                if fidelity == Fidelity::Coarse {
+                    margins.push(belief.has_fine_equilibrium(space, x));
+                }
                 merit_of(reference, &Judged { gains, margins, ..like.clone() })
             };
             let Some((expected, point)) = self.climb(run, space, &merit) else { continue };
@@ -242,27 +255,30 @@ impl Race {
         best
     }
 
-    /// Learns what became of a proposal. Of one without an equilibrium the rest is supposed as predicted, so that a
-    /// wall of failures does not bend what is known beside it.
+    /// Learns what became of a proposal.
     fn learn(&mut self, reference: &Reference, space: &Subspace, point: Vec<f64>, judged: Option<&Judged>) {
-        let failed = || {
-            let predicted = self.belief.as_ref().map(|b| b.predict(space, &point, self.fidelity)).unwrap_or_default();
-            let mut values: Vec<f64> = predicted.into_iter().map(|(mean, _)| mean).collect();
-            values.pop();
-            values.push(-SOLVED);
-            values
+        self.has_learnt = true;
+        let Some(judged) = judged else {
+            return self.learn_failure(space, point, self.fidelity);
         };
-        self.values.push(judged.map_or_else(failed, values_of));
-        self.failures_in_a_row = if judged.is_some() { 0 } else { self.failures_in_a_row + 1 };
-        if let Some(judged) = judged {
-            let merit = merit_of(reference, judged);
-            let found = Best { is_as_fine: true, merit, point: point.clone() };
-            if found.compare(&self.best).is_gt() {
-                self.best = found;
-            }
+        self.values.push(values_of(judged));
+        let found = Best { is_as_fine: true, merit: merit_of(reference, judged), point: point.clone() };
+        if found.compare(&self.best).is_gt() {
+            self.best = found;
         }
         self.seen.push(Seen { point, fidelity: self.fidelity });
-        self.has_learnt = true;
+    }
+
+    /// Of a design without an equilibrium the rest is supposed as predicted, so that a wall of failures does not bend
+    /// what is known beside it.
+    fn learn_failure(&mut self, space: &Subspace, point: Vec<f64>, fidelity: Fidelity) {
+        let Some(belief) = &self.belief else { return };
+        let mut values: Vec<f64> = belief.predict(space, &point, fidelity).into_iter().map(|(mean, _)| mean).collect();
+        values.pop();
+        values.push(-SOLVED);
+        self.values.push(values);
+        self.seen.push(Seen { point, fidelity });
+        self.num_failed += 1;
     }
 
     /// Takes the proposal of an optimism out.
@@ -314,14 +330,16 @@ impl SearchRun<'_> {
                 Some(structures) => structures.clone(),
                 None => state.best_structures(rules.most_structures),
             };
-            races.extend(best.into_iter().filter_map(|space| Race::of(self, judge, state, spaces, space)));
+            let is_given_up = |space: usize| judge.fidelity == Fidelity::Coarse && state.is_given_up(space);
+            let racing = best.into_iter().filter(|space| !is_given_up(*space));
+            races.extend(racing.filter_map(|space| Race::of(self, judge, state, spaces, space)));
         }
         let Some(like) = state.first_judged().filter(|_| !races.is_empty()).cloned() else { return Ok(()) };
         let done = AtomicUsize::new(0);
         let reference = &judge.reference;
         while done.load(atomic::Ordering::Relaxed) < total {
             races.par_iter_mut().for_each(|r| {
-                r.renew_trend(state, spaces, self.study.scan.voxel_mm);
+                r.renew_trend(state, spaces, self.study.scan);
                 r.propose(self, (reference, &like), &spaces[r.space], rules.optimism);
             });
             let designs = next_designs(&mut races, rules);
@@ -371,7 +389,7 @@ impl SearchRun<'_> {
                     Some(judged)
                 }
                 Some(Err(cause)) => {
-                    state.fail(&specimen, &cause);
+                    state.fail(&specimen, Some((space, &point, judge.fidelity)), &cause);
                     None
                 }
             };
@@ -401,7 +419,7 @@ mod tests {
             proposals: proposals.collect(),
             trend: None,
             has_learnt: false,
-            failures_in_a_row: 0,
+            num_failed: 0,
         }
     }
 
@@ -421,7 +439,7 @@ mod tests {
         assert!(next_designs(&mut races, &rules).is_empty());
     }
 
-    /// A structure that fails again and again leaves the evaluations to others; one success, and it goes on.
+    /// A structure that fails more often than not leaves the evaluations to others until that changes.
     #[test]
     fn a_structure_that_keeps_failing_makes_no_more_proposals() {
         let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("geometries/studies");
@@ -442,14 +460,16 @@ mod tests {
         race.best.point = vec![0.5; n];
         let at = |i: usize| vec![0.1 * i as f64; n];
         race.learn(&reference, space, at(0), Some(&judged));
-        for failures in 1..=MOST_FAILURES_IN_A_ROW {
+        for failures in 1..=FEWEST_FAILURES {
             race.propose(&run, (&reference, &judged), space, &[0.0]);
             assert_eq!(race.proposals.len(), 1, "after {} failures", failures - 1);
             race.learn(&reference, space, at(failures), None);
         }
-        race.propose(&run, (&reference, &judged), space, &[0.0]);
-        assert!(race.proposals.is_empty());
-        race.learn(&reference, space, at(9), Some(&judged));
+        for solved in 2..=FEWEST_FAILURES {
+            race.propose(&run, (&reference, &judged), space, &[0.0]);
+            assert!(race.proposals.is_empty(), "{} solved", solved - 1);
+            race.learn(&reference, space, at(FEWEST_FAILURES + solved), Some(&judged));
+        }
         race.propose(&run, (&reference, &judged), space, &[0.0]);
         assert_eq!(race.proposals.len(), 1);
     }

@@ -33,6 +33,10 @@ pub struct DesignResult {
     pub base: DesignEntry,
     /// The winner.
     pub best: DesignEntry,
+    /// The winner's objective over the base's if the scan's grid lay anywhere, in place of on the middle of each specimen;
+    /// absent where the study takes it to do so, or its objective does not hang on it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub objective_grid_anywhere: Option<f64>,
     /// Every confirmed design, best first, those within every limit before others.
     pub ranked: Vec<DesignEntry>,
     /// Indices in `ranked` of the designs that are equal to the best within what meshes leave open, the best included.
@@ -117,7 +121,8 @@ impl DesignResult {
             pareto: pareto(&ranked),
             recommendation: Recommendation::new(study, &base, &ranked, equals),
             protocol: study.protocol.clone(),
-            findings: findings(study, &base, &ranked, &disagreement, equals),
+            findings: findings(study, &base, &ranked, &disagreement, equals, found.gain_anywhere),
+            objective_grid_anywhere: found.gain_anywhere,
             equal_to_best,
             simplest,
             disagreement,

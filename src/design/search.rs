@@ -16,7 +16,7 @@ use super::propose::RaceRules;
 use super::search_error::SearchError;
 use super::search_run::{Attempt, Judge, Progress, ProgressSink, SearchRun};
 use super::space::{Subspace, Variable, subspaces};
-use super::state::State;
+use super::state::{MOST_FINE_FAILURES, State};
 use super::structure_problem::StructureProblem;
 use super::study::Study;
 use super::unfinished::Unfinished;
@@ -26,6 +26,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Proposals of the solid blocks before anything else is sampled.
 const SOLID_PROPOSALS: usize = 10;
+/// Parts of the race on the coarse mesh, before each of which the best designs are tried on the fine one.
+const LAPS: usize = 3;
+/// Structures of which one is.
+const CHECKED_STRUCTURES: usize = 8;
+/// How far the next lies from those that had no equilibrium there, in ranges of the variables.
+const CHECKS_APART: f64 = 0.25;
 
 /// What the search found, best first.
 #[derive(Clone, Debug)]
@@ -34,6 +40,9 @@ pub struct Found {
     pub base: Confirmed,
     /// Confirmed designs, best objective first, those within every limit before others.
     pub ranked: Vec<Confirmed>,
+    /// The objective of the best over the base's if the scan's grid lay anywhere; `None` where the study takes it to do
+    /// so, or its objective does not hang on it.
+    pub gain_anywhere: Option<f64>,
     /// Every design evaluated, in order.
     pub candidates: Vec<Candidate>,
     /// Largest objective within limits after each evaluation.
@@ -101,7 +110,7 @@ impl SearchRun<'_> {
         let coarse = self.judge(&base, Fidelity::Coarse, coarse, &state)?;
         let fine = self.judge(&base, Fidelity::Fine, fine, &state)?;
         let spaces = subspaces(study);
-        self.explore(&coarse, &spaces, &base_specimen, &mut state)?;
+        self.explore((&coarse, &fine), &spaces, &base_specimen, &mut state)?;
         if study.budget.refine > 0 {
             let in_integrals = self.in_integrals(&base_specimen, &state)?;
             let in_integrals = self.as_confirmed(&base, &in_integrals);
@@ -112,7 +121,9 @@ impl SearchRun<'_> {
             self.race(&RaceRules::of_solid(study.budget.propose, &spaces), &fine, &spaces, &mut state)?;
         }
         let ranked = self.confirm_all(&base, &spaces, &mut state)?;
+        let gain_anywhere = ranked.first().and_then(|best| self.gain_anywhere(&base.specimen, &best.specimen));
         Ok(Found {
+            gain_anywhere,
             base,
             ranked,
             history: state.history,
@@ -159,7 +170,7 @@ impl SearchRun<'_> {
 
     fn explore(
         &self,
-        judge: &Judge,
+        (judge, fine): (&Judge, &Judge),
         spaces: &[Subspace],
         base: &Specimen,
         state: &mut State,
@@ -209,8 +220,38 @@ impl SearchRun<'_> {
             let batch: Vec<(usize, Vec<f64>)> = with_count.flat_map(|&s| sampled(s, &known_of(s))).collect();
             self.evaluate_batch(judge, spaces, ("explore", &batch, total), state)?;
         }
-        let so_far = state.num_evaluations;
-        self.race(&RaceRules::of_samples(total.saturating_sub(so_far), None, (so_far, total)), judge, spaces, state)
+        for lap in 0..LAPS {
+            self.check_on_fine_mesh(fine, spaces, total, state)?;
+            let so_far = state.num_evaluations;
+            let proposals = total.saturating_sub(so_far).div_ceil(LAPS - lap);
+            self.race(&RaceRules::of_samples(proposals, None, (so_far, total)), judge, spaces, state)?;
+        }
+        Ok(())
+    }
+
+    /// Solves the best designs of the best structures on the fine mesh, so that the race on the coarse one is not led by
+    /// structures that have no equilibrium there: near folding little is stable and everything tells much.
+    fn check_on_fine_mesh(
+        &self,
+        fine: &Judge,
+        spaces: &[Subspace],
+        total: usize,
+        state: &mut State,
+    ) -> Result<(), SearchError> {
+        if self.study.budget.propose == 0 {
+            return Ok(());
+        }
+        let is_there = |space: &usize, state: &State| !state.is_given_up(*space);
+        let leading: Vec<usize> = state.best_structures(usize::MAX);
+        let leading: Vec<usize> =
+            leading.into_iter().filter(|space| is_there(space, state)).take(CHECKED_STRUCTURES).collect();
+        for _ in 0..MOST_FINE_FAILURES {
+            let left = leading.iter().filter(|space| is_there(space, state));
+            let batch: Vec<(usize, Vec<f64>)> =
+                left.filter_map(|space| state.to_check(*space, CHECKS_APART).cloned()).collect();
+            self.evaluate_batch(fine, spaces, ("explore", &batch, total), state)?;
+        }
+        Ok(())
     }
 
     fn evaluate_batch(
@@ -252,7 +293,7 @@ impl SearchRun<'_> {
                 Some(Ok(evaluated)) => {
                     state.add((*space, vector), specimen, judge, &reference.judge(&evaluated), stage);
                 }
-                Some(Err(cause)) => state.fail(&specimen, &cause),
+                Some(Err(cause)) => state.fail(&specimen, Some((*space, vector, judge.fidelity)), &cause),
             }
         }
         if was_stopped { Err(state.stopped(self.study, stage)) } else { Ok(()) }

@@ -1,5 +1,6 @@
 //! What all stages of a search share: the study, its evaluations kept in the checkpoint, and where progress is told.
 
+use super::aim::ObjectiveKind;
 use super::checkpoint::Checkpoint;
 use super::confirm::estimate;
 use super::evaluation_failure::EvaluationFailure;
@@ -9,6 +10,7 @@ use super::objective::Reference;
 use super::space::Subspace;
 use super::study::Study;
 use crate::provenance::input_hash;
+use crate::sensitivity::{GridPlace, ScanSettings};
 use crate::specimen::Specimen;
 
 /// How far a search is.
@@ -55,6 +57,31 @@ impl SearchRun<'_> {
             Err(EvaluationFailure::Cancelled) => None,
             other => Some(other),
         })
+    }
+
+    /// The objective of `design` over that of `base` if the scan's grid lay anywhere, in place of on the middle of each:
+    /// `None` where the study takes it to do so, where its objective does not look at voxels or asks for a diagnosis, or
+    /// where it was cancelled.
+    pub fn gain_anywhere(&self, base: &Specimen, design: &Specimen) -> Option<f64> {
+        let looks_at_voxels = !matches!(self.study.objective.kind, ObjectiveKind::TellApart | ObjectiveKind::Detect);
+        if self.study.scan.grid != GridPlace::Centred || !looks_at_voxels {
+            return None;
+        }
+        let scan = ScanSettings { grid: GridPlace::Anywhere, ..self.study.scan };
+        let study = Study { scan, ..self.study.clone() };
+        let evaluated = |specimen: &Specimen| {
+            let key = input_hash(&serde_json::json!({ "specimen": specimen, "kind": "anywhere" }));
+            let attempt: Option<Attempt> = self.checkpoint.get_or(&key, || {
+                match estimate(&study, specimen, Fidelity::Fine, &|| (self.is_cancelled)()) {
+                    Err(EvaluationFailure::Cancelled) => None,
+                    other => Some(other),
+                }
+            });
+            attempt?.ok()
+        };
+        let (base, design) = (evaluated(base)?, evaluated(design)?);
+        let reference = Reference::new(&study, self.evaluator.samples(), &base.responses);
+        Some(reference.objective(&reference.judge(&design)).exp())
     }
 
     /// The evaluation of a design in integrals in place of voxels, with gradients where `subspace` is given: from the

@@ -1,6 +1,13 @@
 //! The whole search on a small study: the same bits at any number of threads and after a stop; what it confirms can be
 //! made.
 
+use super::evaluation_failure::EvaluationFailure;
+use super::evaluator::Evaluator;
+use super::fidelity::Fidelity;
+use super::objective::Judged;
+use super::search::base_at_drive;
+use super::search_run::{Judge, SearchRun};
+use super::state::State;
 use super::*;
 use crate::specimen::{Specimen, TestResponse};
 use std::path::Path;
@@ -86,6 +93,49 @@ fn proposals_keep_the_limits() {
     }
     assert!(found.ranked[0].is_within_limits);
     assert!(found.ranked[0].objective.is_finite());
+    // A design is told by how much it gains wherever the grid lies: here by about as much.
+    let anywhere = found.gain_anywhere.expect("the grid is centred");
+    assert!((anywhere / found.ranked[0].objective - 1.0).abs() < 0.3, "{anywhere} {}", found.ranked[0].objective);
+    let said = DesignResult::new(&study, &found).expect("something was confirmed").findings;
+    assert!(said.iter().any(|s| s.contains(&format!("it is {anywhere:.3}"))), "{said:?}");
+}
+
+/// Structures race by their coarse designs; those of which nothing could be solved finely come last, and the next design
+/// to try of them lies elsewhere.
+#[test]
+fn structures_without_a_fine_equilibrium_come_last() {
+    let study = small_study();
+    let checkpoint = Checkpoint::in_memory();
+    let run = SearchRun {
+        study: &study,
+        evaluator: Evaluator::new(&study),
+        checkpoint: &checkpoint,
+        is_cancelled: &|| false,
+        progress: &quiet,
+    };
+    let (mut state, base) = (State::default(), base_at_drive(&study));
+    let judge = |fidelity: Fidelity, state: &State| Judge {
+        fidelity,
+        reference: run.in_integrals(&base, state).expect("the base has an equilibrium"),
+    };
+    let (coarse, fine) = (judge(Fidelity::Coarse, &state), judge(Fidelity::Fine, &state));
+    let judged = coarse.reference.of_base();
+    let gaining = |gain: f64| Judged { gains: judged.gains.iter().map(|g| g + gain).collect(), ..judged.clone() };
+    let add = |state: &mut State, space: usize, at: f64, judge: &Judge, gain: f64| {
+        state.add((space, &[at]), base.clone(), judge, &gaining(gain), "explore");
+    };
+    add(&mut state, 0, 0.5, &coarse, 0.0);
+    add(&mut state, 1, 0.5, &coarse, 0.2);
+    assert_eq!(state.best_structures(9), [1, 0]);
+    assert_eq!(state.to_check(1, 0.25), Some(&(1, vec![0.5])));
+    state.fail(&base, Some((1, &[0.5], Fidelity::Fine)), &EvaluationFailure::Cancelled);
+    assert_eq!(state.best_structures(9), [0, 1]);
+    assert_eq!(state.to_check(1, 0.25), None);
+    add(&mut state, 1, 0.9, &coarse, 0.1);
+    assert_eq!(state.to_check(1, 0.25), Some(&(1, vec![0.9])));
+    // What is found on the fine mesh does not count against coarse designs.
+    add(&mut state, 1, 0.9, &fine, -0.3);
+    assert_eq!((state.best_structures(9), state.to_check(1, 0.25)), (vec![1, 0], None));
 }
 
 /// The solid block is improved on the fine mesh for the comparison, in the race of all structures or by proposals of

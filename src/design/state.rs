@@ -12,6 +12,8 @@ use crate::specimen::Specimen;
 
 /// Designs of one structure that are confirmed at most.
 const MOST_OF_A_STRUCTURE: usize = 2;
+/// Designs of a structure that are tried on the fine mesh until one has an equilibrium.
+pub(super) const MOST_FINE_FAILURES: usize = 2;
 
 /// A design on its way to confirmation.
 #[derive(Clone, Debug)]
@@ -36,6 +38,8 @@ pub(super) struct State {
     /// Largest objective within limits after each evaluation, of the candidates solved as finely.
     pub history: Vec<f64>,
     pub failures: Vec<String>,
+    /// Structure and vector of designs that could not be solved, and how finely they were to be.
+    failed: Vec<(usize, Vec<f64>, Fidelity)>,
     pub num_evaluations: usize,
 }
 
@@ -67,8 +71,11 @@ impl State {
         });
     }
 
-    pub fn fail(&mut self, specimen: &Specimen, cause: &EvaluationFailure) {
+    /// A design that could not be solved; `of` where it was searched for: its structure and vector, and how finely it
+    /// was to be solved.
+    pub fn fail(&mut self, specimen: &Specimen, of: Option<(usize, &[f64], Fidelity)>, cause: &EvaluationFailure) {
         self.num_evaluations += 1;
+        self.failed.extend(of.map(|(space, vector, fidelity)| (space, vector.to_vec(), fidelity)));
         self.failures.push(format!("{}: {cause}", specimen.name));
     }
 
@@ -107,16 +114,36 @@ impl State {
         starts
     }
 
-    /// The `count` structures with the best designs, best first.
+    /// The `count` structures with the best designs, best first; last those of which no design could be solved finely
+    /// although it was tried. Structures are compared by coarse designs, which most have been improved by.
     pub fn best_structures(&self, count: usize) -> Vec<usize> {
-        let mut found: Vec<usize> = Vec::new();
-        for index in self.order() {
+        let is_fine = |index: usize| self.fidelities[index] == Fidelity::Fine;
+        // Of every structure: whether it fails finely, its best coarse (else fine) merit.
+        let mut of_structures: Vec<(usize, bool, f64)> = Vec::new();
+        for index in self.order().into_iter().rev() {
             let space = self.points[index].0;
-            if found.len() < count && !found.contains(&space) {
-                found.push(space);
+            let has_coarse = of_structures.iter().any(|s| s.0 == space);
+            if is_fine(index) && has_coarse {
+                continue;
             }
+            of_structures.retain(|s| s.0 != space);
+            of_structures.push((space, self.fine_failures(space) > 0, self.candidates[index].merit));
         }
-        found
+        of_structures.sort_by(|a, b| a.1.cmp(&b.1).then(b.2.total_cmp(&a.2)).then(a.0.cmp(&b.0)));
+        of_structures.into_iter().take(count).map(|s| s.0).collect()
+    }
+
+    /// How many designs of a structure were to be solved finely and could not be; none where one could.
+    fn fine_failures(&self, space: usize) -> usize {
+        if self.seen_of(space).iter().any(|(_, fidelity, _)| *fidelity == Fidelity::Fine) {
+            return 0;
+        }
+        self.failed_of(space).filter(|(_, fidelity)| *fidelity == Fidelity::Fine).count()
+    }
+
+    /// Whether a structure has so often failed on the fine mesh that it is no longer improved on the coarse one.
+    pub fn is_given_up(&self, space: usize) -> bool {
+        self.fine_failures(space) >= MOST_FINE_FAILURES
     }
 
     /// The best design of the structures that `counts` admits, with its structure.
@@ -128,6 +155,27 @@ impl State {
     pub fn seen_of(&self, space: usize) -> Vec<(&Vec<f64>, Fidelity, &Judged)> {
         let of_space = (0..self.points.len()).filter(|&index| self.points[index].0 == space);
         of_space.map(|index| (&self.points[index].1, self.fidelities[index], &self.judged[index])).collect()
+    }
+
+    /// The designs of a structure that could not be solved, and how finely they were to be, in order.
+    pub fn failed_of(&self, space: usize) -> impl Iterator<Item = (&Vec<f64>, Fidelity)> {
+        self.failed.iter().filter(move |f| f.0 == space).map(|(_, vector, fidelity)| (vector, *fidelity))
+    }
+
+    /// The best design of a structure that is still to be solved finely, if none of it was: the best of those that lie
+    /// at least `apart` from what failed.
+    pub fn to_check(&self, space: usize, apart: f64) -> Option<&(usize, Vec<f64>)> {
+        if self.seen_of(space).iter().any(|(_, fidelity, _)| *fidelity == Fidelity::Fine) {
+            return None;
+        }
+        let are_far = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt() >= apart;
+        let failed: Vec<&Vec<f64>> = self
+            .failed_of(space)
+            .filter(|(_, fidelity)| *fidelity == Fidelity::Fine)
+            .map(|(vector, _)| vector)
+            .collect();
+        let mut of_space = self.order().into_iter().map(|index| &self.points[index]).filter(|(of, _)| *of == space);
+        of_space.find(|(_, point)| failed.iter().all(|f| are_far(f, point)))
     }
 
     /// Designs that were solved, of all structures.

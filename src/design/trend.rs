@@ -10,6 +10,7 @@ use super::objective::Judged;
 use super::space::{Subspace, Variable};
 use super::state::State;
 use super::surrogate::{Seen, Surrogate};
+use crate::sensitivity::{GridPlace, ScanSettings};
 use crate::specimen::{HoleAxis, Specimen};
 use crate::voxel::VoxelGrid;
 use std::sync::Arc;
@@ -35,8 +36,7 @@ pub(super) fn values_of(judged: &Judged) -> Vec<f64> {
 /// Gains and margins over what all structures share.
 pub(super) struct Trend {
     fitted: Surrogate,
-    /// Of the scan.
-    voxel_mm: [f64; 3],
+    scan: ScanSettings,
     /// Designs of all structures that were known when it was fitted.
     num_known: usize,
 }
@@ -44,7 +44,7 @@ pub(super) struct Trend {
 impl Trend {
     /// By the designs of all other structures that have the same test and holes of the same direction or none; `None`
     /// where there are too few.
-    pub fn of_others(state: &State, spaces: &[Subspace], space: usize, voxel_mm: [f64; 3]) -> Option<Trend> {
+    pub fn of_others(state: &State, spaces: &[Subspace], space: usize, scan: ScanSettings) -> Option<Trend> {
         let own = &spaces[space];
         let is_alike = |other: &Subspace| {
             let are_along = |s: &Subspace| s.structure.num_holes() == 0 || s.structure.axis == own.structure.axis;
@@ -55,7 +55,7 @@ impl Trend {
         let (mut seen, mut values) = (Vec::new(), Vec::new());
         for (index, other) in spaces.iter().enumerate().filter(|(index, other)| *index != space && is_alike(other)) {
             for (point, fidelity, judged) in state.seen_of(index) {
-                seen.push(Seen { point: features(other, point, voxel_mm), fidelity });
+                seen.push(Seen { point: features(other, point, &scan), fidelity });
                 values.push(values_of(judged));
             }
         }
@@ -63,7 +63,7 @@ impl Trend {
             return None;
         }
         let fitted = Surrogate::fit(&seen, &values)?;
-        Some(Trend { fitted, voxel_mm, num_known: state.num_seen() })
+        Some(Trend { fitted, scan, num_known: state.num_seen() })
     }
 
     /// Whether so much was learnt since it was fitted that it is worth fitting again.
@@ -73,7 +73,7 @@ impl Trend {
 
     /// What a solution as fine as `at` is expected to give of a design of `space`.
     pub fn means(&self, space: &Subspace, point: &[f64], at: Fidelity) -> Vec<f64> {
-        self.fitted.means(&features(space, point, self.voxel_mm), at)
+        self.fitted.means(&features(space, point, &self.scan), at)
     }
 }
 
@@ -81,8 +81,7 @@ impl Trend {
 pub(super) struct Belief {
     trend: Option<Arc<Trend>>,
     own: Surrogate,
-    /// Of the scan.
-    voxel_mm: [f64; 3],
+    scan: ScanSettings,
 }
 
 impl Belief {
@@ -91,7 +90,7 @@ impl Belief {
         trend: Option<Arc<Trend>>,
         space: &Subspace,
         (seen, values): (&[Seen], &[Vec<f64>]),
-        voxel_mm: [f64; 3],
+        scan: ScanSettings,
     ) -> Option<Belief> {
         let over_trend = |(design, values): (&Seen, &Vec<f64>)| match &trend {
             None => values.clone(),
@@ -101,23 +100,30 @@ impl Belief {
             }
         };
         let over_trend: Vec<Vec<f64>> = seen.iter().zip(values).map(over_trend).collect();
-        let described = |s: &Seen| Seen { point: described(space, &s.point, voxel_mm), ..*s };
+        let described = |s: &Seen| Seen { point: described(space, &s.point, &scan), ..*s };
         let own = Surrogate::fit(&seen.iter().map(described).collect::<Vec<_>>(), &over_trend)?;
-        Some(Belief { trend, own, voxel_mm })
+        Some(Belief { trend, own, scan })
     }
 
     /// Mean and standard deviation of what a solution as fine as `at` would give, of each value at a point of `space`.
     pub fn predict(&self, space: &Subspace, point: &[f64], at: Fidelity) -> Vec<(f64, f64)> {
-        let mut predicted = self.own.predict(&described(space, point, self.voxel_mm), at);
+        let mut predicted = self.own.predict(&described(space, point, &self.scan), at);
         if let Some(trend) = &self.trend {
             predicted.iter_mut().zip(trend.means(space, point, at)).for_each(|((mean, _), of_trend)| *mean += of_trend);
         }
         predicted
     }
 
+    /// Whether a solution on the fine mesh is expected to have an equilibrium: above zero where it is.
+    pub fn has_fine_equilibrium(&self, space: &Subspace, point: &[f64]) -> f64 {
+        let own = self.own.means(&described(space, point, &self.scan), Fidelity::Fine);
+        let of_trend = self.trend.as_ref().map_or(0.0, |t| t.means(space, point, Fidelity::Fine).pop().unwrap_or(0.0));
+        own.last().copied().unwrap_or(SOLVED) + of_trend
+    }
+
     /// As [`Surrogate::nearest`].
     pub fn nearest(&self, space: &Subspace, point: &[f64], at: Fidelity) -> f64 {
-        self.own.nearest(&described(space, point, self.voxel_mm), at)
+        self.own.nearest(&described(space, point, &self.scan), at)
     }
 }
 
@@ -129,19 +135,20 @@ fn shared(space: &Subspace) -> impl Iterator<Item = Variable> {
 /// How the block's free faces along its length and its width lie among the voxels of a scan: from 0, where a row of
 /// voxels has just come in at each side, to 1, where the next ones are about to. Much is seen at free faces: what a
 /// scan tells falls as more material lies beyond the voxels, and jumps up where rows come in, alike for all structures.
-fn beyond_voxels(specimen: &Specimen, voxel_mm: [f64; 3]) -> [f64; 2] {
-    let spare = VoxelGrid::spare_mm(specimen, voxel_mm);
-    spare.map_or([0.5; 2], |spare_mm| [0, 2].map(|axis| spare_mm[axis] / voxel_mm[axis]))
+/// Halfway where it may lie anywhere.
+fn beyond_voxels(specimen: &Specimen, scan: &ScanSettings) -> [f64; 2] {
+    let spare = VoxelGrid::spare_mm(specimen, scan.voxel_mm).ok().filter(|_| scan.grid == GridPlace::Centred);
+    spare.map_or([0.5; 2], |spare_mm| [0, 2].map(|axis| spare_mm[axis] / scan.voxel_mm[axis]))
 }
 
 /// A point of `space`, and how its free faces lie among the voxels.
-fn described(space: &Subspace, point: &[f64], voxel_mm: [f64; 3]) -> Vec<f64> {
-    point.iter().copied().chain(beyond_voxels(&space.specimen(point), voxel_mm)).collect()
+fn described(space: &Subspace, point: &[f64], scan: &ScanSettings) -> Vec<f64> {
+    point.iter().copied().chain(beyond_voxels(&space.specimen(point), scan)).collect()
 }
 
 /// The block and the drive, how its free faces lie among the voxels, the part of it that is cut away, and how far out
 /// along the holes' plane that is: parts that are cut at the ends of an axis and not around the middle.
-fn features(space: &Subspace, point: &[f64], voxel_mm: [f64; 3]) -> Vec<f64> {
+fn features(space: &Subspace, point: &[f64], scan: &ScanSettings) -> Vec<f64> {
     let specimen = space.specimen(point);
     let block = &specimen.block;
     let part_cut = 1.0 - specimen.volume_mm3() / (block.length_mm * block.thickness_mm * block.width_mm);
@@ -156,7 +163,7 @@ fn features(space: &Subspace, point: &[f64], voxel_mm: [f64; 3]) -> Vec<f64> {
     }
     let of_block = space.variables.iter().zip(point).filter(|(v, _)| !v.is_of_holes()).map(|(_, value)| *value);
     let cut = [part_cut, far_out[0], far_out[1]].map(|part| PER_PART_CUT * part);
-    of_block.chain(beyond_voxels(&specimen, voxel_mm)).chain(cut).collect()
+    of_block.chain(beyond_voxels(&specimen, scan)).chain(cut).collect()
 }
 
 #[cfg(test)]
@@ -165,8 +172,6 @@ mod tests {
     use super::super::study::Study;
     use super::*;
     use std::path::Path;
-
-    const VOXEL_MM: [f64; 3] = [1.0, 0.1875, 0.75];
 
     fn spaces() -> Vec<Subspace> {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("geometries/studies");
@@ -192,7 +197,7 @@ mod tests {
         };
         let (one, four) = (of_holes(1), of_holes(4));
         let gain = |space: &Subspace, point: &[f64], own: f64| {
-            let block = features(space, point, VOXEL_MM);
+            let block = features(space, point, &ScanSettings::default());
             vec![0.3 * (block[1] + block[3]) - 0.2 * (block[2] - 0.4).powi(2) + own]
         };
         let designs = |space: &Subspace, holes: f64, blocks: &[f64], own: f64| {
@@ -205,16 +210,16 @@ mod tests {
         let (mut others, mut of_others) = (Vec::new(), Vec::new());
         for holes in [0.0, 0.15] {
             let (seen, values) = designs(four, holes, &everywhere, 0.0);
-            let as_features = |s: Seen| Seen { point: features(four, &s.point, VOXEL_MM), ..s };
+            let as_features = |s: Seen| Seen { point: features(four, &s.point, &ScanSettings::default()), ..s };
             others.extend(seen.into_iter().map(as_features));
             of_others.extend(values);
         }
         let trend = Surrogate::fit(&others, &of_others)
-            .map(|fitted| Arc::new(Trend { fitted, voxel_mm: VOXEL_MM, num_known: 0 }));
+            .map(|fitted| Arc::new(Trend { fitted, scan: ScanSettings::default(), num_known: 0 }));
         let (seen, values) = designs(one, 0.2, &[0.1, 0.2], 0.05);
         let large = &points(one, 0.2, &[0.9])[0];
         let off = |trend: Option<Arc<Trend>>| {
-            let belief = Belief::of(trend, one, (&seen, &values), VOXEL_MM).expect("there are designs");
+            let belief = Belief::of(trend, one, (&seen, &values), ScanSettings::default()).expect("there are designs");
             (belief.predict(one, large, Fidelity::Coarse)[0].0 - gain(one, large, 0.05)[0]).abs()
         };
         let (with, without) = (off(trend), off(None));

@@ -3,7 +3,7 @@ use crate::calibration::Observed as Seen;
 use crate::diagnosis::diagnose::diagnose;
 use crate::diagnosis::supposed::{Supposed, scene_of};
 use crate::diagnosis::test_recordings::{FINER_FACTOR, FORCE_SD_N, NOISE_MM, material, options, recorded};
-use crate::sensitivity::{PartialVoxels, ScanSettings};
+use crate::sensitivity::ScanSettings;
 use crate::specimen::Specimen;
 
 /// The scan of the small recordings.
@@ -12,8 +12,7 @@ fn scan() -> ScanSettings {
         voxel_mm: [2.5, 0.8, 2.5],
         noise_sd_mm: [NOISE_MM; 3],
         force_sd_n: FORCE_SD_N,
-        partial_voxels: PartialVoxels::default(),
-        surface: None,
+        ..ScanSettings::default()
     }
 }
 

@@ -3,7 +3,7 @@
 use super::error::DiagnosisError;
 use crate::calibration::{CalibrationError, Observed};
 use crate::recording::{Filter, RecordedStep, Recording};
-use crate::sensitivity::ScanSettings;
+use crate::sensitivity::{ScanSettings, ScannedVoxels};
 use crate::specimen::Specimen;
 
 /// A scan that is planned: what is scanned, how, at which drives, and which forces are expected there.
@@ -31,7 +31,7 @@ impl PlannedScan<'_> {
     pub(super) fn observed(&self) -> Result<Observed, DiagnosisError> {
         let specimen =
             Specimen { drive_mm: self.drives_mm.to_vec(), other_samples: Vec::new(), ..self.specimen.clone() };
-        let mask = self.scan.mask(&specimen).map_err(CalibrationError::from)?;
+        let ScannedVoxels { mask, voxels_each, .. } = self.scan.voxels(&specimen).map_err(CalibrationError::from)?;
         let step = |(n, &drive_mm): (usize, &f64)| RecordedStep {
             drive_mm,
             force_n: self.forces_n.get(n).copied(),
@@ -45,7 +45,7 @@ impl PlannedScan<'_> {
             specimen,
             grid: mask.grid.clone(),
             mask: mask.spread(&vec![true; mask.num_voxels()], false),
-            noise_sd_mm: Some(self.scan.noise().displacement_sd_mm),
+            noise_sd_mm: Some(self.scan.noise().displacement_sd_mm.map(|sd| sd / voxels_each.sqrt())),
             filter: Filter::None,
             load: None,
             notes: None,

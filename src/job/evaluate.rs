@@ -17,7 +17,7 @@ use crate::sensitivity::{
     bound_discretisation, evaluate_fixture,
 };
 use crate::specimen::Specimen;
-use crate::voxel::VoxelError;
+use crate::voxel::{VoxelError, VoxelGrid};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -131,7 +131,7 @@ impl EvaluationRequest {
 fn check_grid(specimen: &Specimen, scan: &ScanSettings) -> Result<(), FieldError> {
     let mut num_voxels = 0;
     for sample in specimen.samples() {
-        let grid = scan.grid(&sample).map_err(|e| {
+        let grid = VoxelGrid::planned(&sample, scan.voxel_mm, scan.surface).map_err(|e| {
             let error = match (&e, scan.surface) {
                 (VoxelError::HiddenFace { .. }, Some(surface)) => {
                     FieldError::new("/scan/surface/face", surface.face.name(), "a plane face that cameras can see")

@@ -126,7 +126,7 @@ impl Bench {
         let scanned = ScannedStep {
             by_parameter,
             by_unknown,
-            weights: scan.partial_voxels.weights(&self.scanner.mask),
+            weights: self.scanner.weights().to_vec(),
             beyond,
             // Equal blocks scanned together are as many scans of one.
             noise_mm2: scan.noise_sd_mm.map(|sd| sd * sd / f64::from(study.protocol.blocks_scanned)),

@@ -69,7 +69,7 @@ fn relative_bound(value: f64, coarser: [Option<f64>; 2]) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::mesh::MeshOptions;
-    use crate::sensitivity::{PartialVoxels, ScanSettings};
+    use crate::sensitivity::ScanSettings;
 
     /// The standard mesh of the solid block bounds what a mesh of 0.6 of its elements' size shows it to be wrong by.
     #[test]
@@ -85,8 +85,7 @@ mod tests {
             voxel_mm: [2.0, 0.8, 2.0],
             noise_sd_mm: [0.05; 3],
             force_sd_n: 0.02,
-            partial_voxels: PartialVoxels::Uniform,
-            surface: None,
+            ..ScanSettings::default()
         };
         let evaluated = |factor: f64| {
             let mesh = MeshOptions::scaled(&specimen, factor);

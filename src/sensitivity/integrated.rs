@@ -91,11 +91,13 @@ pub(super) fn shear_parameters(material: &Material) -> impl Iterator<Item = Para
     material.parameters().into_iter().filter(|p| *p != Parameter::Kappa)
 }
 
-/// 𝒮 of every μᵢ and αᵢ over the voxels of `mask`, whose states stand in the mask's order.
+/// 𝒮 of every μᵢ and αᵢ over the voxels of `mask`, whose states stand in the mask's order; each of them stands for
+/// `voxels_each` voxels of the scan.
 pub fn integrate_over_voxels(
     material: &Material,
     states: &[Decomposition],
     mask: &VoxelMask,
+    voxels_each: f64,
 ) -> Vec<IntegratedSensitivity> {
     let (voxel_volume, subset_area) = (mask.grid.voxel_volume_mm3(), mask.grid.subset_area_mm2());
     shear_parameters(material)
@@ -107,7 +109,7 @@ pub fn integrate_over_voxels(
             }
             IntegratedSensitivity {
                 parameter: parameter.name(),
-                sum,
+                sum: voxels_each * sum,
                 mean_per_voxel: sum / states.len().max(1) as f64,
                 volume_integral: integral * voxel_volume,
                 surface_integral: subset_area.map(|area| integral * area),
@@ -144,7 +146,7 @@ mod tests {
         let mut states = vec![shear(0.8); 3];
         states.push(shear(0.0));
         let lambda: f64 = 0.4 + 1.16f64.sqrt();
-        let found = integrate_over_voxels(&material(), &states, &mask);
+        let found = integrate_over_voxels(&material(), &states, &mask, 1.0);
         let names: Vec<&str> = found.iter().map(|s| s.parameter.as_str()).collect();
         assert_eq!(names, ["mu_1", "alpha_1", "mu_2", "alpha_2"]);
         for (term, pair) in material().terms.iter().zip(found.chunks(2)) {

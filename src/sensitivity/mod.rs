@@ -39,6 +39,6 @@ pub use joint_information::{JointInformation, NuisanceColumn};
 pub use observation::{DriveMaps, DrivenState, EvaluationStep, Observation, Scanner, Unknown, median};
 pub use pointwise::{PointwiseSensitivity, alpha_sensitivity, mu_sensitivity};
 pub use protocol::{Protocol, ProtocolMismatch};
-pub use scan_settings::{PartialVoxels, ScanSettings};
+pub use scan_settings::{GridPlace, PartialVoxels, ScanSettings, ScannedVoxels};
 pub use separation::{MaterialState, Separation, separation_over_quadrature};
 pub use shares::{BestShares, SharedTime, best_shares};

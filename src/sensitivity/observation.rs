@@ -5,7 +5,7 @@ use super::error::EvaluationError;
 use super::information::{FisherInformation, MeasurementNoise};
 use super::integrated::{IntegratedSensitivity, integrate_over_voxels, sensitivity_map, shear_parameters};
 use super::joint_information::{JointInformation, NuisanceColumn};
-use super::scan_settings::ScanSettings;
+use super::scan_settings::{ScanSettings, ScannedVoxels};
 use crate::fem::ParameterSensitivity;
 use crate::kinematics::{Decomposition, decompose};
 use crate::material::{Material, Parameter};
@@ -40,7 +40,8 @@ pub struct EvaluationStep {
     /// Absent in other tests.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normal_force_n: Option<f64>,
-    /// Voxels in the masks of all blocks that are scanned; what follows is over these.
+    /// Voxels in the masks of all blocks that are scanned, on average over the places of the grid where it may lie
+    /// anywhere; what follows is over these.
     pub num_voxels: usize,
     /// Median of λ over voxels.
     pub median_stretch: f64,
@@ -79,6 +80,8 @@ pub struct DriveMaps {
 pub struct Observation {
     /// For plots.
     pub maps: DriveMaps,
+    /// For how many voxels of a scan each of the maps stands.
+    pub voxels_each: f64,
     /// 𝒮 per parameter.
     pub integrated_sensitivity: Vec<IntegratedSensitivity>,
     /// What the voxels tell of the material and the unknowns of the set-up; the force is not in it.
@@ -129,18 +132,24 @@ pub struct Scanner {
     pub operator: VoxelOperator,
     noise: MeasurementNoise,
     weights: Vec<f64>,
+    /// For how many voxels of a scan each of the mask stands.
+    voxels_each: f64,
 }
 
 impl Scanner {
-    /// Centred grid, mask and operator. `mesh` is a mesh of `specimen`.
+    /// The scan's grid, mask and operator. `mesh` is a mesh of `specimen`.
     ///
     /// # Errors
     /// See [`VoxelError`].
     pub fn new(specimen: &Specimen, mesh: &Mesh, scan: &ScanSettings, sampling: Sampling) -> Result<Self, VoxelError> {
-        let mask = scan.mask(specimen)?;
+        let ScannedVoxels { mask, voxels_each, weights } = scan.voxels(specimen)?;
         let operator = VoxelOperator::new(specimen, mesh, &mask, sampling)?;
-        let weights = scan.partial_voxels.weights(&mask);
-        Ok(Scanner { mask, operator, noise: scan.noise(), weights })
+        Ok(Scanner { mask, operator, noise: scan.noise(), weights, voxels_each })
+    }
+
+    /// Weight of each voxel of the mask.
+    pub fn weights(&self) -> &[f64] {
+        &self.weights
     }
 
     /// λ of every voxel for nodal displacements in mm.
@@ -185,10 +194,10 @@ impl Scanner {
             HistogramAxis { low: 1.0, high: end, num_bins: STRETCH_BINS },
             HistogramAxis { low: 0.0, high: 1.0, num_bins: MODE_BINS },
         )?;
-        let integrated_sensitivity = integrate_over_voxels(material, &states, &self.mask);
+        let integrated_sensitivity = integrate_over_voxels(material, &states, &self.mask, self.voxels_each);
         let sensitivities = shear_parameters(material).map(|p| (p, sensitivity_map(material, p, &states))).collect();
         let maps = DriveMaps { drive_mm: state.drive_mm, displacement, states, sensitivities, histogram };
-        Ok(Observation { maps, integrated_sensitivity, joint })
+        Ok(Observation { maps, voxels_each: self.voxels_each, integrated_sensitivity, joint })
     }
 }
 
@@ -206,10 +215,17 @@ impl SeenBlocks {
         blocks.flat_map(|seen| &seen.maps.states)
     }
 
+    /// How many voxels of a scan, on average over where its grid lies, show a state that `is_counted`.
+    fn num_voxels(&self, is_counted: impl Fn(&Decomposition) -> bool) -> f64 {
+        let of_kind = |(count, seen): &(u32, Observation)| {
+            f64::from(*count) * seen.voxels_each * seen.maps.states.iter().filter(|s| is_counted(s)).count() as f64
+        };
+        self.kinds.iter().map(of_kind).sum()
+    }
+
     /// 𝒮 over all of their voxels.
     fn integrated(&self) -> Vec<IntegratedSensitivity> {
         let mut all: Vec<IntegratedSensitivity> = Vec::new();
-        let num_voxels = self.states().count();
         for (count, seen) in &self.kinds {
             for (index, own) in seen.integrated_sensitivity.iter().enumerate() {
                 if all.len() <= index {
@@ -218,7 +234,7 @@ impl SeenBlocks {
                 all[index].add_blocks(f64::from(*count), own);
             }
         }
-        all.iter_mut().for_each(|s| s.mean_per_voxel = s.sum / num_voxels.max(1) as f64);
+        all.iter_mut().for_each(|s| s.mean_per_voxel = s.sum / self.num_voxels(|_| true));
         all
     }
 
@@ -236,12 +252,12 @@ impl SeenBlocks {
             force_discretisation_n: None,
             force_by_kind_n: if forces_n.len() > 1 { forces_n.to_vec() } else { Vec::new() },
             normal_force_n,
-            num_voxels: self.states().count(),
+            num_voxels: self.num_voxels(|_| true).round() as usize,
             median_stretch: median(self.states().map(|s| s.stretch_amplitude)).unwrap_or(1.0),
             median_mode: median(self.states().filter_map(|s| s.deformation_mode)),
             largest_voxel_stretch: self.states().map(|s| s.stretch_amplitude).fold(1.0, f64::max),
             largest_principal_stretch,
-            num_voxels_without_mode: self.states().filter(|s| s.deformation_mode.is_none()).count(),
+            num_voxels_without_mode: self.num_voxels(|s| s.deformation_mode.is_none()).round() as usize,
             integrated_sensitivity: self.integrated(),
             promised_sd: Vec::new(),
         }
@@ -252,7 +268,7 @@ impl SeenBlocks {
 mod tests {
     use super::super::continuum::tests::{block, made_up_sensitivities, quadrature_points};
     use super::super::information::tests::one_term;
-    use super::super::{PartialVoxels, largest_principal_stretch};
+    use super::super::largest_principal_stretch;
     use super::*;
     use crate::mesh::{MeshOptions, mesh_specimen};
     use crate::specimen::TestKind;
@@ -267,8 +283,7 @@ mod tests {
             voxel_mm: [1.0, 0.25, 0.75],
             noise_sd_mm: [0.05; 3],
             force_sd_n: 0.02,
-            partial_voxels: PartialVoxels::Uniform,
-            surface: None,
+            ..ScanSettings::default()
         };
         let scanner = Scanner::new(&specimen, &mesh, &scan, Sampling::default()).unwrap();
         let displacement: Vec<[f64; 3]> = mesh.nodes.iter().map(|x| [0.6 * x[1], 0.0, 0.0]).collect();

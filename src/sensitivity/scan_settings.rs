@@ -42,6 +42,37 @@ impl PartialVoxels {
     }
 }
 
+/// Where the grid of a scan lies relative to the sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum GridPlace {
+    /// In its middle, as one scan whose grid is placed on the sample to a small part of a voxel.
+    #[default]
+    Centred,
+    /// Anywhere: what is promised is the mean over all places, so that it does not hang on the rows of voxels that
+    /// happen to come in at the free faces.
+    Anywhere,
+}
+
+impl GridPlace {
+    /// Whether it is what files mean that do not say it.
+    pub fn is_default(&self) -> bool {
+        *self == GridPlace::default()
+    }
+}
+
+/// The voxels of a scan of one block.
+#[derive(Clone, Debug)]
+pub struct ScannedVoxels {
+    /// Grid and mask.
+    pub mask: VoxelMask,
+    /// For how many voxels of one scan each of them stands on average: 1 where the grid is centred.
+    pub voxels_each: f64,
+    /// Weight of each voxel of the mask: its noise variance is that of the scan over the weight.
+    pub weights: Vec<f64>,
+}
+
 /// The scan: grid and noise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = ScanSchema))]
@@ -60,6 +91,9 @@ pub struct ScanSettings {
     /// Weight of partly filled voxels.
     #[serde(default)]
     pub partial_voxels: PartialVoxels,
+    /// Where the grid lies relative to the sample.
+    #[serde(default, skip_serializing_if = "GridPlace::is_default")]
+    pub grid: GridPlace,
     /// The face whose displacements cameras measure (digital image correlation), in place of a scan of the volume.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(nullable = false))]
@@ -74,6 +108,7 @@ impl Default for ScanSettings {
             noise_sd_mm: [0.05; 3],
             force_sd_n: 0.02,
             partial_voxels: PartialVoxels::default(),
+            grid: GridPlace::default(),
             surface: None,
         }
     }
@@ -87,20 +122,18 @@ impl ScanSettings {
         MeasurementNoise { displacement_sd_mm, force_sd_n: self.force_sd_n }
     }
 
-    /// Its grid on a specimen of one block.
-    ///
-    /// # Errors
-    /// As [`VoxelGrid::planned`].
-    pub fn grid(&self, specimen: &Specimen) -> Result<VoxelGrid, VoxelError> {
-        VoxelGrid::planned(specimen, self.voxel_mm, self.surface)
-    }
-
     /// Its voxels on a specimen of one block.
     ///
     /// # Errors
-    /// As [`Self::grid`] and [`VoxelMask::of_specimen`].
-    pub fn mask(&self, specimen: &Specimen) -> Result<VoxelMask, VoxelError> {
-        VoxelMask::of_specimen(specimen, self.grid(specimen)?)
+    /// As [`VoxelGrid::planned`] and [`VoxelMask::of_specimen`].
+    pub fn voxels(&self, specimen: &Specimen) -> Result<ScannedVoxels, VoxelError> {
+        let (grid, voxels_each) = match self.grid {
+            GridPlace::Centred => (VoxelGrid::planned(specimen, self.voxel_mm, self.surface)?, 1.0),
+            GridPlace::Anywhere => VoxelGrid::tiling(specimen, self.voxel_mm, self.surface)?,
+        };
+        let mask = VoxelMask::of_specimen(specimen, grid)?;
+        let weights = self.partial_voxels.weights(&mask).into_iter().map(|w| voxels_each * w).collect();
+        Ok(ScannedVoxels { mask, voxels_each, weights })
     }
 
     /// The error of work that only a scan of the volume can do, where a surface is seen; `remedy` says what to do.

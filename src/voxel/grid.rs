@@ -84,6 +84,34 @@ impl VoxelGrid {
         grid.on_surface(specimen, surface)
     }
 
+    /// A grid that stands for [`Self::planned`] wherever that may lie, and for how many of its voxels each voxel stands.
+    ///
+    /// Where a grid lies relative to the sample is not known beforehand, and what a scan tells depends on it: much is
+    /// seen at the free faces, where it decides about a row of voxels. Over all places with the same probability, the
+    /// sum over voxels of a function g of a voxel's centre c is on average ∫ g(c) dc over the centres of voxels at least
+    /// half filled, which are those in the block, divided by the volume of a voxel. The voxels of this grid are stretched
+    /// or shortened until they tile the block exactly, as many along each axis as in [`Self::planned`]: their sum is the
+    /// integral by the midpoint rule. Unlike the sum over one grid it changes smoothly with the size of the block.
+    ///
+    /// # Errors
+    /// As [`Self::planned`].
+    pub fn tiling(
+        specimen: &Specimen,
+        voxel_mm: [f64; 3],
+        surface: Option<Surface>,
+    ) -> Result<(Self, f64), VoxelError> {
+        let mut grid = Self::planned(specimen, voxel_mm, surface)?;
+        let extent = [specimen.block.length_mm, specimen.block.thickness_mm, specimen.block.width_mm];
+        let (normal, mut voxels_each) = (grid.normal_axis(), 1.0);
+        for axis in (0..3).filter(|&a| normal != Some(a)) {
+            let edge = extent[axis] / grid.shape[axis] as f64;
+            voxels_each *= edge / voxel_mm[axis];
+            grid.voxel_mm[axis] = edge;
+            grid.origin_mm[axis] = -0.5 * (grid.shape[axis] as f64 - 1.0) * edge;
+        }
+        Ok((grid, voxels_each))
+    }
+
     /// This grid as one of a surface: it must be a layer on the face.
     ///
     /// # Errors
@@ -187,8 +215,9 @@ fn check_size(num_voxels: f64) -> Result<(), VoxelError> {
 #[cfg(test)]
 mod tests {
     use super::super::mask::tests::{PUBLISHED_VOXEL, solid};
-    use super::super::{Face, MeasuredComponents};
+    use super::super::{Face, MeasuredComponents, VoxelMask};
     use super::*;
+    use crate::specimen::Block;
 
     #[test]
     fn published_grid_is_centred() {
@@ -212,6 +241,38 @@ mod tests {
         let mut smaller = solid();
         smaller.block.length_mm -= spare_mm[0] + 1e-9;
         assert_eq!(VoxelGrid::covering(&smaller, PUBLISHED_VOXEL).unwrap().shape, [24, 34, 25]);
+    }
+
+    /// Sums over the voxels of a grid that lies anywhere are on average those over the tiling's; the centred grid's may be
+    /// far off, and jump with the size of the block.
+    #[test]
+    fn a_tiling_gives_the_mean_over_all_places() {
+        let specimen = Specimen { block: Block { length_mm: 12.7, thickness_mm: 6.4, width_mm: 9.9 }, ..solid() };
+        let voxel_mm = [2.0, 0.5, 1.5];
+        // Much is told at the free faces along x and z.
+        let told = |x: [f64; 3]| 1.0 + (x[0] / 6.35).powi(6) + (x[2] / 4.95).powi(4) - 0.5 * (x[1] / 3.2).powi(2);
+        let sum = |grid: &VoxelGrid| -> f64 {
+            let mask = VoxelMask::of_specimen(&specimen, grid.clone()).unwrap();
+            mask.voxels.iter().map(|&voxel| told(grid.center_mm(voxel as usize))).sum()
+        };
+        let centred = VoxelGrid::covering(&specimen, voxel_mm).unwrap();
+        let (tiling, voxels_each) = VoxelGrid::tiling(&specimen, voxel_mm, None).unwrap();
+        assert_eq!(tiling.shape, centred.shape);
+        assert!((tiling.num_voxels() as f64 * voxels_each - 12.7 * 6.4 * 9.9 / 1.5).abs() < 1e-9);
+        let places = 12;
+        let mut mean = 0.0;
+        for place in 0..places * places * places {
+            let moved = [place % places, place / places % places, place / places / places];
+            let moved = moved.map(|n| (n as f64 + 0.5) / places as f64 - 1.5);
+            let origin = [0, 1, 2].map(|a| centred.origin_mm[a] + moved[a] * voxel_mm[a]);
+            let shape = centred.shape.map(|n| n + 2);
+            mean += sum(&VoxelGrid::new(origin, voxel_mm, shape).unwrap()) / (places * places * places) as f64;
+        }
+        let (promised, one) = (voxels_each * sum(&tiling), sum(&centred));
+        // In the corner of two edges 0.0966 of a voxel's square is less than half filled, 1.5 % of the block here, which
+        // tells up to three times as much; the midpoint rule and the half filled voxels make less.
+        assert!((promised / mean - 1.0).abs() < 0.03, "{promised} {mean}");
+        assert!((one / mean - 1.0).abs() > 0.1, "{one} {mean}");
     }
 
     /// A surface's grid is one layer on the face with the subsets of a volume's grid in its plane.

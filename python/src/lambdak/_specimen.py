@@ -390,6 +390,8 @@ class ScanSettings:
     partial_voxels: Optional[str] = None
     surface: Optional[Mapping[str, str]] = None
     """The face that cameras see in place of a scan of the volume, such as `{"face": "+z", "components": "all"}`."""
+    grid: Optional[str] = None
+    """Where the grid lies relative to the sample: `"centred"` unless it is `"anywhere"`, the mean over all places."""
 
     def to_dict(self) -> Dict[str, Any]:
         """As requests and studies hold it."""

@@ -123,7 +123,7 @@ fn voxel_sums_tend_to_the_continuum() {
                 .unwrap();
         let smooth = information_over_quadrature(&one_term(), &mesh, &points, &sensitivities, &noise, volume).unwrap();
         let (a, b) = (
-            integrate_over_voxels(&one_term(), &states, &mask),
+            integrate_over_voxels(&one_term(), &states, &mask, 1.0),
             integrate_over_quadrature(&one_term(), &points, mesh.mirror, volume),
         );
         let integral =

@@ -39,6 +39,20 @@ export const scanForm = (model, edited) =>
       },
       changed: edited,
     }),
+    choice({
+      label: "The grid lies",
+      value: model.scan.grid ?? "centred",
+      options: [
+        ["centred", "on the sample's middle"],
+        ["anywhere", "anywhere"],
+      ],
+      put: (v) => {
+        if (v === "centred") delete model.scan.grid;
+        else model.scan.grid = v;
+      },
+      meaning: "Anywhere: what is promised is the mean over all places, and no row of voxels at a free face decides.",
+      changed: edited,
+    }),
   );
 
 const hasPlates = ({ specimen }) => specimen.test === "double_lap_shear";
