@@ -82,6 +82,10 @@ const MAX_ITERATIONS: usize = 60;
 /// otherwise.
 const CORRECTION_FACTOR: f64 = 0.8;
 
+/// Elements along the plates of the truth, the correction and the fit over standard ones, where those of
+/// [`VerifyOptions::new`] fold.
+const LARGER_ELEMENTS: [f64; 3] = [1.4, 1.6, 1.8];
+
 /// Settings of [`verify`].
 #[derive(Clone, Debug)]
 pub struct VerifyOptions {
@@ -116,6 +120,18 @@ impl VerifyOptions {
             draws,
             seed,
             fit: FitOptions { max_iterations: MAX_ITERATIONS, ..FitOptions::default() },
+        }
+    }
+
+    /// As [`Self::new`] on meshes like those by which a design is confirmed: as fine toward the plates, and with a
+    /// layer along the free faces, but with larger elements along the plates. For a specimen whose free edges or walls
+    /// of holes fold on smaller elements.
+    pub fn on_larger_elements(specimen: &Specimen, draws: usize, seed: u64) -> VerifyOptions {
+        VerifyOptions {
+            truth_mesh: MeshOptions { grading: 0.4, ..MeshOptions::graded(specimen, LARGER_ELEMENTS[0]) },
+            correction_mesh: Some(MeshOptions::graded(specimen, LARGER_ELEMENTS[1])),
+            fit_mesh: MeshOptions::graded(specimen, LARGER_ELEMENTS[2]),
+            ..VerifyOptions::new(specimen, draws, seed)
         }
     }
 }

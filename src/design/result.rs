@@ -33,8 +33,8 @@ pub struct DesignResult {
     pub base: DesignEntry,
     /// The winner.
     pub best: DesignEntry,
-    /// The winner's objective over the base's if the scan's grid lay anywhere, in place of on the middle of each specimen;
-    /// absent where the study takes it to do so, or its objective does not hang on it.
+    /// The winner's objective over the base's if the scan's grid lay anywhere, in place of on the middle of each
+    /// specimen; absent where the study takes it to do so, or its objective does not hang on it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub objective_grid_anywhere: Option<f64>,
     /// Every confirmed design, best first, those within every limit before others.
@@ -98,6 +98,13 @@ pub struct MaterialVerification {
     /// The same of the base specimen.
     #[serde(default)]
     pub base_failure: Option<String>,
+    /// Whether the best design was verified on larger elements, because it has no equilibrium on those that a
+    /// verification begins with.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub best_on_larger_elements: bool,
+    /// The same of the base specimen.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub base_on_larger_elements: bool,
 }
 
 impl DesignResult {
@@ -161,10 +168,18 @@ impl DesignResult {
         said
     }
 
-    /// Where fits of the verification failed, in words.
+    /// Where fits of the verification failed, or were made on other meshes, in words.
     pub fn verification_failures(&self) -> Vec<String> {
         let mut said = Vec::new();
         for v in &self.verification_by_material {
+            let larger = [("best", v.best_on_larger_elements), ("base", v.base_on_larger_elements)];
+            for (label, _) in larger.into_iter().filter(|(_, is_larger)| *is_larger) {
+                said.push(format!(
+                    "Verification, material \"{}\", {label} specimen: on the small elements of a verification it has no equilibrium; \
+                     truth and fits have larger ones. Its edges or holes are near folding.",
+                    v.material
+                ));
+            }
             for (label, list, reason) in [("best", &v.best, &v.best_failure), ("base", &v.base, &v.base_failure)] {
                 if let (Some(p), Some(reason)) = (list.first(), reason) {
                     said.push(format!(

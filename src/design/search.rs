@@ -229,8 +229,8 @@ impl SearchRun<'_> {
         Ok(())
     }
 
-    /// Solves the best designs of the best structures on the fine mesh, so that the race on the coarse one is not led by
-    /// structures that have no equilibrium there: near folding little is stable and everything tells much.
+    /// Solves the best designs of the best structures on the fine mesh, so that the race on the coarse one is not led
+    /// by structures that have no equilibrium there: near folding little is stable and everything tells much.
     fn check_on_fine_mesh(
         &self,
         fine: &Judge,

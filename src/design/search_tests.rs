@@ -100,8 +100,8 @@ fn proposals_keep_the_limits() {
     assert!(said.iter().any(|s| s.contains(&format!("it is {anywhere:.3}"))), "{said:?}");
 }
 
-/// Structures race by their coarse designs; those of which nothing could be solved finely come last, and the next design
-/// to try of them lies elsewhere.
+/// Structures race by their coarse designs; those of which nothing could be solved finely come last, and the next
+/// design to try of them lies elsewhere.
 #[test]
 fn structures_without_a_fine_equilibrium_come_last() {
     let study = small_study();

@@ -14,6 +14,7 @@ use crate::mesh::MeshOptions;
 use crate::provenance::input_hash;
 use crate::report::design_report;
 use crate::sensitivity::Protocol;
+use crate::specimen::Specimen;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -61,8 +62,14 @@ impl Request for Study {
 
 struct CheckedStudy(Study);
 
-/// What a specimen's verification gives: the spreads, and why a fit failed where one did.
-type Verified = (Vec<ParameterSpread>, Option<String>);
+/// What a specimen's verification gives.
+struct Verified {
+    /// Per parameter; none where nothing could be solved.
+    spreads: Vec<ParameterSpread>,
+    /// Why the first fit that failed did so.
+    failure: Option<String>,
+    is_on_larger_elements: bool,
+}
 
 impl Run for CheckedStudy {
     fn title(&self) -> String {
@@ -166,12 +173,7 @@ impl CheckedStudy {
         let draws = study.verification.draws;
         let total = 2 * study.materials.len() * draws;
         let done = AtomicUsize::new(0);
-        let is_cancelled = || context.is_cancelled();
         let of = |entry: &DesignEntry, material: &Material| -> Option<Verified> {
-            let specimen = &entry.specimen;
-            let scan_share = entry.evaluation.scan_share.clone();
-            let protocol = Protocol { scan_share, ..study.protocol.clone() };
-            let options = VerifyOptions { protocol, ..VerifyOptions::new(specimen, draws, study.seed) };
             let told = AtomicUsize::new(0);
             let on_draw = || {
                 told.fetch_add(1, Ordering::Relaxed);
@@ -179,32 +181,63 @@ impl CheckedStudy {
                 let (best, best_specimen) = (Some(result.best.objective), Some(result.best.specimen.clone()));
                 context.progress(&Progress { best, best_specimen, ..Progress::new("verify", count, total) });
             };
-            let key = input_hash(&json!({
-                "specimen": specimen, "material": material, "kind": "verification", "truth_mesh": options.truth_mesh,
-                "fit_mesh": options.fit_mesh, "max_iterations": options.fit.max_iterations,
-                "protocol": options.protocol,
-            }));
-            let verified = checkpoint.get_or(&key, || {
-                match verify_in_full(specimen, material, &study.scan, &options, &on_draw, &is_cancelled) {
-                    Ok(found) => {
-                        let reason = found.fits.iter().find_map(|fit| fit.as_ref().err().map(ToString::to_string));
-                        Some((found.spreads, reason))
-                    }
-                    Err(_) if context.is_cancelled() => None,
-                    Err(error) => Some((Vec::new(), Some(error.to_string()))),
+            let on = |options: VerifyOptions| {
+                let protocol = Protocol { scan_share: entry.evaluation.scan_share.clone(), ..study.protocol.clone() };
+                let options = VerifyOptions { protocol, ..options };
+                self.verified_on((&entry.specimen, material), &options, checkpoint, &on_draw, context)
+            };
+            let mut verified = on(VerifyOptions::new(&entry.specimen, draws, study.seed))?;
+            if verified.spreads.is_empty() {
+                let larger = on(VerifyOptions::on_larger_elements(&entry.specimen, draws, study.seed))?;
+                if !larger.spreads.is_empty() {
+                    verified = Verified { is_on_larger_elements: true, ..larger };
                 }
-            });
+            }
             // Draws that were known before, or that a failure left out.
             done.fetch_add(draws.saturating_sub(told.load(Ordering::Relaxed)), Ordering::Relaxed);
-            verified
+            Some(verified)
         };
         // Side by side: making the truth of one keeps one thread busy, the draws of another fill the others.
         let of_material = |prior: &MaterialPrior| {
             let both = rayon::join(|| of(&result.best, &prior.material), || of(&result.base, &prior.material));
-            let ((best, best_failure), (base, base_failure)) = (both.0?, both.1?);
-            let material = prior.name.clone();
-            Some(MaterialVerification { material, best, base, best_failure, base_failure })
+            let (best, base) = (both.0?, both.1?);
+            Some(MaterialVerification {
+                material: prior.name.clone(),
+                best: best.spreads,
+                base: base.spreads,
+                best_failure: best.failure,
+                base_failure: base.failure,
+                best_on_larger_elements: best.is_on_larger_elements,
+                base_on_larger_elements: base.is_on_larger_elements,
+            })
         };
         study.materials.par_iter().map(of_material).collect()
+    }
+
+    /// One specimen with one material, from the checkpoint where it is known; `None` where it was stopped.
+    fn verified_on(
+        &self,
+        (specimen, material): (&Specimen, &Material),
+        options: &VerifyOptions,
+        checkpoint: &Checkpoint,
+        on_draw: &(dyn Fn() + Sync),
+        context: &Context,
+    ) -> Option<Verified> {
+        let is_cancelled = || context.is_cancelled();
+        let key = input_hash(&json!({
+            "specimen": specimen, "material": material, "kind": "verification", "truth_mesh": options.truth_mesh,
+            "fit_mesh": options.fit_mesh, "max_iterations": options.fit.max_iterations, "protocol": options.protocol,
+        }));
+        let (spreads, failure) = checkpoint.get_or(&key, || {
+            match verify_in_full(specimen, material, &self.0.scan, options, on_draw, &is_cancelled) {
+                Ok(found) => {
+                    let reason = found.fits.iter().find_map(|fit| fit.as_ref().err().map(ToString::to_string));
+                    Some((found.spreads, reason))
+                }
+                Err(_) if context.is_cancelled() => None,
+                Err(error) => Some((Vec::new(), Some(error.to_string()))),
+            }
+        })?;
+        Some(Verified { spreads, failure, is_on_larger_elements: false })
     }
 }

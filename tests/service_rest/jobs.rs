@@ -22,7 +22,9 @@ fn a_design_reports_progress_and_can_be_cancelled_and_resumed() {
     }
     assert_eq!(service.post(&format!("{job}/cancel"), &json!({})).json()["state"], "cancelled");
     assert_eq!(service.get(&format!("{job}/result")).cause(), "not-finished");
-    assert_eq!(service.post(&format!("{job}/resume"), &json!({})).json()["state"], "queued");
+    // A worker may have taken it before the reply is written.
+    let resumed = service.post(&format!("{job}/resume"), &json!({})).json();
+    assert!(["queued", "running"].iter().any(|state| resumed["state"] == *state), "{resumed}");
     let view = service.wait(&job, LONG);
     assert_eq!(view["state"], "succeeded", "{view}");
     let result = service.get(&format!("{job}/result")).json();
