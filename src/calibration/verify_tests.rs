@@ -84,6 +84,20 @@ fn a_finer_mesh_corrects_the_fits() {
     }
 }
 
+/// Where small elements fold, truth, correction and fit have larger ones along the plates, in the same order.
+#[test]
+fn larger_elements_keep_their_order() {
+    let specimen = Specimen::from_json(include_str!("../../geometries/two-hole-shear.json")).unwrap();
+    let sizes = |o: &VerifyOptions| {
+        let meshes = [Some(&o.truth_mesh), o.correction_mesh.as_ref(), Some(&o.fit_mesh)];
+        meshes.map(|m| m.expect("each has a correction").section_size_mm)
+    };
+    let (small, larger) = (VerifyOptions::new(&specimen, 3, 1), VerifyOptions::on_larger_elements(&specimen, 3, 1));
+    assert!(sizes(&larger).is_sorted() && sizes(&small).is_sorted());
+    assert!(sizes(&larger).iter().zip(sizes(&small)).all(|(larger, small)| *larger > 1.5 * small));
+    assert!(larger.truth_mesh.free_layer_mm > 0.0 && larger.truth_mesh.grading != larger.fit_mesh.grading);
+}
+
 /// One model or two: the same bits. The models must be alike; other tests of this process may disturb the ordering of
 /// the unknowns while one is made, so a pair is made until it is.
 #[test]
