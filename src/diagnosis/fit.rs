@@ -406,20 +406,44 @@ fn deviance_of(
     sum
 }
 
+/// How the prediction of `fitted` changes, to first order, where it is fitted again: to `measured` as `metric` weighs
+/// it. `columns` are its [`derivatives`].
+pub(super) fn first_order_refit(
+    metric: &Metric,
+    measured: &Trace,
+    fitted: &CauseFit,
+    settings: &FitSettings,
+    columns: &[Trace],
+) -> Trace {
+    let CauseFit { material, causes, prediction, .. } = fitted;
+    let (matrix, gradient) = normal_system(metric, measured, prediction, material, causes, settings, columns);
+    // What determines nothing changes nothing.
+    let change = matrix.cholesky().map_or_else(|| DVector::zeros(columns.len()), |c| c.solve(&gradient));
+    let num_of_material = material.parameters().len();
+    let part = change.iter().enumerate().map(|(i, c)| largest_step(i, num_of_material) / c.abs().max(1e-12));
+    let part = part.fold(1.0, f64::min);
+    let none = prediction.trace.scaled(0.0);
+    columns.iter().zip(&change).fold(none, |sum, (column, change)| sum.plus(part * change, column))
+}
+
+/// The largest change in one step of a scaled parameter, the first of which are the material's.
+fn largest_step(index: usize, num_of_material: usize) -> f64 {
+    if index == 0 {
+        1.0
+    } else if index < num_of_material {
+        LARGEST_STEP
+    } else {
+        LARGEST_CAUSE_STEP
+    }
+}
+
 /// The material and the members' causes after a scaled step, shortened to the largest allowed and cut to the ranges.
 fn moved(members: &[Member], at: &Point, step: &DVector<f64>) -> (Material, Vec<Vec<Supposed>>) {
     let parameters = at.material.parameters();
     let mut part = 1.0f64;
     for m in members {
         for (i, &place) in m.places.iter().enumerate() {
-            let largest = if i == 0 {
-                1.0
-            } else if i < parameters.len() {
-                LARGEST_STEP
-            } else {
-                LARGEST_CAUSE_STEP
-            };
-            part = part.min(largest / step[place].abs().max(1e-12));
+            part = part.min(largest_step(i, parameters.len()) / step[place].abs().max(1e-12));
         }
     }
     let mut next = at.material.clone();

@@ -30,8 +30,8 @@ pub(super) const FINER: f64 = 0.5;
 const FINEST: f64 = 0.45;
 /// Most passes of the correction of one fit.
 const MAX_CORRECTIONS: usize = 3;
-/// Passes end where one moves the prediction by less than this part of what the finer mesh predicts beyond ours (rms):
-/// that changes by some percent of it.
+/// What the finer mesh predicts beyond ours is not worked out again where the prediction has moved by less than this
+/// part of it (rms): it changes by some percent of that.
 const HARDLY_MOVED: f64 = 0.2;
 /// A finer mesh whose element size is closer to ours than this factor says nothing about our error.
 const HARDLY_FINER: f64 = 0.9;
@@ -56,6 +56,8 @@ pub struct Finer<'a> {
     nesting: Option<Nesting>,
     /// What was last predicted of a scene on our mesh and on this one.
     known: Option<[Vec<Equilibrium>; 2]>,
+    /// What our mesh predicted where the defect of a fit without causes was last worked out, and that defect.
+    nominal: Option<(Trace, MeshDefect)>,
 }
 
 /// What a finer mesh does to a fit's prediction.
@@ -72,6 +74,11 @@ impl MeshDefect {
     pub fn taken_off(&self, recorded: &Trace) -> Trace {
         recorded.plus(-1.0, &self.trace)
     }
+
+    /// Whether a prediction of ours is so near that of which this was worked out that another one would say the same.
+    fn holds_at(&self, prediction: &Trace, worked_out_of: &Trace) -> bool {
+        prediction.plus(-1.0, worked_out_of).rms_mm() < HARDLY_MOVED * self.trace.rms_mm()
+    }
 }
 
 impl<'a> Finer<'a> {
@@ -86,7 +93,7 @@ impl<'a> Finer<'a> {
         }
         let laboratory = Laboratory::new(observed, &mesh).ok()?;
         let nesting = Nesting::located(coarse.nominal_mesh(), laboratory.nominal_mesh());
-        Some(Finer { laboratory, ratio, nesting, known: None })
+        Some(Finer { laboratory, ratio, nesting, known: None, nominal: None })
     }
 
     /// Corrects a fit by the finer mesh's prediction (deferred correction: what the finer mesh predicts beyond ours is
@@ -104,13 +111,15 @@ impl<'a> Finer<'a> {
         fitted: &mut CauseFit,
         is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<MeshDefect, DiagnosisError> {
-        let mut defect = self.defect(laboratory, fitted, is_cancelled)?;
+        let mut defect = match self.known_near(fitted) {
+            Some(known) => known,
+            None => self.defect(laboratory, fitted, is_cancelled)?,
+        };
         for pass in 1..=MAX_CORRECTIONS {
             let before = fitted.prediction.trace.clone();
             let seen = defect.taken_off(measured);
             *fitted = fit(laboratory, metric, &seen, &fitted.material, &fitted.causes, settings, is_cancelled)?;
-            let moved_mm = fitted.prediction.trace.plus(-1.0, &before).rms_mm();
-            if pass == MAX_CORRECTIONS || moved_mm < HARDLY_MOVED * defect.trace.rms_mm() {
+            if pass == MAX_CORRECTIONS || defect.holds_at(&fitted.prediction.trace, &before) {
                 break;
             }
             match self.defect(laboratory, fitted, is_cancelled) {
@@ -121,6 +130,12 @@ impl<'a> Finer<'a> {
             }
         }
         Ok(defect)
+    }
+
+    /// The defect of a fit without causes that hardly differs from the last of these.
+    fn known_near(&self, fitted: &CauseFit) -> Option<MeshDefect> {
+        let (at, defect) = self.nominal.as_ref().filter(|_| fitted.causes.is_empty())?;
+        defect.holds_at(&fitted.prediction.trace, at).then(|| defect.clone())
     }
 
     /// What the finer mesh predicts beyond ours, that of `coarse`. Its equilibria start from those on our mesh.
@@ -142,7 +157,11 @@ impl<'a> Finer<'a> {
         let theirs = self.laboratory.predict(material, &scene, is_cancelled)?;
         let trace = theirs.trace.plus(-1.0, &ours.trace);
         self.known = nesting.map(|_| [ours.states.clone(), theirs.states]);
-        Ok(MeshDefect { trace, ratio: self.ratio })
+        let defect = MeshDefect { trace, ratio: self.ratio };
+        if fitted.causes.is_empty() {
+            self.nominal = Some((ours.trace.clone(), defect.clone()));
+        }
+        Ok(defect)
     }
 }
 
