@@ -2,8 +2,8 @@
 
 use crate::material::Parameter;
 
-/// 97.5 % point of the standard normal distribution.
-pub(super) const TWO_SIDED_95: f64 = 1.959_964;
+/// 97.5 % point of the standard normal distribution: half the width of an interval of 95 %, in standard deviations.
+pub const TWO_SIDED_95: f64 = 1.959_963_984_540_054;
 
 /// The interval of a parameter about its estimate: 1.96 standard deviations, and in squares the furthest that an error
 /// of the size of the misfit could shift it.

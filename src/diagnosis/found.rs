@@ -3,10 +3,10 @@
 use super::cause::{Category, CauseName};
 use super::cause_fit::CauseFit;
 use super::experiment::Experiment;
-use super::interval::{HALF_WIDTH, interval};
+use super::interval::interval;
 use super::load_effect::FittedEffect;
 use super::location::Location;
-use crate::calibration::Observed;
+use crate::calibration::{Observed, TWO_SIDED_95};
 
 /// A parameter of a cause found: its name with the unit, its value and its 95 % interval (infinite where the data do
 /// not bound it).
@@ -60,7 +60,7 @@ impl FoundCause {
             .map(|(p, (value, sd))| {
                 // Wider than the parameter's range, as of a patch's edge beyond the face's own: the data say nothing of
                 // it.
-                let sd = if HALF_WIDTH * sd > p.range[1] - p.range[0] { f64::INFINITY } else { *sd };
+                let sd = if TWO_SIDED_95 * sd > p.range[1] - p.range[0] { f64::INFINITY } else { *sd };
                 (p.name.clone(), *value, interval(*value, sd))
             })
             .collect();

@@ -7,14 +7,11 @@ use super::posterior::{Point, Posterior};
 use super::result::{CandidateResult, LeftOut, MisfitResult, NextParameter, NextResult, Stop, StopVerdict};
 use super::trial::{Bench, Trial};
 use super::worth::{Knowledge, MOST_SCANS, Worth};
-use crate::calibration::Observed;
+use crate::calibration::{Observed, TWO_SIDED_95};
 use crate::material::Parameter;
 use crate::specimen::{Specimen, farthest_from_zero, leads_on};
 use rayon::prelude::*;
 use std::cmp::Ordering;
-
-/// Standard deviations that a 95 % interval reaches.
-const TWO_SIDED_95: f64 = 1.959_963_984_540_054;
 
 /// What `observed` leave unknown, and what should be scanned next. `names` are those of the recordings.
 ///

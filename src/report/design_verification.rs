@@ -2,19 +2,16 @@
 
 use super::html::Report;
 use super::{CalloutKind, Column, SpreadPlot, SpreadRow, Table, significant, symbol_of_parameter};
-use crate::calibration::ParameterSpread;
+use crate::calibration::{ParameterSpread, TWO_SIDED_95};
 use crate::design::DesignResult;
 use crate::material::Parameter;
-
-/// Half width of a 95 % interval of a normal distribution, in standard deviations.
-const HALF_WIDTH_95: f64 = 1.96;
 
 /// Share of the draws whose interval, estimate ± 1.96 promised standard deviations, holds the truth once the mesh's
 /// shift is taken out; `None` where nothing is promised or found.
 fn coverage(p: &ParameterSpread) -> Option<f64> {
     let sd = p.promised_sd?;
     let shift = p.discretisation_bias.unwrap_or(0.0);
-    let is_held = |estimate: &&f64| (**estimate - shift - p.truth).abs() <= HALF_WIDTH_95 * sd;
+    let is_held = |estimate: &&f64| (**estimate - shift - p.truth).abs() <= TWO_SIDED_95 * sd;
     let count = p.estimates.iter().filter(is_held).count();
     (!p.estimates.is_empty()).then(|| count as f64 / p.estimates.len() as f64)
 }
