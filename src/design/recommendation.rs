@@ -5,7 +5,7 @@ use super::entry::DesignEntry;
 use super::findings::{Equals, symbol};
 use super::study::Study;
 use super::words::{listed, plates_in_words, sample_in_words, short_number};
-use crate::sensitivity::Protocol;
+use crate::sensitivity::{GridPlace, Protocol};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -133,14 +133,18 @@ fn assumptions(study: &Study, entry: &DesignEntry) -> String {
     } else {
         format!("{a}, {b} and {c} mm along x, y and z")
     };
+    let grid = match scan.grid {
+        GridPlace::Centred => "on a grid centred on each sample",
+        GridPlace::Anywhere => "on a grid that lies anywhere (the mean over its places)",
+    };
     let num_samples = entry.specimen.num_samples();
     let blocks = match (protocol.blocks_scanned, num_samples) {
         (1, 1) => "one sample, which is scanned".to_string(),
         (blocks, _) => format!("{blocks} of {num_samples} samples scanned"),
     };
     format!(
-        "Assumed are voxels of {x} × {y} × {z} mm whose displacement has a noise of {noise}, a force of all samples together read to \
-         {} N{}, and {blocks}.",
+        "Assumed are voxels of {x} × {y} × {z} mm {grid}, whose displacement has a noise of {noise}, a force of all samples together \
+         read to {} N{}, and {blocks}.",
         short_number(scan.force_sd_n),
         set_up(protocol)
     )
