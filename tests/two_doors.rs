@@ -65,7 +65,8 @@ fn curve(time: bool) -> String {
 /// A search so small that it takes seconds.
 fn small_study() -> Value {
     let mut study = shipped("studies/two-hole-shear-same-block.json");
-    study["base"] = shipped("two-hole-shear.json");
+    study["base"] = shipped("solid-shear.json");
+    study["base"]["block"] = json!({ "length_mm": 12.7, "thickness_mm": 6.4, "width_mm": 9.6 });
     study["materials"] = json!([{ "name": "one term", "material": shipped("materials/ecoflex-0020.json") }]);
     study["scan"]["voxel_mm"] = json!([2.0, 0.8, 2.0]);
     study["vary"]["hole_count"] = json!({ "min": 0, "max": 0 });
@@ -128,11 +129,11 @@ fn requests(evaluation: &Value, scans: [(&Path, &str); 2]) -> Vec<Asked> {
         Asked::alike("paper-tables", json!({ "mesh_factor": 5.0 })),
         Asked::alike(
             "prove-diagnosis",
-            json!({ "per_cause": 0, "unknown": 0, "controls": 1, "only": ["none"], "mesh_factor": 4.0 }),
+            json!({ "per_cause": 0, "unknown": 0, "controls": 1, "only": ["none"], "mesh_factor": 5.0 }),
         ),
         Asked::alike(
             "prove-diagnosis",
-            json!({ "has_several": true, "recordings": 0, "unknown": 0, "controls": 1, "mesh_factor": 4.0 }),
+            json!({ "has_several": true, "recordings": 0, "unknown": 0, "controls": 1, "mesh_factor": 5.0 }),
         ),
     ]
 }
