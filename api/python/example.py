@@ -65,7 +65,7 @@ print("images:", ", ".join(a["name"] for a in diagnosis.artefacts() if a["name"]
 
 # %% A better one, with a small budget.
 small = {**study, "materials": study["materials"][:1], "verification": {"is_on": False, "draws": 1}}
-small["budget"] = {"explore": 6, "refine": 1, "iterations": 1, "confirm": 1}
+small["budget"] = {"explore": 6, "confirm": 1, "variants_in_search": False}
 design = service.design(small)
 result = design.result()
 print("gain of the best over the base:", round(result["best"]["objective"], 3))
