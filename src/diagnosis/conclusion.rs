@@ -68,8 +68,8 @@ pub(super) fn explain_too_little(verdict: Verdict, [before, after]: [f64; 2]) ->
 /// `seen` is what each of the two models is compared with. Gives the rms misfit (mm) on the blocks that the fits did
 /// not see, without and with the causes.
 ///
-/// The fits to half of the voxels go to first order from where that to all of them ended: they differ from it by little,
-/// and cost no equilibria.
+/// The fits to half of the voxels go to first order from where that to all of them ended: they differ from it by
+/// little, and cost no equilibria.
 ///
 /// # Errors
 /// [`DiagnosisError`]: no derivatives, or the work was cancelled.
