@@ -8,10 +8,12 @@ use common::{Random, random_material, random_specimen};
 use lambdak::material::Material;
 use lambdak::mesh::MeshOptions;
 use lambdak::sensitivity::{
-    DriveSelection, Evaluation, EvaluationOptions, Fixture, ScanSettings, bound_discretisation, evaluate_fixture,
+    DriveSelection, Evaluation, EvaluationOptions, Fixture, PromisedSd, ScanSettings, bound_discretisation,
+    evaluate_fixture,
 };
 use lambdak::specimen::Specimen;
 use rayon::prelude::*;
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 /// Element size of the mesh that the standard one is compared with.
@@ -72,7 +74,9 @@ fn figures((specimen, material): &(Specimen, Material)) -> Option<Vec<Bounded>> 
     for (own, fine) in step.integrated_sensitivity.iter().zip(&fine.integrated_sensitivity) {
         figures.push((KINDS[1], error(own.volume_integral, fine.volume_integral), own.discretisation_relative));
     }
-    for (own, fine) in own.promised_sd.iter().zip(&reference.promised_sd).filter(|(p, _)| p.parameter != "kappa") {
+    // The bulk modulus is not what a scan is made for, and what is not identifiable is not read.
+    let is_read = |own: &PromisedSd| own.parameter != "kappa" && own.identifiable;
+    for (own, fine) in own.promised_sd.iter().zip(&reference.promised_sd).filter(|(own, _)| is_read(own)) {
         if let (Some(sd), Some(of_fine)) = (own.value, fine.value) {
             figures.push((KINDS[2], error(sd, of_fine), own.discretisation_relative));
         }
@@ -81,15 +85,9 @@ fn figures((specimen, material): &(Specimen, Material)) -> Option<Vec<Bounded>> 
     Some(figures.into_iter().filter_map(|(kind, error, bound)| Some(Bounded { kind, error, bound: bound? })).collect())
 }
 
-#[test]
-#[ignore = "an hour of computing"]
-fn random_cases() {
-    let stated = |name: &str| std::env::var(name).ok().and_then(|v| v.parse().ok());
-    let mut random = Random::new(stated("SEED").unwrap_or(2));
-    let cases: Vec<_> = (0..stated("CASES").unwrap_or(120)).map(|_| random_case(&mut random)).collect();
-    let found: Vec<Vec<Bounded>> = cases.par_iter().filter_map(figures).collect();
-    println!("{} of {} cases with a reference", found.len(), cases.len());
-    let all: Vec<&Bounded> = found.iter().flatten().collect();
+/// What the figures of each kind come to, one line a kind.
+fn table(all: &[&Bounded]) -> String {
+    let mut lines = String::new();
     for kind in KINDS {
         let of_kind: Vec<&&Bounded> = all.iter().filter(|f| f.kind == kind).collect();
         let median = |of: fn(&Bounded) -> f64| {
@@ -98,17 +96,43 @@ fn random_cases() {
             values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
         };
         let held = of_kind.iter().filter(|f| f.error <= f.bound).count();
-        println!(
-            "{kind}: {held} of {} within the bound ({:.1} %), median error {:.2e}, median bound {:.2e}",
+        lines += &format!(
+            "{kind}: {held} of {} within the bound ({:.1} %), median error {:.2e}, median bound {:.2e}\n",
             of_kind.len(),
             100.0 * held as f64 / of_kind.len() as f64,
             median(|f| f.error),
             median(|f| f.bound)
         );
     }
+    lines
+}
+
+#[test]
+#[ignore = "an hour of computing"]
+fn random_cases() {
+    let stated = |name: &str| std::env::var(name).ok().and_then(|v| v.parse().ok());
+    let mut random = Random::new(stated("SEED").unwrap_or(4));
+    let cases: Vec<_> = (0..stated("CASES").unwrap_or(160)).map(|_| random_case(&mut random)).collect();
+    // Those that are done, among them those with a reference.
+    let progress = Mutex::new((0, Vec::new()));
+    cases.par_iter().for_each(|case| {
+        let figures = figures(case);
+        let (done, found) = &mut *progress.lock().expect("no case panics");
+        *done += 1;
+        let Some(figures) = figures else { return };
+        found.push(figures);
+        if found.len() % 10 == 0 {
+            let all: Vec<&Bounded> = found.iter().flatten().collect();
+            eprintln!("{} of {done} cases with a reference\n{}", found.len(), table(&all));
+        }
+    });
+    let (done, found) = progress.into_inner().expect("no case panics");
+    println!("{} of {done} cases with a reference", found.len());
+    let all: Vec<&Bounded> = found.iter().flatten().collect();
+    println!("{}", table(&all));
     let held = all.iter().filter(|f| f.error <= f.bound).count();
     let part = held as f64 / all.len() as f64;
     println!("all: {held} of {} ({:.1} %)", all.len(), 100.0 * part);
-    // Figures are alike within a case: of a hundred cases three parts in a hundred are one standard deviation.
-    assert!(part > 0.84, "{part}");
+    // Figures are alike within a case: of a hundred cases two parts in a hundred are one standard deviation.
+    assert!(part > 0.91, "{part}");
 }

@@ -115,6 +115,11 @@ impl Direct {
             .map_err(|NonPositivePivot(index)| LinearError::NotPositiveDefinite { index })
     }
 
+    /// Floating-point operations of a factorisation.
+    pub(super) fn factor_operations(&self) -> f64 {
+        self.fronts.work
+    }
+
     /// Whether threads help each other in [`Direct::solve`].
     pub(super) fn is_worth_help(&self) -> bool {
         self.symbolic.len_val() >= ENTRIES_WORTH_HELP

@@ -125,6 +125,14 @@ impl LinearSystem {
         self.topology.num_unknowns()
     }
 
+    /// Floating-point operations of a direct factor; `None` where there is none.
+    pub(super) fn factor_operations(&self) -> Option<f64> {
+        match &self.method {
+            Method::Direct(direct) => Some(direct.factor_operations()),
+            Method::Levels(_) => None,
+        }
+    }
+
     /// Calls of [`LinearSystem::factorise`] so far.
     pub(super) fn num_factorisations(&self) -> usize {
         self.num_factorisations

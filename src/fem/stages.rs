@@ -37,4 +37,53 @@ impl ForwardModel {
         let x = system.solve(&[right], 1e-3)?;
         Ok(x[0].iter().fold(0.0, |s, v| s.max(v.abs())))
     }
+
+    /// Floating-point operations, multiplications and additions, of [`ForwardModel::factorise_stage`], which is in
+    /// single precision; `None` where the tangent gets no factor of its own.
+    pub fn factor_operations(&self) -> Option<f64> {
+        self.fine.linearisation.system.factor_operations()
+    }
+
+    /// Floating-point operations of the matrix products without which no tangent is made, all elements together: the
+    /// lower half of Σ_q ∇N : A : ∇N and of Bᵀ D B. What [`ForwardModel::assemble_stage`] does beside them (kinematics,
+    /// stresses and moduli of the material, adding up) is not counted.
+    pub fn stiffness_operations(&self) -> f64 {
+        let assembler = &self.fine.assembler;
+        stiffness_operations(assembler.tables().num) * assembler.mesh().num_elements() as f64
+    }
+}
+
+/// Of one element of `num` nodes and as many quadrature points; see [`ForwardModel::stiffness_operations`].
+fn stiffness_operations(num: usize) -> f64 {
+    let unknowns = 3 * num;
+    // At each point A : ∇N_b for all unknowns b: nine entries of three products each.
+    let tractions = num * unknowns * 9 * 3;
+    // Of each entry on or below the diagonal: three products at each point, and four of the pressure.
+    let entries = unknowns * (unknowns + 1) / 2;
+    let products = tractions + entries * (3 * num + 4);
+    // A product is added to a sum.
+    2.0 * products as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::stiffness_operations;
+    use crate::fem::ForwardModel;
+    use crate::mesh::MeshOptions;
+    use crate::specimen::Specimen;
+
+    /// A dense Cholesky factor of n unknowns takes n³/3 operations and needs them all; that of a mesh takes less, and
+    /// more than its diagonal blocks alone would.
+    #[test]
+    fn operations_are_those_of_the_mesh() {
+        let specimen = Specimen::from_json(include_str!("../../geometries/solid-shear.json")).expect("shipped");
+        let model = ForwardModel::of_specimen(&specimen, &MeshOptions::search(&specimen)).expect("a model");
+        let operations = model.factor_operations().expect("a small mesh has a factor");
+        let num = model.num_unknowns() as f64;
+        assert!(operations < num.powi(3) / 3.0 && operations > 9.0 * num, "{operations} of {num} unknowns");
+        // 81 unknowns: 27·81·27 + 3321·85 products of a hexahedron.
+        let per_element = model.stiffness_operations() / model.mesh().num_elements() as f64;
+        assert_eq!(per_element, 2.0 * (59_049.0 + 282_285.0));
+        assert_eq!(per_element, stiffness_operations(27));
+    }
 }

@@ -5,7 +5,7 @@
 //! the processor seconds of a whole job over those of one equilibrium at each of its drives.
 
 use super::request::RecordingOutline;
-use crate::mesh::{MeshOptions, coarser_meshes, mesh_specimen};
+use crate::mesh::{CoarserMeshes, MeshOptions, mesh_specimen};
 use crate::specimen::Specimen;
 use crate::voxel::{Surface, VoxelGrid};
 
@@ -61,7 +61,7 @@ pub(super) fn of_coarser_meshes(
     scan: Option<([f64; 3], Option<Surface>)>,
     num_drives: usize,
 ) -> f64 {
-    let meshes = coarser_meshes(mesh, specimen).into_iter().flatten();
+    let meshes = CoarserMeshes::of(mesh, specimen).into_iter().flat_map(|coarser| coarser.options);
     meshes.filter_map(|mesh| seconds(specimen, &mesh, scan, num_drives)).sum()
 }
 

@@ -8,7 +8,7 @@ use crate::fem::{Equilibrium, ForwardModel, QuadraturePoint, SolveOptions, Solve
 use crate::field::FieldError;
 use crate::kinematics::decompose;
 use crate::material::Material;
-use crate::mesh::{Mesh, MeshOptions, MeshSize, coarser_meshes};
+use crate::mesh::{CoarserMeshes, Mesh, MeshOptions, MeshSize};
 use crate::report::{deformed_picture, pvd, solution_fields, vtu_of};
 use crate::specimen::Specimen;
 use serde::{Deserialize, Serialize};
@@ -122,7 +122,9 @@ impl Run for CheckedSolve {
         let mut result = SolveResult::of_samples(results, &context.input_hash);
         if self.request.has_discretisation {
             context.step("coarser meshes", self.specimen.drive_mm.len(), self.specimen.drive_mm.len());
-            result.bound_forces(&self.forces_on_coarser_meshes(&samples, context));
+            if let Some(meshes) = CoarserMeshes::of(&self.mesh_options(&samples[0]), &samples[0]) {
+                result.bound_forces(&meshes, &self.forces_on_coarser_meshes(&samples, context));
+            }
             context.stop_if_cancelled()?;
         }
         let mut outcome = Outcome::new("solve.json", &result, summary::solve(&self.specimen.name, &result))?;
@@ -175,7 +177,7 @@ impl CheckedSolve {
         let on_mesh = |coarser: usize| {
             let mut forces = vec![[0.0; 2]; self.specimen.drive_mm.len()];
             for sample in samples {
-                let mesh = coarser_meshes(&self.mesh_options(sample), sample)?[coarser];
+                let mesh = CoarserMeshes::of(&self.mesh_options(sample), sample)?.options[coarser];
                 let mut model = ForwardModel::of_specimen(sample, &mesh).ok()?;
                 let mut last: Option<Equilibrium> = None;
                 for (sum, &drive) in forces.iter_mut().zip(&sample.drive_mm) {

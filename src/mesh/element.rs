@@ -159,7 +159,7 @@ pub(super) fn section_shape(kind: ElementKind, [xi, eta]: [f64; 2]) -> ([f64; 9]
 }
 
 /// Quadratic Lagrange polynomials at −1, 0, 1 and their derivatives.
-fn lagrange(x: f64) -> ([f64; 3], [f64; 3]) {
+pub(super) fn lagrange(x: f64) -> ([f64; 3], [f64; 3]) {
     ([0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0)], [x - 0.5, -2.0 * x, x + 0.5])
 }
 

@@ -1,6 +1,6 @@
 //! Which element holds a point, and where in it.
 
-use super::element::section_shape;
+use super::element::{lagrange, section_shape};
 use super::{ElementKind, Mesh};
 
 /// Newton on the inverse map stops when the reference coordinates move less than this.
@@ -27,6 +27,31 @@ pub struct Column {
     pub cell: u32,
     /// (ξ, η) as in [`ElementKind`].
     pub section_coordinates: [f64; 2],
+}
+
+/// Shape functions of a cell of the section in a column. Those of an element are their products with those along the
+/// extrusion ([`LevelShape`]): node s + n k, of n nodes of a section, has function s of the column and k of the level.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ColumnShape {
+    /// Index of the cell.
+    pub cell: u32,
+    /// Values; past the cell's nodes zero, like the slopes.
+    pub values: [f64; 9],
+    /// Derivatives along x, mm⁻¹.
+    pub along_x: [f64; 9],
+    /// Derivatives along the other axis of the section, mm⁻¹.
+    pub across: [f64; 9],
+}
+
+/// Shape functions of a layer at a position along the extrusion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LevelShape {
+    /// Index of the layer.
+    pub layer: usize,
+    /// Values.
+    pub values: [f64; 3],
+    /// Derivatives along the extrusion, mm⁻¹.
+    pub slopes: [f64; 3],
 }
 
 /// Finds points in an extruded mesh. The section's cells are sorted into uniform bins by their bounding boxes; the
@@ -175,6 +200,39 @@ impl Locator {
         Some(self.at(column, layer, zeta))
     }
 
+    /// The shape functions of a column; `None` where its cell is flat there.
+    pub fn column_shape(&self, mesh: &Mesh, column: Column) -> Option<ColumnShape> {
+        let points = &self.cells[column.cell as usize];
+        let (values, slopes) = section_shape(mesh.element_kind, column.section_coordinates);
+        // ∂(x, b)/∂(ξ, η).
+        let mut j = [[0.0; 2]; 2];
+        for (point, slope) in points.iter().zip(&slopes) {
+            for c in 0..2 {
+                j[c][0] += point[c] * slope[0];
+                j[c][1] += point[c] * slope[1];
+            }
+        }
+        let det = j[0][0] * j[1][1] - j[0][1] * j[1][0];
+        let of_det = 1.0 / det;
+        let along_x = slopes.map(|s| (s[0] * j[1][1] - s[1] * j[1][0]) * of_det);
+        let across = slopes.map(|s| (s[1] * j[0][0] - s[0] * j[0][1]) * of_det);
+        of_det.is_finite().then_some(ColumnShape { cell: column.cell, values, along_x, across })
+    }
+
+    /// The shape functions along the extrusion at a position (mm); `None` outside the mesh or where it is flat.
+    pub fn level_shape(&self, position: f64) -> Option<LevelShape> {
+        let (layer, zeta) = self.layer(position)?;
+        let [start, middle, end] = self.layers[layer];
+        let (values, slopes) = lagrange(zeta);
+        let of_slope = 1.0 / (0.5 * (end - start) + (start + end - 2.0 * middle) * zeta);
+        of_slope.is_finite().then_some(LevelShape { layer, values, slopes: slopes.map(|s| s * of_slope) })
+    }
+
+    /// The element of a cell in a layer.
+    pub fn element(&self, cell: u32, layer: usize) -> u32 {
+        (layer * self.num_cells) as u32 + cell
+    }
+
     /// Coordinate index of the extrusion: 1 (y) or 2 (z).
     pub fn extrusion_axis(&self) -> usize {
         self.extrusion_axis
@@ -182,8 +240,7 @@ impl Locator {
 
     fn at(&self, column: Column, layer: usize, zeta: f64) -> Location {
         let [xi, eta] = column.section_coordinates;
-        let element = (layer * self.num_cells) as u32 + column.cell;
-        Location { element, reference_coordinates: [xi, eta, zeta] }
+        Location { element: self.element(column.cell, layer), reference_coordinates: [xi, eta, zeta] }
     }
 
     fn layer(&self, position: f64) -> Option<(usize, f64)> {
@@ -289,6 +346,8 @@ mod tests {
                     let axis = locator.extrusion_axis();
                     let column = locator.locate_column(&mesh, [point[0], point[3 - axis]]).unwrap();
                     assert_eq!(locator.locate_in_column(column, point[axis]), Some(found));
+                    let column = locator.column_shape(&mesh, column).unwrap();
+                    check_shapes(&mesh, found, &column, &locator.level_shape(point[axis]).unwrap(), axis);
                     let inside = xi.iter().all(|x| x.abs() < 0.999) && mesh.element_kind == ElementKind::Hex27;
                     assert!(!inside || found.element as usize == element);
                 }
@@ -306,6 +365,33 @@ mod tests {
             assert!(locator.locate(&mesh, [0.3 * block.length_mm, 0.51 * block.thickness_mm, 0.1]).is_none());
             assert!(locator.locate(&mesh, [f64::NAN, 0.0, 0.0]).is_none());
             assert!(locator.locate(&mesh, [0.0, f64::NAN, 0.0]).is_none());
+        }
+    }
+
+    /// The products of the shape functions of a column and a level are those of the element, and give the positions of
+    /// the nodes the gradient that positions have: the identity.
+    fn check_shapes(mesh: &Mesh, found: Location, column: &ColumnShape, level: &LevelShape, axis: usize) {
+        let n = mesh.element_kind.shape_functions(found.reference_coordinates);
+        let per_level = mesh.element_kind.num_nodes() / 3;
+        let mut gradient = [[0.0; 3]; 3];
+        for (a, &node) in mesh.element(found.element as usize).iter().enumerate() {
+            let (s, k) = (a % per_level, a / per_level);
+            // Sums of a few products of numbers of the order of 1.
+            assert!((column.values[s] * level.values[k] - n[a]).abs() < 1e-14);
+            let mut slope = [column.along_x[s] * level.values[k]; 3];
+            slope[3 - axis] = column.across[s] * level.values[k];
+            slope[axis] = column.values[s] * level.slopes[k];
+            for i in 0..3 {
+                for j in 0..3 {
+                    gradient[i][j] += mesh.nodes[node as usize][i] * slope[j];
+                }
+            }
+        }
+        for i in 0..3 {
+            for j in 0..3 {
+                // Positions of 10 mm in elements of a tenth of that, and rounding.
+                assert!((gradient[i][j] - f64::from(i == j)).abs() < 1e-12, "{gradient:?}");
+            }
         }
     }
 

@@ -54,10 +54,10 @@ pub use block_shape::{BlockShape, FACE_TERMS, face_term_degree, face_term_name, 
 pub use build::{mesh_specimen, mesh_specimen_along};
 pub use check::MeshQuality;
 pub use cut::{Cut, clearance_mm, cut_offset, mesh_cut_specimen, section_axes, takes_cuts};
-pub use discretisation::{COARSER, coarser_meshes, discretisation_bound};
+pub use discretisation::{COARSER, CoarserMeshes, MeshedResult};
 pub use element::ElementKind;
 pub use error::{LigamentEnd, MeshError};
-pub use locator::{Column, Location, Locator};
+pub use locator::{Column, ColumnShape, LevelShape, Location, Locator};
 pub use morph::{DesignVariable, morphed, shape_velocity};
 pub use options::MeshOptions;
 pub use refine::{Refinement, refined};

@@ -28,7 +28,7 @@ pub struct PromisedSd {
     pub relative_sd: Option<f64>,
     /// Whether the relative standard deviation is below the limit in use.
     pub identifiable: bool,
-    /// What the mesh may put the standard deviation wrong by, relative to it: in 9 of 10 cases no more. Absent where
+    /// What the mesh may put the standard deviation wrong by, relative to it: in 19 of 20 cases no more. Absent where
     /// no coarser mesh was solved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub discretisation_relative: Option<f64>,

@@ -8,14 +8,14 @@ use super::evaluation_result::Evaluation;
 use super::fixture::Fixture;
 use super::integrated::IntegratedSensitivity;
 use crate::material::Material;
-use crate::mesh::{coarser_meshes, discretisation_bound};
+use crate::mesh::{CoarserMeshes, MeshedResult};
 use crate::specimen::Specimen;
 use rayon::prelude::*;
 
 /// Solves the drives of `evaluation`, which was made with these options, on coarser meshes too, side by side, and fills
 /// in by how much the mesh may put its forces, sensitivities and promised standard deviations wrong. What has no
 /// equilibrium on a coarser mesh, or was cancelled, gets no bound from it, and neither does what is itself on a mesh
-/// too coarse for coarser ones ([`coarser_meshes`]).
+/// too coarse for coarser ones ([`CoarserMeshes::of`]).
 pub fn bound_discretisation(
     evaluation: &mut Evaluation,
     specimen: &Specimen,
@@ -23,7 +23,7 @@ pub fn bound_discretisation(
     options: &EvaluationOptions,
     is_cancelled: &(dyn Fn() -> bool + Sync),
 ) {
-    let Some(meshes) = coarser_meshes(&options.mesh, specimen) else { return };
+    let Some(meshes) = CoarserMeshes::of(&options.mesh, specimen) else { return };
     let drives = DriveSelection::DriveMm(evaluation.steps.iter().map(|s| s.drive_mm).collect());
     let scan = evaluation.scan;
     let on_mesh = |mesh| {
@@ -32,37 +32,35 @@ pub fn bound_discretisation(
         let (found, _) = evaluate_fixture(&mut fixture, material, &drives, &[], &options, &is_cancelled).ok()?;
         Some(found)
     };
-    let coarser: Vec<Option<Evaluation>> = meshes.into_par_iter().map(on_mesh).collect();
+    let coarser: Vec<Option<Evaluation>> = meshes.options.into_par_iter().map(on_mesh).collect();
     if let [a, b] = &coarser[..] {
-        bound_by(evaluation, [a.as_ref(), b.as_ref()]);
+        bound_by(evaluation, &meshes, [a.as_ref(), b.as_ref()]);
     }
 }
 
-/// Fills in bounds from the same evaluation on the meshes of [`crate::mesh::COARSER`].
-fn bound_by(evaluation: &mut Evaluation, coarser: [Option<&Evaluation>; 2]) {
+/// Fills in bounds from the same evaluation on coarser meshes.
+fn bound_by(evaluation: &mut Evaluation, meshes: &CoarserMeshes, coarser: [Option<&Evaluation>; 2]) {
     for (index, step) in evaluation.steps.iter_mut().enumerate() {
         let steps = coarser.map(|e| e?.steps.get(index));
-        step.force_discretisation_n = discretisation_bound(step.force_n, steps.map(|s| Some(s?.force_n)));
+        let forces = steps.map(|s| Some(s?.force_n));
+        step.force_discretisation_n = meshes.bound(MeshedResult::Force, step.force_n, forces);
         for (which, own) in step.integrated_sensitivity.iter_mut().enumerate() {
             let integral = |s: &IntegratedSensitivity| s.surface_integral.unwrap_or(s.volume_integral);
             let others = steps.map(|s| s?.integrated_sensitivity.get(which).map(integral));
-            own.discretisation_relative = relative_bound(integral(own), others);
+            let kind = MeshedResult::IntegratedSensitivity;
+            own.discretisation_relative = meshes.relative_bound(kind, integral(own), others);
         }
-        bound_promised(&mut step.promised_sd, steps.map(|s| Some(&s?.promised_sd[..])));
+        bound_promised(&mut step.promised_sd, meshes, steps.map(|s| Some(&s?.promised_sd[..])));
     }
-    bound_promised(&mut evaluation.promised_sd, coarser.map(|e| Some(&e?.promised_sd[..])));
+    bound_promised(&mut evaluation.promised_sd, meshes, coarser.map(|e| Some(&e?.promised_sd[..])));
 }
 
-fn bound_promised(promised: &mut [PromisedSd], coarser: [Option<&[PromisedSd]>; 2]) {
+fn bound_promised(promised: &mut [PromisedSd], meshes: &CoarserMeshes, coarser: [Option<&[PromisedSd]>; 2]) {
     for (which, own) in promised.iter_mut().enumerate() {
         let others = coarser.map(|list| list?.get(which)?.value);
-        own.discretisation_relative = own.value.and_then(|sd| relative_bound(sd, others));
+        own.discretisation_relative =
+            own.value.and_then(|sd| meshes.relative_bound(MeshedResult::PromisedSd, sd, others));
     }
-}
-
-/// [`discretisation_bound`] relative to the value; `None` where there is nothing to be relative to.
-fn relative_bound(value: f64, coarser: [Option<f64>; 2]) -> Option<f64> {
-    discretisation_bound(value, coarser).map(|bound| bound / value.abs()).filter(|r| r.is_finite())
 }
 
 #[cfg(test)]

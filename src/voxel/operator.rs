@@ -2,10 +2,11 @@
 
 use super::section::Section;
 use super::{Sampling, VoxelError, VoxelMask};
-use crate::kinematics::{IDENTITY, Tensor, inverse};
-use crate::mesh::{Locator, Mesh};
+use crate::kinematics::{IDENTITY, Tensor};
+use crate::mesh::{ColumnShape, LevelShape, Locator, Mesh};
 use crate::specimen::Specimen;
 use rayon::prelude::*;
+use std::collections::HashMap;
 
 /// Voxels that one thread works on at a time.
 const CHUNK: usize = 512;
@@ -35,7 +36,7 @@ pub struct VoxelOperator {
 
 /// A sample point of a mirrored half carried to the meshed one, the reflection, and ∂X/∂x of the field that is seen
 /// there.
-fn reflected(mesh: &Mesh, (mut point, back): ([f64; 3], Tensor)) -> ([f64; 3], u32, Tensor) {
+fn reflected(mesh: &Mesh, (mut point, mut back): ([f64; 3], Tensor)) -> ([f64; 3], u32, Tensor) {
     let mut reflection = 0;
     for (axis, is_mirrored) in [(1, mesh.mirror.y), (2, mesh.mirror.z)] {
         if is_mirrored && point[axis] < 0.0 {
@@ -44,24 +45,66 @@ fn reflected(mesh: &Mesh, (mut point, back): ([f64; 3], Tensor)) -> ([f64; 3], u
         }
     }
     let signs = SIGNS[reflection as usize];
-    (point, reflection, [0, 1, 2].map(|m| back[m].map(|b| signs[m] * b)))
+    for (row, sign) in back.iter_mut().zip(signs) {
+        for b in row {
+            *b *= sign;
+        }
+    }
+    (point, reflection, back)
+}
+
+/// Shape functions at the sample points of voxels. Voxels above one another have the same section points, and those of
+/// a row the same positions along the extrusion, to the last bit; what was found of either is kept.
+struct Shapes<'a> {
+    locator: &'a Locator,
+    mesh: &'a Mesh,
+    columns: HashMap<[u64; 2], Option<ColumnShape>>,
+    levels: HashMap<u64, Option<LevelShape>>,
+}
+
+/// Most columns that are kept: a few megabytes. Sample points that lie on no grid share none.
+const MAX_COLUMNS: usize = 10_000;
+
+impl<'a> Shapes<'a> {
+    fn new(locator: &'a Locator, mesh: &'a Mesh) -> Self {
+        Shapes { locator, mesh, columns: HashMap::new(), levels: HashMap::new() }
+    }
+
+    /// At a point (mm) of the meshed half: the element and its shape functions; `None` outside the mesh, and where an
+    /// element is flat.
+    fn at(&mut self, point: [f64; 3]) -> Option<(u32, &ColumnShape, &LevelShape)> {
+        let (locator, mesh) = (self.locator, self.mesh);
+        let along = point[locator.extrusion_axis()];
+        let level = self.levels.entry(along.to_bits()).or_insert_with(|| locator.level_shape(along)).as_ref()?;
+        let in_section = [point[0], point[3 - locator.extrusion_axis()]];
+        if self.columns.len() >= MAX_COLUMNS {
+            self.columns.clear();
+        }
+        let column = self.columns.entry([in_section[0].to_bits(), in_section[1].to_bits()]).or_insert_with(|| {
+            locator.locate_column(mesh, in_section).and_then(|column| locator.column_shape(mesh, column))
+        });
+        let column = column.as_ref()?;
+        Some((locator.element(column.cell, level.layer), column, level))
+    }
 }
 
 /// Weights of an element's nodes, summed over the sample points of a voxel that lie in it one after the other.
 struct ElementSums<'a> {
     mesh: &'a Mesh,
+    extrusion_axis: usize,
     is_started: bool,
     element: u32,
     reflection: u32,
-    positions: [[f64; 3]; 27],
-    values: [f64; 27],
-    gradients: [[f64; 3]; 27],
+    /// By level, then by node of the section.
+    values: [[f64; 9]; 3],
+    /// The same by direction.
+    gradients: [[[f64; 9]; 3]; 3],
 }
 
 impl<'a> ElementSums<'a> {
-    fn new(mesh: &'a Mesh) -> Self {
-        let (positions, values, gradients) = ([[0.0; 3]; 27], [0.0; 27], [[0.0; 3]; 27]);
-        ElementSums { mesh, is_started: false, element: 0, reflection: 0, positions, values, gradients }
+    fn new(mesh: &'a Mesh, extrusion_axis: usize) -> Self {
+        let (values, gradients) = ([[0.0; 9]; 3], [[[0.0; 9]; 3]; 3]);
+        ElementSums { mesh, extrusion_axis, is_started: false, element: 0, reflection: 0, values, gradients }
     }
 
     fn is_of(&self, element: u32, reflection: u32) -> bool {
@@ -70,36 +113,25 @@ impl<'a> ElementSums<'a> {
 
     fn start(&mut self, element: u32, reflection: u32) {
         (self.is_started, self.element, self.reflection) = (true, element, reflection);
-        (self.values, self.gradients) = ([0.0; 27], [[0.0; 3]; 27]);
-        for (position, &node) in self.positions.iter_mut().zip(self.mesh.element(element as usize)) {
-            *position = self.mesh.nodes[node as usize];
-        }
+        (self.values, self.gradients) = ([[0.0; 9]; 3], [[[0.0; 9]; 3]; 3]);
     }
 
-    /// Adds a point; false where the element is flat there. `back` is ∂X/∂x with the signs of the reflection.
-    fn add(&mut self, reference_coordinates: [f64; 3], back: &Tensor, weight: f64) -> bool {
-        let kind = self.mesh.element_kind;
-        let (n, g) = (kind.shape_functions(reference_coordinates), kind.shape_gradients(reference_coordinates));
-        let mut map = [[0.0; 3]; 3];
-        for (x, g) in self.positions.iter().zip(&g).take(kind.num_nodes()) {
-            for i in 0..3 {
-                for j in 0..3 {
-                    map[i][j] += x[i] * g[j];
+    /// Adds a point. `back` is ∂X/∂x with the signs of the reflection.
+    fn add(&mut self, column: &ColumnShape, level: &LevelShape, back: &Tensor, weight: f64) {
+        let (along, across) = (self.extrusion_axis, 3 - self.extrusion_axis);
+        for k in 0..3 {
+            let (value, slope) = (weight * level.values[k], weight * level.slopes[k]);
+            for s in 0..9 {
+                self.values[k][s] += value * column.values[s];
+            }
+            for j in 0..3 {
+                let (of_x, of_across, of_along) = (value * back[0][j], value * back[across][j], slope * back[along][j]);
+                let sums = &mut self.gradients[j][k];
+                for s in 0..9 {
+                    sums[s] += of_x * column.along_x[s] + of_across * column.across[s] + of_along * column.values[s];
                 }
             }
         }
-        let Some(inverse) = inverse(&map) else { return false };
-        // ∂ξ_m/∂x_j.
-        let slopes = [0, 1, 2].map(|m| [0, 1, 2].map(|j| (0..3).map(|k| inverse[m][k] * back[k][j]).sum::<f64>()));
-        for (value, n) in self.values.iter_mut().zip(&n) {
-            *value += weight * n;
-        }
-        for (gradient, g) in self.gradients.iter_mut().zip(&g) {
-            for j in 0..3 {
-                gradient[j] += weight * (g[0] * slopes[0][j] + g[1] * slopes[1][j] + g[2] * slopes[2][j]);
-            }
-        }
-        true
     }
 }
 
@@ -134,16 +166,17 @@ impl VoxelOperator {
         sampling.check()?;
         let section = Section::new(specimen);
         let locator = Locator::new(mesh);
-        let of_chunk = |voxels: &[u32]| {
+        let of_chunk = |shapes: &mut Shapes, voxels: &[u32]| {
             let mut part = VoxelOperator::empty(mesh, voxels.len());
-            part.add_voxels(voxels, mesh, &locator, place_of, &|voxel, points| {
+            part.add_voxels(voxels, shapes, place_of, &|voxel, points| {
                 sampling.points(&section, &mask.grid, voxel, points);
             })
             .map_err(|voxel| VoxelError::OutsideMesh { voxel, center_mm: mask.grid.center_mm(voxel) })?;
             Ok(part)
         };
         // Every voxel stands for itself: the operator is the same for any number of threads.
-        let parts = mask.voxels.par_chunks(CHUNK).map(of_chunk).collect::<Result<Vec<_>, VoxelError>>()?;
+        let parts = mask.voxels.par_chunks(CHUNK).map_init(|| Shapes::new(&locator, mesh), of_chunk);
+        let parts = parts.collect::<Result<Vec<_>, VoxelError>>()?;
         let mut operator = VoxelOperator::empty(mesh, mask.num_voxels());
         parts.into_iter().for_each(|part| operator.append(part));
         Ok(operator)
@@ -180,44 +213,39 @@ impl VoxelOperator {
     fn add_voxels(
         &mut self,
         voxels: &[u32],
-        mesh: &Mesh,
-        locator: &Locator,
+        shapes: &mut Shapes,
         place_of: &dyn Fn([f64; 3]) -> ([f64; 3], Tensor),
         points_of: &dyn Fn(usize, &mut Vec<SamplePoint>),
     ) -> Result<(), usize> {
         // Place of a key among the current voxel's entries; valid where it is at or after the voxel's first entry.
+        let mesh = shapes.mesh;
         let mut place = vec![u32::MAX; 4 * mesh.nodes.len()];
         let mut points = Vec::new();
-        let mut sums = ElementSums::new(mesh);
+        let mut sums = ElementSums::new(mesh, shapes.locator.extrusion_axis());
         for &voxel in voxels {
             let first = self.keys.len();
             points_of(voxel as usize, &mut points);
             let mut total = 0.0;
             for &(point, weight) in &points {
                 let (point, reflection, back) = reflected(mesh, place_of(point));
-                let Some(location) = locator.locate(mesh, point) else {
+                let Some((element, column, level)) = shapes.at(point) else {
                     self.num_dropped_points += 1;
                     continue;
                 };
-                if !sums.is_of(location.element, reflection) {
+                if !sums.is_of(element, reflection) {
                     self.take(&mut sums, &mut place, first);
-                    sums.start(location.element, reflection);
+                    sums.start(element, reflection);
                 }
-                if sums.add(location.reference_coordinates, &back, weight) {
-                    self.num_points += 1;
-                    total += weight;
-                } else {
-                    self.num_dropped_points += 1;
-                }
+                sums.add(column, level, &back, weight);
+                self.num_points += 1;
+                total += weight;
             }
             self.take(&mut sums, &mut place, first);
             if self.keys.len() == first {
                 return Err(voxel as usize);
             }
-            for n in first..self.keys.len() {
-                self.values[n] /= total;
-                self.gradients[n] = self.gradients[n].map(|g| g / total);
-            }
+            self.values[first..].iter_mut().for_each(|value| *value /= total);
+            self.gradients[first..].iter_mut().flatten().for_each(|gradient| *gradient /= total);
             self.offsets.push(self.keys.len() as u32);
         }
         Ok(())
@@ -230,19 +258,21 @@ impl VoxelOperator {
         }
         sums.is_started = false;
         let nodes = sums.mesh.element(sums.element as usize);
-        for (a, &node) in nodes.iter().enumerate() {
-            let key = 4 * node + sums.reflection;
-            let mut at = place[key as usize] as usize;
-            if at < first || at >= self.keys.len() || self.keys[at] != key {
-                at = self.keys.len();
-                place[key as usize] = at as u32;
-                self.keys.push(key);
-                self.values.push(0.0);
-                self.gradients.push([0.0; 3]);
-            }
-            self.values[at] += sums.values[a];
-            for j in 0..3 {
-                self.gradients[at][j] += sums.gradients[a][j];
+        for (k, nodes) in nodes.chunks(nodes.len() / 3).enumerate() {
+            for (s, &node) in nodes.iter().enumerate() {
+                let key = 4 * node + sums.reflection;
+                let mut at = place[key as usize] as usize;
+                if at < first || at >= self.keys.len() || self.keys[at] != key {
+                    at = self.keys.len();
+                    place[key as usize] = at as u32;
+                    self.keys.push(key);
+                    self.values.push(0.0);
+                    self.gradients.push([0.0; 3]);
+                }
+                self.values[at] += sums.values[k][s];
+                for j in 0..3 {
+                    self.gradients[at][j] += sums.gradients[j][k][s];
+                }
             }
         }
     }

@@ -202,7 +202,7 @@ export const GLOSSARY = {
     "could hide. Read the interval, not the estimate alone.",
   "median stretch": "Half of the voxels are stretched more than this, half less.",
   "mesh error":
-    "What the mesh may put a number wrong by: in 9 of 10 cases no more. Coarser meshes tell; a finer one makes it smaller.",
+    "What the mesh may put a number wrong by: in 19 of 20 cases no more. Coarser meshes tell; a finer one makes it smaller.",
   "largest stretch": "The largest principal stretch anywhere in the sample. Where it is too large, the sample tears.",
   gain: "How much more a design tells than the base specimen, by the chosen objective: 1 is as much, 2 twice as much.",
   "D-optimal": "The volume of the region in which all parameters together would lie, per parameter.",
