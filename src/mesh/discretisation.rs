@@ -40,8 +40,8 @@ pub enum MeshedResult {
 impl MeshedResult {
     /// Standard deviation of the relative error of such results on standard meshes: 1.48 times the median of its
     /// magnitude, which is the ratio of the two in a normal distribution. Of 29 random specimens, materials and drives
-    /// (`tests/discretisation_study.rs`, seed 3); that of promised standard deviations lies between what it is with one
-    /// term, 0.007, and with two, 0.11, most of which are not identifiable.
+    /// (`tests/discretisation_study.rs`, seed 3); that of promised standard deviations is a choice between what it is
+    /// with one term and what it is with two, which is larger and mostly of parameters that are not identifiable.
     fn typical_error(self) -> f64 {
         match self {
             MeshedResult::Force => 0.0009,

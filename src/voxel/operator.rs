@@ -62,8 +62,8 @@ struct Shapes<'a> {
     levels: HashMap<u64, Option<LevelShape>>,
 }
 
-/// Most columns that are kept: a few megabytes. Sample points that lie on no grid share none.
-const MAX_COLUMNS: usize = 10_000;
+/// Most columns, and most levels, that are kept: a few megabytes. Sample points that lie on no grid share none.
+const MAX_KEPT: usize = 10_000;
 
 impl<'a> Shapes<'a> {
     fn new(locator: &'a Locator, mesh: &'a Mesh) -> Self {
@@ -74,12 +74,13 @@ impl<'a> Shapes<'a> {
     /// element is flat.
     fn at(&mut self, point: [f64; 3]) -> Option<(u32, &ColumnShape, &LevelShape)> {
         let (locator, mesh) = (self.locator, self.mesh);
+        if self.columns.len().max(self.levels.len()) >= MAX_KEPT {
+            self.columns.clear();
+            self.levels.clear();
+        }
         let along = point[locator.extrusion_axis()];
         let level = self.levels.entry(along.to_bits()).or_insert_with(|| locator.level_shape(along)).as_ref()?;
         let in_section = [point[0], point[3 - locator.extrusion_axis()]];
-        if self.columns.len() >= MAX_COLUMNS {
-            self.columns.clear();
-        }
         let column = self.columns.entry([in_section[0].to_bits(), in_section[1].to_bits()]).or_insert_with(|| {
             locator.locate_column(mesh, in_section).and_then(|column| locator.column_shape(mesh, column))
         });
