@@ -23,7 +23,7 @@ fn two_variables(kind: ObjectiveKind) -> Study {
 }
 
 /// Points per variable of the grid.
-const POINTS: usize = 6;
+const POINTS: usize = 5;
 
 #[test]
 fn a_grid_finds_nothing_better() {

@@ -15,7 +15,7 @@ use super::leftover::leftover;
 use super::load_curve::{largest_drive_mm, read_load_curve, take_off_effects};
 use super::load_history::LoadHistoryFit;
 use super::material_cause::{MaterialCase, Recheck};
-use super::mesh_error::{Finer, MeshDefect, widen};
+use super::mesh_error::{Coarser, Finer, MeshDefect, widen};
 use super::metric::Metric;
 use super::nominal::{first_guess, fit_nominal};
 use super::options::DiagnosisOptions;
@@ -106,6 +106,8 @@ pub(super) struct Run<'a> {
     pub(super) inference: Inference<'a>,
     /// The finer mesh; `None` where ours is fine already, or the finer one cannot be meshed.
     pub(super) finer: Option<Finer<'a>>,
+    /// The coarser meshes, by which intervals are widened.
+    coarser: Coarser<'a>,
     /// The material from which nominal fits start.
     pub(super) start: Material,
     /// Displacement unknowns of the model.
@@ -168,6 +170,7 @@ impl<'a> Run<'a> {
             observed,
             inference,
             finer: None,
+            coarser: Coarser::default(),
             start,
             num_unknowns,
             recorded,
@@ -420,10 +423,10 @@ impl<'a> Run<'a> {
         settings: &FitSettings,
         defect: Option<&MeshDefect>,
     ) -> Result<(), DiagnosisError> {
-        let Run { inference, findings, .. } = self;
+        let Run { inference, coarser, findings, .. } = self;
         let Inference { laboratory, metric, mesh_factor, is_cancelled, progress, .. } = inference;
         let fitted = if n == 0 { &mut findings.nominal } else { &mut findings.current };
-        match widen(laboratory, *mesh_factor, metric, settings, fitted, defect, *is_cancelled) {
+        match widen(laboratory, (coarser, *mesh_factor), metric, settings, fitted, defect, *is_cancelled) {
             Err(error) if is_cancelled() => Err(error),
             Err(_) => {
                 progress("a coarser model has no equilibrium: the intervals are those of the noise");

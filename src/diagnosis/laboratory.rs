@@ -103,8 +103,7 @@ impl<'a> Laboratory<'a> {
 
     /// Displacement unknowns of the nominal model.
     pub fn num_unknowns(&mut self) -> Result<usize, DiagnosisError> {
-        let station = self.stations.at(&Scene::default())?;
-        Ok(self.stations[station].model.num_unknowns())
+        Ok(self.model_of(&Scene::default())?.num_unknowns())
     }
 
     /// What would be recorded of `scene` with `material`.
@@ -151,27 +150,36 @@ impl<'a> Laboratory<'a> {
         self.stations.nominal()
     }
 
-    /// Lets the next prediction of `scene` start from `states`, what `coarse`, in whose mesh ours lies as `nesting`
+    /// The model of a scene.
+    ///
+    /// # Errors
+    /// [`DiagnosisError`]: the scene's specimen cannot be modelled.
+    pub(super) fn model_of(&mut self, scene: &Scene) -> Result<&ForwardModel, DiagnosisError> {
+        let at = self.stations.at(scene)?;
+        Ok(&self.stations[at].model)
+    }
+
+    /// Lets the next prediction of `scene` start from `states`, what `other`, in whose mesh ours lies as `nesting`
     /// says, predicts of it; `known` are equilibria of another scene there and here.
     ///
     /// # Errors
     /// [`DiagnosisError`]: the scene's specimen cannot be modelled.
     pub(super) fn start_from(
         &mut self,
-        coarse: &mut Laboratory,
+        other: &ForwardModel,
         nesting: &Nesting,
         material: &Material,
         scene: &Scene,
         states: &[Equilibrium],
         known: Option<&[Vec<Equilibrium>; 2]>,
     ) -> Result<(), DiagnosisError> {
-        let (here, there) = (self.stations.at(scene)?, coarse.stations.at(scene)?);
-        let (fine, coarse) = (&self.stations[here].model, &coarse.stations[there].model);
+        let at = self.stations.at(scene)?;
+        let ours = &self.stations[at].model;
         let start = |(n, state): (usize, &Equilibrium)| {
-            let known = known.map(|[coarse, fine]| [&coarse[n], &fine[n]]);
-            fine.start_from(coarse, nesting, material, state, known)
+            let known = known.map(|[there, here]| [&there[n], &here[n]]);
+            ours.start_from(other, nesting, material, state, known)
         };
-        self.stations[here].states = states.par_iter().enumerate().map(start).collect();
+        self.stations[at].states = states.par_iter().enumerate().map(start).collect();
         Ok(())
     }
 

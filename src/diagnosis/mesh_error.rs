@@ -15,10 +15,10 @@ use super::error::DiagnosisError;
 use super::fit::{derivatives, fit, normal_matrix, scales};
 use super::laboratory::Laboratory;
 use super::metric::Metric;
+use super::other_mesh::OtherMesh;
 use super::prior::FitSettings;
 use super::scene::Scene;
 use super::trace::Trace;
-use crate::fem::{Equilibrium, Nesting};
 use crate::mesh::MeshOptions;
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -49,13 +49,9 @@ const SD_OVER_EDGE: f64 = 0.58;
 
 /// The finer mesh of a recording, on which what was found with ours is corrected.
 pub struct Finer<'a> {
-    laboratory: Laboratory<'a>,
+    mesh: OtherMesh<'a>,
     /// Element size as a factor on ours.
     ratio: f64,
-    /// How its mesh lies in ours; `None` where it does not.
-    nesting: Option<Nesting>,
-    /// What was last predicted of a scene on our mesh and on this one.
-    known: Option<[Vec<Equilibrium>; 2]>,
     /// What our mesh predicted where the defect of a fit without causes was last worked out, and that defect.
     nominal: Option<(Trace, MeshDefect)>,
 }
@@ -84,16 +80,13 @@ impl MeshDefect {
 impl<'a> Finer<'a> {
     /// Of a laboratory whose element size is `mesh_factor` times the standard one; `None` where that is fine already,
     /// or the finer one cannot be meshed.
-    pub fn new(coarse: &Laboratory<'a>, mesh_factor: f64) -> Option<Finer<'a>> {
-        let observed = coarse.observed();
+    pub fn new(ours: &Laboratory<'a>, mesh_factor: f64) -> Option<Finer<'a>> {
         let ratio = FINER.max(FINEST / mesh_factor);
-        let mesh = MeshOptions::scaled(&observed.specimen, ratio * mesh_factor);
         if ratio > HARDLY_FINER {
             return None;
         }
-        let laboratory = Laboratory::new(observed, &mesh).ok()?;
-        let nesting = Nesting::located(coarse.nominal_mesh(), laboratory.nominal_mesh());
-        Some(Finer { laboratory, ratio, nesting, known: None, nominal: None })
+        let mesh = MeshOptions::scaled(&ours.observed().specimen, ratio * mesh_factor);
+        Some(Finer { mesh: OtherMesh::new(ours, &mesh).ok()?, ratio, nominal: None })
     }
 
     /// Corrects a fit by the finer mesh's prediction (deferred correction: what the finer mesh predicts beyond ours is
@@ -138,30 +131,43 @@ impl<'a> Finer<'a> {
         defect.holds_at(&fitted.prediction.trace, at).then(|| defect.clone())
     }
 
-    /// What the finer mesh predicts beyond ours, that of `coarse`. Its equilibria start from those on our mesh.
+    /// What the finer mesh predicts beyond ours, that of `laboratory`.
     ///
     /// # Errors
     /// As [`Self::correct`].
     pub fn defect(
         &mut self,
-        coarse: &mut Laboratory,
+        laboratory: &mut Laboratory,
         fitted: &CauseFit,
         is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<MeshDefect, DiagnosisError> {
-        let (material, scene, ours) = (&fitted.material, fitted.scene(), &fitted.prediction);
-        // A sample with a cut has another mesh.
-        let nesting = self.nesting.as_ref().filter(|_| scene.cut.is_none());
-        if let Some(nesting) = nesting {
-            self.laboratory.start_from(coarse, nesting, material, &scene, &ours.states, self.known.as_ref())?;
-        }
-        let theirs = self.laboratory.predict(material, &scene, is_cancelled)?;
-        let trace = theirs.trace.plus(-1.0, &ours.trace);
-        self.known = nesting.map(|_| [ours.states.clone(), theirs.states]);
+        let trace = self.mesh.beyond(laboratory.model_of(&fitted.scene())?, fitted, is_cancelled)?;
         let defect = MeshDefect { trace, ratio: self.ratio };
         if fitted.causes.is_empty() {
-            self.nominal = Some((ours.trace.clone(), defect.clone()));
+            self.nominal = Some((fitted.prediction.trace.clone(), defect.clone()));
         }
         Ok(defect)
+    }
+}
+
+/// The coarser meshes of a recording, by which intervals are widened. They are made where they are first asked for.
+#[derive(Default)]
+pub struct Coarser<'a> {
+    /// Each with its element size as a factor on ours.
+    meshes: Vec<(f64, OtherMesh<'a>)>,
+}
+
+impl<'a> Coarser<'a> {
+    /// Of a laboratory whose element size is `mesh_factor` times the standard one.
+    fn of(&mut self, ours: &Laboratory<'a>, mesh_factor: f64) -> Result<&mut [(f64, OtherMesh<'a>)], DiagnosisError> {
+        if self.meshes.is_empty() {
+            let other = |&(coarser, force_prisms): &(f64, bool)| {
+                let scaled = MeshOptions::scaled(&ours.observed().specimen, coarser * mesh_factor);
+                Ok((coarser, OtherMesh::new(ours, &MeshOptions { force_prisms, ..scaled })?))
+            };
+            self.meshes = COARSER.iter().map(other).collect::<Result<_, DiagnosisError>>()?;
+        }
+        Ok(&mut self.meshes)
     }
 }
 
@@ -170,9 +176,9 @@ impl<'a> Finer<'a> {
 ///
 /// # Errors
 /// [`DiagnosisError`]: the coarser model has no equilibrium, or the work was cancelled.
-pub fn widen(
-    laboratory: &mut Laboratory,
-    mesh_factor: f64,
+pub fn widen<'a>(
+    laboratory: &mut Laboratory<'a>,
+    (coarser, mesh_factor): (&mut Coarser<'a>, f64),
     metric: &Metric,
     settings: &FitSettings,
     fitted: &mut CauseFit,
@@ -192,13 +198,13 @@ pub fn widen(
         factor.solve(&DVector::from_iterator(weighed.len(), weighed.iter().map(|c| metric.inner(c, &change))))
     };
     // The shift by the error of our mesh, as each of the other meshes tells it.
-    let material = &fitted.material;
-    let by_mesh = |&(coarser, force_prisms): &(f64, bool)| {
-        let mesh = MeshOptions { force_prisms, ..MeshOptions::scaled(&observed.specimen, coarser * mesh_factor) };
-        let theirs = Laboratory::new(observed, &mesh)?.predict(material, &fitted.scene(), is_cancelled)?;
-        Ok(shift_by(&fitted.prediction.trace.plus(-1.0, &theirs.trace)) / (coarser.powf(ORDER) - 1.0))
+    let meshes = coarser.of(laboratory, mesh_factor)?;
+    let ours = laboratory.model_of(&fitted.scene())?;
+    let by_mesh = |(coarser, mesh): &mut (f64, OtherMesh)| {
+        let beyond = mesh.beyond(ours, fitted, is_cancelled)?;
+        Ok(shift_by(&beyond) / (1.0 - coarser.powf(ORDER)))
     };
-    let mut shifts = COARSER.par_iter().map(by_mesh).collect::<Result<Vec<_>, DiagnosisError>>()?;
+    let mut shifts = meshes.par_iter_mut().map(by_mesh).collect::<Result<Vec<_>, DiagnosisError>>()?;
     // The part of that error which the correction by the finer mesh leaves.
     let left = defect.map_or(1.0, |d| d.ratio.powf(ORDER));
     shifts.extend(defect.map(|d| shift_by(&d.trace) / (1.0 - left)));

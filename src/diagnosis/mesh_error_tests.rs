@@ -73,7 +73,9 @@ fn a_finer_mesh_corrects_estimates() {
     assert!(after.abs() < 0.5 * before.abs(), "{before} {after}");
 
     let noise = fitted.sd_of(0)[0];
-    widen(&mut laboratory, mesh_factor, &metric, &settings, &mut fitted, Some(&defect), &never).unwrap();
+    let mut coarser = Coarser::default();
+    widen(&mut laboratory, (&mut coarser, mesh_factor), &metric, &settings, &mut fitted, Some(&defect), &never)
+        .unwrap();
     let wider = fitted.sd_of(0)[0];
     assert!(wider > noise && after.abs() < 1.96 * wider, "{noise} {wider} {after}");
     // Not everything fits into it: shrinkage of 1.2 % is told from none by five standard deviations, on this coarse

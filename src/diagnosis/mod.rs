@@ -56,6 +56,7 @@ mod metric;
 mod nominal;
 mod noncentral;
 mod options;
+mod other_mesh;
 mod outcome;
 mod planned;
 mod prior;

@@ -9,7 +9,7 @@ use super::error::DiagnosisError;
 use super::evidence::EVIDENCE;
 use super::fit::{Member, fit_members};
 use super::interval::interval;
-use super::mesh_error::widen;
+use super::mesh_error::{Coarser, widen};
 use super::outcome::Diagnosis;
 use super::prior::{BulkPrior, FitSettings, ShearPrior};
 use super::result::{ParameterResult, material_parameters, parameter};
@@ -276,7 +276,8 @@ fn widen_all(
     for (case, fitted) in cases.iter_mut().zip(shared.iter_mut()) {
         let settings = case.found.settings;
         let defect = case.found.mesh_defect.as_ref();
-        match widen(&mut case.laboratory, mesh_factor, &case.metric, &settings, fitted, defect, is_cancelled) {
+        let other = (&mut Coarser::default(), mesh_factor);
+        match widen(&mut case.laboratory, other, &case.metric, &settings, fitted, defect, is_cancelled) {
             Err(error) if is_cancelled() => return Err(error),
             // Where a coarser model has no equilibrium the noise alone counts, as in the diagnosis.
             Err(_) | Ok(()) => {}

@@ -29,7 +29,7 @@ fn whole(specimen: &Specimen, factor: f64, force_prisms: bool) -> Mesh {
 fn random_outlines_conform() {
     let mut random = Random::new(5);
     let (mut quads, mut prisms) = (0, 0);
-    for case in 0..80 {
+    for case in 0..50 {
         let kind = KINDS[random.below(2)];
         let count = 1 + random.below(3);
         let mut s = block(kind, [4.0, 4.0], [0.0; 2]);
