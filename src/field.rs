@@ -6,11 +6,13 @@ mod read;
 pub mod schema;
 mod tag;
 mod text;
+mod xml;
 
 pub use path::FieldPath;
 pub use read::read;
 pub(crate) use tag::file_tag;
 pub use text::{printable, with_short_numbers};
+pub use xml::escape_xml;
 
 use serde::{Deserialize, Serialize};
 

@@ -22,6 +22,7 @@ mod slurm;
 mod sweep;
 mod task_bar;
 mod terminal;
+mod time_left;
 #[cfg(feature = "service")]
 mod worker;
 

@@ -2,22 +2,27 @@
 //! results.
 
 use super::interrupt;
+use super::time_left::{time_left, words};
 use crate::job::{InputFile, JobError, Progress, Surroundings};
 use crate::recording::{RawRecording, ReadLimits, ReadRecording, Recording};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+
+/// After so long without a line the last one is said again, with how long it has taken.
+const LONGEST_SILENCE: Duration = Duration::from_secs(5);
 
 /// The command's side of a job.
 pub(super) struct Terminal {
     folder: Option<PathBuf>,
     begin: Instant,
     limit: Option<Duration>,
-    bar: Option<ProgressBar>,
-    /// Stage and tenth last written.
-    last: Mutex<(String, u64)>,
+    told: Arc<Told>,
+    /// Speaks where the job is silent.
+    reminder: Option<JoinHandle<()>>,
 }
 
 impl Terminal {
@@ -31,15 +36,98 @@ impl Terminal {
             }
             bar
         });
-        let last = Mutex::new((String::new(), 0));
-        Terminal { folder: folder.map(Path::to_path_buf), begin: Instant::now(), limit, bar, last }
+        let begin = Instant::now();
+        let told = Arc::new(Told { begin, bar, last: Mutex::new(Last::new(begin)), ends: Condvar::new() });
+        let reminder = {
+            let told = told.clone();
+            // Without a thread for it there are no reminders.
+            std::thread::Builder::new().name("progress".into()).spawn(move || told.remind()).ok()
+        };
+        Terminal { folder: folder.map(Path::to_path_buf), begin, limit, told, reminder }
     }
 
     /// Removes the bar.
     pub(super) fn clear(&self) {
-        if let Some(bar) = &self.bar {
+        if let Some(bar) = &self.told.bar {
             bar.finish_and_clear();
         }
+    }
+}
+
+impl Drop for Terminal {
+    fn drop(&mut self) {
+        self.told.last().is_over = true;
+        self.told.ends.notify_all();
+        if let Some(reminder) = self.reminder.take() {
+            // What panicked there has said so itself.
+            let _ = reminder.join();
+        }
+    }
+}
+
+/// What was told of the progress.
+struct Told {
+    begin: Instant,
+    bar: Option<ProgressBar>,
+    last: Mutex<Last>,
+    /// Wakes the reminder at the end.
+    ends: Condvar,
+}
+
+/// The last progress.
+struct Last {
+    progress: Progress,
+    /// When its stage began, and how much of it was done then.
+    since: Instant,
+    done_before: u64,
+    /// Tenth of the stage last written.
+    tenth: u64,
+    written: Instant,
+    is_over: bool,
+}
+
+impl Last {
+    fn new(begin: Instant) -> Last {
+        let progress = Progress::default();
+        Last { progress, since: begin, done_before: 0, tenth: 0, written: begin, is_over: false }
+    }
+
+    /// Takes progress; whether it is worth a line: a new stage, or another tenth of it.
+    fn take(&mut self, p: &Progress, now: Instant) -> bool {
+        let tenth = (10 * p.done).checked_div(p.total).unwrap_or(0);
+        let is_other_stage = self.progress.stage != p.stage;
+        if is_other_stage {
+            (self.since, self.done_before) = (now, p.done);
+        }
+        let is_new = is_other_stage || self.tenth < tenth;
+        if is_new {
+            (self.tenth, self.written) = (tenth, now);
+        }
+        self.progress = p.clone();
+        is_new
+    }
+
+    /// The line of the last progress; `is_again` where it was written before.
+    fn line(&self, is_again: bool, now: Instant) -> String {
+        let Progress { stage, done, total, best, .. } = &self.progress;
+        let best = best.map_or(String::new(), |b| format!(" best gain {b:.3}"));
+        let elapsed = now.duration_since(self.since);
+        if *total > 1 {
+            let computed = done.saturating_sub(self.done_before) as usize;
+            let left = time_left(computed, total.saturating_sub(*done) as usize, elapsed);
+            let left = left.map_or(String::new(), |left| format!(", about {} left", words(left)));
+            format!("{stage}: {done} of {total}{best}{left}")
+        } else if is_again {
+            format!("{stage}{best}: {} so far", words(elapsed))
+        } else {
+            format!("{stage}{best}")
+        }
+    }
+}
+
+impl Told {
+    fn last(&self) -> MutexGuard<'_, Last> {
+        self.last.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn write_line(&self, text: &str) {
@@ -47,6 +135,29 @@ impl Terminal {
         match &self.bar {
             Some(bar) => bar.suspend(|| eprintln!("{line}")),
             None => eprintln!("{line}"),
+        }
+    }
+
+    /// Whether the bar shows this progress.
+    fn shows_bar(&self, p: &Progress) -> bool {
+        self.bar.is_some() && p.total > 1
+    }
+
+    /// Writes the last line again after a long silence, until the end.
+    fn remind(&self) {
+        let mut last = self.last();
+        while !last.is_over {
+            let silence = last.written.elapsed();
+            if silence >= LONGEST_SILENCE {
+                let now = Instant::now();
+                last.written = now;
+                if !last.progress.stage.is_empty() && !self.shows_bar(&last.progress) {
+                    self.write_line(&last.line(true, now));
+                }
+            } else {
+                let waited = self.ends.wait_timeout(last, LONGEST_SILENCE - silence);
+                last = waited.unwrap_or_else(PoisonError::into_inner).0;
+            }
         }
     }
 }
@@ -71,27 +182,18 @@ impl Surroundings for Terminal {
     }
 
     fn progress(&self, p: &Progress) {
-        let best = p.best.map_or(String::new(), |b| format!(" best gain {b:.3}"));
-        let tenth = (10 * p.done).checked_div(p.total).unwrap_or(0);
-        let is_new = {
-            let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
-            let is_new = last.0 != p.stage || last.1 < tenth;
-            if is_new {
-                *last = (p.stage.clone(), tenth);
-            }
-            is_new
-        };
-        if let Some(bar) = &self.bar
-            && p.total > 1
-        {
+        let told = &self.told;
+        let now = Instant::now();
+        let mut last = told.last();
+        let is_new = last.take(p, now);
+        if let Some(bar) = told.bar.as_ref().filter(|_| told.shows_bar(p)) {
+            let best = p.best.map_or(String::new(), |b| format!(" best gain {b:.3}"));
             bar.set_draw_target(indicatif::ProgressDrawTarget::stderr());
             bar.set_length(p.total);
             bar.set_position(p.done);
             bar.set_message(format!("{}{best}", p.stage));
-        } else if is_new && p.total > 1 {
-            self.write_line(&format!("{}: {} of {}{best}", p.stage, p.done, p.total));
         } else if is_new {
-            self.write_line(&format!("{}{best}", p.stage));
+            told.write_line(&last.line(false, now));
         }
     }
 
@@ -101,5 +203,28 @@ impl Surroundings for Terminal {
 
     fn checkpoint(&self, name: &str) -> Option<PathBuf> {
         self.folder.as_ref().map(|folder| folder.join(name))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Lines come with a stage and with each tenth of it, and tell the time left by what this run has done.
+    #[test]
+    fn a_line_for_every_stage_and_tenth() {
+        let begin = Instant::now();
+        let at = |s: u64| begin + Duration::from_secs(s);
+        let mut last = Last::new(begin);
+        assert!(last.take(&Progress::stage("fitting"), at(2)));
+        assert_eq!((last.line(false, at(2)), last.line(true, at(9))), ("fitting".into(), "fitting: 7 s so far".into()));
+        // Ten of forty were there before.
+        assert!(last.take(&Progress::new("explore", 10, 40), at(10)));
+        assert_eq!(last.line(false, at(10)), "explore: 10 of 40");
+        assert!(!last.take(&Progress::new("explore", 11, 40), at(11)));
+        assert!(last.take(&Progress::new("explore", 20, 40), at(20)));
+        assert_eq!(last.line(false, at(20)), "explore: 20 of 40, about 20 s left");
+        assert!(last.take(&Progress { best: Some(1.25), ..Progress::new("explore", 40, 40) }, at(40)));
+        assert_eq!(last.line(false, at(40)), "explore: 40 of 40 best gain 1.250");
     }
 }

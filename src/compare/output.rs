@@ -2,6 +2,7 @@
 
 use super::figure::{Judgement, Line};
 use super::verdict::Comparison;
+use crate::field::escape_xml;
 
 /// Lines shown per comparison in text and Markdown; the JSON has all.
 const MAX_LINES: usize = 40;
@@ -104,22 +105,6 @@ pub fn to_junit(comparisons: &[Comparison]) -> String {
         }
     }
     text + "</testsuite>\n</testsuites>\n"
-}
-
-fn escape_xml(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            // XML 1.0 has no other control characters.
-            c if c.is_control() && c != '\n' && c != '\t' => out.push('\u{fffd}'),
-            c => out.push(c),
-        }
-    }
-    out
 }
 
 #[cfg(test)]

@@ -78,7 +78,7 @@ pub(super) struct Shown {
 
 /// The drives of a specimen's load curve: between its steps and beyond the last of them, mm.
 fn drives_of_curve(specimen: &Specimen) -> Vec<f64> {
-    let largest = specimen.drive_mm.iter().fold(0.0f64, |s, d| s.max(d.abs()));
+    let largest = specimen.largest_drive_mm().abs();
     let parts = PARTS_OF_CURVE.into_iter().chain([BEYOND]).map(|part| part * largest);
     let is_new = |d: &f64| specimen.drive_mm.iter().all(|step| (step - d).abs() > SAME_PART * largest);
     parts.filter(is_new).collect()
@@ -280,7 +280,7 @@ fn departures(made: &Specimen, experiment: &Experiment, drive_mm: f64) -> Depart
 fn depart(d: &mut Departures, made: &Specimen, material: &Material, hidden: &Hidden, drive_mm: f64) {
     let half = half_extents_mm(made);
     let (strength, which) = (hidden.strength, hidden.which);
-    let largest = made.drive_mm.iter().fold(1e-9f64, |s, x| s.max(x.abs()));
+    let largest = made.largest_drive_mm().abs().max(1e-9);
     let shear_modulus = material.initial_shear_modulus_kpa();
     let mut motion = PlateMotion::default();
     match hidden.cause {

@@ -138,7 +138,7 @@ fn scored(
     made: &Concealed,
     found: Result<DiagnosisResult, &DiagnosisError>,
 ) -> Scored {
-    let largest = specimen.drive_mm.iter().fold(0.0f64, |s, d| s.max(d.abs()));
+    let largest = specimen.largest_drive_mm().abs();
     let acts_on_force = matches!(
         hidden.cause,
         HiddenCause::Relaxation | HiddenCause::Mullins | HiddenCause::Cell | HiddenCause::Compliance

@@ -193,7 +193,7 @@ fn is_detectable(
     effect: &OwnEffect,
     num_data: usize,
 ) -> bool {
-    let largest = specimen.drive_mm.iter().fold(0.0f64, |s, d| s.max(d.abs()));
+    let largest = specimen.largest_drive_mm().abs();
     let snr = num_data as f64 * (effect.rms_mm / experiment.noise_sd_mm).powi(2);
     let hidden = &experiment.hidden[place];
     let force_relative = match hidden.cause {

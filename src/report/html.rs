@@ -2,8 +2,8 @@
 
 use super::ReportError;
 use super::html_parts::{CalloutKind, STYLE, Table, picture};
-use super::text::escape;
 use super::vtu::write_file;
+use crate::field::escape_xml;
 use std::path::Path;
 
 /// What identifies the run, at the head of the page.
@@ -41,20 +41,20 @@ impl Report {
     /// Starts a section; it appears in the contents.
     pub fn section(&mut self, title: &str) -> &mut Self {
         self.sections.push(title.to_string());
-        self.body.push_str(&format!("<h2 id=\"section-{}\">{}</h2>\n", self.sections.len(), escape(title)));
+        self.body.push_str(&format!("<h2 id=\"section-{}\">{}</h2>\n", self.sections.len(), escape_xml(title)));
         self
     }
 
     /// A smaller heading.
     pub fn subsection(&mut self, title: &str) -> &mut Self {
-        self.body.push_str(&format!("<h3>{}</h3>\n", escape(title)));
+        self.body.push_str(&format!("<h3>{}</h3>\n", escape_xml(title)));
         self
     }
 
     /// A paragraph. Empty lines divide it into several.
     pub fn paragraph(&mut self, text: &str) -> &mut Self {
         for part in text.split("\n\n").map(str::trim).filter(|p| !p.is_empty()) {
-            self.body.push_str(&format!("<p>{}</p>\n", escape(part)));
+            self.body.push_str(&format!("<p>{}</p>\n", escape_xml(part)));
         }
         self
     }
@@ -64,7 +64,7 @@ impl Report {
         if !points.is_empty() {
             self.body.push_str("<ul>\n");
             for point in points {
-                self.body.push_str(&format!("<li>{}</li>\n", escape(point.as_ref())));
+                self.body.push_str(&format!("<li>{}</li>\n", escape_xml(point.as_ref())));
             }
             self.body.push_str("</ul>\n");
         }
@@ -78,7 +78,7 @@ impl Report {
             CalloutKind::Caution => "callout caution",
             CalloutKind::Note => "callout note",
         };
-        self.body.push_str(&format!("<aside class=\"{class}\">\n<h3>{}</h3>\n", escape(title)));
+        self.body.push_str(&format!("<aside class=\"{class}\">\n<h3>{}</h3>\n", escape_xml(title)));
         self.paragraph(text);
         self.body.push_str("</aside>\n");
         self
@@ -110,7 +110,7 @@ impl Report {
 
     /// A block of text as it is, such as JSON or a command.
     pub fn verbatim(&mut self, text: &str) -> &mut Self {
-        self.body.push_str(&format!("<pre>{}</pre>\n", escape(text)));
+        self.body.push_str(&format!("<pre>{}</pre>\n", escape_xml(text)));
         self
     }
 
@@ -120,7 +120,7 @@ impl Report {
             "<figure>\n{}\n<figcaption><b>Figure {}.</b> {}</figcaption>\n</figure>\n",
             picture(svg, caption),
             self.num_figures,
-            escape(caption)
+            escape_xml(caption)
         )
     }
 
@@ -135,12 +135,12 @@ impl Report {
         let facts: String = facts
             .iter()
             .filter(|(_, value)| !value.is_empty())
-            .map(|(name, value)| format!("<div><dt>{}</dt><dd>{}</dd></div>\n", escape(name), escape(value)))
+            .map(|(name, value)| format!("<div><dt>{}</dt><dd>{}</dd></div>\n", escape_xml(name), escape_xml(value)))
             .collect();
         let subtitle = if self.header.subtitle.is_empty() {
             String::new()
         } else {
-            format!("<p class=\"subtitle\">{}</p>\n", escape(&self.header.subtitle))
+            format!("<p class=\"subtitle\">{}</p>\n", escape_xml(&self.header.subtitle))
         };
         // Three sections and more are worth a list of contents.
         let contents = if self.sections.len() < 3 {
@@ -150,11 +150,11 @@ impl Report {
                 .sections
                 .iter()
                 .enumerate()
-                .map(|(i, title)| format!("<li><a href=\"#section-{}\">{}</a></li>\n", i + 1, escape(title)))
+                .map(|(i, title)| format!("<li><a href=\"#section-{}\">{}</a></li>\n", i + 1, escape_xml(title)))
                 .collect();
             format!("<nav aria-label=\"contents\"><ol>\n{entries}</ol></nav>\n")
         };
-        let title = escape(&self.title);
+        let title = escape_xml(&self.title);
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\" />\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\" />\n<title>{title}</title>\n\

@@ -1,7 +1,7 @@
 //! Parts of the page: tables, callouts, figures, and their style.
 
 use super::base64::encode;
-use super::text::escape;
+use crate::field::escape_xml;
 
 /// Alignment of a column.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -67,7 +67,7 @@ impl Table {
     pub(super) fn to_html(&self) -> String {
         let mut out = String::from("<div class=\"table\">\n<table>\n");
         if !self.caption.is_empty() {
-            out.push_str(&format!("<caption>{}</caption>\n", escape(&self.caption)));
+            out.push_str(&format!("<caption>{}</caption>\n", escape_xml(&self.caption)));
         }
         let class = |column: &Column| if column.align == Align::Left { " class=\"words\"" } else { "" };
         out.push_str("<thead><tr>");
@@ -75,16 +75,16 @@ impl Table {
             let unit = if column.unit.is_empty() {
                 String::new()
             } else {
-                format!("<span class=\"unit\">{}</span>", escape(&column.unit))
+                format!("<span class=\"unit\">{}</span>", escape_xml(&column.unit))
             };
-            out.push_str(&format!("<th scope=\"col\"{}>{}{unit}</th>", class(column), escape(&column.heading)));
+            out.push_str(&format!("<th scope=\"col\"{}>{}{unit}</th>", class(column), escape_xml(&column.heading)));
         }
         out.push_str("</tr></thead>\n<tbody>\n");
         for (r, row) in self.rows.iter().enumerate() {
             out.push_str(if self.emphasised_rows.contains(&r) { "<tr class=\"strong\">" } else { "<tr>" });
             for (c, column) in self.columns.iter().enumerate() {
                 let cell = row.get(c).map_or("", String::as_str);
-                out.push_str(&format!("<td{}>{}</td>", class(column), escape(cell)));
+                out.push_str(&format!("<td{}>{}</td>", class(column), escape_xml(cell)));
             }
             out.push_str("</tr>\n");
         }
@@ -94,7 +94,7 @@ impl Table {
         }
         out.push_str("</tbody>\n</table>\n");
         if !self.note.is_empty() {
-            out.push_str(&format!("<p class=\"remark\">{}</p>\n", escape(&self.note)));
+            out.push_str(&format!("<p class=\"remark\">{}</p>\n", escape_xml(&self.note)));
         }
         out.push_str("</div>\n");
         out
@@ -108,7 +108,7 @@ pub(super) fn picture(svg: &str, description: &str) -> String {
     let reaches_out = ["<style", "<script", " id=", " onload", "<foreignObject"].iter().any(|s| svg.contains(s));
     if reaches_out || !svg.contains("<svg") {
         let code = encode(svg.as_bytes());
-        format!("<img src=\"data:image/svg+xml;base64,{code}\" alt=\"{}\" />", escape(description))
+        format!("<img src=\"data:image/svg+xml;base64,{code}\" alt=\"{}\" />", escape_xml(description))
     } else {
         svg[start..].trim_end().to_string()
     }

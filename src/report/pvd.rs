@@ -1,6 +1,6 @@
 //! A series of field files for ParaView (`.pvd`): which file shows which drive.
 
-use super::text::escape;
+use crate::field::escape_xml;
 
 /// The series of files over drives (mm), which stand for ParaView's time.
 ///
@@ -11,7 +11,7 @@ use super::text::escape;
 pub fn pvd(files: &[(f64, String)]) -> String {
     let entries: String = files
         .iter()
-        .map(|(drive, file)| format!("<DataSet timestep=\"{drive}\" part=\"0\" file=\"{}\"/>\n", escape(file)))
+        .map(|(drive, file)| format!("<DataSet timestep=\"{drive}\" part=\"0\" file=\"{}\"/>\n", escape_xml(file)))
         .collect();
     format!(
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n\

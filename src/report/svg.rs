@@ -1,7 +1,7 @@
 //! A small canvas that writes SVG. Coordinates in px, y down.
 
 use super::color::{INK, MUTED};
-use super::text::escape;
+use crate::field::escape_xml;
 
 /// Sans-serif fonts that are on most machines.
 pub(super) const FONTS: &str =
@@ -187,7 +187,7 @@ impl Svg {
             "<text x=\"{x}\" y=\"{y}\" font-size=\"{}\" fill=\"{}\"{anchor}{weight}{turn}>{}</text>\n",
             px(style.size),
             style.color,
-            escape(content)
+            escape_xml(content)
         ));
     }
 
@@ -273,7 +273,7 @@ impl Svg {
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}\" height=\"{h}\" viewBox=\"0 0 {w} {h}\" role=\"img\" \
              font-family=\"{FONTS}\">\n<title>{}</title>\n<rect width=\"{w}\" height=\"{h}\" fill=\"#ffffff\"/>\n{}</svg>\n",
-            escape(description),
+            escape_xml(description),
             self.body
         )
     }

@@ -1,23 +1,4 @@
-//! Text in XML: escaping, and estimates of its width.
-
-/// `text` for element content and quoted attributes. Characters that XML forbids are dropped.
-pub(super) fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\'' => out.push_str("&#39;"),
-            '\t' | '\n' => out.push(c),
-            '\u{fffe}' | '\u{ffff}' => {}
-            c if c.is_control() => {}
-            c => out.push(c),
-        }
-    }
-    out
-}
+//! Estimates of the width of text.
 
 /// Widths of the printable ASCII characters in Helvetica, 1/1000 of the font size (Adobe's font metrics).
 const WIDTHS: [u16; 95] = [

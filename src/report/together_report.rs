@@ -132,7 +132,7 @@ pub fn in_words(a: &Agreement) -> String {
 }
 
 fn materials(t: &TogetherResult, all: &[&DiagnosisResult], specimen: &Specimen) -> String {
-    let drive = specimen.drive_mm.iter().fold(0.0f64, |s, d| s.max(d.abs()));
+    let drive = specimen.largest_drive_mm().abs();
     let (test, strain, x_label) = match specimen.test {
         TestKind::DoubleLapShear => (HomogeneousTest::SimpleShear, drive / specimen.block.thickness_mm, "shear (1)"),
         TestKind::Uniaxial => (HomogeneousTest::Uniaxial, drive / specimen.block.length_mm, "stretch (1)"),

@@ -4,7 +4,7 @@ use super::ReportError;
 use super::base64::encode;
 use super::shown_mesh::ShownMesh;
 use super::solution_field::{FieldPlace, SolutionField};
-use super::text::escape;
+use crate::field::escape_xml;
 use crate::mesh::Mesh;
 use std::path::Path;
 
@@ -183,7 +183,7 @@ fn data_array(kind: &str, name: &str, components: usize, bytes: &[u8]) -> String
     block.extend_from_slice(bytes);
     format!(
         "<DataArray type=\"{kind}\" Name=\"{}\" NumberOfComponents=\"{components}\" format=\"binary\">{}</DataArray>\n",
-        escape(name),
+        escape_xml(name),
         encode(&block)
     )
 }

@@ -2,6 +2,7 @@
 
 use super::Specimen;
 use super::drawing_sheet::{Anchor, Drawing, Layer, Shape};
+use crate::field::escape_xml;
 use std::fmt::Write;
 
 /// A dimensioned drawing of the specimen: front view (x, z), side view (x, y), every hole with its place and
@@ -25,7 +26,7 @@ pub fn to_svg(specimen: &Specimen) -> String {
         ),
         w = width,
         h = height,
-        name = escape(&specimen.name)
+        name = escape_xml(&specimen.name)
     );
     for entity in &drawing.entities {
         let class = match (entity.is_hidden, entity.layer) {
@@ -90,30 +91,13 @@ pub fn to_svg(specimen: &Specimen) -> String {
                     svg,
                     "<text x=\"{x:.3}\" y=\"{y:.3}\" font-size=\"{:.3}\" text-anchor=\"{anchor}\"{turn}>{}</text>",
                     1.15 * text.height,
-                    escape(&text.content)
+                    escape_xml(&text.content)
                 )
             }
         };
     }
     svg.push_str("</svg>\n");
     svg
-}
-
-/// Escapes markup, and drops the characters that XML 1.0 does not allow.
-fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\u{fffe}' | '\u{ffff}' => {}
-            c if c.is_control() => {}
-            c => out.push(c),
-        }
-    }
-    out
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ mod grid;
 mod histogram;
 mod mask;
 mod operator;
+mod point_shapes;
 mod sampling;
 mod section;
 mod surface;

@@ -1,12 +1,12 @@
 //! What a voxel measures of a nodal field: its average, and that of its gradient, over the voxel's material part.
 
+use super::point_shapes::{ElementSums, Shapes};
 use super::section::Section;
 use super::{Sampling, VoxelError, VoxelMask};
 use crate::kinematics::{IDENTITY, Tensor};
-use crate::mesh::{ColumnShape, LevelShape, Locator, Mesh};
+use crate::mesh::{Locator, Mesh};
 use crate::specimen::Specimen;
 use rayon::prelude::*;
-use std::collections::HashMap;
 
 /// Voxels that one thread works on at a time.
 const CHUNK: usize = 512;
@@ -51,89 +51,6 @@ fn reflected(mesh: &Mesh, (mut point, mut back): ([f64; 3], Tensor)) -> ([f64; 3
         }
     }
     (point, reflection, back)
-}
-
-/// Shape functions at the sample points of voxels. Voxels above one another have the same section points, and those of
-/// a row the same positions along the extrusion, to the last bit; what was found of either is kept.
-struct Shapes<'a> {
-    locator: &'a Locator,
-    mesh: &'a Mesh,
-    columns: HashMap<[u64; 2], Option<ColumnShape>>,
-    levels: HashMap<u64, Option<LevelShape>>,
-}
-
-/// Most columns, and most levels, that are kept: a few megabytes. Sample points that lie on no grid share none.
-const MAX_KEPT: usize = 10_000;
-
-impl<'a> Shapes<'a> {
-    fn new(locator: &'a Locator, mesh: &'a Mesh) -> Self {
-        Shapes { locator, mesh, columns: HashMap::new(), levels: HashMap::new() }
-    }
-
-    /// At a point (mm) of the meshed half: the element and its shape functions; `None` outside the mesh, and where an
-    /// element is flat.
-    fn at(&mut self, point: [f64; 3]) -> Option<(u32, &ColumnShape, &LevelShape)> {
-        let (locator, mesh) = (self.locator, self.mesh);
-        if self.columns.len().max(self.levels.len()) >= MAX_KEPT {
-            self.columns.clear();
-            self.levels.clear();
-        }
-        let along = point[locator.extrusion_axis()];
-        let level = self.levels.entry(along.to_bits()).or_insert_with(|| locator.level_shape(along)).as_ref()?;
-        let in_section = [point[0], point[3 - locator.extrusion_axis()]];
-        let column = self.columns.entry([in_section[0].to_bits(), in_section[1].to_bits()]).or_insert_with(|| {
-            locator.locate_column(mesh, in_section).and_then(|column| locator.column_shape(mesh, column))
-        });
-        let column = column.as_ref()?;
-        Some((locator.element(column.cell, level.layer), column, level))
-    }
-}
-
-/// Weights of an element's nodes, summed over the sample points of a voxel that lie in it one after the other.
-struct ElementSums<'a> {
-    mesh: &'a Mesh,
-    extrusion_axis: usize,
-    is_started: bool,
-    element: u32,
-    reflection: u32,
-    /// By level, then by node of the section.
-    values: [[f64; 9]; 3],
-    /// The same by direction.
-    gradients: [[[f64; 9]; 3]; 3],
-}
-
-impl<'a> ElementSums<'a> {
-    fn new(mesh: &'a Mesh, extrusion_axis: usize) -> Self {
-        let (values, gradients) = ([[0.0; 9]; 3], [[[0.0; 9]; 3]; 3]);
-        ElementSums { mesh, extrusion_axis, is_started: false, element: 0, reflection: 0, values, gradients }
-    }
-
-    fn is_of(&self, element: u32, reflection: u32) -> bool {
-        self.is_started && self.element == element && self.reflection == reflection
-    }
-
-    fn start(&mut self, element: u32, reflection: u32) {
-        (self.is_started, self.element, self.reflection) = (true, element, reflection);
-        (self.values, self.gradients) = ([[0.0; 9]; 3], [[[0.0; 9]; 3]; 3]);
-    }
-
-    /// Adds a point. `back` is ∂X/∂x with the signs of the reflection.
-    fn add(&mut self, column: &ColumnShape, level: &LevelShape, back: &Tensor, weight: f64) {
-        let (along, across) = (self.extrusion_axis, 3 - self.extrusion_axis);
-        for k in 0..3 {
-            let (value, slope) = (weight * level.values[k], weight * level.slopes[k]);
-            for s in 0..9 {
-                self.values[k][s] += value * column.values[s];
-            }
-            for j in 0..3 {
-                let (of_x, of_across, of_along) = (value * back[0][j], value * back[across][j], slope * back[along][j]);
-                let sums = &mut self.gradients[j][k];
-                for s in 0..9 {
-                    sums[s] += of_x * column.along_x[s] + of_across * column.across[s] + of_along * column.values[s];
-                }
-            }
-        }
-    }
 }
 
 /// Signs of x, y, z under each reflection.

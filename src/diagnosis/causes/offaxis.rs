@@ -22,7 +22,7 @@ pub struct OffAxis {
 impl OffAxis {
     /// Translations are stated at the specimen's largest drive.
     pub fn of(specimen: &Specimen) -> OffAxis {
-        OffAxis { largest_drive_mm: specimen.drive_mm.iter().fold(1e-9, |s: f64, d| s.max(d.abs())) }
+        OffAxis { largest_drive_mm: specimen.largest_drive_mm().abs().max(1e-9) }
     }
 }
 

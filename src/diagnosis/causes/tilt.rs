@@ -22,7 +22,7 @@ pub struct Tilt {
 impl Tilt {
     /// Angles are stated at the specimen's largest drive.
     pub fn of(specimen: &Specimen) -> Tilt {
-        Tilt { largest_drive_mm: specimen.drive_mm.iter().fold(1e-9, |s: f64, d| s.max(d.abs())) }
+        Tilt { largest_drive_mm: specimen.largest_drive_mm().abs().max(1e-9) }
     }
 }
 
