@@ -9,7 +9,7 @@ use super::allowance::{Allowance, ERROR_OVER_SHIFT};
 use super::calibrate_options::{CalibrateOptions, TermCount};
 use super::contours::contours;
 use super::error::CalibrationError;
-use super::interval::{TWO_SIDED_95, interval_95};
+use super::interval::{TWO_SIDED_95, widened};
 use super::observed::Observed;
 use super::outcome::{Calibration, Estimate, MeshComparison};
 use super::problem::CalibrationProblem;
@@ -19,6 +19,7 @@ use super::run::{Run, with_falling_exponents};
 use super::starts::Candidates;
 use super::target::Objective;
 use super::terms::{Rule, SETTLED, TermSelection, choose, compare, is_kept};
+use super::weak_intervals::{Ends, ends_by_noise, is_weak};
 use crate::material::{Material, Parameter};
 use crate::mesh::MeshOptions;
 use crate::sensitivity::IDENTIFIABILITY_LIMIT;
@@ -129,15 +130,24 @@ pub fn calibrate(
         Some(m) => ERROR_OVER_SHIFT * (value(&fit.material) - value(&m.coarse)).abs(),
         None => 0.0,
     };
+    if is_weak(&fit) {
+        on_stage("profiles of weakly known terms");
+        run.notes.push(
+            "terms are hardly told apart: the intervals of moduli and exponents are those of their profile likelihoods, which \
+             follow the valley that the data leave open"
+                .into(),
+        );
+    }
+    let ends = ends_by_noise(&mut problem, &fit, &run.fit_options, is_cancelled)?;
     let mut estimates: Vec<Estimate> = Vec::new();
-    for parameter in fit.material.parameters() {
+    for (parameter, ends) in fit.material.parameters().into_iter().zip(ends) {
         let value = fit.material.value(parameter);
         // κ is positive and hardly known: its logarithm is nearer to Gaussian.
         let mesh_error = match parameter {
             Parameter::Kappa => value * mesh_error(&|m: &Material| m.value(parameter).ln()),
             _ => mesh_error(&|m: &Material| m.value(parameter)),
         };
-        estimates.push(estimate(&fit, parameter, value, mesh_error, options.discretisation_factor));
+        estimates.push(estimate(&fit, parameter, value, ends, mesh_error, options.discretisation_factor));
     }
     // Without forces κ is in proportion to the μ₁ that was assumed.
     if has_force && !estimates[0].is_identifiable && !fit.held.contains(0) && options.objective == Objective::Weighted {
@@ -183,13 +193,23 @@ fn half_width(sd: f64, discretisation_sd: f64, possible_shift: f64) -> f64 {
     (TWO_SIDED_95 * sd.hypot(discretisation_sd)).hypot(possible_shift)
 }
 
-fn estimate(fit: &RecordingFit, parameter: Parameter, value: f64, mesh_error: f64, factor: f64) -> Estimate {
+/// With `ends`, what the noise leaves the parameter.
+fn estimate(
+    fit: &RecordingFit,
+    parameter: Parameter,
+    value: f64,
+    ends: Option<Ends>,
+    mesh_error: f64,
+    factor: f64,
+) -> Estimate {
     let sd = fit.sd(parameter);
     let possible_shift = fit.possible_shift(parameter).unwrap_or(0.0);
     let is_identifiable = sd.is_some_and(|sd| sd < IDENTIFIABILITY_LIMIT * value.abs());
     let discretisation_sd = factor * mesh_error;
-    let interval_95 = match sd.filter(|_| is_identifiable) {
-        Some(sd) => interval_95(parameter, value, sd.hypot(discretisation_sd), possible_shift).map(Some),
+    // Symmetric intervals say nothing of what is not identifiable; profiles do.
+    let has_interval = is_identifiable || parameter != Parameter::Kappa && is_weak(fit);
+    let interval_95 = match ends.filter(|_| has_interval) {
+        Some(ends) => widened(parameter, value, ends, discretisation_sd, possible_shift),
         None => [None; 2],
     };
     Estimate { parameter, value, sd, mesh_error, discretisation_sd, possible_shift, interval_95, is_identifiable }

@@ -69,7 +69,7 @@ const EQUAL: f64 = 1e-9;
 /// What a step that failed or was poor does to the damping.
 const RAISE: Raise = Raise { factor: 10.0, at_least: 1e-3 };
 /// No damping as long as steps are good: an equilibrium costs far more than a step.
-const DAMPING: Damping = Damping {
+pub(super) const DAMPING: Damping = Damping {
     start: 0.0,
     good_part: GOOD_PART,
     negligible: 1e-6,

@@ -13,6 +13,7 @@ mod doubt;
 mod error;
 mod fit;
 mod force_readings;
+mod further_terms;
 mod interval;
 mod measured_boundary;
 mod mesh_correction;
@@ -32,6 +33,7 @@ mod stand_ins;
 mod starts;
 mod step;
 mod stress_path;
+mod stress_response;
 mod study;
 #[cfg(test)]
 mod surface_tests;
@@ -42,6 +44,7 @@ mod terms;
 #[cfg(test)]
 mod test_problem;
 mod verify;
+mod weak_intervals;
 
 pub use allowance::Allowance;
 pub use bench::Bench;

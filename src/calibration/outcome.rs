@@ -23,7 +23,8 @@ pub struct Estimate {
     pub discretisation_sd: f64,
     /// What the structured part of the misfit may have shifted it by, at most.
     pub possible_shift: f64,
-    /// 95 % interval; a side that the data leave open is none. κ's is symmetric in ln κ.
+    /// 95 % interval; a side that the data leave open is none. κ's is symmetric in ln κ; where terms are hardly told
+    /// apart, those of moduli and exponents are of their profile likelihoods.
     pub interval_95: [Option<f64>; 2],
     /// Whether the standard deviation is below half of the value.
     pub is_identifiable: bool,

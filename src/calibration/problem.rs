@@ -114,6 +114,11 @@ impl<'a> CalibrationProblem<'a> {
         Target::of_recordings(self.observed, &self.views, self.objective)
     }
 
+    /// The states that predictions of `material` visit.
+    pub(super) fn stress_path(&self, material: &Material, predictions: &[Prediction]) -> StressPath {
+        path_of(&self.models, material, predictions)
+    }
+
     pub(super) fn predict(
         &mut self,
         material: &Material,
@@ -166,11 +171,7 @@ impl<'a> CalibrationProblem<'a> {
         let mut work = SolverWork::default();
         first.iter().for_each(|p| work.add(p.work));
         let CalibrationProblem { observed, models, others, views, objective } = self;
-        let path = first
-            .iter()
-            .zip(models.iter())
-            .map(|(prediction, model)| StressPath::new(model, start, &prediction.states))
-            .fold(StressPath::default(), StressPath::join);
+        let path = path_of(models, start, &first);
         let targets = Target::of_recordings(observed, views, *objective)?;
         let mut models = Models { scanned: models, others, views };
         let mut trial = |material: &Material, near: &[Prediction]| {
@@ -248,6 +249,14 @@ fn with_boundary(model: ForwardModel, recording: &Observed) -> Result<ForwardMod
             Err(CalibrationError::NoMeasuredBoundary { reason })
         }
     }
+}
+
+fn path_of(models: &[ForwardModel], material: &Material, predictions: &[Prediction]) -> StressPath {
+    predictions
+        .iter()
+        .zip(models)
+        .map(|(prediction, model)| StressPath::new(model, material, &prediction.states))
+        .fold(StressPath::default(), StressPath::join)
 }
 
 /// The models of all recordings.

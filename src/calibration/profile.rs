@@ -47,11 +47,8 @@ fn held_at(
 
 /// The increase of the objective in units in which one sandwich standard deviation is one.
 fn increase(fit: &RecordingFit, held: &RecordingFit, index: usize) -> f64 {
-    // Where weights and noise differ the curvature is not the inverse variance.
-    let plain = fit.information.covariance().sd(index).unwrap_or(1.0);
-    let true_sd = fit.covariance.sd(index).unwrap_or(plain);
     let last = |f: &RecordingFit| f.history.last().copied().unwrap_or(f64::NAN);
-    (last(held) - last(fit)).max(0.0) * (plain / true_sd).powi(2) / fit.misfit_factor
+    (last(held) - last(fit)).max(0.0) / fit.objective_per_variance(index)
 }
 
 /// Profiles every parameter that was fitted and that the data determine.

@@ -74,6 +74,15 @@ impl RecordingFit {
         Some(plain * self.structured_misfit)
     }
 
+    /// By how much the objective is higher one standard deviation ([`Self::sd`]) of a parameter away, all others
+    /// following: 1 where weights are those of the noise and the misfit is noise.
+    pub(super) fn objective_per_variance(&self, index: usize) -> f64 {
+        // Where weights and noise differ the curvature is not the inverse variance.
+        let plain = self.information.covariance().sd(index).unwrap_or(1.0);
+        let true_sd = self.covariance.sd(index).unwrap_or(plain);
+        self.misfit_factor * (true_sd / plain).powi(2)
+    }
+
     /// The initial shear modulus, kPa, and its standard deviation by the delta method.
     pub fn initial_shear_modulus(&self) -> (f64, Option<f64>) {
         let value = self.material.initial_shear_modulus_kpa();

@@ -72,7 +72,8 @@ pub struct ParameterResult {
     pub value: Option<f64>,
     /// Its standard deviation from the noise; null where undetermined.
     pub sd: Option<f64>,
-    /// 95 % interval from noise, discretisation and misfit; an open side is null. κ's is symmetric in ln κ.
+    /// 95 % interval from noise, discretisation and misfit; an open side is null. κ's is symmetric in ln κ; those of
+    /// terms that are hardly told apart are of their profile likelihoods.
     pub interval_95: [Option<f64>; 2],
     /// What our own mesh may have shifted it by.
     pub mesh_error: f64,

@@ -1,14 +1,14 @@
 //! Where fits start: from a force by hand's formula, and new terms by what they promise to gain.
 
 use super::error::CalibrationError;
+use super::further_terms::{Group, with_further_terms};
 use super::observed::Observed;
 use super::options::{FitOptions, Held};
-use super::prediction::Prediction;
 use super::problem::CalibrationProblem;
 use super::recording_fit::RecordingFit;
 use super::system::raw_sums;
 use super::target::Target;
-use crate::material::{LawKind, MAX_TERMS, Material, OgdenTerm};
+use crate::material::{LawKind, Material, OgdenTerm};
 use crate::specimen::{Specimen, TestKind};
 use nalgebra::DVector;
 
@@ -16,8 +16,6 @@ use nalgebra::DVector;
 const REFERENCE_SHEAR_KPA: f64 = 10.0;
 /// κ over the shear modulus at the start.
 const START_BULK_RATIO: f64 = 100.0;
-/// A term of this part of the shear modulus is not there yet; its derivatives exist.
-const NO_MODULUS: f64 = 1e-9;
 /// Exponents of one-term starts.
 const FIRST_EXPONENTS: [f64; 3] = [2.0, 6.0, -3.0];
 /// Exponents that a further term is tried with.
@@ -74,8 +72,7 @@ pub(super) fn law_starts(observed: &[Observed], kind: LawKind) -> Vec<Material> 
 pub(super) struct Candidates {
     old: Material,
     held: Held,
-    /// Exponents solved together, and the predictions with terms of these.
-    groups: Vec<(Vec<f64>, Vec<Prediction>)>,
+    groups: Vec<Group>,
 }
 
 impl Candidates {
@@ -90,20 +87,10 @@ impl Candidates {
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Candidates, CalibrationError> {
         let old = &fit.material;
-        let shear = old.initial_shear_modulus_kpa();
         let gap = 1.1 * options.min_alpha_gap;
         let exponents: Vec<f64> =
             NEXT_EXPONENTS.into_iter().filter(|a| old.terms.iter().all(|t| (t.alpha - a).abs() > gap)).collect();
-        let num_at_once = MAX_TERMS.saturating_sub(old.terms.len());
-        let mut groups = Vec::new();
-        if num_at_once > 0 {
-            for chunk in exponents.chunks(num_at_once) {
-                let mut wide = old.clone();
-                wide.terms.extend(chunk.iter().map(|&alpha| OgdenTerm { mu_kpa: NO_MODULUS * shear, alpha }));
-                let predictions = problem.predict(&wide, Some(&fit.predictions), &options.solve, is_cancelled)?;
-                groups.push((chunk.to_vec(), predictions));
-            }
-        }
+        let groups = with_further_terms(problem, fit, &exponents, options, is_cancelled)?;
         Ok(Candidates { old: old.clone(), held: fit.held, groups })
     }
 

@@ -125,7 +125,7 @@ impl StressPath {
 
     /// Traceless principal Kirchhoff stresses Σμ λ̄^α of all states (kPa, times the root of the volume), and their
     /// derivatives with respect to the scaled parameters, κ first.
-    fn stresses(&self, material: &Material) -> (DVector<f64>, DMatrix<f64>) {
+    pub(super) fn stresses(&self, material: &Material) -> (DVector<f64>, DMatrix<f64>) {
         let mut stresses = DVector::zeros(3 * self.states.len());
         let mut slopes = DMatrix::zeros(3 * self.states.len(), 2 * material.terms.len() + 1);
         for (s, (logs, root)) in self.states.iter().enumerate() {

@@ -15,7 +15,7 @@ use super::allowance::ERROR_OVER_SHIFT;
 use super::calibrate::MESH_RATIO;
 use super::calibrate_options::CalibrateOptions;
 use super::error::CalibrationError;
-use super::interval::interval_95;
+use super::interval::widened;
 use super::observed::Observed;
 use super::problem::CalibrationProblem;
 use super::recording_fit::RecordingFit;
@@ -23,6 +23,7 @@ use super::run::{Run, with_falling_exponents};
 use super::starts::Candidates;
 use super::synthetic::SyntheticScan;
 use super::terms::{Rule, SETTLED, choose, compare};
+use super::weak_intervals::{Ends, ends_by_noise};
 use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::recording::Filter;
@@ -152,8 +153,14 @@ impl fmt::Display for Study {
     }
 }
 
-/// Estimates, their standard deviations and χ² per datum of a fit.
-type DrawFit = (Vec<f64>, Vec<Option<f64>>, f64);
+/// What a fit says of every parameter, and its χ² per datum.
+struct DrawFit {
+    values: Vec<f64>,
+    sd: Vec<Option<f64>>,
+    /// What the noise leaves.
+    ends: Vec<Option<Ends>>,
+    chi2_per_datum: f64,
+}
 
 struct Draw {
     /// The fit with as many terms as the truth.
@@ -281,12 +288,15 @@ fn one_draw(
         // Both are within a small part of a standard deviation of the optimum.
         is_alike = Some(fit.as_ref().zip(blind).is_some_and(|(f, chi2)| (chi2 - f.chi2).abs() < 0.1));
     }
-    let fit = fit.map(|fit| {
-        let parameters = fit.material.parameters();
-        let values = parameters.iter().map(|p| fit.material.value(*p)).collect();
-        (values, parameters.iter().map(|p| fit.sd(*p)).collect(), fit.chi2_per_datum)
-    });
-    Ok(Draw { fit, chosen, is_alike })
+    let Some(fit) = fit else { return Ok(Draw { fit: None, chosen, is_alike }) };
+    let parameters = fit.material.parameters();
+    let fit = DrawFit {
+        values: parameters.iter().map(|p| fit.material.value(*p)).collect(),
+        sd: parameters.iter().map(|p| fit.sd(*p)).collect(),
+        ends: ends_by_noise(problem, &fit, &case.options.fit, is_cancelled)?,
+        chi2_per_datum: fit.chi2_per_datum,
+    };
+    Ok(Draw { fit: Some(fit), chosen, is_alike })
 }
 
 fn summarise(draws: &[Draw], truth: &Material, noiseless: &RecordingFit, coarse: &RecordingFit, factor: f64) -> Study {
@@ -306,13 +316,13 @@ fn summarise(draws: &[Draw], truth: &Material, noiseless: &RecordingFit, coarse:
         .enumerate()
         .map(|(i, parameter)| {
             let at = noiseless.material.value(parameter);
-            let values: Vec<f64> = fitted.iter().map(|d| d.0[i]).collect();
-            let stated = || fitted.iter().filter_map(|d| d.1[i].map(|sd| (d.0[i], sd)));
+            let values: Vec<f64> = fitted.iter().map(|d| d.values[i]).collect();
+            let stated = || fitted.iter().filter_map(|d| d.ends[i].map(|ends| (d.values[i], ends)));
             let discretisation_sd = factor * ERROR_OVER_SHIFT * (at - coarse.material.value(parameter)).abs();
             let true_value = truth.value(parameter);
-            let covers = |v: f64, center: f64, sd: f64| {
-                let [low, high] = interval_95(parameter, v, sd, 0.0);
-                f64::from(u8::from(low <= center && center <= high))
+            let covers = |v: f64, center: f64, ends: Ends, discretisation_sd: f64| {
+                let [low, high] = widened(parameter, v, ends, discretisation_sd, 0.0);
+                f64::from(u8::from(low.is_none_or(|l| l <= center) && high.is_none_or(|h| center <= h)))
             };
             StudyRow {
                 parameter: parameter.name(),
@@ -320,19 +330,17 @@ fn summarise(draws: &[Draw], truth: &Material, noiseless: &RecordingFit, coarse:
                 mesh_shift: at - truth.value(parameter),
                 mean_shift: mean(&mut values.iter().copied()) - at,
                 found_sd: spread(&values),
-                promised_sd: mean(&mut stated().map(|(_, sd)| sd)),
-                coverage: mean(&mut stated().map(|(v, sd)| covers(v, at, sd))),
+                promised_sd: mean(&mut fitted.iter().filter_map(|d| d.sd[i])),
+                coverage: mean(&mut stated().map(|(v, ends)| covers(v, at, ends, 0.0))),
                 discretisation_sd,
-                coverage_of_truth: mean(
-                    &mut stated().map(|(v, sd)| covers(v, true_value, sd.hypot(discretisation_sd))),
-                ),
+                coverage_of_truth: mean(&mut stated().map(|(v, ends)| covers(v, true_value, ends, discretisation_sd))),
             }
         })
         .collect();
     let most = draws.iter().flat_map(|d| d.chosen).max().unwrap_or(0);
     let num_by_rule =
         [0, 1, 2].map(|r| (1..=most).map(|n| draws.iter().filter(|d| d.chosen[r] == n).count()).collect());
-    let chi2: Vec<f64> = fitted.iter().map(|d| d.2).collect();
+    let chi2: Vec<f64> = fitted.iter().map(|d| d.chi2_per_datum).collect();
     Study {
         rows,
         num_fitted: fitted.len(),

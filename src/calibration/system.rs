@@ -115,9 +115,10 @@ pub(super) fn scales_of(material: &Material) -> Vec<f64> {
     material.parameters().into_iter().map(scale).collect()
 }
 
-/// Gauss–Newton matrix and half the negative gradient in the parameters' own units, for parameters that may be zero.
+/// Gauss–Newton matrix and half the negative gradient by everything that the predictions have derivatives by, in its
+/// own unit, for parameters that may be zero.
 pub(super) fn raw_sums(predictions: &[Prediction], targets: &[Target]) -> (DMatrix<f64>, DVector<f64>) {
-    let n = predictions.first().map_or(0, |p| p.material.parameters().len());
+    let n = predictions.first().and_then(|p| p.sensitivities.first()).map_or(0, Vec::len);
     let mut sums = Sums { matrix: DMatrix::zeros(n, n), gradient: DVector::zeros(n), ..Sums::default() };
     for (prediction, target) in predictions.iter().zip(targets) {
         sums.add(prediction, target);

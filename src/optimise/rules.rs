@@ -87,7 +87,7 @@ pub struct Stop {
 
 impl Stop {
     /// After so many trials.
-    pub fn after_trials(max_trials: usize) -> Stop {
+    pub const fn after_trials(max_trials: usize) -> Stop {
         Stop { max_trials, max_steps: usize::MAX, least_relative_gain: None }
     }
 
