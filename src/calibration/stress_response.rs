@@ -21,7 +21,8 @@ use crate::material::{Material, OgdenTerm};
 use crate::optimise::{self, LeastSquares, Rules, Shortening, Step, Stop};
 use nalgebra::{DMatrix, DVector};
 
-/// Exponents of the further terms. Stresses of exponents between them are combinations of theirs to 10⁻³.
+/// Exponents of the further terms, close enough that stresses of exponents between them are nearly combinations of
+/// theirs.
 const EXPONENTS: [f64; 15] = [-24.0, -16.0, -11.0, -7.5, -5.0, -3.0, -1.5, 1.0, 2.5, 4.0, 6.0, 8.5, 12.0, 17.0, 24.0];
 /// Beyond the largest of them nothing is promised.
 pub(super) const LARGEST_EXPONENT: f64 = 25.0;
