@@ -11,7 +11,7 @@ use super::options::FitOptions;
 use super::problem::CalibrationProblem;
 use super::recording_fit::RecordingFit;
 use super::stress_response::{LARGEST_EXPONENT, ResponsePoint, StressResponse};
-use crate::material::{Material, Parameter};
+use crate::material::{MAX_TERMS, Material, Parameter};
 
 /// Of the linear model's intervals the ends are wrong by about half of the relative standard deviation, in standard
 /// deviations: beyond this one it matters.
@@ -33,7 +33,7 @@ pub(super) type Ends = [Option<f64>; 2];
 /// deviations, and the material there; it is sought from one near it. None beyond a limit.
 type Root<'a> = dyn Fn(f64, &Material) -> Option<(f64, Material)> + 'a;
 
-/// Whether any modulus of a fit of several terms is known to a part of its size only.
+/// Whether any modulus of a fit of several terms, fewer than the most, is known to a part of its size only.
 pub(super) fn is_weak(fit: &RecordingFit) -> bool {
     let is_hardly_known = |p: Parameter| {
         let index = fit.information.index_of(p).ok();
@@ -41,7 +41,9 @@ pub(super) fn is_weak(fit: &RecordingFit) -> bool {
             && !fit.sd(p).is_some_and(|sd| sd <= WEAK_RELATIVE_SD * fit.material.value(p).abs())
     };
     let moduli = |p: &Parameter| matches!(p, Parameter::Mu(_));
-    fit.material.terms.len() > 1 && fit.material.parameters().into_iter().filter(moduli).any(is_hardly_known)
+    // Without room for a further term no other stresses can be asked for.
+    let has_room = (2..MAX_TERMS).contains(&fit.material.terms.len());
+    has_room && fit.material.parameters().into_iter().filter(moduli).any(is_hardly_known)
 }
 
 /// What the noise leaves every parameter of `fit`, in the order of its parameters: by the linear model, or by profiles
@@ -61,8 +63,13 @@ pub(super) fn ends_by_noise(
     if !is_weak(fit) {
         return Ok(parameters.iter().map(linear).collect());
     }
-    let response = StressResponse::new(problem, fit, options, is_cancelled)?;
-    let least = response.least(fit.material.clone(), options)?;
+    let response = StressResponse::new(problem, fit, options, is_cancelled)
+        .and_then(|response| Ok((response.least(fit.material.clone(), options)?, response)));
+    let (least, response) = match response {
+        // An estimate is not lost because its profiles are.
+        Err(e) if e.is_of_the_data() => return Ok(parameters.iter().map(linear).collect()),
+        other => other?,
+    };
     let mut all = Vec::new();
     for (index, parameter) in parameters.iter().enumerate() {
         let is_held = fit.held.contains(index);
