@@ -8,7 +8,8 @@
 //! docs/challenge.md tells how to take part.
 
 use lambdak::proof::{
-    Answer, SeveralOptions, conceal, score_answer, several_experiments, specimen_of, sum_up, unknown_cause,
+    Answer, SeveralOptions, SeveralScored, conceal, score_answer, several_experiments, specimen_of, sum_up,
+    unknown_cause,
 };
 use lambdak::specimen::Specimen;
 use rayon::prelude::*;
@@ -72,6 +73,9 @@ fn score(specimen: &Specimen, options: &SeveralOptions, folder: &Path) -> Result
         })
         .collect::<Result<Vec<_>, Box<dyn Error + Send + Sync>>>()?;
     let proof = sum_up(scored, options);
+    for scored in &proof.scored {
+        println!("{}", line_of(scored));
+    }
     let share = |[part, whole]: [usize; 2]| format!("{part} of {whole}");
     println!("recordings scored                                  {}", proof.scored.len());
     println!("all detectable causes named                        {}", share(proof.all_named));
@@ -91,4 +95,19 @@ fn score(specimen: &Specimen, options: &SeveralOptions, folder: &Path) -> Result
         );
     }
     Ok(())
+}
+
+/// What was hidden in a recording, how large each cause's own effect is, and what was said of it.
+fn line_of(scored: &SeveralScored) -> String {
+    let hidden = scored.causes.iter().map(|c| {
+        let state = match (c.is_named, c.is_detectable) {
+            (true, _) => "named",
+            (false, true) => "missed",
+            (false, false) => "too small to see",
+        };
+        format!("{} ({:.4} mm, {state})", c.cause.name(), c.own_effect_rms_mm)
+    });
+    let hidden = hidden.collect::<Vec<_>>().join(", ");
+    let verdict = scored.verdict.map_or_else(|| "failed".to_owned(), |v| format!("{v:?}"));
+    format!("hidden: {hidden}; {verdict}, falsely named: {}", scored.false_names.join(", "))
 }

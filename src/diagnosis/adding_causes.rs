@@ -1,6 +1,7 @@
 //! The stage of a diagnosis that names causes: single ones round by round, the set-up as a whole where they leave much,
 //! and what later causes made needless out again.
 
+use super::cause::CauseName;
 use super::cause_fit::CauseFit;
 use super::diagnose::Run;
 use super::error::DiagnosisError;
@@ -13,6 +14,7 @@ use super::metric::Metric;
 use super::nominal::fit_with_terms;
 use super::rounds::{Asked, RoundLimits, add_causes, fit_round, score_round};
 use super::set_up::{fit_set_up, is_set_up_promising, simplest_set_up};
+use super::stand_ins::with_sponge_for_stand_ins;
 use super::supposed::Supposed;
 use super::thinning::{Needed, named_causes, thinned};
 use super::trace::Trace;
@@ -113,6 +115,7 @@ impl Run<'_> {
         if fit_round(inference, findings, &measured, &scored)? {
             add_causes(inference, findings, &measured, limits, &to_ask)?;
         }
+        self.replace_stand_ins(&measured, limits)?;
         let are_all_asked = !(does_inside_wait || are_given_up.get());
         if are_all_asked {
             self.start_otherwise(begun, &measured, limits)?;
@@ -122,13 +125,32 @@ impl Run<'_> {
         let Some(with_set_up) = with_set_up else {
             return if are_all_asked { Ok(()) } else { self.ask_all(&measured, limits) };
         };
-        let gains =
-            |run: &Self| run.left_mm(&with_set_up.findings.current) < SET_UP_GAINS * run.left_mm(&run.findings.current);
+        let gains = |run: &Self| {
+            let [with, without] = [&with_set_up.findings, &run.findings].map(|f| &f.current);
+            let (left_with, left_without) = (run.left_mm(with), run.left_mm(without));
+            // Fewer causes that leave no more are simpler, as free motions are than several plain ones beside a filler.
+            let is_simpler = with.causes.len() < without.causes.len() && run.is_explained_by(&run.findings);
+            left_with < if is_simpler { left_without } else { SET_UP_GAINS * left_without }
+        };
         if !(are_all_asked || gains(self) || self.is_explained_by(&with_set_up.findings)) {
             self.ask_all(&measured, limits)?;
         }
         if gains(self) {
             self.go_on_with(with_set_up);
+        }
+        Ok(())
+    }
+
+    /// Puts a smooth field in the place of causes that stand in for it, and goes on with rounds from there.
+    fn replace_stand_ins(&mut self, measured: &Trace, limits: RoundLimits) -> Result<(), DiagnosisError> {
+        let Run { inference, registry, findings, .. } = self;
+        if let Some(other) = with_sponge_for_stand_ins(inference, registry, measured, &findings.current)? {
+            self.findings.current = other;
+            self.findings.alternatives.clear();
+            self.name_causes_of_fit()?;
+            let Run { inference, registry, findings, options, .. } = self;
+            let everything = Asked { registry, with_terms: options.prior.is_none(), evidence: EVIDENCE };
+            add_causes(inference, findings, measured, limits, &|_, _| Some(everything))?;
         }
         Ok(())
     }
@@ -242,13 +264,14 @@ impl Run<'_> {
     /// for, or has no fit.
     fn with_set_up(&mut self, measured: &Trace, limits: RoundLimits) -> Result<Option<WithSetUp>, DiagnosisError> {
         let parts = self.registry.set_up(self.observed);
-        if parts.is_empty() || self.is_explained_by(&self.findings) {
-            return Ok(None);
-        }
-        // What the set-up has a part for, or takes up, is left to it.
         let of_parts: Vec<Supposed> =
             parts.into_iter().map(|cause| Supposed { values: cause.start(), cause }).collect();
         let special_cases = self.registry.special_cases(&of_parts);
+        let is_asked = !self.is_explained_by(&self.findings) || self.makes_up_motions(&special_cases);
+        if of_parts.is_empty() || !is_asked {
+            return Ok(None);
+        }
+        // What the set-up has a part for, or takes up, is left to it.
         let is_beside = |c: &&Supposed| {
             let is_part = of_parts.iter().any(|p| p.cause.name() == c.cause.name());
             !(is_part || special_cases.contains(&c.cause.name()) || c.cause.is_sponge() || c.cause.is_artefact())
@@ -262,6 +285,15 @@ impl Run<'_> {
         let alone = self.set_up_beside(Vec::new(), measured, limits)?;
         let left_mm = |found: &WithSetUp| self.left_mm(&found.findings.current);
         Ok([together, alone].into_iter().flatten().min_by(|a, b| left_mm(a).total_cmp(&left_mm(b))))
+    }
+
+    /// Whether the fit makes up a motion of the plates from several plain ones (`plain`, special cases of free ones)
+    /// and does not quite come to it: more than the error of a mesh is left, or a smooth field takes it up.
+    fn makes_up_motions(&self, plain: &[CauseName]) -> bool {
+        let current = &self.findings.current;
+        let num_plain = current.causes.iter().filter(|s| plain.contains(&s.cause.name())).count();
+        let has_sponge = current.causes.iter().any(|s| s.cause.is_sponge());
+        num_plain > 1 && (has_sponge || self.left_mm(current) > self.inference.allowance_mm)
     }
 
     /// The set-up as a whole beside some causes, with further causes added to them; `None` where it has no fit.

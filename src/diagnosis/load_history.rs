@@ -13,6 +13,9 @@ use crate::recording::LoadCurve;
 /// A further effect must lower the deviance by this part of what the effects before it did, too: their models err by
 /// some percent. A repeated effect, such as a second relaxation, is a part of one model and need not.
 const SMALLEST_SHARE: f64 = 0.02;
+/// An effect must change the force by this part of the largest elastic one: what a load cell adds that is less than the
+/// force model errs by (its allowances are of this size) is no finding.
+const LEAST_CHANGE: f64 = 0.004;
 /// Most effects.
 const MAX_EFFECTS: usize = 5;
 
@@ -114,12 +117,22 @@ fn best_trial(
             let whole: Vec<f64> = current.parameters.iter().copied().chain(start).collect();
             let Some(fit) = problem.fit(&effects, &whole) else { continue };
             let gain = current.deviance - fit.deviance - num_parameters * cost;
-            if best.as_ref().is_none_or(|b| gain > b.gain) {
+            if best.as_ref().is_none_or(|b| gain > b.gain) && changes_enough(problem, &effects, &fit) {
                 best = Some(Trial { index, gain, fit });
             }
         }
     }
     best
+}
+
+/// Whether the last of `effects` changes any reading by more than [`LEAST_CHANGE`] of the largest elastic force.
+fn changes_enough(problem: &LoadProblem, effects: &[&'static dyn LoadEffect], fit: &LoadFit) -> bool {
+    let Some((last, before)) = effects.split_last() else { return false };
+    let num_before = fit.parameters.len() - problem.parameters_of(*last).len();
+    let (with, elastic) = problem.force(effects, &fit.parameters);
+    let (without, _) = problem.force(before, &fit.parameters[..num_before]);
+    let change = with.iter().zip(&without).fold(0.0f64, |largest, (a, b)| largest.max((a - b).abs()));
+    change > LEAST_CHANGE * elastic.iter().fold(0.0f64, |largest, f| largest.max(f.abs()))
 }
 
 /// The effects with their parameters in the units of their names.

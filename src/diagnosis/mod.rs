@@ -69,6 +69,7 @@ mod score;
 mod score_round;
 mod search;
 mod set_up;
+mod stand_ins;
 mod station;
 mod supposed;
 #[cfg(test)]

@@ -55,6 +55,11 @@ impl Trial<'_> {
     fn counted(&self) -> f64 {
         self.fit.causes.last().map_or(1.0, |c| counted_part(&*c.cause)) * self.gain
     }
+
+    /// The cause that it adds, in words.
+    fn description(&self) -> String {
+        self.fit.causes.last().map_or_else(String::new, |c| c.cause.description())
+    }
 }
 
 /// What the first half of a round found.
@@ -337,32 +342,41 @@ fn gain_of(inference: &Inference, current: &CauseFit, fit: &CauseFit) -> f64 {
 
 /// Names the best trial as a cause where the evidence for it is strong enough, with what cannot be told apart from it;
 /// whether it did.
+///
+/// Where the leading one does too little to be a cause, one that explains more than it is taken: a smooth field, whose
+/// gain counts in part.
 fn take_best<'a>(
     inference: &mut Inference<'a>,
     findings: &mut Findings,
-    trials: Vec<Trial<'a>>,
+    mut trials: Vec<Trial<'a>>,
     evidence: f64,
 ) -> Result<bool, DiagnosisError> {
-    let mut trials = trials.into_iter();
-    let Some(mut best) = trials.next() else { return Ok(false) };
-    let effect = best.fit.prediction.trace.plus(-1.0, &findings.current.prediction.trace);
-    let share = smallest_share(&findings.current.causes);
-    let least = evidence.max(share * findings.explained());
+    let Some(leading) = trials.first() else { return Ok(false) };
+    let least = evidence.max(smallest_share(&findings.current.causes) * findings.explained());
     (inference.progress)(&format!(
         "round {}: '{}' lowers the deviance by {:.0}, of which {:.0} count; {least:.0} are called for",
         findings.num_rounds,
-        best.fit.causes.last().map_or_else(String::new, |c| c.cause.description()),
-        best.gain,
-        best.counted()
+        leading.description(),
+        leading.gain,
+        leading.counted()
     ));
-    let is_large = best.fit.causes.last().is_some_and(|found| {
+    let gain_of_leading = leading.gain;
+    let effect_of = |trial: &Trial| trial.fit.prediction.trace.plus(-1.0, &findings.current.prediction.trace);
+    let may_be_named = |trial: &Trial| {
         let observed = inference.laboratory.observed();
-        times_to_large_of(&*found.cause, observed, &effect, inference.allowance_mm) < 1.0
-    });
-    if best.counted() < least || !is_large {
-        return Ok(false);
+        let is_large = trial.fit.causes.last().is_some_and(|found| {
+            times_to_large_of(&*found.cause, observed, &effect_of(trial), inference.allowance_mm) < 1.0
+        });
+        trial.gain >= gain_of_leading && trial.counted() >= least && is_large
+    };
+    let Some(place) = trials.iter().position(may_be_named) else { return Ok(false) };
+    let effect = effect_of(&trials[place]);
+    let others = trials.split_off(place + 1);
+    let Some(mut best) = trials.pop() else { return Ok(false) };
+    if place > 0 {
+        (inference.progress)(&format!("it does too little; '{}' explains more", best.description()));
     }
-    for other in trials {
+    for other in others {
         if best.counted() - other.counted() < AMBIGUITY && !is_same(&best.fit, &other.fit, &effect) {
             let alternative = alternative(inference, &findings.current, &best.fit, &other)?;
             findings.alternatives.push(alternative);
@@ -401,4 +415,57 @@ fn alternative(
 fn last_cause(inference: &Inference, trial: &Trial, effect: &Trace) -> FoundCause {
     let last = trial.fit.causes.len() - 1;
     FoundCause::of_fit(&trial.fit, last, inference.laboratory.observed()).with_evidence(trial.gain, effect.rms_mm())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibration::Observed;
+    use crate::diagnosis::scene::Scene;
+    use crate::diagnosis::test_recordings::{FORCE_SD_N, MESH_FACTOR, inference_of, material, recorded};
+
+    /// A fit of `measured` with the cause of this name beside those of `current`, and what it changes, mm rms.
+    fn trial_of<'a>(
+        inference: &Inference<'a>,
+        registry: &Registry,
+        measured: &Trace,
+        current: &CauseFit,
+        name: &str,
+    ) -> (Trial<'a>, f64) {
+        let specimen = &inference.laboratory.observed().specimen;
+        let cause = registry.tested(specimen).into_iter().find(|c| c.name().as_str() == name).unwrap();
+        let start = (cause.clone(), cause.start());
+        let mut inference = inference.twin();
+        let (gain, fit) = tried(&mut inference, current, 1, measured, &[], &start).unwrap();
+        let effect = fit.prediction.trace.plus(-1.0, &current.prediction.trace);
+        (Trial { gain, fit, is_settled: true, inference }, effect.rms_mm())
+    }
+
+    /// A background of 0.03 mm that a displaced plate takes up in part. Where that plate does less than a mesh could and
+    /// leads all the same, because the gain of a smooth field counts in part, the field is named, not nothing; and
+    /// nothing where the plate is all there is.
+    #[test]
+    fn a_leading_cause_that_does_too_little_gives_way_to_what_explains_more() {
+        let mut scene = Scene::default();
+        scene.image.background_mm[1] = [0.01, 0.0, 0.01, 0.0, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let recording = recorded(&material(), &scene, MESH_FACTOR);
+        let observed = Observed::new(&recording, FORCE_SD_N).unwrap();
+        let (registry, mut inference) = (Registry::standard(), inference_of(&observed));
+        let measured = inference.laboratory.measured();
+        let current = inference.fit(&measured, &material(), &[]).unwrap();
+        let mut findings = Findings::of_nominal(current.clone());
+        let trial = |name| trial_of(&inference, &registry, &measured, &current, name);
+        let ((plate, plate_mm), (field, field_mm)) = (trial("mount"), trial("background"));
+        let (alone, _) = trial("mount");
+        assert!(
+            field.gain > plate.gain && field_mm > 2.0 * plate_mm,
+            "{} {} {field_mm} {plate_mm}",
+            field.gain,
+            plate.gain
+        );
+        inference.allowance_mm = (plate_mm * field_mm).sqrt();
+        assert!(!take_best(&mut inference, &mut findings, vec![alone], EVIDENCE).unwrap());
+        assert!(take_best(&mut inference, &mut findings, vec![plate, field], EVIDENCE).unwrap());
+        assert_eq!(findings.causes.last().unwrap().name.as_str(), "background");
+    }
 }

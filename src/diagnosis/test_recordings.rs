@@ -1,9 +1,12 @@
 //! Small synthetic recordings for the tests of single stages: a solid block on a coarse mesh, with a few hundred
 //! voxels.
 
+use super::inference::{Inference, KNOWN_LOG_SD};
 use super::laboratory::Laboratory;
 use super::mesh_error::FINER;
+use super::metric::Metric;
 use super::options::DiagnosisOptions;
+use super::prior::{BulkPrior, FitSettings};
 use super::scene::Scene;
 use crate::calibration::Observed;
 use crate::material::Material;
@@ -87,4 +90,22 @@ pub(super) fn recorded(material: &Material, scene: &Scene, mesh_factor: f64) -> 
         step.force_n = Some(prediction.trace.force[n]);
     }
     recording
+}
+
+/// What fits of such a recording need, with a bulk modulus that is as good as known.
+pub(super) fn inference_of(observed: &Observed) -> Inference<'_> {
+    let allowance_mm = options().allowance_mm.unwrap();
+    let bulk = BulkPrior { center_kpa: material().bulk_kpa, log_sd: KNOWN_LOG_SD };
+    Inference {
+        laboratory: Laboratory::new(observed, &MeshOptions::scaled(&observed.specimen, MESH_FACTOR)).unwrap(),
+        metric: Metric::new(observed, allowance_mm, &|_| true),
+        settings: FitSettings { max_iterations: 12, bulk, shear: None, tolerance: 0.1, relative_tolerance: 0.0 },
+        nominal_bulk: bulk,
+        believed_bulk: bulk,
+        allowance_mm,
+        discrepancy_mm2: [0.0; 3],
+        mesh_factor: MESH_FACTOR,
+        is_cancelled: &|| false,
+        progress: &|_| {},
+    }
 }
