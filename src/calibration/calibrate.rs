@@ -132,21 +132,32 @@ pub fn calibrate(
     };
     if is_weak(&fit) {
         on_stage("profiles of weakly known terms");
-        run.notes.push(
-            "terms are hardly told apart: the intervals of moduli and exponents are those of their profile likelihoods, which \
-             follow the valley that the data leave open"
-                .into(),
-        );
     }
-    let ends = ends_by_noise(&mut problem, &fit, &run.fit_options, is_cancelled)?;
+    let of_noise = ends_by_noise(&mut problem, &fit, &run.fit_options, is_cancelled)?;
+    if is_weak(&fit) {
+        let how = match of_noise.are_of_profiles {
+            true => {
+                "the intervals of moduli and exponents are those of their profile likelihoods, which follow the valley that \
+                 the data leave open"
+            }
+            false => {
+                "a material along the valley that the data leave open has no equilibrium, so that the intervals are those of \
+                 the linear model and may be too short"
+            }
+        };
+        run.notes.push(format!("terms are hardly told apart: {how}"));
+    }
     let mut estimates: Vec<Estimate> = Vec::new();
-    for (parameter, ends) in fit.material.parameters().into_iter().zip(ends) {
+    for (parameter, ends) in fit.material.parameters().into_iter().zip(&of_noise.ends) {
         let value = fit.material.value(parameter);
         // κ is positive and hardly known: its logarithm is nearer to Gaussian.
         let mesh_error = match parameter {
             Parameter::Kappa => value * mesh_error(&|m: &Material| m.value(parameter).ln()),
             _ => mesh_error(&|m: &Material| m.value(parameter)),
         };
+        // Symmetric intervals say nothing of what is not identifiable; profiles do.
+        let ends = ends
+            .filter(|_| is_identifiable(&fit, parameter) || parameter != Parameter::Kappa && of_noise.are_of_profiles);
         estimates.push(estimate(&fit, parameter, value, ends, mesh_error, options.discretisation_factor));
     }
     // Without forces κ is in proportion to the μ₁ that was assumed.
@@ -193,7 +204,11 @@ fn half_width(sd: f64, discretisation_sd: f64, possible_shift: f64) -> f64 {
     (TWO_SIDED_95 * sd.hypot(discretisation_sd)).hypot(possible_shift)
 }
 
-/// With `ends`, what the noise leaves the parameter.
+fn is_identifiable(fit: &RecordingFit, parameter: Parameter) -> bool {
+    fit.sd(parameter).is_some_and(|sd| sd < IDENTIFIABILITY_LIMIT * fit.material.value(parameter).abs())
+}
+
+/// With `ends`, what the noise leaves the parameter, as far as they mean anything.
 fn estimate(
     fit: &RecordingFit,
     parameter: Parameter,
@@ -204,11 +219,9 @@ fn estimate(
 ) -> Estimate {
     let sd = fit.sd(parameter);
     let possible_shift = fit.possible_shift(parameter).unwrap_or(0.0);
-    let is_identifiable = sd.is_some_and(|sd| sd < IDENTIFIABILITY_LIMIT * value.abs());
+    let is_identifiable = is_identifiable(fit, parameter);
     let discretisation_sd = factor * mesh_error;
-    // Symmetric intervals say nothing of what is not identifiable; profiles do.
-    let has_interval = is_identifiable || parameter != Parameter::Kappa && is_weak(fit);
-    let interval_95 = match ends.filter(|_| has_interval) {
+    let interval_95 = match ends {
         Some(ends) => widened(parameter, value, ends, discretisation_sd, possible_shift),
         None => [None; 2],
     };

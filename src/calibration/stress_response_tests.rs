@@ -2,9 +2,9 @@ use super::super::interval::linear_ends;
 use super::super::observed::Observed;
 use super::super::target::Objective;
 use super::super::test_problem::{block, coarse, ogden, same_mesh};
-use super::super::weak_intervals::{ends_by_noise, is_weak};
+use super::super::weak_intervals::{NoiseEnds, ends_by_noise, is_weak};
 use super::*;
-use crate::fem::SolveOptions;
+use crate::fem::{SolveError, SolveOptions};
 use crate::material::Parameter;
 use crate::recording::Filter;
 
@@ -39,7 +39,9 @@ fn it_is_the_objective_of_refits_where_parameters_change_by_factors() {
             assert!((system.matrix[(i, j)] - of_fit[(i, j)]).abs() < 1e-6 * scale, "{i} {j}");
         }
     }
-    let ends = ends_by_noise(&mut problem, &fit, &options(), &|| false).unwrap();
+    let found = ends_by_noise(&mut problem, &fit, &options(), &|| false).unwrap();
+    assert!(found.are_of_profiles);
+    let ends = found.ends;
     let mut num_ends = 0;
     for (index, parameter) in [(1, Parameter::Mu(0)), (2, Parameter::Alpha(0)), (4, Parameter::Alpha(1))] {
         for end in ends[index].unwrap().into_iter().flatten() {
@@ -74,10 +76,17 @@ fn well_known_terms_keep_the_linear_model() {
         let mut problem = CalibrationProblem::new(&observed, &coarse, Objective::Weighted).unwrap();
         let fit = problem.fit(&truth, None, &options(), &|| false).unwrap();
         assert!(!is_weak(&fit));
-        let ends = ends_by_noise(&mut problem, &fit, &options(), &|| false).unwrap();
-        for (parameter, ends) in fit.material.parameters().into_iter().zip(ends) {
-            let linear = linear_ends(parameter, fit.material.value(parameter), fit.sd(parameter).unwrap());
-            assert_eq!(ends, Some(linear.map(Some)));
+        // So does a fit whose profiles have no equilibrium, and it does not call them profiles.
+        let lost = CalibrationError::NotConverged { iterations: 1, distance: 2.0, limit: 0.1 };
+        let without_profiles = NoiseEnds::or_linear(Err(lost), &fit).unwrap();
+        for found in [ends_by_noise(&mut problem, &fit, &options(), &|| false).unwrap(), without_profiles] {
+            assert!(!found.are_of_profiles);
+            for (parameter, ends) in fit.material.parameters().into_iter().zip(found.ends) {
+                let linear = linear_ends(parameter, fit.material.value(parameter), fit.sd(parameter).unwrap());
+                assert_eq!(ends, Some(linear.map(Some)));
+            }
         }
+        let cancelled = NoiseEnds::or_linear(Err(SolveError::Cancelled { reached_mm: 0.0 }.into()), &fit);
+        assert!(cancelled.is_err());
     }
 }

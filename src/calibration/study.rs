@@ -293,7 +293,7 @@ fn one_draw(
     let fit = DrawFit {
         values: parameters.iter().map(|p| fit.material.value(*p)).collect(),
         sd: parameters.iter().map(|p| fit.sd(*p)).collect(),
-        ends: ends_by_noise(problem, &fit, &case.options.fit, is_cancelled)?,
+        ends: ends_by_noise(problem, &fit, &case.options.fit, is_cancelled)?.ends,
         chi2_per_datum: fit.chi2_per_datum,
     };
     Ok(Draw { fit: Some(fit), chosen, is_alike })

@@ -46,9 +46,43 @@ pub(super) fn is_weak(fit: &RecordingFit) -> bool {
     has_room && fit.material.parameters().into_iter().filter(moduli).any(is_hardly_known)
 }
 
-/// What the noise leaves every parameter of `fit`, in the order of its parameters: by the linear model, or by profiles
-/// where that does not hold; none where a parameter was held or nothing is known of it. κ is by the linear model
-/// always.
+/// What the noise leaves the parameters of a fit.
+pub(super) struct NoiseEnds {
+    /// Per parameter, in the fit's order; none where a parameter was held or nothing is known of it.
+    pub(super) ends: Vec<Option<Ends>>,
+    /// Whether those of moduli and exponents are of profiles, which hold where parameters are not identifiable, too.
+    pub(super) are_of_profiles: bool,
+}
+
+impl NoiseEnds {
+    fn of_linear_model(fit: &RecordingFit) -> NoiseEnds {
+        let ends = fit.material.parameters().into_iter().map(|p| linear(fit, p)).collect();
+        NoiseEnds { ends, are_of_profiles: false }
+    }
+
+    /// Those that were `found` by profiles; by the linear model where these have no equilibrium, because an estimate is
+    /// not lost with its profiles.
+    ///
+    /// # Errors
+    /// Any other error of the profiles.
+    pub(super) fn or_linear(
+        found: Result<Vec<Option<Ends>>, CalibrationError>,
+        fit: &RecordingFit,
+    ) -> Result<Self, CalibrationError> {
+        match found {
+            Ok(ends) => Ok(NoiseEnds { ends, are_of_profiles: true }),
+            Err(e) if e.is_of_the_data() => Ok(NoiseEnds::of_linear_model(fit)),
+            Err(e) => Err(e),
+        }
+    }
+}
+
+fn linear(fit: &RecordingFit, parameter: Parameter) -> Option<Ends> {
+    Some(linear_ends(parameter, fit.material.value(parameter), fit.sd(parameter)?).map(Some))
+}
+
+/// What the noise leaves every parameter of `fit`: by the linear model, or by profiles where that does not hold. κ is
+/// by the linear model always.
 ///
 /// # Errors
 /// [`CalibrationError`].
@@ -57,32 +91,27 @@ pub(super) fn ends_by_noise(
     fit: &RecordingFit,
     options: &FitOptions,
     is_cancelled: &dyn Fn() -> bool,
-) -> Result<Vec<Option<Ends>>, CalibrationError> {
-    let parameters = fit.material.parameters();
-    let linear = |p: &Parameter| Some(linear_ends(*p, fit.material.value(*p), fit.sd(*p)?).map(Some));
+) -> Result<NoiseEnds, CalibrationError> {
     if !is_weak(fit) {
-        return Ok(parameters.iter().map(linear).collect());
+        return Ok(NoiseEnds::of_linear_model(fit));
     }
-    let response = StressResponse::new(problem, fit, options, is_cancelled)
-        .and_then(|response| Ok((response.least(fit.material.clone(), options)?, response)));
-    let (least, response) = match response {
-        // An estimate is not lost because its profiles are.
-        Err(e) if e.is_of_the_data() => return Ok(parameters.iter().map(linear).collect()),
-        other => other?,
+    NoiseEnds::or_linear(ends_of_profiles(problem, fit, options, is_cancelled), fit)
+}
+
+fn ends_of_profiles(
+    problem: &mut CalibrationProblem,
+    fit: &RecordingFit,
+    options: &FitOptions,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Vec<Option<Ends>>, CalibrationError> {
+    let response = StressResponse::new(problem, fit, options, is_cancelled)?;
+    let least = response.least(fit.material.clone(), options)?;
+    let of_parameter = |(index, parameter): (usize, Parameter)| match parameter {
+        _ if fit.held.contains(index) => None,
+        Parameter::Kappa => linear(fit, parameter),
+        _ => Some(ResponseProfile { response: &response, fit, least: &least, options, index }.ends(parameter)),
     };
-    let mut all = Vec::new();
-    for (index, parameter) in parameters.iter().enumerate() {
-        let is_held = fit.held.contains(index);
-        all.push(match parameter {
-            _ if is_held => None,
-            Parameter::Kappa => linear(parameter),
-            _ => {
-                let profile = ResponseProfile { response: &response, fit, least: &least, options, index };
-                Some(profile.ends(*parameter))
-            }
-        });
-    }
-    Ok(all)
+    Ok(fit.material.parameters().into_iter().enumerate().map(of_parameter).collect())
 }
 
 /// The profile of one parameter.
