@@ -109,8 +109,8 @@ impl Last {
 
     /// The line of the last progress; `is_again` where it was written before.
     fn line(&self, is_again: bool, now: Instant) -> String {
-        let Progress { stage, done, total, best, .. } = &self.progress;
-        let best = best.map_or(String::new(), |b| format!(" best gain {b:.3}"));
+        let Progress { stage, done, total, .. } = &self.progress;
+        let best = best_gain(&self.progress);
         let elapsed = now.duration_since(self.since);
         if *total > 1 {
             let computed = done.saturating_sub(self.done_before) as usize;
@@ -162,6 +162,11 @@ impl Told {
     }
 }
 
+/// The best gain so far in words, with a space before them; nothing where there is none.
+fn best_gain(p: &Progress) -> String {
+    p.best.map_or(String::new(), |gain| format!(" best gain {gain:.3}"))
+}
+
 fn unreadable(name: &str, error: &dyn std::fmt::Display) -> JobError {
     JobError::Unreadable { name: name.into(), message: error.to_string() }
 }
@@ -187,11 +192,10 @@ impl Surroundings for Terminal {
         let mut last = told.last();
         let is_new = last.take(p, now);
         if let Some(bar) = told.bar.as_ref().filter(|_| told.shows_bar(p)) {
-            let best = p.best.map_or(String::new(), |b| format!(" best gain {b:.3}"));
             bar.set_draw_target(indicatif::ProgressDrawTarget::stderr());
             bar.set_length(p.total);
             bar.set_position(p.done);
-            bar.set_message(format!("{}{best}", p.stage));
+            bar.set_message(format!("{}{}", p.stage, best_gain(p)));
         } else if is_new {
             told.write_line(&last.line(false, now));
         }
