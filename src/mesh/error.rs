@@ -102,6 +102,16 @@ pub enum MeshError {
         /// Smallest length that is meshed, mm.
         limit_mm: f64,
     },
+    /// A wedge that is not meshed: in a uniaxial test, with holes along the width, or without thickness at an end.
+    #[error(
+        "wedge_mm is {value_mm} mm; only a double-lap shear block with holes along its thickness may be a wedge, of less than twice its thickness ({thickness_mm} mm): set it to 0, or change the test or the holes"
+    )]
+    UnsupportedWedge {
+        /// The wedge, mm.
+        value_mm: f64,
+        /// Thickness in the middle, mm.
+        thickness_mm: f64,
+    },
     /// More elements than the options allow.
     #[error("about {elements} elements are needed, the limit is {limit}; increase the element size or the limit")]
     TooManyElements {
