@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{model, off_axis, ogden, solid, solve, specimen, two_terms};
+use common::{model, never, off_axis, ogden, solid, solve, specimen, two_terms};
 use lambdak::calibration::{
     Boundary, CalibrateOptions, CalibrationError, Observed, SyntheticScan, TermCount, calibrate,
 };
@@ -79,39 +79,29 @@ fn stiffnesses(extents: [f64; 3], wedge_mm: f64, material: &Material) -> [f64; 2
         };
         let mut model = ForwardModel::new(mesh_specimen(&specimen, &options).unwrap(), &specimen).unwrap();
         let drive = 1e-3 * extents[1];
-        solve(&mut model, material, drive).unwrap().force_n / drive
+        // Of materials that hardly change their volume, residuals do not fall to the 10⁻¹¹ of other tests.
+        let options = SolveOptions { tolerance: 1e-8, ..SolveOptions::default() };
+        model.solve(material, drive, None, &options, &never).unwrap().force_n / drive
     })
 }
 
-/// A thin compressible layer is sheared by drive/thickness everywhere but at its ends, which take from the force of a
-/// wedge what they take from that of an even layer: the difference is G W (∫ dx/thickness − L/thickness).
+/// A thin layer is sheared by drive/thickness everywhere but at its ends, which take from the force of a wedge what they
+/// take from that of an even layer: the difference is G W (∫ dx/thickness − L/thickness). That holds of incompressible
+/// materials too: seen from the middle of the gap its plates go ± half of the drive, and as both faces slant alike the
+/// gap at a place stays as it is and nothing has to flow along.
 #[test]
-fn a_thin_compressible_wedge_is_sheared_place_by_place() {
-    let ([length, thickness, width], wedge) = ([40.0, 1.0, 20.0], 0.6);
+fn a_thin_wedge_is_sheared_place_by_place() {
     let shear_kpa = 20.0;
-    let [even, slanted] = stiffnesses([length, thickness, width], wedge, &ogden(shear_kpa, &[(20.0, 2.0)]));
-    let per_mm = ((1.0 + 0.5 * wedge) / (1.0 - 0.5 * wedge)).ln() * length / wedge - length / thickness;
-    let expected = 1e-3 * shear_kpa * width * per_mm;
-    println!("{even} N/mm even, {slanted} N/mm slanted, {} more where {expected} is expected", slanted - even);
-    // What is left is of the order of the slope times the thickness over the length: a few per cent of the difference.
-    assert!(((slanted - even) / expected - 1.0).abs() < 0.05);
-}
-
-/// A thin incompressible layer between plates that slide out of parallel must flow: with the plates' gap h(x) the mean
-/// flow d h(x)/2 is not the same everywhere, and pressure evens it out (Reynolds' equation). To second order in the
-/// wedge w that takes G d L W w²/(4 t³) of force, less by 1 − 0.63 L/W as pressure also escapes to the sides (the
-/// torsion constant of a rectangle is the same problem), beside G d W (∫ dx/h − L/t) for shear.
-#[test]
-fn a_thin_incompressible_wedge_flows() {
-    let ([length, thickness, width], wedge) = ([20.0, 1.0, 60.0], 0.3);
-    let shear_kpa = 20.0;
-    let [even, slanted] = stiffnesses([length, thickness, width], wedge, &ogden(2e6, &[(20.0, 2.0)]));
-    let per_mm = ((1.0 + 0.5 * wedge) / (1.0 - 0.5 * wedge)).ln() * length / wedge - length / thickness;
-    let flow = length * wedge.powi(2) / (4.0 * thickness.powi(3)) * (1.0 - 0.63 * length / width);
-    let expected = 1e-3 * shear_kpa * width * (per_mm + flow);
-    println!("{even} N/mm even, {slanted} N/mm slanted, {} more where {expected} is expected", slanted - even);
-    // Pressure ends within a thickness of the free faces: three times a part of thickness/length of the flow's force.
-    assert!(((slanted - even) / expected - 1.0).abs() < 0.1);
+    for (bulk_kpa, [length, thickness, width], wedge) in
+        [(shear_kpa, [40.0, 1.0, 20.0], 0.6), (2e6, [20.0, 1.0, 60.0], 0.3)]
+    {
+        let [even, slanted] = stiffnesses([length, thickness, width], wedge, &ogden(bulk_kpa, &[(20.0, 2.0)]));
+        let per_mm = ((1.0 + 0.5 * wedge) / (1.0 - 0.5 * wedge)).ln() * length / wedge - length / thickness;
+        let expected = 1e-3 * shear_kpa * width * per_mm;
+        println!("{even} N/mm even, {slanted} N/mm slanted, {} more; expected {expected}", slanted - even);
+        // What is left is of the order of thickness/length of the difference: a fortieth and a twentieth.
+        assert!(((slanted - even) / expected - 1.0).abs() < thickness / length);
+    }
 }
 
 /// Sums over the filled parts of all voxels of a grid are integrals over the wedge: volume, displacement, its gradient
@@ -123,7 +113,7 @@ fn voxels_add_up_to_integrals() {
     let mut model = model(&specimen, 1.6);
     let state = solve(&mut model, &material, drive).unwrap();
     let grid = VoxelGrid::new([-12.9, -4.3, -9.7], [0.6, 0.22, 0.5], [44, 40, 40]).unwrap();
-    let mask = VoxelMask::from_flags(&specimen, grid.clone(), &vec![true; grid.num_voxels()], 1e-6).unwrap();
+    let mask = VoxelMask::from_flags(&specimen, grid.clone(), &vec![true; grid.num_voxels()], 0.02).unwrap();
     let operator = VoxelOperator::new(&specimen, model.mesh(), &mask, Sampling::default()).unwrap();
     let deformations = operator.deformation_gradients(&state.displacement).unwrap();
     let fields = model.quadrature_fields(&material, &state);
@@ -136,7 +126,7 @@ fn voxels_add_up_to_integrals() {
     };
     let volume = specimen.volume_mm3();
     let shear = by_quadrature(&|f| f[0][1]);
-    // Slices of cut voxels are good to a thousandth of them; coarse arcs to as much of the holes.
+    // Slices of cut voxels are good to a thousandth of them, and slivers are left out; coarse arcs to as much of the holes.
     assert!((by_voxels(&|_| 1.0) / volume - 1.0).abs() < 1e-3 && (by_quadrature(&|_| 1.0) / volume - 1.0).abs() < 1e-3);
     for i in 0..3 {
         for j in 0..3 {

@@ -52,6 +52,8 @@ fn gradients_of_a_wedge_pass_the_taylor_test() {
     let mut study = study();
     study.base.block.wedge_mm = 1.8;
     study.materials.truncate(2);
+    study.vary.axes = Some(vec![crate::specimen::HoleAxis::Thickness]);
+    study.vary.tests = vec![crate::specimen::TestKind::DoubleLapShear];
     assert_eq!(study.validate().map_err(|e| e.to_string()), Ok(()));
     let mut specimen = study.base.clone();
     specimen.drive_mm = vec![5.0];
@@ -70,6 +72,8 @@ fn what_does_not_go_with_a_wedge_is_told_at_it() {
     let base = || {
         let mut study = study();
         study.base.block.wedge_mm = 1.8;
+        study.vary.axes = Some(vec![HoleAxis::Thickness]);
+        study.vary.tests = vec![TestKind::DoubleLapShear];
         study
     };
     let pointers = |study: &Study| study.field_errors().into_iter().map(|e| e.pointer).collect::<Vec<_>>();

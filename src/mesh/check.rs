@@ -4,14 +4,14 @@ use std::collections::HashMap;
 
 use serde::Serialize;
 
-use super::domain::Domain;
+use super::domain::{COINCIDENT, Domain};
 use super::error::MeshError;
 use super::node_sets::{nodes_on_plane, pull_axis};
 use super::options::MeshOptions;
 use super::section::{Section, scaled_jacobian};
 use super::{ElementKind, Mesh};
 use crate::specimen::dumbbell::Profile;
-use crate::specimen::{HoleWall, Specimen};
+use crate::specimen::{HoleWall, Specimen, Taper};
 
 /// Relative error allowed in a hole's or an arc's area: a parabola through three points of a 60° arc has 0.14 %.
 const ARC_AREA_TOLERANCE: f64 = 2e-3;
@@ -67,6 +67,10 @@ impl Mesh {
         let domain = Domain::new(specimen, &options)?;
         self.check_indices()?;
         self.check_jacobians()?;
+        let [found, expected] = [self.taper, domain.taper].map(Taper::slope_per_mm);
+        if !((found - expected).abs() * domain.half[0] <= COINCIDENT) {
+            return Err(MeshError::WrongTaper { found, expected });
+        }
         // In flattened coordinates the faces of a wedge are planes across the axes.
         let flattened = (!self.taper.is_even()).then(|| self.flattened());
         let flat = flattened.as_ref().unwrap_or(self);

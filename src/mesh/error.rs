@@ -171,6 +171,16 @@ pub enum MeshError {
         /// Tolerance, mm³.
         tolerance_mm3: f64,
     },
+    /// The mesh is said to be that of another wedge, or of none.
+    #[error(
+        "the mesh's gap changes by {found} of its middle per mm along x, the specimen's by {expected}; give the mesh the specimen's taper"
+    )]
+    WrongTaper {
+        /// The mesh's slope, mm⁻¹.
+        found: f64,
+        /// The specimen's, mm⁻¹.
+        expected: f64,
+    },
     /// A face belongs to one element only but does not lie on the specimen's surface: a hole in the mesh.
     #[error("a face of element {element} around ({}, {}, {}) mm is open but not on the specimen's surface", center_mm[0], center_mm[1], center_mm[2])]
     OpenFace {

@@ -61,7 +61,10 @@ fn meshes_are_those_of_the_wedge() {
         let mut even = specimen.clone();
         even.block.wedge_mm = 0.0;
         let options = MeshOptions::search(&specimen);
-        assert!(mesh_specimen(&even, &options).unwrap().check(&specimen).is_err());
+        let mut unlike = mesh_specimen(&even, &options).unwrap();
+        assert!(matches!(unlike.check(&specimen), Err(MeshError::WrongTaper { .. })));
+        unlike.taper = specimen.block.taper();
+        assert!(unlike.check(&specimen).is_err());
         assert!(mesh_specimen(&specimen, &options).unwrap().check(&even).is_err());
     }
 }

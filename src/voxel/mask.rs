@@ -127,8 +127,6 @@ fn slanted_fraction(grid: &VoxelGrid, section: &Section, n: [usize; 3]) -> Optio
         return None;
     }
     let edge_on_mm = (grid.normal_axis() == Some(section.across)).then_some(grid.voxel_mm[section.across]);
-    // Where nothing is left of a voxel inside the box, its length is negative.
-    let [x, z] = [x, z].map(|[low, high]| [low, high.max(low)]);
     Some(section.volume(x, z, y, edge_on_mm, FRACTION_SLICES) / grid.voxel_mm.iter().product::<f64>())
 }
 

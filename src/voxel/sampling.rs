@@ -70,8 +70,9 @@ impl Sampling {
             Overlap::Full | Overlap::Cut => {
                 let is_edge_on = grid.normal_axis() == Some(across);
                 let mut intervals: Vec<[f64; 2]> = Vec::new();
+                let in_gap = if is_slanted { section.x_within_gap(bounds[0], bounds[along]) } else { bounds[0] };
                 for s in 0..self.cut_slices {
-                    let x = at(bounds[0], (2.0 * s as f64 + 1.0) / self.cut_slices as f64 - 1.0);
+                    let x = at(in_gap, (2.0 * s as f64 + 1.0) / self.cut_slices as f64 - 1.0);
                     let mut along_bounds = bounds[along];
                     let mut depth = 1.0;
                     if is_slanted {

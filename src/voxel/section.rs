@@ -49,6 +49,16 @@ impl<'a> Section<'a> {
         x.iter().any(|&x| farthest > self.specimen.half_gap_mm(x))
     }
 
+    /// What of [x₀, x₁] has any of [low, high] along the extrusion in a wedge.
+    pub fn x_within_gap(&self, x: [f64; 2], [low, high]: [f64; 2]) -> [f64; 2] {
+        let (nearest, middle) = (low.max(-high), self.specimen.half_gap_mm(0.0));
+        if nearest <= 0.0 {
+            return x;
+        }
+        let face = (nearest / middle - 1.0) / self.taper.slope_per_mm();
+        if self.taper.slope_per_mm() > 0.0 { [x[0].max(face), x[1]] } else { [x[0], x[1].min(face)] }
+    }
+
     /// What of [low, high] along the extrusion is in a wedge at x; low ≥ high where nothing is.
     pub fn within_gap(&self, x: f64, [low, high]: [f64; 2]) -> [f64; 2] {
         let half = self.specimen.half_gap_mm(x);
@@ -133,7 +143,8 @@ impl<'a> Section<'a> {
     /// Material volume in a voxel that a slanted face cuts, mm³: as [`Self::area`]. On a face that is seen edge-on in the
     /// section, a length of `edge_on_mm` across counts for the straight line.
     pub fn volume(&self, x: [f64; 2], b: [f64; 2], along: [f64; 2], edge_on_mm: Option<f64>, num_slices: usize) -> f64 {
-        let width = (x[1] - x[0]) / num_slices as f64;
+        let x = self.x_within_gap(x, along);
+        let width = (x[1] - x[0]).max(0.0) / num_slices as f64;
         let mut intervals = Vec::new();
         let mut volume = 0.0;
         for n in 0..num_slices {
