@@ -51,8 +51,8 @@ fn the_force_is_the_virtual_work_of_the_stresses() {
     assert!((work_n / state.force_n - 1.0).abs() < 1e-7);
 }
 
-/// Turned by half a turn about z, a wedge is that of the opposite sign with the plates exchanged; seen in a mirror it is
-/// that of the opposite sign driven the other way. Both are the same force.
+/// Turned by half a turn about z, a wedge is that of the opposite sign with the plates exchanged; seen in a mirror it
+/// is that of the opposite sign driven the other way. Both are the same force.
 #[test]
 fn turned_and_mirrored_wedges_take_the_same_force() {
     let material = two_terms();
@@ -85,10 +85,10 @@ fn stiffnesses(extents: [f64; 3], wedge_mm: f64, material: &Material) -> [f64; 2
     })
 }
 
-/// A thin layer is sheared by drive/thickness everywhere but at its ends, which take from the force of a wedge what they
-/// take from that of an even layer: the difference is G W (∫ dx/thickness − L/thickness). That holds of incompressible
-/// materials too: seen from the middle of the gap its plates go ± half of the drive, and as both faces slant alike the
-/// gap at a place stays as it is and nothing has to flow along.
+/// A thin layer is sheared by drive/thickness everywhere but at its ends, which take from the force of a wedge what
+/// they take from that of an even layer: the difference is G W (∫ dx/thickness − L/thickness). That holds of
+/// incompressible materials too: seen from the middle of the gap its plates go ± half of the drive, and as both faces
+/// slant alike the gap at a place stays as it is and nothing has to flow along.
 #[test]
 fn a_thin_wedge_is_sheared_place_by_place() {
     let shear_kpa = 20.0;
@@ -126,7 +126,8 @@ fn voxels_add_up_to_integrals() {
     };
     let volume = specimen.volume_mm3();
     let shear = by_quadrature(&|f| f[0][1]);
-    // Slices of cut voxels are good to a thousandth of them, and slivers are left out; coarse arcs to as much of the holes.
+    // Slices of cut voxels are good to a thousandth of them, and slivers are left out; coarse arcs to as much of the
+    // holes.
     assert!((by_voxels(&|_| 1.0) / volume - 1.0).abs() < 1e-3 && (by_quadrature(&|_| 1.0) / volume - 1.0).abs() < 1e-3);
     for i in 0..3 {
         for j in 0..3 {
@@ -173,8 +174,8 @@ fn forces_of_unlike_wedges_add() {
     assert!((together / (first + second) - 1.0).abs() < 1e-6);
 }
 
-/// An evaluation sees as many voxels as fill the wedge, of its volume and of a free face; a wedge of 0 in the file is no
-/// wedge, to the last bit.
+/// An evaluation sees as many voxels as fill the wedge, of its volume and of a free face; a wedge of 0 in the file is
+/// no wedge, to the last bit.
 #[test]
 fn an_evaluation_sees_the_wedge() {
     let even = block([12.0, 4.0, 9.0]);

@@ -301,8 +301,8 @@ impl Domain {
         Ok(())
     }
 
-    /// Volume of the meshed part, mm³, in closed form: depth × ∫ g dA. Of a wedge the section is mirrored in b alone, so
-    /// that the outline adds no first moment along x.
+    /// Volume of the meshed part, mm³, in closed form: depth × ∫ g dA. Of a wedge the section is mirrored in b alone,
+    /// so that the outline adds no first moment along x.
     pub fn volume(&self) -> f64 {
         let moment_x = |hole: &SectionHole| {
             let whole = hole.area_mm2() * hole.center()[0];

@@ -55,8 +55,9 @@ pub struct LevelShape {
     pub slopes: [f64; 3],
 }
 
-/// Finds points in an extruded mesh, of a wedge in flattened coordinates. The section's cells are sorted into uniform bins by their bounding boxes; the
-/// inverse map is Newton's method in the section and a quadratic equation along the extrusion.
+/// Finds points in an extruded mesh, of a wedge in flattened coordinates. The section's cells are sorted into uniform
+/// bins by their bounding boxes; the inverse map is Newton's method in the section and a quadratic equation along the
+/// extrusion.
 #[derive(Clone, Debug)]
 pub struct Locator {
     /// 1 (y) or 2 (z).
@@ -224,8 +225,8 @@ impl Locator {
         of_det.is_finite().then_some(ColumnShape { cell: column.cell, values, along_x, across })
     }
 
-    /// The shape functions along the extrusion at a position (mm); `None` outside the mesh or where it is flat. Position
-    /// and slopes are in the flattened coordinates of a wedge ([`Self::taper`]).
+    /// The shape functions along the extrusion at a position (mm); `None` outside the mesh or where it is flat.
+    /// Position and slopes are in the flattened coordinates of a wedge ([`Self::taper`]).
     pub fn level_shape(&self, position: f64) -> Option<LevelShape> {
         let (layer, zeta) = self.layer(position)?;
         let [start, middle, end] = self.layers[layer];

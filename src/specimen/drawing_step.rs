@@ -1,7 +1,7 @@
 //! The specimen, and a mould for it, as exact solids in STEP files (ISO 10303-21, AP214), for CAD programs.
 //!
-//! Walls of holes and arcs are cylinders; walls of ellipses are ellipses extruded. The bonded faces of a wedge are planes
-//! that slant, and cut the walls in ellipses. Nothing is approximated.
+//! Walls of holes and arcs are cylinders; walls of ellipses are ellipses extruded. The bonded faces of a wedge are
+//! planes that slant, and cut the walls in ellipses. Nothing is approximated.
 
 use super::section_loop::{inner_loops, outline, rectangle};
 use super::solid::{Level, Sense, Solid, SolidBuilder};

@@ -3,10 +3,10 @@
 //! Frame (reference): origin at the centre of the undeformed block; x along its length (the pull direction),
 //! y along its thickness, z along its width. Lengths in mm.
 //!
-//! What is supported: a plain block, a wedge ([`Taper`]) or a dumb-bell ([`Outline`]), with holes that all share one axis: circles, ellipses
-//! and slots ([`HoleShape`]), and round notches in free sides ([`Notch`]); in a double-lap test further blocks beside
-//! it ([`Specimen::samples`]). The mesh is a section extruded along that axis, so holes of two directions in one
-//! specimen are refused. Parsing and validation: [`Specimen::from_json`]. Limits of what can be made:
+//! What is supported: a plain block, a wedge ([`Taper`]) or a dumb-bell ([`Outline`]), with holes that all share one
+//! axis: circles, ellipses and slots ([`HoleShape`]), and round notches in free sides ([`Notch`]); in a double-lap test
+//! further blocks beside it ([`Specimen::samples`]). The mesh is a section extruded along that axis, so holes of two
+//! directions in one specimen are refused. Parsing and validation: [`Specimen::from_json`]. Limits of what can be made:
 //! [`ManufacturingLimits`]. Drawings for the mould maker: [`to_svg`], [`to_dxf`], [`to_stl`], [`to_step`].
 
 mod bounds;

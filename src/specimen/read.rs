@@ -124,8 +124,8 @@ impl Specimen {
         [("length_mm", length_mm), ("thickness_mm", thickness_mm), ("width_mm", width_mm)]
     }
 
-    /// Whether the block may be a wedge, and this one; `is_sound`: whether nothing else is wrong with block and holes, so
-    /// that a limit means something.
+    /// Whether the block may be a wedge, and this one; `is_sound`: whether nothing else is wrong with block and holes,
+    /// so that a limit means something.
     fn check_wedge(&self, is_sound: bool, problems: &mut Vec<SpecimenError>) {
         let value_mm = self.block.wedge_mm;
         let field = || FieldPath::of("block").name("wedge_mm");

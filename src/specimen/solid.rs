@@ -1,7 +1,7 @@
 //! A solid bounded by exact faces: what is extruded from the loops of a section, as vertices, edges and faces.
 //!
-//! Loops of a section are walls between two levels, and bounds of plane faces at a level, which may slant along x. Every edge is shared by two
-//! faces that pass it in opposite senses, so the surface is closed.
+//! Loops of a section are walls between two levels, and bounds of plane faces at a level, which may slant along x.
+//! Every edge is shared by two faces that pass it in opposite senses, so the surface is closed.
 
 use super::HoleAxis;
 use super::section_loop::{Conic, SectionCurve, SectionLoop};

@@ -80,8 +80,8 @@ impl Block {
         [self.length_mm, self.thickness_mm + 0.5 * self.wedge_mm.abs(), self.width_mm]
     }
 
-    /// The even thickness that would be sheared with the same force, mm: of ends of thickness a and b (b − a)/ln(b/a), the
-    /// harmonic mean over the length.
+    /// The even thickness that would be sheared with the same force, mm: of ends of thickness a and b (b − a)/ln(b/a),
+    /// the harmonic mean over the length.
     pub fn harmonic_thickness_mm(&self) -> f64 {
         let [a, b] = self.end_thicknesses_mm();
         if self.taper().is_even() { self.thickness_mm } else { (b - a) / (b / a).ln() }

@@ -36,8 +36,8 @@ impl VoxelGrid {
         Ok(VoxelGrid { origin_mm, voxel_mm, shape, surface: None })
     }
 
-    /// The grid centred on the specimen's block (of a wedge, on the box around it), with extent / edge voxels along each axis, rounded to the nearest
-    /// whole number (at least one).
+    /// The grid centred on the specimen's block (of a wedge, on the box around it), with extent / edge voxels along
+    /// each axis, rounded to the nearest whole number (at least one).
     ///
     /// A scan's grid lies anywhere relative to the sample. On average over that offset, the voxels at least half filled
     /// number extent / edge along each axis; rounding keeps closest to that and keeps the grid mirror symmetric. Up to

@@ -1,9 +1,9 @@
 //! The specimen's section as the voxels see it: slices at constant x are unions of intervals.
 //!
 //! Every specimen is a section extruded along y (or along z, for holes along the width), and x lies in the section. At
-//! constant x the material along the other section axis is the outline's interval less the chords of the holes, and that
-//! along the extrusion an interval, which in a wedge changes with x: all in closed form. Areas, volumes and averages over
-//! cut voxels need only a rule along x.
+//! constant x the material along the other section axis is the outline's interval less the chords of the holes, and
+//! that along the extrusion an interval, which in a wedge changes with x: all in closed form. Areas, volumes and
+//! averages over cut voxels need only a rule along x.
 
 use super::VoxelGrid;
 use crate::specimen::{HoleAxis, HoleWall, Specimen, Taper};
@@ -140,8 +140,8 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Material volume in a voxel that a slanted face cuts, mm³: as [`Self::area`]. On a face that is seen edge-on in the
-    /// section, a length of `edge_on_mm` across counts for the straight line.
+    /// Material volume in a voxel that a slanted face cuts, mm³: as [`Self::area`]. On a face that is seen edge-on in
+    /// the section, a length of `edge_on_mm` across counts for the straight line.
     pub fn volume(&self, x: [f64; 2], b: [f64; 2], along: [f64; 2], edge_on_mm: Option<f64>, num_slices: usize) -> f64 {
         let x = self.x_within_gap(x, along);
         let width = (x[1] - x[0]).max(0.0) / num_slices as f64;
