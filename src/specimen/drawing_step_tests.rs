@@ -165,7 +165,7 @@ fn slanted_area(text: &str, axis: [f64; 3]) -> f64 {
         }
         let normal = read.triple(read.references(read.references(surface)[0])[1]);
         let towards = dot(normal, axis).abs();
-        if towards < 1e-12 || towards > 1.0 - 1e-15 {
+        if !(1e-12..=1.0 - 1e-15).contains(&towards) {
             return 0.0;
         }
         let walks = parts.iter().flat_map(|&bound| read.references(read.references(bound)[0]));
