@@ -159,6 +159,7 @@ class Formats:
             "`double_lap_shear` test the faces y = ±thickness/2 are bonded to plates; the one at −y is fixed, the one at +y moves by the drive",
             "along x, or at `drive_angle_deg` from x towards z. In a `uniaxial` test the faces x = ±length/2 are held; the one at −x is fixed, the one at +x moves by the drive along x.",
             "Before that it goes by `precompression_mm` towards −y, and keeps this displacement.",
+            "The faces of a wedge (`wedge_mm` of its block) lie at y = ±(thickness + wedge · x/length)/2.",
             "A negative drive goes the other way: it shears towards −x, or pushes the bar together.",
             "",
             "Unknown fields are errors. A missing field that is not required has its default. All that is wrong is said at once, each with",

@@ -2,8 +2,9 @@
 //! along the drive and across it. The table is in docs/design-study.md.
 //!
 //! All blocks hold the volume of the published one, and are driven until the thinnest place of each is sheared as much
-//! as the published block is at 7 mm. Such a specimen has no file and no mesh of its own: the mesh of a block of even
-//! thickness is stretched between the plates, and so are the voxels, which count by the material in them.
+//! as the published block is at 7 mm. Of these only a wedge along the drive has a file and a mesh of its own (`wedge_mm`
+//! of a block): the mesh of a block of even thickness is stretched between the plates, and so are the voxels, which count
+//! by the material in them.
 //!
 //! ```text
 //! cargo run --release --example unlike_gaps

@@ -159,6 +159,11 @@ fn shape_derivatives_are_of_second_order() {
         let name = format!("ellipse and slot, {variable:?}");
         check_path(&name, &with_outlines, 5.0, Some(variable), step, &mut failures);
     }
+    let mut wedge = off_axis();
+    wedge.block.wedge_mm = -2.8;
+    for variable in [HoleX(0), HoleOther(1), HoleDiameter(0), BlockLength, BlockThickness, BlockWidth] {
+        check_path(&format!("wedge, {variable:?}"), &wedge, 3.5, Some(variable), 0.02, &mut failures);
+    }
     for variable in [HoleDiameter(0), BlockThickness] {
         check_path(&format!("bar, {variable:?}"), &bar(), 20.0, Some(variable), 0.02, &mut failures);
     }

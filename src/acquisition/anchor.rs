@@ -77,10 +77,14 @@ fn at_plate(displacement: &[f64], specimen: &Specimen, grid: &VoxelGrid, is_move
         TestKind::Uniaxial => (0, specimen.block.length_mm),
     };
     let face = if is_moved { 0.5 * extent } else { -0.5 * extent };
+    let taper = specimen.block.taper();
     let stride = grid.stride(axis);
     let n = grid.shape[axis];
     let mut values = Vec::new();
     for start in (0..grid.num_voxels()).filter(|v| (v / stride).is_multiple_of(n)) {
+        // The bonded faces of a wedge lie elsewhere in every column.
+        let [x, _, _] = grid.center_mm(start);
+        let face = if taper.is_even() { face } else { face * taper.at(x) };
         let layers = (0..n).map(|i| if is_moved { n - 1 - i } else { i });
         let mut points = Vec::with_capacity(LAYERS);
         for i in layers {

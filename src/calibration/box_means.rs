@@ -37,8 +37,7 @@ impl BoxMeans {
     /// Of `residual`: measured minus model per drive and compared voxel, mm; `is_used`(drive, voxel) says which count,
     /// those that are not finite do not.
     pub fn of(observed: &Observed, residual: &[Vec<[f64; 3]>], is_used: &dyn Fn(usize, usize) -> bool) -> BoxMeans {
-        let b = observed.specimen.block;
-        let half = [0.5 * b.length_mm, 0.5 * b.thickness_mm, 0.5 * b.width_mm];
+        let half = observed.specimen.block.extents_mm().map(|extent| 0.5 * extent);
         let num = BOXES.iter().product::<usize>();
         let correlation = observed.noise_correlation();
         let (mut chi2, mut count) = (0.0, 0.0);

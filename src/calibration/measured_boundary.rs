@@ -45,8 +45,8 @@ impl Observed {
     /// displacement measured there imposed on it. Steps at rest are left out.
     ///
     /// # Errors
-    /// [`CalibrationError::NoMeasuredBoundary`] where the sample is no block, the values are filtered, or too few
-    /// voxels lie beside the planes; [`CalibrationError::Voxel`] where none lies between them;
+    /// [`CalibrationError::NoMeasuredBoundary`] where the sample is no block or a wedge, the values are filtered, or
+    /// too few voxels lie beside the planes; [`CalibrationError::Voxel`] where none lies between them;
     /// [`CalibrationError::NeedsVolume`] where cameras measured a face.
     pub fn between_measured_planes(&self, cut_part: f64) -> Result<Observed, CalibrationError> {
         let axis = match self.specimen.test {
@@ -56,6 +56,9 @@ impl Observed {
         self.check_volume("a boundary measured inside the sample")?;
         if self.specimen.outline != Outline::Block {
             return Err(CalibrationError::NoMeasuredBoundary { reason: "the sample is no block" });
+        }
+        if !self.specimen.block.taper().is_even() {
+            return Err(CalibrationError::NoMeasuredBoundary { reason: "the sample is a wedge" });
         }
         if self.filter != Filter::None {
             return Err(CalibrationError::NoMeasuredBoundary { reason: "the scan's filter reaches across the planes" });

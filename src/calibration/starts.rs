@@ -34,7 +34,9 @@ fn shear_modulus_kpa(observed: &[Observed]) -> f64 {
             let of_sample = |specimen: &Specimen| {
                 let block = &specimen.block;
                 let (area, strain) = match specimen.test {
-                    TestKind::DoubleLapShear => (block.length_mm * block.width_mm, step.drive_mm / block.thickness_mm),
+                    TestKind::DoubleLapShear => {
+                        (block.length_mm * block.width_mm, step.drive_mm / block.harmonic_thickness_mm())
+                    }
                     TestKind::Uniaxial => (block.thickness_mm * block.width_mm, 3.0 * step.drive_mm / block.length_mm),
                 };
                 1e-3 * area * strain * f64::from(specimen.samples_in_parallel)

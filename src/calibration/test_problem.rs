@@ -14,7 +14,7 @@ pub(super) fn block() -> Specimen {
     Specimen {
         name: "small block".into(),
         test: TestKind::DoubleLapShear,
-        block: Block { length_mm: 12.0, thickness_mm: 4.0, width_mm: 9.0 },
+        block: Block::new(12.0, 4.0, 9.0),
         outline: Outline::Block,
         holes: vec![],
         drive_mm: vec![4.0],

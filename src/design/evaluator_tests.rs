@@ -46,6 +46,52 @@ fn every_gradient_passes_the_taylor_test() {
     check_gradients(&study, &specimen, space, &variables);
 }
 
+/// The same of a wedge, whose nodes between the plates rise and sink as they go along x.
+#[test]
+fn gradients_of_a_wedge_pass_the_taylor_test() {
+    let mut study = study();
+    study.base.block.wedge_mm = 1.8;
+    study.materials.truncate(2);
+    study.vary.axes = Some(vec![crate::specimen::HoleAxis::Thickness]);
+    study.vary.tests = vec![crate::specimen::TestKind::DoubleLapShear];
+    assert_eq!(study.validate().map_err(|e| e.to_string()), Ok(()));
+    let mut specimen = study.base.clone();
+    specimen.drive_mm = vec![5.0];
+    specimen.holes[0].center_mm = [-4.6, 1.3];
+    specimen.holes[0].diameter_mm = 4.2;
+    let all = subspaces(&study);
+    let space = all.iter().find(|s| s.vector_of(&specimen, 5.0).is_some()).expect("two holes are allowed");
+    let variables = [Variable::X(0), Variable::Diameter(0), Variable::Length, Variable::Thickness];
+    check_gradients(&study, &specimen, space, &variables);
+}
+
+/// A wedge stays as it is in the base, so nothing may be tried that it does not go with.
+#[test]
+fn what_does_not_go_with_a_wedge_is_told_at_it() {
+    use crate::specimen::{HoleAxis, Symmetry, TestKind};
+    let base = || {
+        let mut study = study();
+        study.base.block.wedge_mm = 1.8;
+        study.vary.axes = Some(vec![HoleAxis::Thickness]);
+        study.vary.tests = vec![TestKind::DoubleLapShear];
+        study
+    };
+    let pointers = |study: &Study| study.field_errors().into_iter().map(|e| e.pointer).collect::<Vec<_>>();
+    assert_eq!(pointers(&base()), Vec::<String>::new());
+    let mut pulled = base();
+    pulled.vary.tests = vec![TestKind::DoubleLapShear, TestKind::Uniaxial];
+    let mut across = base();
+    across.vary.axes = Some(vec![HoleAxis::Thickness, HoleAxis::Width]);
+    let mut mirrored = base();
+    mirrored.limits.symmetry = Symmetry::MirrorXAndZ;
+    for study in [pulled, across, mirrored] {
+        assert_eq!(pointers(&study), ["/base/block/wedge_mm"]);
+    }
+    let mut along = base();
+    along.limits.symmetry = Symmetry::MirrorZ;
+    assert_eq!(pointers(&along), Vec::<String>::new());
+}
+
 /// The same of an ellipse's and a slot's extents and angle.
 #[test]
 fn gradients_of_outlines_pass_the_taylor_test() {

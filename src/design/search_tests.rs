@@ -166,10 +166,7 @@ fn the_solid_block_is_improved_too() {
 /// both, and the recommendation speaks of both.
 #[test]
 fn unlike_samples_are_searched() {
-    let sample = crate::specimen::Sample {
-        block: crate::specimen::Block { length_mm: 12.0, thickness_mm: 4.0, width_mm: 9.0 },
-        holes: Vec::new(),
-    };
+    let sample = crate::specimen::Sample { block: crate::specimen::Block::new(12.0, 4.0, 9.0), holes: Vec::new() };
     let mut study = small_study();
     study.base = Specimen {
         test: crate::specimen::TestKind::DoubleLapShear,

@@ -232,7 +232,7 @@ pub(super) fn is_same(a: &Specimen, b: &Specimen) -> bool {
     const TOLERANCE_MM: f64 = 1e-3;
     let near = |a: f64, b: f64| (a - b).abs() <= TOLERANCE_MM;
     let is_same_sample = |a: &Specimen, b: &Specimen| {
-        let lengths = |s: &Specimen| [s.block.length_mm, s.block.thickness_mm, s.block.width_mm];
+        let lengths = |s: &Specimen| [s.block.length_mm, s.block.thickness_mm, s.block.width_mm, s.block.wedge_mm];
         let gauge = |s: &Specimen| {
             s.outline.dumbbell().map_or([0.0; 3], |d| [d.gauge_width_mm, d.gauge_length_mm, d.fillet_radius_mm])
         };

@@ -9,7 +9,7 @@ use super::study_limits::{
     MAX_COUNT, MAX_HOLES_TO_TRY, MAX_LENGTH_MM, MAX_RELATIVE_SD, MAX_WEIGHT, MIN_LENGTH_MM, MIN_WEIGHT,
 };
 use crate::field::{FieldError, FieldPath};
-use crate::specimen::{MAX_HOLE_ANGLE_DEG, MAX_NAME_LENGTH, MAX_PRECOMPRESSION, Outline, Symmetry, TestKind};
+use crate::specimen::{HoleAxis, MAX_HOLE_ANGLE_DEG, MAX_NAME_LENGTH, MAX_PRECOMPRESSION, Outline, Symmetry, TestKind};
 
 impl Study {
     /// Checks a study and all of its parts. Call it on a study that was not read by this program's readers.
@@ -152,6 +152,31 @@ impl Study {
         }
         if !base.other_samples.is_empty() && self.tests().contains(&TestKind::Uniaxial) {
             problems.push(StudyError::OtherSamplesInTension);
+        }
+        self.check_wedge(problems);
+    }
+
+    /// Whether all that is tried can be done with a wedge, which stays as it is in the base.
+    fn check_wedge(&self, problems: &mut Vec<StudyError>) {
+        let others = self.base.other_samples.iter().map(|sample| sample.block.wedge_mm);
+        let wedges_mm = std::iter::once(self.base.block.wedge_mm).chain(others);
+        let Some(value_mm) = wedges_mm.into_iter().find(|wedge_mm| wedge_mm.abs() > 0.0) else { return };
+        let is_mirrored = self.limits.symmetry.mirrors().iter().any(|signs| signs[0] < 0.0);
+        for (is_unsuited, reason) in [
+            (self.tests().contains(&TestKind::Uniaxial), "only double-lap shear is of wedges: vary no other tests"),
+            (
+                self.axes().contains(&HoleAxis::Width),
+                "holes of a wedge run along its thickness: leave width out of vary.axes",
+            ),
+            (is_mirrored, "a wedge is not alike at both ends: choose the symmetry none or mirror_z in limits"),
+            (
+                self.objective.kind == ObjectiveKind::Detect,
+                "a diagnosis is of even blocks: choose another objective.kind",
+            ),
+        ] {
+            if is_unsuited {
+                problems.push(StudyError::UnsuitedWedge { value_mm, reason });
+            }
         }
     }
 

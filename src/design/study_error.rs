@@ -170,6 +170,14 @@ pub enum StudyError {
          protocol.blocks_scanned, or choose another objective"
     )]
     SeveralBlocksToDiagnose,
+    /// A wedge that does not go with the rest of the study.
+    #[error("base.block.wedge_mm is {value_mm} mm; {reason}, or set it to 0")]
+    UnsuitedWedge {
+        /// The wedge, mm.
+        value_mm: f64,
+        /// What it does not go with, and what to change.
+        reason: &'static str,
+    },
     /// Gradients and variants of the priors know nothing of what a diagnosis would find.
     #[error(
         "objective.kind: detect has no gradients and is not judged at the priors' variants; set budget.refine and every \
@@ -312,6 +320,9 @@ impl StudyError {
             E::SeveralBlocksToDiagnose => {
                 FieldError::new("/objective/kind", "\"detect\"", "another kind for several blocks")
                     .remedy("or leave out base.other_samples and protocol.blocks_scanned")
+            }
+            E::UnsuitedWedge { value_mm, reason } => {
+                FieldError::new("/base/block/wedge_mm", value_mm, "0 in such a study").remedy(format!("{reason}, or set it to 0"))
             }
             E::DetectNeedsVoxels => {
                 let allowed = "another kind where budget.refine or a relative_sd is above 0";

@@ -68,10 +68,14 @@ pub(super) fn holes_in_words(specimen: &Specimen) -> String {
     }
 }
 
-/// The block of one sample: length × thickness × width, mm.
+/// The block of one sample: length × thickness × width, mm; of a wedge its thickness at both ends.
 pub fn block_in_brief(specimen: &Specimen) -> String {
     let b = &specimen.block;
-    format!("{:.1} × {:.2} × {:.1}", b.length_mm, b.thickness_mm, b.width_mm)
+    if b.taper().is_even() {
+        return format!("{:.1} × {:.2} × {:.1}", b.length_mm, b.thickness_mm, b.width_mm);
+    }
+    let [from, to] = b.end_thicknesses_mm();
+    format!("{:.1} × {from:.2} to {to:.2} × {:.1}", b.length_mm, b.width_mm)
 }
 
 /// How the plates are before the drive, in words; `None` where they are as far apart as the sample is thick.
@@ -82,7 +86,11 @@ pub fn plates_in_words(specimen: &Specimen) -> Option<String> {
 
 /// One sample in words: a block of … mm without holes, or with these.
 pub fn sample_in_words(specimen: &Specimen) -> String {
-    let kind = if specimen.outline.dumbbell().is_some() { "dumb-bell" } else { "block" };
+    let kind = match (specimen.outline.dumbbell(), specimen.block.taper().is_even()) {
+        (Some(_), _) => "dumb-bell",
+        (None, true) => "block",
+        (None, false) => "wedge",
+    };
     let mut block = format!("a {kind} of {} mm (length × thickness × width)", block_in_brief(specimen));
     if let Some(gauge) = specimen.outline.dumbbell() {
         let [width, length] = [gauge.gauge_width_mm, gauge.gauge_length_mm];

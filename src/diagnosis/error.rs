@@ -44,6 +44,14 @@ pub enum DiagnosisError {
         /// The angle, degrees.
         value_deg: f64,
     },
+    /// The faces of a made block lie off those of a drawn one that is even.
+    #[error(
+        "the specimen's block.wedge_mm is {value_mm} mm; a diagnosis is of blocks of even thickness alone: calibrate it, or set wedge_mm to 0"
+    )]
+    Wedge {
+        /// The wedge, mm.
+        value_mm: f64,
+    },
     /// A setting is out of range.
     #[error("{name} is {value}; it must be {requirement}")]
     Setting {

@@ -51,6 +51,9 @@ impl<'a> Laboratory<'a> {
         if !observed.specimen.is_driven_along_x() {
             return Err(DiagnosisError::DriveAngle { value_deg: observed.specimen.drive_angle_deg });
         }
+        if !observed.specimen.block.taper().is_even() {
+            return Err(DiagnosisError::Wedge { value_mm: observed.specimen.block.wedge_mm });
+        }
         let options = MeshOptions { use_mirror: false, ..*mesh };
         let nominal = mesh_specimen(&observed.specimen, &options).map_err(crate::fem::PrepareError::from)?;
         Ok(Laboratory {

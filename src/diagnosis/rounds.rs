@@ -441,8 +441,8 @@ mod tests {
         (Trial { gain, fit, is_settled: true, inference }, effect.rms_mm())
     }
 
-    /// A background of 0.03 mm that a displaced plate takes up in part. Where that plate does less than a mesh could and
-    /// leads all the same, because the gain of a smooth field counts in part, the field is named, not nothing; and
+    /// A background of 0.03 mm that a displaced plate takes up in part. Where that plate does less than a mesh could
+    /// and leads all the same, because the gain of a smooth field counts in part, the field is named, not nothing; and
     /// nothing where the plate is all there is.
     #[test]
     fn a_leading_cause_that_does_too_little_gives_way_to_what_explains_more() {

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::mesh::{ElementKind, Mirror};
+use crate::specimen::Taper;
 use hdf5_pure::File;
 
 /// Two prisms, whose bubble nodes VTK does not show.
@@ -12,6 +13,7 @@ fn prisms() -> Mesh {
         element_kind: ElementKind::Prism21,
         nodes,
         connectivity: (0..42).collect(),
+        taper: Taper::default(),
         mirror: Mirror::default(),
         fixed_nodes: vec![],
         moved_nodes: vec![],

@@ -73,7 +73,7 @@ impl Plates {
             driven_elements,
             direction: specimen.drive_direction(),
             before_drive_mm: specimen.displacement_before_drive_mm(),
-            lift: mesh.nodes.iter().map(|x| x[axis] / extent + 0.5).collect(),
+            lift: mesh.nodes.iter().map(|x| mesh.taper.flattened(*x)[axis] / extent + 0.5).collect(),
             // One step to a shear strain of 0.8 takes five or six iterations; stretching is more nonlinear.
             first_step_mm: if axis == 1 { 0.85 } else { 0.3 } * extent,
             face_centers: [-0.5, 0.5].map(|side| {

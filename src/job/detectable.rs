@@ -33,6 +33,10 @@ pub(super) fn check_detectable(
         let remedy = "a diagnosis is of drives along x alone; leave out drive_angle_deg";
         return Err(refused("false where the specimen has a drive_angle_deg").remedy(remedy));
     }
+    if !specimen.block.taper().is_even() {
+        let remedy = "a diagnosis is of blocks of even thickness alone; set block.wedge_mm to 0";
+        return Err(refused("false where the specimen is a wedge").remedy(remedy));
+    }
     let num_voxels = VoxelGrid::covering(specimen, scan.voxel_mm).map_or(0, |grid| grid.num_voxels());
     if num_voxels * num_drives > MAX_VALUES {
         let allowed = format!("false above {MAX_VALUES} voxels of all drives together");

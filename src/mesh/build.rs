@@ -110,6 +110,7 @@ fn extrude(domain: &Domain, options: &MeshOptions, section: &Section) -> Result<
         element_kind,
         nodes,
         connectivity,
+        taper: domain.taper,
         mirror: domain.mirror,
         fixed_nodes: Vec::new(),
         moved_nodes: Vec::new(),
@@ -127,6 +128,9 @@ fn extrude(domain: &Domain, options: &MeshOptions, section: &Section) -> Result<
     }
     if domain.mirror.z {
         mesh.mirror_z_nodes = nodes_on_plane(&mesh, 2, 0.0, tolerance);
+    }
+    for node in &mut mesh.nodes {
+        *node = domain.taper.raised(*node);
     }
     Ok(mesh)
 }

@@ -4,14 +4,14 @@ use std::collections::HashMap;
 
 use serde::Serialize;
 
-use super::domain::Domain;
+use super::domain::{COINCIDENT, Domain};
 use super::error::MeshError;
 use super::node_sets::{nodes_on_plane, pull_axis};
 use super::options::MeshOptions;
 use super::section::{Section, scaled_jacobian};
 use super::{ElementKind, Mesh};
 use crate::specimen::dumbbell::Profile;
-use crate::specimen::{HoleWall, Specimen};
+use crate::specimen::{HoleWall, Specimen, Taper};
 
 /// Relative error allowed in a hole's or an arc's area: a parabola through three points of a 60° arc has 0.14 %.
 const ARC_AREA_TOLERANCE: f64 = 2e-3;
@@ -67,7 +67,19 @@ impl Mesh {
         let domain = Domain::new(specimen, &options)?;
         self.check_indices()?;
         self.check_jacobians()?;
-        self.check_faces(&domain)?;
+        let [found, expected] = [self.taper, domain.taper].map(Taper::slope_per_mm);
+        if !((found - expected).abs() * domain.half[0] <= COINCIDENT) {
+            return Err(MeshError::WrongTaper { found, expected });
+        }
+        // In flattened coordinates the faces of a wedge are planes across the axes.
+        let flattened = (!self.taper.is_even()).then(|| self.flattened());
+        let flat = flattened.as_ref().unwrap_or(self);
+        flat.check_faces(&domain)?;
+        self.check_volume(&domain)?;
+        flat.check_sets(&domain)
+    }
+
+    fn check_volume(&self, domain: &Domain) -> Result<(), MeshError> {
         let volume = self.volume();
         let curved = if domain.holes.is_empty() && domain.profile.is_none() {
             0.0
@@ -78,14 +90,14 @@ impl Mesh {
             };
             let holes: f64 = domain.holes.iter().map(|d| of_wall(&d.wall)).sum();
             let of_sides = |profile: Profile| 8.0 * ARC_AREA_TOLERANCE * profile.curved_area_mm2();
-            domain.depth() * (holes + domain.profile.map_or(0.0, of_sides))
+            domain.thickest() * (holes + domain.profile.map_or(0.0, of_sides))
         };
-        let (expected_mm3, tolerance_mm3) = (domain.area() * domain.depth(), curved + 1e-9 * volume.abs());
+        let (expected_mm3, tolerance_mm3) = (domain.volume(), curved + 1e-9 * volume.abs());
         let difference = (volume - expected_mm3).abs();
         if difference.is_nan() || difference > tolerance_mm3 {
             return Err(MeshError::VolumeMismatch { volume_mm3: volume, expected_mm3, tolerance_mm3 });
         }
-        self.check_sets(&domain)
+        Ok(())
     }
 
     fn check_indices(&self) -> Result<(), MeshError> {

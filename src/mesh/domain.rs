@@ -4,7 +4,7 @@ use super::Mirror;
 use super::error::{LigamentEnd, MeshError};
 use super::options::{MeshOptions, in_range};
 use crate::specimen::dumbbell::{ISO37_WIDTH_MM, Profile};
-use crate::specimen::{HoleAxis, HoleWall, Notch, Outline, SectionEdge, Specimen, TestKind};
+use crate::specimen::{HoleAxis, HoleWall, Notch, Outline, SectionEdge, Specimen, Taper, TestKind};
 
 /// Lengths outside this range, mm, are refused: they are certainly errors of unit.
 const LENGTH_RANGE_MM: [f64; 2] = [1e-3, 1e5];
@@ -81,6 +81,8 @@ pub(super) struct Domain {
     pub extrusion_axis: usize,
     pub extrusion_half: f64,
     pub extrusion_mirrored: bool,
+    /// How far the extrusion reaches along x, relative to the middle.
+    pub taper: Taper,
     pub mirror: Mirror,
     pub test: TestKind,
     /// Size ratio at a = ±half₀, at b = ±half₁, at the hole walls and at the ends of the extrusion; 1 = not graded.
@@ -123,6 +125,7 @@ impl Domain {
             }
         }
         let along_width = specimen.holes.first().is_some_and(|h| h.axis == HoleAxis::Width);
+        check_wedge(specimen, along_width)?;
         check_dumbbell(specimen)?;
         let profile = specimen.profile();
         if profile.is_some() && along_width {
@@ -167,6 +170,7 @@ impl Domain {
             extrusion_axis,
             extrusion_half: 0.5 * extents[extrusion_axis],
             extrusion_mirrored,
+            taper: block.taper(),
             mirror: Mirror { y: is_mirrored(1), z: is_mirrored(2) },
             test: specimen.test,
             // In shear every edge of the block and of a hole through the plates is singular. In tension the grips'
@@ -297,6 +301,21 @@ impl Domain {
         Ok(())
     }
 
+    /// Volume of the meshed part, mm³, in closed form: depth × ∫ g dA. Of a wedge the section is mirrored in b alone,
+    /// so that the outline adds no first moment along x.
+    pub fn volume(&self) -> f64 {
+        let moment_x = |hole: &SectionHole| {
+            let whole = hole.area_mm2() * hole.center()[0];
+            hole.notch.map_or(whole, |n| if hole.is_half { 0.5 * n.moment_x_mm3() } else { n.moment_x_mm3() })
+        };
+        let slanted = if self.taper.is_even() {
+            0.0
+        } else {
+            self.taper.slope_per_mm() * self.holes.iter().map(moment_x).sum::<f64>()
+        };
+        (self.area() - slanted) * self.depth()
+    }
+
     /// Area of the meshed part of the section, mm², in closed form.
     pub fn area(&self) -> f64 {
         let [a, b] = self.half;
@@ -306,10 +325,26 @@ impl Domain {
         whole * if mirrored { 0.5 } else { 1.0 } - holes
     }
 
-    /// Extent of the meshed part along the extrusion, mm.
+    /// Extent of the meshed part along the extrusion, mm; of a wedge that in the middle.
     pub fn depth(&self) -> f64 {
         self.extrusion_half * if self.extrusion_mirrored { 1.0 } else { 2.0 }
     }
+
+    /// The same where it is largest, mm.
+    pub fn thickest(&self) -> f64 {
+        self.depth() * (1.0 + self.taper.slope_per_mm().abs() * self.half[0])
+    }
+}
+
+/// Whether the block is even, or a wedge that is extruded between its bonded faces.
+fn check_wedge(specimen: &Specimen, along_width: bool) -> Result<(), MeshError> {
+    let value_mm = specimen.block.wedge_mm;
+    let is_even = value_mm.is_finite() && specimen.block.taper().is_even();
+    let is_meshed = specimen.test == TestKind::DoubleLapShear && specimen.outline == Outline::Block && !along_width;
+    if is_even || (is_meshed && specimen.block.thinnest_mm() > 0.0) {
+        return Ok(());
+    }
+    Err(MeshError::UnsupportedWedge { value_mm, thickness_mm: specimen.block.thickness_mm })
 }
 
 /// Whether a specimen's dumb-bell can be drawn.

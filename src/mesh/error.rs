@@ -102,6 +102,16 @@ pub enum MeshError {
         /// Smallest length that is meshed, mm.
         limit_mm: f64,
     },
+    /// A wedge that is not meshed: in a uniaxial test, with holes along the width, or without thickness at an end.
+    #[error(
+        "wedge_mm is {value_mm} mm; only a double-lap shear block with holes along its thickness may be a wedge, of less than twice its thickness ({thickness_mm} mm): set it to 0, or change the test or the holes"
+    )]
+    UnsupportedWedge {
+        /// The wedge, mm.
+        value_mm: f64,
+        /// Thickness in the middle, mm.
+        thickness_mm: f64,
+    },
     /// More elements than the options allow.
     #[error("about {elements} elements are needed, the limit is {limit}; increase the element size or the limit")]
     TooManyElements {
@@ -160,6 +170,16 @@ pub enum MeshError {
         expected_mm3: f64,
         /// Tolerance, mm³.
         tolerance_mm3: f64,
+    },
+    /// The mesh is said to be that of another wedge, or of none.
+    #[error(
+        "the mesh's gap changes by {found} of its middle per mm along x, the specimen's by {expected}; give the mesh the specimen's taper"
+    )]
+    WrongTaper {
+        /// The mesh's slope, mm⁻¹.
+        found: f64,
+        /// The specimen's, mm⁻¹.
+        expected: f64,
     },
     /// A face belongs to one element only but does not lie on the specimen's surface: a hole in the mesh.
     #[error("a face of element {element} around ({}, {}, {}) mm is open but not on the specimen's surface", center_mm[0], center_mm[1], center_mm[2])]

@@ -2,6 +2,7 @@
 
 use super::element::{lagrange, section_shape};
 use super::{ElementKind, Mesh};
+use crate::specimen::Taper;
 
 /// Newton on the inverse map stops when the reference coordinates move less than this.
 const TOLERANCE: f64 = 1e-12;
@@ -54,13 +55,16 @@ pub struct LevelShape {
     pub slopes: [f64; 3],
 }
 
-/// Finds points in an extruded mesh. The section's cells are sorted into uniform bins by their bounding boxes; the
-/// inverse map is Newton's method in the section and a quadratic equation along the extrusion.
+/// Finds points in an extruded mesh, of a wedge in flattened coordinates. The section's cells are sorted into uniform
+/// bins by their bounding boxes; the inverse map is Newton's method in the section and a quadratic equation along the
+/// extrusion.
 #[derive(Clone, Debug)]
 pub struct Locator {
     /// 1 (y) or 2 (z).
     extrusion_axis: usize,
     b_axis: usize,
+    /// How the mesh's layers rise along x; in flattened coordinates they are plane.
+    taper: Taper,
     num_cells: usize,
     /// Lower bound, bin size and number of bins in (a, b).
     low: [f64; 2],
@@ -85,7 +89,7 @@ impl Locator {
         let per_level = kind.num_nodes() / 3;
         let extrusion_axis = extrusion_axis(mesh);
         let b_axis = 3 - extrusion_axis;
-        let position = |element: usize, n: usize| mesh.nodes[mesh.element(element)[n] as usize];
+        let position = |element: usize, n: usize| mesh.taper.flattened(mesh.nodes[mesh.element(element)[n] as usize]);
         let total = mesh.num_elements();
         let layer_of = |e: usize| [0, 1, 2].map(|k| position(e, k * per_level)[extrusion_axis]);
         // Elements of the first layer share its levels.
@@ -118,6 +122,7 @@ impl Locator {
         let mut locator = Locator {
             extrusion_axis,
             b_axis,
+            taper: mesh.taper,
             num_cells,
             low: [0.0; 2],
             bin_size: [1.0; 2],
@@ -173,6 +178,7 @@ impl Locator {
     /// The element that holds `point` (mm, reference frame), or `None` outside the mesh. Points on a shared face belong
     /// to one of its elements, always the same. Points of the mirrored half must be reflected by the caller.
     pub fn locate(&self, mesh: &Mesh, point: [f64; 3]) -> Option<Location> {
+        let point = self.taper.flattened(point);
         let (layer, zeta) = self.layer(point[self.extrusion_axis])?;
         let column = self.locate_column(mesh, [point[0], point[self.b_axis]])?;
         Some(self.at(column, layer, zeta))
@@ -194,7 +200,7 @@ impl Locator {
         })
     }
 
-    /// The point of a column at `position` (mm) along the extrusion.
+    /// The point of a column at `position` (mm) along the extrusion, of a wedge in flattened coordinates.
     pub fn locate_in_column(&self, column: Column, position: f64) -> Option<Location> {
         let (layer, zeta) = self.layer(position)?;
         Some(self.at(column, layer, zeta))
@@ -220,6 +226,7 @@ impl Locator {
     }
 
     /// The shape functions along the extrusion at a position (mm); `None` outside the mesh or where it is flat.
+    /// Position and slopes are in the flattened coordinates of a wedge ([`Self::taper`]).
     pub fn level_shape(&self, position: f64) -> Option<LevelShape> {
         let (layer, zeta) = self.layer(position)?;
         let [start, middle, end] = self.layers[layer];
@@ -231,6 +238,11 @@ impl Locator {
     /// The element of a cell in a layer.
     pub fn element(&self, cell: u32, layer: usize) -> u32 {
         (layer * self.num_cells) as u32 + cell
+    }
+
+    /// How the layers rise along x: columns and levels are those of the mesh in flattened coordinates.
+    pub fn taper(&self) -> Taper {
+        self.taper
     }
 
     /// Coordinate index of the extrusion: 1 (y) or 2 (z).

@@ -11,7 +11,8 @@
 //!
 //! The section is (x, z) extruded along y, or (x, y) extruded along z where holes run along the width. Every mesh is
 //! conforming, its curved walls (of circles, ellipses and slots) carry exact nodes at element corners and middles, and
-//! equal input gives equal bits.
+//! equal input gives equal bits. A wedge is meshed as the block of even thickness that it is in flattened coordinates
+//! ([`Taper`]), and its nodes are then raised to where they are.
 
 mod block_shape;
 mod build;
@@ -49,6 +50,8 @@ mod notch_tests;
 mod outline_tests;
 #[cfg(test)]
 mod test_specimens;
+#[cfg(test)]
+mod wedge_tests;
 
 pub use block_shape::{BlockShape, FACE_TERMS, face_term_degree, face_term_name, half_extents_mm, made_mesh};
 pub use build::{mesh_specimen, mesh_specimen_along};
@@ -62,6 +65,8 @@ pub use morph::{DesignVariable, morphed, shape_velocity};
 pub use options::MeshOptions;
 pub use refine::{Refinement, refined};
 pub use size::{MeshSize, SIZE_FACTORS};
+
+use crate::specimen::Taper;
 
 /// Which mirror planes through the origin the mesh uses. A mirrored mesh covers the half with the positive
 /// coordinate only; normal displacement is zero on the plane.
@@ -82,6 +87,8 @@ pub struct Mesh {
     pub nodes: Vec<[f64; 3]>,
     /// `num_elements × nodes_per_element` node indices, element after element.
     pub connectivity: Vec<u32>,
+    /// How the gap goes along x, where the extrusion is along y: flattened, the mesh has plane layers.
+    pub taper: Taper,
     /// Mirror planes in use.
     pub mirror: Mirror,
     /// Nodes on the fixed plate or grip (−y or −x).
@@ -98,6 +105,12 @@ impl Mesh {
     /// Number of elements.
     pub fn num_elements(&self) -> usize {
         self.connectivity.len() / self.element_kind.num_nodes()
+    }
+
+    /// The same mesh of the block of even thickness that a wedge is in flattened coordinates.
+    fn flattened(&self) -> Mesh {
+        let nodes = self.nodes.iter().map(|&x| self.taper.flattened(x)).collect();
+        Mesh { nodes, taper: Taper::default(), ..self.clone() }
     }
 
     /// Node indices of an element, in the order of [`ElementKind`].

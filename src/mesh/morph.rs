@@ -47,6 +47,9 @@ pub enum DesignVariable {
 /// arc, the ends of the mouth slide along the side, and so does the side next to them. A dimension of the block moves a
 /// side and holds the centres of notches, which then lie deeper or less deep in it.
 ///
+/// A wedge is moved as the block of even thickness is that it is in flattened coordinates ([`crate::specimen::Taper`]),
+/// and its wedge is held.
+///
 /// In a mirrored mesh the velocity is that of the meshed half. A hole and its image are moved together by summing their
 /// two variables (with opposite signs for [`DesignVariable::HoleOther`]); the one outside the meshed half contributes
 /// zero. [`DesignVariable::HoleOther`] of a hole centred on the mirror plane gives zero: by symmetry it changes
@@ -57,12 +60,30 @@ pub enum DesignVariable {
 /// its other dimensions give zero, as those of a gauge do in a block. An index of a hole that does not exist gives
 /// zero.
 pub fn shape_velocity(mesh: &Mesh, specimen: &Specimen, variable: DesignVariable) -> Vec<[f64; 3]> {
-    let field = Field::new(mesh, specimen);
-    mesh.nodes.iter().map(|&p| field.velocity(p, variable)).collect()
+    let (field, taper) = (Field::new(mesh, specimen), specimen.block.taper());
+    if taper.is_even() {
+        return mesh.nodes.iter().map(|&p| field.velocity(p, variable)).collect();
+    }
+    // y = Y g(x) with g = 1 + slope · x, where the slope is wedge / (thickness · length).
+    let slope = taper.slope_per_mm();
+    let slope_rate = match variable {
+        DesignVariable::BlockThickness => -slope / specimen.block.thickness_mm,
+        DesignVariable::BlockLength => -slope / specimen.block.length_mm,
+        _ => 0.0,
+    };
+    let raised = |&p: &[f64; 3]| {
+        let flat = taper.flattened(p);
+        let v = field.velocity(flat, variable);
+        let of_gap = slope * v[0] + slope_rate * flat[0];
+        [v[0], taper.at(flat[0]) * v[1] + flat[1] * of_gap, v[2]]
+    };
+    mesh.nodes.iter().map(raised).collect()
 }
 
 /// `mesh` with its nodes moved by `step` times `velocity` (as from [`shape_velocity`]). Topology and node sets stay.
-/// Check the result before use when the step is not small: elements may have become poor.
+/// Check the result before use when the step is not small: elements may have become poor. The taper of a wedge stays,
+/// too: where length or thickness change, give the result that of the moved specimen before points are looked for in
+/// it.
 pub fn morphed(mesh: &Mesh, velocity: &[[f64; 3]], step: f64) -> Mesh {
     let mut moved = mesh.clone();
     for (p, v) in moved.nodes.iter_mut().zip(velocity) {

@@ -79,6 +79,7 @@ pub fn refined(coarse: &Mesh) -> Option<Refinement> {
         mirror_z_nodes: on(&coarse.mirror_z_nodes),
         nodes,
         connectivity,
+        taper: coarse.taper,
         mirror: coarse.mirror,
     };
     Some(Refinement { mesh, nodes: places, parents })

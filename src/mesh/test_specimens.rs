@@ -9,7 +9,7 @@ pub(super) fn specimen(test: TestKind, extents: [f64; 3], axis: HoleAxis, holes:
     Specimen {
         name: format!("{test:?} {extents:?} {axis:?} {holes:?}"),
         test,
-        block: Block { length_mm, thickness_mm, width_mm },
+        block: Block::new(length_mm, thickness_mm, width_mm),
         outline: Outline::Block,
         holes: holes.iter().map(|h| Hole::circle(axis, [h[0], h[1]], h[2])).collect(),
         drive_mm: vec![1.0],

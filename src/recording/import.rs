@@ -212,7 +212,7 @@ impl ImportOptions {
 /// # Errors
 /// [`ImportError::Extent`].
 pub(super) fn check_extent(specimen: &Specimen, grid: &VoxelGrid) -> Result<(), ImportError> {
-    let expected_mm = [specimen.block.length_mm, specimen.block.thickness_mm, specimen.block.width_mm];
+    let expected_mm = specimen.block.extents_mm();
     let found_mm = [0, 1, 2].map(|a| grid.shape[a] as f64 * grid.voxel_mm[a]);
     let fits = |a: usize| {
         let ratio = found_mm[a] / expected_mm[a];

@@ -46,7 +46,7 @@ impl Recording {
             TestKind::DoubleLapShear => (1, self.specimen.block.thickness_mm),
             TestKind::Uniaxial => (0, self.specimen.block.length_mm),
         };
-        let grid = &self.grid;
+        let (grid, taper) = (&self.grid, self.specimen.block.taper());
         let (stride, n) = (grid.stride(axis), grid.shape[axis]);
         let mut motions = [Vec::new(), Vec::new(), Vec::new()];
         for start in (0..grid.num_voxels()).filter(|v| (v / stride).is_multiple_of(n)) {
@@ -55,6 +55,9 @@ impl Recording {
                 self.mask[v] && self.is_complete(&displacement[v])
             };
             let (Some(first), Some(last)) = ((0..n).find(is_measured), (0..n).rfind(is_measured)) else { continue };
+            // The bonded faces of a wedge lie elsewhere in every column.
+            let [x, _, _] = grid.center_mm(start);
+            let extent = if taper.is_even() { extent } else { extent * taper.at(x) };
             let place = |i: usize| (grid.origin_mm[axis] + i as f64 * grid.voxel_mm[axis]) / extent;
             if place(first) > REACH - 0.5 || place(last) < 0.5 - REACH {
                 continue;

@@ -13,7 +13,7 @@ const LEAST: f64 = 0.5;
 /// # Errors
 /// [`RecordingError::Position`].
 pub(super) fn check_position(specimen: &Specimen, grid: &VoxelGrid, mask: &[bool]) -> Result<(), RecordingError> {
-    let extent_mm = [specimen.block.length_mm, specimen.block.thickness_mm, specimen.block.width_mm];
+    let extent_mm = specimen.block.extents_mm();
     let (mut num_voxels, mut num_inside) = (0, 0);
     let mut box_mm = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
     for voxel in (0..grid.num_voxels()).filter(|v| mask[*v]) {

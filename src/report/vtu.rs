@@ -16,11 +16,13 @@ use std::path::Path;
 /// ```
 /// use lambdak::mesh::{ElementKind, Mesh, Mirror};
 /// use lambdak::report::Vtu;
+/// use lambdak::specimen::Taper;
 ///
 /// let mesh = Mesh {
 ///     element_kind: ElementKind::Hex27,
 ///     nodes: ElementKind::Hex27.node_coordinates(),
 ///     connectivity: (0..27).collect(),
+///     taper: Taper::default(),
 ///     mirror: Mirror::default(),
 ///     fixed_nodes: vec![],
 ///     moved_nodes: vec![],
@@ -193,6 +195,7 @@ pub(super) mod tests {
     use super::super::test_xml::assert_well_formed;
     use super::*;
     use crate::mesh::{ElementKind, Mirror};
+    use crate::specimen::Taper;
 
     /// A row of `n` cells along x; hexahedra of edge 2 mm, prisms beside one another.
     pub(in super::super) fn row_of_cells(kind: ElementKind, n: u32) -> Mesh {
@@ -203,6 +206,7 @@ pub(super) mod tests {
             element_kind: kind,
             nodes,
             connectivity: (0..n * per).collect(),
+            taper: Taper::default(),
             mirror: Mirror::default(),
             fixed_nodes: vec![],
             moved_nodes: vec![],

@@ -71,9 +71,9 @@ fn homogeneous_drive_mm(specimen: &Specimen, stretch: f64) -> f64 {
     match specimen.test {
         TestKind::Uniaxial if specimen.is_compressed() => (1.0 / stretch - 1.0) * specimen.block.length_mm,
         TestKind::DoubleLapShear if specimen.largest_drive_mm() < 0.0 => {
-            (1.0 / stretch - stretch) * specimen.block.thickness_mm
+            (1.0 / stretch - stretch) * specimen.block.harmonic_thickness_mm()
         }
-        TestKind::DoubleLapShear => (stretch - 1.0 / stretch) * specimen.block.thickness_mm,
+        TestKind::DoubleLapShear => (stretch - 1.0 / stretch) * specimen.block.harmonic_thickness_mm(),
         TestKind::Uniaxial => (stretch - 1.0) * specimen.block.length_mm,
     }
 }

@@ -36,23 +36,24 @@ impl Drawing {
         let panel = num_tables as f64 * table_width(specimen);
 
         let block = specimen.block;
+        let [_, thickness_mm, _] = block.extents_mm();
         let is_front_section = specimen.extrusion_axis() == HoleAxis::Thickness;
         let below = |is_section: bool| if is_section { BELOW_SECTION } else { BELOW_OTHER };
         let (below_front, below_side) = (below(is_front_section), below(!is_front_section));
         let area = [size[0] - 2.0 * MARGIN - panel - 4.0, size[1] - 2.0 * MARGIN];
         let free =
             [area[0] - LEFT_OF_VIEW - RIGHT_OF_VIEW, area[1] - ABOVE_FRONT - below_front - ABOVE_SIDE - below_side];
-        let fits = |s: f64| s * block.length_mm <= free[0] && s * (block.width_mm + block.thickness_mm) <= free[1];
+        let fits = |s: f64| s * block.length_mm <= free[0] && s * (block.width_mm + thickness_mm) <= free[1];
         // A specimen larger than any usual scale allows is drawn to whatever scale fits.
-        let largest = (free[0] / block.length_mm).min(free[1] / (block.width_mm + block.thickness_mm));
+        let largest = (free[0] / block.length_mm).min(free[1] / (block.width_mm + thickness_mm));
         let scale = SCALES.into_iter().find(|s| fits(*s)).unwrap_or(largest);
 
-        let spare = free[1] - scale * (block.width_mm + block.thickness_mm);
+        let spare = free[1] - scale * (block.width_mm + thickness_mm);
         let x = MARGIN + LEFT_OF_VIEW + 0.5 * free[0];
         let front_top = size[1] - MARGIN - ABOVE_FRONT - 0.25 * spare;
         let front_center = [x, front_top - 0.5 * scale * block.width_mm];
         let side_top = front_top - scale * block.width_mm - below_front - 0.35 * spare - ABOVE_SIDE;
-        let side_center = [x, side_top - 0.5 * scale * block.thickness_mm];
+        let side_center = [x, side_top - 0.5 * scale * thickness_mm];
 
         let mut drawing = Drawing { entities: Vec::new(), size, scale, front_center };
         drawing.outline(specimen, front_center, side_center);
@@ -73,7 +74,11 @@ impl Drawing {
         let is_front_section = specimen.extrusion_axis() == HoleAxis::Thickness;
         let (section, (other, half)) =
             if is_front_section { (front, (side, [hx, hy])) } else { (side, (front, [hx, hz])) };
-        self.rectangle(Layer::Outline, [0, 1].map(|c| other[c] - half[c]), [0, 1].map(|c| other[c] + half[c]));
+        if specimen.block.taper().is_even() {
+            self.rectangle(Layer::Outline, [0, 1].map(|c| other[c] - half[c]), [0, 1].map(|c| other[c] + half[c]));
+        } else {
+            self.wedge_outline(specimen, side);
+        }
         self.section_outline(specimen, section);
         let Some(profile) = specimen.profile() else { return };
         let narrow = profile.arcs()[0].start_mm;
@@ -82,6 +87,17 @@ impl Drawing {
         let above = front[1] + hz + 5.0;
         let ends = [at(-narrow[0], narrow[1]), at(narrow[0], narrow[1])];
         self.dimension_x([ends[0], ends[1]], above, format_mm(2.0 * narrow[0]));
+    }
+
+    /// The four sides of a wedge seen along z.
+    fn wedge_outline(&mut self, specimen: &Specimen, [x, y]: [f64; 2]) {
+        let half_mm = 0.5 * specimen.block.length_mm;
+        let at =
+            |end_mm: f64, side: f64| [x + self.scale * end_mm, y + side * self.scale * specimen.half_gap_mm(end_mm)];
+        let corners = [at(-half_mm, -1.0), at(half_mm, -1.0), at(half_mm, 1.0), at(-half_mm, 1.0)];
+        for (i, corner) in corners.into_iter().enumerate() {
+            self.line(Layer::Outline, corner, corners[(i + 1) % 4]);
+        }
     }
 
     /// The outline of the section, as lines and arcs.
@@ -143,13 +159,19 @@ impl Drawing {
     }
 
     fn overall_dimensions(&mut self, specimen: &Specimen, front: [f64; 2], side: [f64; 2]) {
-        let [hx, hy, hz] = [specimen.block.length_mm, specimen.block.thickness_mm, specimen.block.width_mm]
-            .map(|c| 0.5 * self.scale * c);
+        let [hx, hy, hz] = specimen.block.extents_mm().map(|c| 0.5 * self.scale * c);
         let top = front[1] + hz;
         let ends = [[front[0] - hx, top], [front[0] + hx, top]];
         self.dimension_x(ends, top + 12.0, format_mm(specimen.block.length_mm));
         self.dimension_y(front, [hx, hz], format_mm(specimen.block.width_mm));
-        self.dimension_y(side, [hx, hy], format_mm(specimen.block.thickness_mm));
+        if specimen.block.taper().is_even() {
+            self.dimension_y(side, [hx, hy], format_mm(specimen.block.thickness_mm));
+        } else {
+            for (sign, thickness_mm) in [-1.0, 1.0].into_iter().zip(specimen.block.end_thicknesses_mm()) {
+                let half = [hx, 0.5 * self.scale * thickness_mm];
+                self.dimension_of_end(side, half, sign, format_mm(thickness_mm));
+            }
+        }
         let title_x = front[0] - hx;
         let front_title = format!("Front view (x, z){}", outline_in_words(specimen.outline));
         self.text(Layer::Dimensions, [title_x, top + 20.0], TEXT_HEIGHT, Anchor::Start, false, front_title);
@@ -175,7 +197,10 @@ impl Drawing {
         let [length, thickness, breadth] = [block.length_mm, block.thickness_mm, block.width_mm].map(format_mm);
         let faces = match specimen.test {
             TestKind::DoubleLapShear => {
-                let faces = format!("Double-lap shear, faces y = ±{} bonded", format_mm(0.5 * block.thickness_mm));
+                let faces = match block.taper().is_even() {
+                    true => format!("Double-lap shear, faces y = ±{} bonded", format_mm(0.5 * block.thickness_mm)),
+                    false => "Double-lap shear, slanted faces bonded".to_string(),
+                };
                 let faces = match specimen.is_driven_along_x() {
                     true => faces,
                     false => format!("{faces}, moved {}° from x to z", format_mm(specimen.drive_angle_deg)),
@@ -194,7 +219,13 @@ impl Drawing {
         };
         let sheet = if self.size[0] > 300.0 { "A3" } else { "A4" };
         for line in [
-            format!("Block {length} × {thickness} × {breadth} (x, y, z)"),
+            match block.taper().is_even() {
+                true => format!("Block {length} × {thickness} × {breadth} (x, y, z)"),
+                false => {
+                    let [from, to] = block.end_thicknesses_mm().map(format_mm);
+                    format!("Wedge {length} × {from} to {to} × {breadth} (x, y, z)")
+                }
+            },
             faces,
             format!("Samples of this kind in one test: {}", specimen.samples_in_parallel),
             format!("Dimensions in mm. Scale {ratio} on {sheet}."),
@@ -253,7 +284,7 @@ fn wrap(text: &str, per_line: usize, max_lines: usize) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::specimen::drawing_sheet::Text;
-    use crate::specimen::sampling::{dumbbell_with_hole, valid_specimen};
+    use crate::specimen::sampling::{dumbbell_with_hole, valid_specimen, valid_wedge};
     use proptest::prelude::*;
 
     fn check_texts(drawing: &Drawing) -> Result<(), String> {
@@ -290,6 +321,12 @@ mod tests {
 
         #[test]
         fn texts_do_not_overlap(specimen in valid_specimen()) {
+            prop_assert_eq!(check_texts(&Drawing::new(&specimen)), Ok(()));
+        }
+
+        #[test]
+        fn texts_do_not_overlap_in_wedges(specimen in valid_wedge()) {
+            prop_assert_eq!(specimen.validate(), Ok(()));
             prop_assert_eq!(check_texts(&Drawing::new(&specimen)), Ok(()));
         }
 

@@ -67,15 +67,18 @@ impl Drawing {
 
     /// The holes as hidden lines in the view across their axis.
     pub(super) fn hidden_holes(&mut self, specimen: &Specimen, center: [f64; 2]) {
-        let half = 0.5 * self.scale * specimen.extrusion_mm();
+        let (scale, half_middle) = (self.scale, 0.5 * self.scale * specimen.extrusion_mm());
+        let half_at = |x: f64| specimen.block.taper().raised([(x - center[0]) / scale, half_middle, 0.0])[1];
         for hole in &specimen.holes {
             let x = center[0] + self.scale * hole.center_mm[0];
             let reach = self.scale * hole.wall().half_extents_mm()[0];
             let end = 0.5 * self.scale * specimen.block.length_mm;
             for wall in [x - reach, x + reach].into_iter().filter(|wall| (wall - center[0]).abs() < end) {
+                let half = half_at(wall);
                 let shape = Shape::Line([wall, center[1] - half], [wall, center[1] + half]);
                 self.entities.push(Entity { layer: Layer::Holes, is_hidden: true, shape });
             }
+            let half = half_at(x);
             self.line(Layer::Centre, [x, center[1] - half - 1.5], [x, center[1] + half + 1.5]);
         }
     }

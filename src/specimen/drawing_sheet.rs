@@ -129,10 +129,15 @@ impl Drawing {
 
     /// The vertical overall dimension at the left of a view with half extents `half`.
     pub(super) fn dimension_y(&mut self, center: [f64; 2], half: [f64; 2], content: String) {
-        let edge = center[0] - half[0];
-        let x = edge - 9.0;
+        self.dimension_of_end(center, half, -1.0, content);
+    }
+
+    /// The same of the end at the left (`side` −1) or at the right (1).
+    pub(super) fn dimension_of_end(&mut self, center: [f64; 2], half: [f64; 2], side: f64, content: String) {
+        let edge = center[0] + side * half[0];
+        let x = edge + side * 9.0;
         for y in [center[1] - half[1], center[1] + half[1]] {
-            self.line(Layer::Dimensions, [edge - 1.0, y], [x - 1.5, y]);
+            self.line(Layer::Dimensions, [edge + side, y], [x + side * 1.5, y]);
             self.line(Layer::Dimensions, [x - 1.0, y - 1.0], [x + 1.0, y + 1.0]);
         }
         self.line(Layer::Dimensions, [x, center[1] - half[1]], [x, center[1] + half[1]]);

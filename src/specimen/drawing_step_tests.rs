@@ -1,8 +1,8 @@
 //! The files read back from their text: topology, and the volume by the divergence theorem.
 
 use super::*;
-use crate::specimen::HoleAxis;
-use crate::specimen::sampling::{dumbbell_with_hole, valid_specimen};
+use crate::specimen::sampling::{dumbbell_with_hole, valid_specimen, valid_wedge};
+use crate::specimen::{Block, HoleAxis};
 use proptest::prelude::*;
 use std::collections::HashMap;
 
@@ -154,6 +154,26 @@ fn check(text: &str, genus: i64, axis: [f64; 3]) -> (f64, usize) {
     (volume, faces)
 }
 
+/// The area of the plane faces that slant to an axis.
+fn slanted_area(text: &str, axis: [f64; 3]) -> f64 {
+    let read = Read::of(text);
+    let of_face = |face: usize| -> f64 {
+        let mut parts = read.references(face);
+        let surface = parts.pop().unwrap();
+        if !read.is(surface, "PLANE") {
+            return 0.0;
+        }
+        let normal = read.triple(read.references(read.references(surface)[0])[1]);
+        let towards = dot(normal, axis).abs();
+        if !(1e-12..=1.0 - 1e-15).contains(&towards) {
+            return 0.0;
+        }
+        let walks = parts.iter().flat_map(|&bound| read.references(read.references(bound)[0]));
+        walks.map(|oriented| swept_area(&read, oriented, normal)).sum()
+    };
+    read.of_kind("ADVANCED_FACE").map(of_face).sum()
+}
+
 fn axis_of(specimen: &Specimen) -> [f64; 3] {
     match specimen.extrusion_axis() {
         HoleAxis::Thickness => [0.0, 1.0, 0.0],
@@ -187,6 +207,25 @@ proptest! {
     #[test]
     fn blocks_are_closed_with_the_exact_volume(specimen in valid_specimen()) {
         check_specimen(&specimen, 4);
+    }
+
+    /// The slanted planes of a wedge cut its walls in ellipses whose ends and areas are exact.
+    #[test]
+    fn wedges_are_closed_with_the_exact_faces(specimen in valid_wedge()) {
+        let num_holes = specimen.holes.len() as i64;
+        let longer = (0.5 * specimen.block.thickness_mm * specimen.block.taper().slope_per_mm()).hypot(1.0);
+        let even = Specimen { block: Block { wedge_mm: 0.0, ..specimen.block }, ..specimen.clone() };
+        let section_mm2 = even.volume_mm3() / specimen.block.thickness_mm;
+        let text = to_step(&specimen).unwrap();
+        check(&text, num_holes, axis_of(&specimen));
+        let area = slanted_area(&text, axis_of(&specimen));
+        prop_assert!((area / (2.0 * longer * section_mm2) - 1.0).abs() < 1e-9, "{} of {}", area, section_mm2);
+        // Floor, rim and the tops of pins together cover the box.
+        let text = mould_to_step(&specimen).unwrap();
+        check(&text, 0, axis_of(&specimen));
+        let box_mm2: f64 = specimen.section_size().iter().map(|extent| extent + 2.0 * MOULD_WALL_MM).product();
+        let area = slanted_area(&text, axis_of(&specimen));
+        prop_assert!((area / (longer * box_mm2) - 1.0).abs() < 1e-9, "{} of {}", area, box_mm2);
     }
 
     #[test]

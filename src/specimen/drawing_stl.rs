@@ -169,6 +169,7 @@ fn extrude(specimen: &Specimen, points: &[[f64; 2]], triangles: &[[usize; 3]]) -
     let is_left_handed = specimen.extrusion_axis() == HoleAxis::Thickness;
     let place = |index: usize, along: f64| {
         let [x, b] = points[index];
+        let along = specimen.block.taper().raised([x, along, 0.0])[1];
         if is_left_handed { [x, along, b] } else { [x, b, along] }
     };
     let orient = |[a, b, c]: [[f64; 3]; 3]| if is_left_handed { [a, c, b] } else { [a, b, c] };
@@ -206,7 +207,7 @@ fn normal_of(facet: &[[f64; 3]; 3]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::specimen::sampling::{dumbbell_with_hole, valid_specimen};
+    use crate::specimen::sampling::{dumbbell_with_hole, valid_specimen, valid_wedge};
     use proptest::prelude::*;
 
     fn read(bytes: &[u8]) -> Vec<([f32; 3], [[f32; 3]; 3])> {
@@ -264,6 +265,11 @@ mod tests {
 
         #[test]
         fn blocks_are_closed_with_the_right_volume(specimen in valid_specimen()) {
+            check(&specimen);
+        }
+
+        #[test]
+        fn wedges_are_closed_with_the_right_volume(specimen in valid_wedge()) {
             check(&specimen);
         }
 

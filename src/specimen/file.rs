@@ -22,6 +22,8 @@ file_tag!(SpecimenTag, SCHEMA);
 schema_type! {
     /// An extent of a block, mm.
     pub(super) ExtentMm = number_within(MIN_SIZE_MM..=MAX_SIZE_MM);
+    /// By how much a wedge is thicker at one end than at the other, mm.
+    pub(super) WedgeMm = number_within(-MAX_SIZE_MM..=MAX_SIZE_MM);
     /// The diameter of a hole, mm.
     pub(super) DiameterMm = number_within(MIN_DIAMETER_MM..=MAX_DIAMETER_MM);
     /// The radius of a dumb-bell's arcs, mm.

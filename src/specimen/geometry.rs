@@ -24,12 +24,16 @@ impl Specimen {
         self.profile().map_or(0.5 * self.block.width_mm, |profile| profile.half_width_mm(x_mm))
     }
 
+    /// Half the extent along y at `x_mm`, mm: thickness/2, times g(x) of a wedge.
+    pub fn half_gap_mm(&self, x_mm: f64) -> f64 {
+        self.block.taper().raised([x_mm, 0.5 * self.block.thickness_mm, 0.0])[1]
+    }
+
     /// Whether a reference position (x, y, z), mm, lies in the material, boundary included.
     pub fn contains(&self, position: [f64; 3]) -> bool {
         let [x, y, z] = position;
-        let is_in_outline = x.abs() <= 0.5 * self.block.length_mm
-            && y.abs() <= 0.5 * self.block.thickness_mm
-            && z.abs() <= self.half_width_mm(x);
+        let is_in_outline =
+            x.abs() <= 0.5 * self.block.length_mm && y.abs() <= self.half_gap_mm(x) && z.abs() <= self.half_width_mm(x);
         is_in_outline
             && self.holes.iter().all(|hole| {
                 let lateral = match hole.axis {
@@ -80,9 +84,9 @@ impl Specimen {
         self.mirror_defect_mm([-1.0, 1.0, 1.0]) <= MIRROR_TOLERANCE_MM
     }
 
-    /// How far the holes are from being symmetric under (x, y, z) → (s₀x, s₁y, s₂z) with signs s, mm: the
-    /// largest of the least differences (distance of centres plus difference of diameters and outlines) between the
-    /// mirror image of a hole and a hole. Zero without holes.
+    /// How far the block and its holes are from being symmetric under (x, y, z) → (s₀x, s₁y, s₂z) with signs s, mm:
+    /// the largest of the least differences (distance of centres plus difference of diameters and outlines) between the
+    /// mirror image of a hole and a hole, and where x changes its sign the wedge. Zero without holes in an even block.
     pub fn mirror_defect_mm(&self, signs: [f64; 3]) -> f64 {
         let defect_of = |hole: &super::Hole| {
             let lateral_sign = if hole.axis == HoleAxis::Thickness { signs[2] } else { signs[1] };
@@ -90,15 +94,23 @@ impl Specimen {
             let others = self.holes.iter().filter(|other| other.axis == hole.axis);
             others.map(|other| other.difference_mm(&image)).fold(f64::INFINITY, f64::min)
         };
-        self.holes.iter().map(defect_of).fold(0.0, f64::max)
+        let of_block = if signs[0] < 0.0 { self.block.wedge_mm.abs() } else { 0.0 };
+        self.holes.iter().map(defect_of).fold(of_block, f64::max)
     }
 
-    /// Volume of one sample (of the first kind), mm³: area of the outline less the holes', times the extrusion.
+    /// Volume of one sample (of the first kind), mm³: area of the outline less the holes', times the extrusion; of a
+    /// wedge the thickness times the integral of g over that area, to which the block itself adds no first moment.
     pub fn volume_mm3(&self) -> f64 {
         let [length, lateral] = self.section_size();
         let outline_area = self.profile().map_or(length * lateral, |profile| profile.area_mm2());
         let hole_area: f64 = self.holes.iter().map(|hole| self.hole_area_mm2(hole)).sum();
-        (outline_area - hole_area) * self.extrusion_mm()
+        let taper = self.block.taper();
+        let slanted = if taper.is_even() {
+            0.0
+        } else {
+            taper.slope_per_mm() * self.holes.iter().map(|hole| self.hole_moment_x_mm3(hole)).sum::<f64>()
+        };
+        (outline_area - hole_area - slanted) * self.extrusion_mm()
     }
 
     /// Every ligament: each hole to each of the four sides (but a notch to its own), and each pair of holes. In the

@@ -3,10 +3,10 @@
 //! Frame (reference): origin at the centre of the undeformed block; x along its length (the pull direction),
 //! y along its thickness, z along its width. Lengths in mm.
 //!
-//! What is supported: a plain block or a dumb-bell ([`Outline`]), with holes that all share one axis: circles, ellipses
-//! and slots ([`HoleShape`]), and round notches in free sides ([`Notch`]); in a double-lap test further blocks beside
-//! it ([`Specimen::samples`]). The mesh is a section extruded along that axis, so holes of two directions in one
-//! specimen are refused. Parsing and validation: [`Specimen::from_json`]. Limits of what can be made:
+//! What is supported: a plain block, a wedge ([`Taper`]) or a dumb-bell ([`Outline`]), with holes that all share one
+//! axis: circles, ellipses and slots ([`HoleShape`]), and round notches in free sides ([`Notch`]); in a double-lap test
+//! further blocks beside it ([`Specimen::samples`]). The mesh is a section extruded along that axis, so holes of two
+//! directions in one specimen are refused. Parsing and validation: [`Specimen::from_json`]. Limits of what can be made:
 //! [`ManufacturingLimits`]. Drawings for the mould maker: [`to_svg`], [`to_dxf`], [`to_stl`], [`to_step`].
 
 mod bounds;
@@ -45,6 +45,9 @@ pub(crate) mod sampling;
 mod section_loop;
 mod solid;
 mod step_file;
+mod taper;
+#[cfg(test)]
+mod taper_tests;
 #[cfg(test)]
 mod tests;
 
@@ -75,6 +78,7 @@ pub use limits_error::LimitsError;
 pub use notch::{MAX_NOTCH_INSET, MIN_NOTCH_DEPTH, Notch, NotchProblem, NotchRates};
 pub use read::min_meshable_ligament_mm;
 pub use read_error::SpecimenError;
+pub use taper::{MAX_WEDGE_OF_LENGTH, MAX_WEDGE_OF_THICKNESS, Taper};
 
 use serde::{Deserialize, Serialize};
 
@@ -83,8 +87,8 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = TestSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum TestKind {
-    /// Faces y = ±thickness/2 bonded to rigid plates; the one at +y moves by the drive along x, or at an
-    /// angle from it towards z.
+    /// Faces y = ±thickness/2 (of a wedge, those that slant) bonded to rigid plates; the one at +y moves by the drive
+    /// along x, or at an angle from it towards z.
     DoubleLapShear,
     /// Faces x = ±length/2 bonded to rigid grips; the one at +x moves by the drive along x.
     Uniaxial,
@@ -98,12 +102,21 @@ pub struct Block {
     /// Extent along x, mm.
     #[cfg_attr(feature = "schema", schema(value_type = file::ExtentMm))]
     pub length_mm: f64,
-    /// Extent along y, mm.
+    /// Extent along y, mm; of a wedge that in the middle, at x = 0.
     #[cfg_attr(feature = "schema", schema(value_type = file::ExtentMm))]
     pub thickness_mm: f64,
     /// Extent along z, mm.
     #[cfg_attr(feature = "schema", schema(value_type = file::ExtentMm))]
     pub width_mm: f64,
+    /// Thickness at x = +length/2 less that at x = −length/2, mm; 0 by default. Both bonded faces of a double-lap test
+    /// slant alike, and so do the plates that hold them. Holes of a wedge run along the thickness.
+    #[serde(default, skip_serializing_if = "is_even")]
+    #[cfg_attr(feature = "schema", schema(value_type = file::WedgeMm))]
+    pub wedge_mm: f64,
+}
+
+fn is_even(wedge_mm: &f64) -> bool {
+    *wedge_mm == 0.0
 }
 
 /// The direction of a hole's axis.

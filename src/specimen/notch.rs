@@ -120,6 +120,14 @@ impl Notch {
         motion
     }
 
+    /// First moment along x about the origin of the area that is cut out, mm³: what the side cuts off the disc, farther
+    /// than d from its centre, has the moment 2/3 (r² − d²)^(3/2) towards the side.
+    pub fn moment_x_mm3(&self) -> f64 {
+        let (axis, sign) = self.side.axis_and_sign();
+        let cut_off = if axis == 0 { sign * 2.0 / 3.0 * self.half_mouth_mm().powi(3) } else { 0.0 };
+        self.area_mm2() * self.center_mm[0] - cut_off
+    }
+
     /// Area that is cut out of the block, mm²: r² β + d √(r² − d²).
     pub fn area_mm2(&self) -> f64 {
         self.radius_mm.powi(2) * self.half_angle() + self.inset_mm * self.half_mouth_mm()
@@ -188,6 +196,12 @@ impl Specimen {
     /// Area of the section that a hole takes away, mm².
     pub fn hole_area_mm2(&self, hole: &Hole) -> f64 {
         self.notch_of(hole).map_or_else(|| hole.wall().area_mm2(), |notch| notch.area_mm2())
+    }
+
+    /// First moment along x about the origin of that area, mm³.
+    pub fn hole_moment_x_mm3(&self, hole: &Hole) -> f64 {
+        let whole = || hole.wall().area_mm2() * hole.center_mm[0];
+        self.notch_of(hole).map_or_else(whole, |notch| notch.moment_x_mm3())
     }
 
     /// What is wrong with a notch, if the hole is one.

@@ -6,7 +6,7 @@ pub(crate) fn notched(notches: &[([f64; 2], f64)]) -> Specimen {
     Specimen {
         name: "notched".into(),
         test: TestKind::DoubleLapShear,
-        block: Block { length_mm: 25.4, thickness_mm: 6.4, width_mm: 19.1 },
+        block: Block::new(25.4, 6.4, 19.1),
         outline: Outline::Block,
         holes: notches.iter().map(|&(center, d)| Hole::notch(HoleAxis::Thickness, center, d)).collect(),
         drive_mm: vec![4.0],

@@ -15,6 +15,9 @@ use crate::field::{FieldError, FieldPath};
 /// How far a dumb-bell's block may be off the standard, mm: rounding only.
 const STANDARD_TOLERANCE_MM: f64 = 1e-6;
 
+/// A wedge at its limit is not refused for rounding.
+const ROUNDING: f64 = 1e-12;
+
 /// Thinnest ligament that can be meshed beside a hole (the larger one of two), mm: 0.05 mm and 2 % of the diameter (of
 /// an ellipse or a slot the extent across it).
 pub fn min_meshable_ligament_mm(diameter_mm: f64) -> f64 {
@@ -92,6 +95,7 @@ impl Specimen {
         }
         self.check_outline(problems);
         self.check_holes(problems);
+        self.check_wedge(problems.len() == num_before, problems);
         // Ligaments mean something only where the holes and the block do.
         if problems.len() == num_before {
             problems.extend(self.thin_ligaments());
@@ -116,8 +120,32 @@ impl Specimen {
 
     /// Extents of the block by name, mm.
     fn extents(&self) -> [(&'static str, f64); 3] {
-        let Block { length_mm, thickness_mm, width_mm } = self.block;
+        let Block { length_mm, thickness_mm, width_mm, .. } = self.block;
         [("length_mm", length_mm), ("thickness_mm", thickness_mm), ("width_mm", width_mm)]
+    }
+
+    /// Whether the block may be a wedge, and this one; `is_sound`: whether nothing else is wrong with block and holes,
+    /// so that a limit means something.
+    fn check_wedge(&self, is_sound: bool, problems: &mut Vec<SpecimenError>) {
+        let value_mm = self.block.wedge_mm;
+        let field = || FieldPath::of("block").name("wedge_mm");
+        if !value_mm.is_finite() {
+            problems.push(SpecimenError::NotFinite { field: field(), value: value_mm });
+            return;
+        }
+        if self.block.taper().is_even() {
+            return;
+        }
+        if self.test == TestKind::Uniaxial {
+            problems.push(SpecimenError::WedgeOfPull { value_mm });
+        } else if let Some(hole) = self.holes.iter().position(|hole| hole.axis == HoleAxis::Width) {
+            problems.push(SpecimenError::WedgeHoleAlongWidth { hole, value_mm });
+        } else if is_sound {
+            let limit_mm = self.block.wedge_limit_mm(MIN_SIZE_MM).max(0.0);
+            if value_mm.abs() > limit_mm * (1.0 + ROUNDING) {
+                problems.push(SpecimenError::WedgeTooLarge { value_mm, limit_mm });
+            }
+        }
     }
 
     fn check_outline(&self, problems: &mut Vec<SpecimenError>) {

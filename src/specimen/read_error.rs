@@ -239,6 +239,34 @@ pub enum SpecimenError {
         /// What is wrong.
         error: Box<SpecimenError>,
     },
+    /// A wedge in a uniaxial test, whose grips hold the ends and whose section is even.
+    #[error(
+        "block.wedge_mm is {value_mm} mm; only a block between the plates of a double-lap shear test may be a wedge: set it to 0, or test to double_lap_shear"
+    )]
+    WedgeOfPull {
+        /// The wedge, mm.
+        value_mm: f64,
+    },
+    /// A wedge's mesh is extruded along its thickness, so its holes run along it.
+    #[error(
+        "holes[{hole}] runs along the width and block.wedge_mm is {value_mm} mm; in a wedge holes must run along the thickness, because the mesh is extruded along it: turn the hole, or set wedge_mm to 0"
+    )]
+    WedgeHoleAlongWidth {
+        /// The first such hole.
+        hole: usize,
+        /// The wedge, mm.
+        value_mm: f64,
+    },
+    /// A wedge that leaves too thin an end, or whose faces slant too much.
+    #[error(
+        "block.wedge_mm is {value_mm} mm; from -{limit_mm:.4} to {limit_mm:.4} mm are supported, at most the thickness, the length, and what leaves a thin end that can be made: make the wedge smaller, or the block thicker or longer"
+    )]
+    WedgeTooLarge {
+        /// The wedge, mm.
+        value_mm: f64,
+        /// Largest either way, mm.
+        limit_mm: f64,
+    },
     /// The block is not the bounding box of the standard's dumb-bell.
     #[error(
         "{field} is {value_mm} mm; outline iso37_type4 has {standard_mm} mm there: set it, or leave out the outline"
@@ -376,6 +404,18 @@ impl SpecimenError {
                     .remedy("only a double-lap shear test may hold unlike samples; test them one after the other")
             }
             E::OtherSample { index, error } => error.field_error().below(&format!("/other_samples/{index}")),
+            E::WedgeOfPull { value_mm } => FieldError::new("/block/wedge_mm", value_mm, "0 in a uniaxial test")
+                .remedy("only a block between the plates of a double-lap shear test may be a wedge"),
+            E::WedgeHoleAlongWidth { hole, .. } => {
+                let pointer = of_hole(*hole).name("axis").pointer();
+                FieldError::new(pointer, HoleAxis::Width.name(), "thickness in a wedge")
+                    .remedy("the mesh of a wedge is extruded along its thickness: turn the hole, or set wedge_mm to 0")
+            }
+            E::WedgeTooLarge { value_mm, limit_mm } => {
+                let allowed = format!("from -{limit_mm:.4} to {limit_mm:.4} mm");
+                FieldError::new("/block/wedge_mm", value_mm, allowed)
+                    .remedy("make the wedge smaller, or the block thicker or longer")
+            }
             E::NotTheStandardsBlock { field, value_mm, standard_mm } => {
                 FieldError::new(field.pointer(), value_mm, format!("{standard_mm} mm, as the standard has it"))
                     .remedy("set it, or leave out the outline")

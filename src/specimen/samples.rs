@@ -75,9 +75,9 @@ impl Specimen {
         self.samples().iter().zip(counts).map(|(s, count)| f64::from(count) * s.volume_mm3()).sum()
     }
 
-    /// The thinnest sample's thickness, mm: the one that is sheared most.
+    /// The thickness of the thinnest sample at its thinnest, mm: what is sheared most.
     pub(super) fn thinnest_mm(&self) -> f64 {
-        self.other_samples.iter().map(|s| s.block.thickness_mm).fold(self.block.thickness_mm, f64::min)
+        self.other_samples.iter().map(|s| s.block.thinnest_mm()).fold(self.block.thinnest_mm(), f64::min)
     }
 }
 

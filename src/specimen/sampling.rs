@@ -21,7 +21,7 @@ pub(crate) fn any_layout() -> impl Strategy<Value = Specimen> {
             Specimen {
                 name: "random layout".into(),
                 test: if is_shear { TestKind::DoubleLapShear } else { TestKind::Uniaxial },
-                block: Block { length_mm, thickness_mm, width_mm },
+                block: Block::new(length_mm, thickness_mm, width_mm),
                 outline: Outline::Block,
                 holes: holes.into_iter().map(place).collect(),
                 drive_mm: vec![0.3 * thickness_mm, thickness_mm],
@@ -50,12 +50,25 @@ pub(crate) fn valid_specimen() -> impl Strategy<Value = Specimen> {
     })
 }
 
+/// A valid wedge with holes along its thickness.
+pub(crate) fn valid_wedge() -> impl Strategy<Value = Specimen> {
+    (valid_specimen(), 0.05..1.0, any::<bool>()).prop_map(|(mut specimen, part, is_thin_at_plus)| {
+        specimen.test = TestKind::DoubleLapShear;
+        if specimen.hole_axis() == Some(HoleAxis::Width) {
+            specimen.holes.clear();
+        }
+        let sign = if is_thin_at_plus { -1.0 } else { 1.0 };
+        specimen.block.wedge_mm = sign * part * specimen.block.wedge_limit_mm(super::MIN_SIZE_MM);
+        specimen.drive_mm = vec![0.3 * specimen.drive_limit_mm()];
+        specimen
+    })
+}
+
 /// A dumb-bell, the standard's or one with a gauge of its own, with one hole that may lie anywhere.
 pub(crate) fn dumbbell_with_hole() -> impl Strategy<Value = Specimen> {
     (free_dumbbell(), any::<bool>(), -0.5..0.5, -0.4..0.4, 0.02..0.25).prop_map(
         |(free, is_standard, x, z, diameter): (Specimen, bool, f64, f64, f64)| {
-            let standard =
-                Block { length_mm: ISO37_LENGTH_MM, thickness_mm: ISO37_THICKNESS_MM, width_mm: ISO37_WIDTH_MM };
+            let standard = Block::new(ISO37_LENGTH_MM, ISO37_THICKNESS_MM, ISO37_WIDTH_MM);
             let (block, outline) =
                 if is_standard { (standard, Outline::Iso37Type4) } else { (free.block, free.outline) };
             let center_mm = [x * block.length_mm, z * block.width_mm];
@@ -78,7 +91,7 @@ pub(crate) fn free_dumbbell() -> impl Strategy<Value = Specimen> {
         let mut specimen = Specimen {
             name: "dumb-bell".into(),
             test: TestKind::Uniaxial,
-            block: Block { length_mm: 1.0, thickness_mm, width_mm },
+            block: Block::new(1.0, thickness_mm, width_mm),
             outline: Outline::Dumbbell(dumbbell),
             holes: Vec::new(),
             drive_mm: vec![1.0],

@@ -1,7 +1,7 @@
 //! A solid bounded by exact faces: what is extruded from the loops of a section, as vertices, edges and faces.
 //!
-//! Loops of a section are walls between two levels, and bounds of plane faces at a level. Every edge is shared by two
-//! faces that pass it in opposite senses, so the surface is closed.
+//! Loops of a section are walls between two levels, and bounds of plane faces at a level, which may slant along x.
+//! Every edge is shared by two faces that pass it in opposite senses, so the surface is closed.
 
 use super::HoleAxis;
 use super::section_loop::{Conic, SectionCurve, SectionLoop};
@@ -10,7 +10,27 @@ use std::collections::HashMap;
 /// An edge passed by a face: its number, and whether from its first to its second vertex.
 pub(super) type OrientedEdge = (usize, bool);
 
-/// A conic in space, in a plane across the extrusion.
+/// A plane across the extrusion, or slanted along x: the positions along the axis of a level of the section.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Level {
+    /// At x = 0, mm.
+    pub middle_mm: f64,
+    /// Per mm of x.
+    pub slope: f64,
+}
+
+impl Level {
+    /// Straight across.
+    pub fn straight(middle_mm: f64) -> Level {
+        Level { middle_mm, slope: 0.0 }
+    }
+
+    fn at(self, x_mm: f64) -> f64 {
+        self.middle_mm + self.slope * x_mm
+    }
+}
+
+/// A conic in space, in a plane across the extrusion or slanted to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SpaceConic {
     /// Centre, mm.
@@ -19,9 +39,24 @@ pub(super) struct SpaceConic {
     pub half_mm: [f64; 2],
     /// Unit vector.
     pub along: [f64; 3],
+    /// Unit normal of its plane, towards higher levels.
+    pub axis: [f64; 3],
 }
 
 impl SpaceConic {
+    /// The ellipse c + u cos t + v sin t.
+    fn with_diameters(center_mm: [f64; 3], u: [f64; 3], v: [f64; 3]) -> SpaceConic {
+        // Its axes are the conjugate half diameters that are orthogonal.
+        let turn = 0.5 * (2.0 * dot(u, v)).atan2(dot(u, u) - dot(v, v));
+        let (sin, cos) = turn.sin_cos();
+        let major = [0, 1, 2].map(|c| u[c] * cos + v[c] * sin);
+        let minor = [0, 1, 2].map(|c| v[c] * cos - u[c] * sin);
+        let half_mm = [dot(major, major).sqrt(), dot(minor, minor).sqrt()];
+        let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+        let length = dot(normal, normal).sqrt();
+        SpaceConic { center_mm, half_mm, along: major.map(|c| c / half_mm[0]), axis: normal.map(|c| c / length) }
+    }
+
     /// Whether it is a circle.
     pub fn is_circle(&self) -> bool {
         // Both are set from one number where a wall is a circle.
@@ -108,8 +143,7 @@ pub(super) enum Sense {
 pub(super) struct SolidBuilder {
     extrusion: HoleAxis,
     loops: Vec<SectionLoop>,
-    /// Levels, mm along the axis.
-    levels_mm: Vec<f64>,
+    levels: Vec<Level>,
     solid: Solid,
     /// The vertex at the start of a piece (loop, piece, level).
     vertex_of: HashMap<(usize, usize, usize), usize>,
@@ -121,12 +155,12 @@ pub(super) struct SolidBuilder {
 
 impl SolidBuilder {
     /// Of loops extruded along `extrusion`, at increasing levels.
-    pub fn new(extrusion: HoleAxis, loops: Vec<SectionLoop>, levels_mm: Vec<f64>) -> SolidBuilder {
+    pub fn new(extrusion: HoleAxis, loops: Vec<SectionLoop>, levels: Vec<Level>) -> SolidBuilder {
         let axis = place(extrusion, [0.0; 2], 1.0);
         SolidBuilder {
             extrusion,
             loops,
-            levels_mm,
+            levels,
             solid: Solid { vertices: Vec::new(), edges: Vec::new(), faces: Vec::new(), axis },
             vertex_of: HashMap::new(),
             edge_of_piece: HashMap::new(),
@@ -144,18 +178,20 @@ impl SolidBuilder {
                 Sense::Forward => vec![(bottom, true), (end, true), (top, false), (start, false)],
                 Sense::Backward => vec![(bottom, false), (start, true), (top, true), (end, false)],
             };
-            let surface = self.wall_surface(loop_index, piece, bottom, sense);
+            let surface = self.wall_surface(loop_index, piece, (low, bottom), sense);
             self.solid.faces.push(Face { surface, bounds: vec![bound] });
         }
     }
 
-    fn wall_surface(&self, loop_index: usize, piece: usize, bottom: usize, sense: Sense) -> Surface {
+    /// What the wall of a piece lies on, which rises from the edge `bottom` at the level `low`.
+    fn wall_surface(&self, loop_index: usize, piece: usize, (low, bottom): (usize, usize), sense: Sense) -> Surface {
         let ring = &self.loops[loop_index];
-        match (ring[piece].curve, self.solid.edges[bottom].curve) {
-            (SectionCurve::Conic { is_counterclockwise, .. }, EdgeCurve::Conic { conic, .. }) => {
-                Surface::Extruded { conic, is_convex: is_counterclockwise == (sense == Sense::Forward) }
-            }
-            _ => {
+        match ring[piece].curve {
+            SectionCurve::Conic { conic, is_counterclockwise } => Surface::Extruded {
+                conic: self.space_conic(conic, Level::straight(self.levels[low].middle_mm)),
+                is_convex: is_counterclockwise == (sense == Sense::Forward),
+            },
+            SectionCurve::Line => {
                 let (a, b) = (ring[piece].start_mm, ring[(piece + 1) % ring.len()].start_mm);
                 let sign = if sense == Sense::Forward { 1.0 } else { -1.0 };
                 let length = (b[0] - a[0]).hypot(b[1] - a[1]);
@@ -184,8 +220,10 @@ impl SolidBuilder {
             vertex = self.vertex(loop_index, 0, level);
             walks.push(walk);
         }
-        let normal = if looks == Sense::Forward { self.solid.axis } else { self.solid.axis.map(|c| -c) };
-        let along = place(self.extrusion, [1.0, 0.0], 0.0);
+        let slope = self.levels[level].slope;
+        let sign = if looks == Sense::Forward { 1.0 } else { -1.0 } / slope.hypot(1.0);
+        let normal = place(self.extrusion, [-slope, 0.0], 1.0).map(|c| sign * c);
+        let along = place(self.extrusion, [1.0, 0.0], slope).map(|c| c / slope.hypot(1.0));
         self.solid.faces.push(Face { surface: Surface::Plane { vertex, normal, along }, bounds: walks });
     }
 
@@ -195,7 +233,8 @@ impl SolidBuilder {
     }
 
     fn vertex(&mut self, loop_index: usize, piece: usize, level: usize) -> usize {
-        let position = place(self.extrusion, self.loops[loop_index][piece].start_mm, self.levels_mm[level]);
+        let start_mm = self.loops[loop_index][piece].start_mm;
+        let position = place(self.extrusion, start_mm, self.levels[level].at(start_mm[0]));
         let vertices = &mut self.solid.vertices;
         *self.vertex_of.entry((loop_index, piece, level)).or_insert_with(|| {
             vertices.push(position);
@@ -208,13 +247,8 @@ impl SolidBuilder {
         let ends = [self.vertex(loop_index, piece, level), self.vertex(loop_index, next, level)];
         let curve = match self.loops[loop_index][piece].curve {
             SectionCurve::Line => EdgeCurve::Line,
-            SectionCurve::Conic { conic: Conic { center_mm, half_mm, along }, is_counterclockwise } => {
-                let conic = SpaceConic {
-                    center_mm: place(self.extrusion, center_mm, self.levels_mm[level]),
-                    half_mm,
-                    along: place(self.extrusion, along, 0.0),
-                };
-                EdgeCurve::Conic { conic, is_counterclockwise }
+            SectionCurve::Conic { conic, is_counterclockwise } => {
+                EdgeCurve::Conic { conic: self.space_conic(conic, self.levels[level]), is_counterclockwise }
             }
         };
         let edges = &mut self.solid.edges;
@@ -222,6 +256,18 @@ impl SolidBuilder {
             edges.push(Edge { ends, curve });
             edges.len() - 1
         })
+    }
+
+    /// A conic of the section at a level: of a slanted one, the ellipse in which the level cuts its wall.
+    fn space_conic(&self, Conic { center_mm, half_mm, along }: Conic, level: Level) -> SpaceConic {
+        let center = place(self.extrusion, center_mm, level.at(center_mm[0]));
+        if level.slope.abs() > 0.0 {
+            let [u, v] = [along.map(|c| half_mm[0] * c), [-half_mm[1] * along[1], half_mm[1] * along[0]]]
+                .map(|p| place(self.extrusion, p, level.slope * p[0]));
+            return SpaceConic::with_diameters(center, u, v);
+        }
+        let along = place(self.extrusion, along, 0.0);
+        SpaceConic { center_mm: center, half_mm, along, axis: self.solid.axis }
     }
 
     fn rise(&mut self, loop_index: usize, piece: usize, between: [usize; 2]) -> usize {
@@ -232,6 +278,10 @@ impl SolidBuilder {
             edges.len() - 1
         })
     }
+}
+
+fn dot(u: [f64; 3], v: [f64; 3]) -> f64 {
+    u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 }
 
 /// A point of the section at a level, in the specimen's frame. (x, lateral, level) is right-handed: along the thickness

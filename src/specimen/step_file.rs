@@ -48,8 +48,8 @@ impl Entities {
         self.add(&format!("VECTOR('',#{direction},{})", real(length)))
     }
 
-    fn conic(&mut self, conic: &SpaceConic, axis: [f64; 3]) -> usize {
-        let placement = self.placement(conic.center_mm, axis, conic.along);
+    fn conic(&mut self, conic: &SpaceConic) -> usize {
+        let placement = self.placement(conic.center_mm, conic.axis, conic.along);
         let [a, b] = conic.half_mm;
         if conic.is_circle() {
             self.add(&format!("CIRCLE('',#{placement},{})", real(a)))
@@ -112,9 +112,7 @@ fn solid_entity(entities: &mut Entities, name: &str, solid: &Solid) -> usize {
                 let (point, vector) = (entities.point(from), entities.vector(along.map(|c| c / length), length));
                 (entities.add(&format!("LINE('',#{point},#{vector})")), true)
             }
-            EdgeCurve::Conic { conic, is_counterclockwise } => {
-                (entities.conic(&conic, solid.axis), is_counterclockwise)
-            }
+            EdgeCurve::Conic { conic, is_counterclockwise } => (entities.conic(&conic), is_counterclockwise),
         };
         let [from, to] = edge.ends.map(|end| vertices[end]);
         edges.push(entities.add(&format!("EDGE_CURVE('',#{from},#{to},#{curve},{})", logical(is_same))));
@@ -148,7 +146,7 @@ fn face_entity(entities: &mut Entities, solid: &Solid, edges: &[usize], face: &F
         }
         // Along the ellipse times along the axis points out of it.
         Surface::Extruded { conic, is_convex } => {
-            let (curve, vector) = (entities.conic(&conic, solid.axis), entities.vector(solid.axis, 1.0));
+            let (curve, vector) = (entities.conic(&conic), entities.vector(solid.axis, 1.0));
             (entities.add(&format!("SURFACE_OF_LINEAR_EXTRUSION('',#{curve},#{vector})")), is_convex)
         }
     };

@@ -6,7 +6,7 @@ use crate::material::MaterialError;
 use crate::specimen::SpecimenError;
 
 /// What a variable may set, for messages.
-const KNOWN_TARGETS: &str = "drive_mm, precompression_mm, block.length_mm, block.thickness_mm, block.width_mm, outline.dumbbell.gauge_width_mm, \
+const KNOWN_TARGETS: &str = "drive_mm, precompression_mm, block.length_mm, block.thickness_mm, block.width_mm, block.wedge_mm, outline.dumbbell.gauge_width_mm, \
     outline.dumbbell.gauge_length_mm, outline.dumbbell.fillet_radius_mm, holes[i].x_mm, \
      holes[i].other_mm, holes[i].diameter_mm, holes[i].length_mm, holes[i].angle_deg, material.bulk_kpa, material.mu_1_kpa, material.alpha_1, scan.voxel_mm[c], \
      scan.noise_sd_mm[c], scan.force_sd_n, each with or without a leading '-'";

@@ -20,6 +20,7 @@ enum Place {
     Length,
     Thickness,
     Width,
+    Wedge,
     Precompression,
     GaugeWidth,
     GaugeLength,
@@ -40,7 +41,7 @@ enum Place {
 
 impl Target {
     /// Reads `drive_mm`, `precompression_mm`, `block.length_mm`, `block.thickness_mm`, `block.width_mm`,
-    /// `outline.dumbbell.gauge_width_mm`,
+    /// `block.wedge_mm`, `outline.dumbbell.gauge_width_mm`,
     /// `outline.dumbbell.gauge_length_mm`, `outline.dumbbell.fillet_radius_mm`, `holes[i].x_mm`,
     /// `holes[i].other_mm` (z of a hole along the thickness, y of one along the width), `holes[i].diameter_mm`,
     /// `holes[i].length_mm` and `holes[i].angle_deg` (of a hole with an outline of its own), `material.bulk_kpa`,
@@ -59,6 +60,7 @@ impl Target {
             "block.length_mm" => Place::Length,
             "block.thickness_mm" => Place::Thickness,
             "block.width_mm" => Place::Width,
+            "block.wedge_mm" => Place::Wedge,
             "outline.dumbbell.gauge_width_mm" => Place::GaugeWidth,
             "outline.dumbbell.gauge_length_mm" => Place::GaugeLength,
             "outline.dumbbell.fillet_radius_mm" => Place::FilletRadius,
@@ -150,6 +152,7 @@ impl Target {
             Place::Length => Some(&mut specimen.block.length_mm),
             Place::Thickness => Some(&mut specimen.block.thickness_mm),
             Place::Width => Some(&mut specimen.block.width_mm),
+            Place::Wedge => Some(&mut specimen.block.wedge_mm),
             Place::GaugeWidth => specimen.outline.free_gauge_mut().map(|gauge| &mut gauge.gauge_width_mm),
             Place::GaugeLength => specimen.outline.free_gauge_mut().map(|gauge| &mut gauge.gauge_length_mm),
             Place::FilletRadius => specimen.outline.free_gauge_mut().map(|gauge| &mut gauge.fillet_radius_mm),

@@ -36,8 +36,8 @@ impl VoxelGrid {
         Ok(VoxelGrid { origin_mm, voxel_mm, shape, surface: None })
     }
 
-    /// The grid centred on the specimen's block, with extent / edge voxels along each axis, rounded to the nearest
-    /// whole number (at least one).
+    /// The grid centred on the specimen's block (of a wedge, on the box around it), with extent / edge voxels along
+    /// each axis, rounded to the nearest whole number (at least one).
     ///
     /// A scan's grid lies anywhere relative to the sample. On average over that offset, the voxels at least half filled
     /// number extent / edge along each axis; rounding keeps closest to that and keeps the grid mirror symmetric. Up to
@@ -48,7 +48,7 @@ impl VoxelGrid {
     /// [`VoxelError::InvalidVoxel`], [`VoxelError::TooManyVoxels`].
     pub fn covering(specimen: &Specimen, voxel_mm: [f64; 3]) -> Result<Self, VoxelError> {
         check_voxel(voxel_mm)?;
-        let extent = [specimen.block.length_mm, specimen.block.thickness_mm, specimen.block.width_mm];
+        let extent = specimen.block.extents_mm();
         let count = [0, 1, 2].map(|a| (extent[a] / voxel_mm[a]).round().max(1.0));
         check_size(count.iter().product())?;
         let origin_mm = [0, 1, 2].map(|a| -0.5 * (count[a] - 1.0) * voxel_mm[a]);
@@ -62,7 +62,7 @@ impl VoxelGrid {
     /// As [`Self::covering`].
     pub fn spare_mm(specimen: &Specimen, voxel_mm: [f64; 3]) -> Result<[f64; 3], VoxelError> {
         let grid = Self::covering(specimen, voxel_mm)?;
-        let extent = [specimen.block.length_mm, specimen.block.thickness_mm, specimen.block.width_mm];
+        let extent = specimen.block.extents_mm();
         Ok([0, 1, 2].map(|a| extent[a] - (grid.shape[a] as f64 - 0.5) * voxel_mm[a]))
     }
 
@@ -93,7 +93,7 @@ impl VoxelGrid {
     /// least half filled, which are those in the block, divided by the volume of a voxel. The voxels of this grid are
     /// stretched or shortened until they tile the block exactly, as many along each axis as in [`Self::planned`]: their
     /// sum is the integral by the midpoint rule. Unlike the sum over one grid it changes smoothly with the size of the
-    /// block.
+    /// block. Of a wedge they tile the box around it, and those at least half filled stand for the integral.
     ///
     /// # Errors
     /// As [`Self::planned`].
@@ -103,7 +103,7 @@ impl VoxelGrid {
         surface: Option<Surface>,
     ) -> Result<(Self, f64), VoxelError> {
         let mut grid = Self::planned(specimen, voxel_mm, surface)?;
-        let extent = [specimen.block.length_mm, specimen.block.thickness_mm, specimen.block.width_mm];
+        let extent = specimen.block.extents_mm();
         let (normal, mut voxels_each) = (grid.normal_axis(), 1.0);
         for axis in (0..3).filter(|&a| normal != Some(a)) {
             let edge = extent[axis] / grid.shape[axis] as f64;
@@ -249,7 +249,7 @@ mod tests {
     /// be far off, and jump with the size of the block.
     #[test]
     fn a_tiling_gives_the_mean_over_all_places() {
-        let specimen = Specimen { block: Block { length_mm: 12.9, thickness_mm: 6.2, width_mm: 9.7 }, ..solid() };
+        let specimen = Specimen { block: Block::new(12.9, 6.2, 9.7), ..solid() };
         let voxel_mm = [2.0, 0.5, 1.5];
         // Much is told at the free faces along x and z.
         let told = |x: [f64; 3]| 1.0 + (x[0] / 6.45).powi(6) + (x[2] / 4.85).powi(4) - 0.5 * (x[1] / 3.1).powi(2);

@@ -20,7 +20,7 @@ pub struct VoxelMask {
 
 impl VoxelMask {
     /// Voxels of `grid` that `specimen` fills to at least a half. Uncut voxels are measured in closed form, voxels cut
-    /// by a wall by slices.
+    /// by a wall or a slanted face by slices.
     ///
     /// # Errors
     /// [`VoxelError::EmptyMask`].
@@ -79,7 +79,11 @@ impl VoxelMask {
         let (mut voxels, mut material_fraction) = (Vec::new(), Vec::new());
         for index in 0..grid.num_voxels() {
             let n = grid.indices(index);
-            let fraction = column_fraction[n[0] + grid.shape[0] * n[section.across]] * layer_fraction[n[section.along]];
+            let of_layer = layer_fraction[n[section.along]];
+            let mut fraction = column_fraction[n[0] + grid.shape[0] * n[section.across]] * of_layer;
+            if let Some(slanted) = slanted_fraction(&grid, &section, n) {
+                fraction = slanted;
+            }
             if is_kept(index, fraction) {
                 voxels.push(index as u32);
                 material_fraction.push(fraction.min(1.0));
@@ -116,6 +120,16 @@ impl VoxelMask {
     }
 }
 
+/// The filled part of a voxel that a slanted face of a wedge cuts; `None` of others.
+fn slanted_fraction(grid: &VoxelGrid, section: &Section, n: [usize; 3]) -> Option<f64> {
+    let [x, y, z] = [0, 1, 2].map(|axis| clipped(grid, section, axis, n[axis]));
+    if !section.is_slanted(x, y) {
+        return None;
+    }
+    let edge_on_mm = (grid.normal_axis() == Some(section.across)).then_some(grid.voxel_mm[section.across]);
+    Some(section.volume(x, z, y, edge_on_mm, FRACTION_SLICES) / grid.voxel_mm.iter().product::<f64>())
+}
+
 /// How much of a voxel's edge along an axis lies in an interval, mm. Along the normal of a face, where a voxel has no
 /// thickness, it is there as a whole.
 fn filled_mm(grid: &VoxelGrid, axis: usize, [low, high]: [f64; 2]) -> f64 {
@@ -144,7 +158,7 @@ pub(crate) mod tests {
         Specimen {
             name: "solid".into(),
             test: TestKind::DoubleLapShear,
-            block: Block { length_mm: 25.4, thickness_mm: 6.4, width_mm: 19.1 },
+            block: Block::new(25.4, 6.4, 19.1),
             outline: Outline::Block,
             holes: vec![],
             drive_mm: vec![5.0],
@@ -201,7 +215,7 @@ pub(crate) mod tests {
     fn dumbbell_adds_up() {
         let specimen = Specimen {
             test: TestKind::Uniaxial,
-            block: Block { length_mm: 35.0, thickness_mm: 2.0, width_mm: 6.0 },
+            block: Block::new(35.0, 2.0, 6.0),
             outline: Outline::Iso37Type4,
             ..solid()
         };
@@ -217,7 +231,7 @@ pub(crate) mod tests {
         let bar = Specimen { test: TestKind::Uniaxial, ..two_hole() };
         let dumbbell = Specimen {
             test: TestKind::Uniaxial,
-            block: Block { length_mm: 35.0, thickness_mm: 2.0, width_mm: 6.0 },
+            block: Block::new(35.0, 2.0, 6.0),
             outline: Outline::Iso37Type4,
             ..solid()
         };

@@ -53,6 +53,18 @@ fn reflected(mesh: &Mesh, (mut point, mut back): ([f64; 3], Tensor)) -> ([f64; 3
     (point, reflection, back)
 }
 
+/// The same in the flattened coordinates of a wedge, in which the locator's columns and levels are.
+fn flattened(locator: &Locator, (point, reflection, mut back): ([f64; 3], u32, Tensor)) -> ([f64; 3], u32, Tensor) {
+    let taper = locator.taper();
+    if taper.is_even() {
+        return (point, reflection, back);
+    }
+    let [along_x, along_y] = taper.flattening_slopes(point);
+    let [of_x, of_y, _] = back;
+    back[1] = [0, 1, 2].map(|j| along_x * of_x[j] + along_y * of_y[j]);
+    (taper.flattened(point), reflection, back)
+}
+
 /// Signs of x, y, z under each reflection.
 const SIGNS: [[f64; 3]; 4] = [[1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, -1.0], [1.0, -1.0, -1.0]];
 
@@ -145,7 +157,7 @@ impl VoxelOperator {
             points_of(voxel as usize, &mut points);
             let mut total = 0.0;
             for &(point, weight) in &points {
-                let (point, reflection, back) = reflected(mesh, place_of(point));
+                let (point, reflection, back) = flattened(shapes.locator, reflected(mesh, place_of(point)));
                 let Some((element, column, level)) = shapes.at(point) else {
                     self.num_dropped_points += 1;
                     continue;

@@ -51,9 +51,10 @@ impl Sampling {
         let (across, along) = (section.across, section.along);
         // A voxel on a face has no thickness.
         let rule = |axis: usize| gauss(if grid.normal_axis() == Some(axis) { 1 } else { self.gauss_points[axis] });
+        let is_slanted = section.is_slanted(bounds[0], bounds[along]);
         match section.overlap_on(grid, bounds[0], bounds[across]) {
             Overlap::None => return,
-            Overlap::Full => {
+            Overlap::Full if !is_slanted => {
                 for &(x, wx) in rule(0) {
                     for &(b, wb) in rule(across) {
                         for &(c, wc) in rule(along) {
@@ -66,19 +67,37 @@ impl Sampling {
                     }
                 }
             }
-            Overlap::Cut => {
-                let mut intervals = Vec::new();
+            Overlap::Full | Overlap::Cut => {
+                let is_edge_on = grid.normal_axis() == Some(across);
+                let mut intervals: Vec<[f64; 2]> = Vec::new();
+                let in_gap = if is_slanted { section.x_within_gap(bounds[0], bounds[along]) } else { bounds[0] };
                 for s in 0..self.cut_slices {
-                    let x = at(bounds[0], (2.0 * s as f64 + 1.0) / self.cut_slices as f64 - 1.0);
-                    section.slice(x, bounds[across][0], bounds[across][1], &mut intervals);
+                    let x = at(in_gap, (2.0 * s as f64 + 1.0) / self.cut_slices as f64 - 1.0);
+                    let mut along_bounds = bounds[along];
+                    let mut depth = 1.0;
+                    if is_slanted {
+                        along_bounds = section.within_gap(x, bounds[along]);
+                        depth = along_bounds[1] - along_bounds[0];
+                        if !(depth > 0.0) {
+                            continue;
+                        }
+                    }
+                    // A face that is seen edge-on is a point across.
+                    if is_edge_on {
+                        intervals.clear();
+                        intervals.push(bounds[across]);
+                    } else {
+                        section.slice(x, bounds[across][0], bounds[across][1], &mut intervals);
+                    }
                     for &interval in &intervals {
+                        let width = if is_edge_on { 1.0 } else { interval[1] - interval[0] };
                         for &(b, wb) in rule(across) {
                             for &(c, wc) in rule(along) {
                                 let mut point = [0.0; 3];
                                 point[0] = x;
                                 point[across] = at(interval, b);
-                                point[along] = at(bounds[along], c);
-                                points.push((point, (interval[1] - interval[0]) * wb * wc));
+                                point[along] = at(along_bounds, c);
+                                points.push((point, width * wb * wc * depth));
                             }
                         }
                     }

@@ -1,11 +1,12 @@
 //! The specimen's section as the voxels see it: slices at constant x are unions of intervals.
 //!
 //! Every specimen is a section extruded along y (or along z, for holes along the width), and x lies in the section. At
-//! constant x the material along the other section axis is the outline's interval less the chords of the holes, all in
-//! closed form. Areas and averages over cut voxels need only a rule along x.
+//! constant x the material along the other section axis is the outline's interval less the chords of the holes, and
+//! that along the extrusion an interval, which in a wedge changes with x: all in closed form. Areas, volumes and
+//! averages over cut voxels need only a rule along x.
 
 use super::VoxelGrid;
-use crate::specimen::{HoleAxis, HoleWall, Specimen};
+use crate::specimen::{HoleAxis, HoleWall, Specimen, Taper};
 
 /// How a rectangle of the section lies to the material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,16 +26,43 @@ pub(super) struct Section<'a> {
     pub across: usize,
     /// Axis of extrusion (2 or 1).
     pub along: usize,
-    /// Half extents of the block, mm.
+    /// Half extents of the box around the block, mm.
     pub half: [f64; 3],
+    /// How the extent along y goes along x.
+    taper: Taper,
 }
 
 impl<'a> Section<'a> {
     pub fn new(specimen: &'a Specimen) -> Self {
         let is_along_width = specimen.holes.first().is_some_and(|h| h.axis == HoleAxis::Width);
         let (across, along) = if is_along_width { (1, 2) } else { (2, 1) };
-        let half = [specimen.block.length_mm, specimen.block.thickness_mm, specimen.block.width_mm].map(|e| 0.5 * e);
-        Section { specimen, across, along, half }
+        let half = specimen.block.extents_mm().map(|e| 0.5 * e);
+        Section { specimen, across, along, half, taper: specimen.block.taper() }
+    }
+
+    /// Whether a voxel with these bounds, cut to the box, meets a slanted face of a wedge.
+    pub fn is_slanted(&self, x: [f64; 2], along: [f64; 2]) -> bool {
+        if self.taper.is_even() {
+            return false;
+        }
+        let farthest = along[0].abs().max(along[1].abs());
+        x.iter().any(|&x| farthest > self.specimen.half_gap_mm(x))
+    }
+
+    /// What of [x₀, x₁] has any of [low, high] along the extrusion in a wedge.
+    pub fn x_within_gap(&self, x: [f64; 2], [low, high]: [f64; 2]) -> [f64; 2] {
+        let (nearest, middle) = (low.max(-high), self.specimen.half_gap_mm(0.0));
+        if nearest <= 0.0 {
+            return x;
+        }
+        let face = (nearest / middle - 1.0) / self.taper.slope_per_mm();
+        if self.taper.slope_per_mm() > 0.0 { [x[0].max(face), x[1]] } else { [x[0], x[1].min(face)] }
+    }
+
+    /// What of [low, high] along the extrusion is in a wedge at x; low ≥ high where nothing is.
+    pub fn within_gap(&self, x: f64, [low, high]: [f64; 2]) -> [f64; 2] {
+        let half = self.specimen.half_gap_mm(x);
+        [low.max(-half), high.min(half)]
     }
 
     /// Half extent of the outline across the section at x, mm.
@@ -110,6 +138,23 @@ impl<'a> Section<'a> {
             }
             _ => self.overlap(x, b),
         }
+    }
+
+    /// Material volume in a voxel that a slanted face cuts, mm³: as [`Self::area`]. On a face that is seen edge-on in
+    /// the section, a length of `edge_on_mm` across counts for the straight line.
+    pub fn volume(&self, x: [f64; 2], b: [f64; 2], along: [f64; 2], edge_on_mm: Option<f64>, num_slices: usize) -> f64 {
+        let x = self.x_within_gap(x, along);
+        let width = (x[1] - x[0]).max(0.0) / num_slices as f64;
+        let mut intervals = Vec::new();
+        let mut volume = 0.0;
+        for n in 0..num_slices {
+            let at = x[0] + (n as f64 + 0.5) * width;
+            let [low, high] = self.within_gap(at, along);
+            self.slice(at, b[0], b[1], &mut intervals);
+            let across = edge_on_mm.unwrap_or_else(|| intervals.iter().map(|[low, high]| high - low).sum());
+            volume += width * across * (high - low).max(0.0);
+        }
+        volume
     }
 
     /// Material area in the rectangle, mm²: closed form along `across`, midpoint rule with `num_slices` along x.

@@ -58,7 +58,7 @@ impl Face {
     /// Where it lies along its axis, mm.
     pub fn position_mm(self, specimen: &Specimen) -> f64 {
         let block = &specimen.block;
-        0.5 * self.sign() * [block.length_mm, block.thickness_mm, block.width_mm][self.axis()]
+        0.5 * self.sign() * block.extents_mm()[self.axis()]
     }
 
     /// Whether it is a plane that no plate hides: y faces of a sheared block are bonded, and the z faces of a dumb-bell

@@ -5,7 +5,7 @@
 use lambdak::fem::{Equilibrium, ForwardModel, SolveError, SolveOptions};
 use lambdak::material::{Material, OgdenTerm};
 use lambdak::mesh::{ElementKind, Mesh, MeshOptions, Mirror, mesh_specimen};
-use lambdak::specimen::{Block, Hole, HoleAxis, HoleKind, HoleShape, Outline, Specimen, TestKind};
+use lambdak::specimen::{Block, Hole, HoleAxis, HoleKind, HoleShape, Outline, Specimen, Taper, TestKind};
 use std::collections::HashMap;
 
 pub type Vector = [f64; 3];
@@ -32,7 +32,7 @@ pub fn specimen(test: TestKind, extents: Vector, axis: HoleAxis, holes: &[Vector
     Specimen {
         name: format!("{test:?} {extents:?} {axis:?} {holes:?}"),
         test,
-        block: Block { length_mm, thickness_mm, width_mm },
+        block: Block::new(length_mm, thickness_mm, width_mm),
         outline: Outline::Block,
         holes: holes.iter().map(|h| Hole::circle(axis, [h[0], h[1]], h[2])).collect(),
         drive_mm: vec![1.0],
@@ -107,6 +107,7 @@ pub fn cube(kind: ElementKind, n: usize, map: impl Fn(Vector) -> Vector) -> Mesh
         element_kind: kind,
         nodes: Vec::new(),
         connectivity: Vec::new(),
+        taper: Taper::default(),
         mirror: Mirror::default(),
         fixed_nodes: Vec::new(),
         moved_nodes: Vec::new(),

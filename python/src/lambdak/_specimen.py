@@ -148,15 +148,16 @@ class Sample:
     thickness_mm: float
     width_mm: float
     holes: Tuple[Hole, ...] = ()
+    wedge_mm: Optional[float] = None
 
     def __post_init__(self) -> None:
-        for name in _EXTENTS:
+        for name in (*_EXTENTS, "wedge_mm"):
             object.__setattr__(self, name, plain(getattr(self, name)))
         object.__setattr__(self, "holes", tuple(self.holes))
 
     def to_dict(self) -> Dict[str, Any]:
         """As `specimen/1` holds it."""
-        block = {name: getattr(self, name) for name in _EXTENTS}
+        block = {**{name: getattr(self, name) for name in _EXTENTS}, **given(wedge_mm=self.wedge_mm)}
         return {"block": block, "holes": [hole.to_dict() for hole in self.holes]}
 
     @classmethod
@@ -166,7 +167,7 @@ class Sample:
 
 
 def _block(found: Dict[str, Any]) -> Dict[str, float]:
-    only_known(found["block"], _EXTENTS, "the block")
+    only_known(found["block"], (*_EXTENTS, "wedge_mm"), "the block")
     return dict(found["block"])
 
 
@@ -179,8 +180,9 @@ class Specimen:
     """A specimen (`specimen/1`): a block with holes, how it is held, and the drives at which it is scanned.
 
     Lengths are in mm. The frame has its origin at the block's centre: x along the length (the pull direction), y along
-    the thickness, z along the width. `test` is `double_lap_shear` or `uniaxial`. A double-lap test may hold further
-    samples, unlike the first; their forces add. `outline` is `block`, `iso37_type4` or a `Dumbbell`, the last two in
+    the thickness, z along the width. `test` is `double_lap_shear` or `uniaxial`. The block of a double-lap test may be a
+    wedge: `wedge_mm` is its thickness at x = +length/2 less that at x = -length/2, and `thickness_mm` that in the middle.
+    A double-lap test may hold further samples, unlike the first; their forces add. `outline` is `block`, `iso37_type4` or a `Dumbbell`, the last two in
     a uniaxial test.
     """
 
@@ -196,6 +198,7 @@ class Specimen:
     other_samples: Tuple[Sample, ...] = ()
     drive_angle_deg: Optional[float] = None
     precompression_mm: Optional[float] = None
+    wedge_mm: Optional[float] = None
 
     def __init__(
         self,
@@ -212,11 +215,13 @@ class Specimen:
         other_samples: Sequence[Sample] = (),
         drive_angle_deg: Optional[float] = None,
         precompression_mm: Optional[float] = None,
+        wedge_mm: Optional[float] = None,
     ) -> None:
         values = {"length_mm": length_mm, "thickness_mm": thickness_mm, "width_mm": width_mm, "test": test}
         self._set(holes=tuple(holes), outline=outline, name=name, drive_mm=_tuple(drive_mm), **plain(values))
         self._set(samples_in_parallel=plain(samples_in_parallel), other_samples=tuple(other_samples))
         self._set(drive_angle_deg=plain(drive_angle_deg), precompression_mm=plain(precompression_mm))
+        self._set(wedge_mm=plain(wedge_mm))
         _check("specimen", self.to_dict())
 
     def _set(self, **values: Any) -> None:
@@ -238,7 +243,7 @@ class Specimen:
         specimen = object.__new__(cls)
         others = tuple(Sample._of_program(sample) for sample in found.get("other_samples") or [])
         specimen._set(samples_in_parallel=None, outline=None, other_samples=others)
-        specimen._set(drive_angle_deg=None, precompression_mm=None)
+        specimen._set(drive_angle_deg=None, precompression_mm=None, wedge_mm=None)
         specimen._set(holes=_holes(found), **_block(found), **{name: found[name] for name in own if name in found})
         specimen._set(drive_mm=tuple(found["drive_mm"]))
         if isinstance(found.get("outline"), dict):
@@ -259,11 +264,12 @@ class Specimen:
         )
         if self.other_samples:
             optional["other_samples"] = [sample.to_dict() for sample in self.other_samples]
+        block = {"length_mm": self.length_mm, "thickness_mm": self.thickness_mm, "width_mm": self.width_mm}
         return {
             "schema": "specimen/1",
             "name": self.name,
             "test": self.test,
-            "block": {"length_mm": self.length_mm, "thickness_mm": self.thickness_mm, "width_mm": self.width_mm},
+            "block": {**block, **given(wedge_mm=self.wedge_mm)},
             "holes": [hole.to_dict() for hole in self.holes],
             "drive_mm": list(self.drive_mm),
             **optional,

@@ -3,16 +3,24 @@
 /** Extents of the section: x along the length; the other axis is z for holes through the thickness, y for the width. */
 export function sectionOf(specimen) {
   const axis = specimen.holes[0]?.axis ?? "thickness";
-  const { length_mm: length, thickness_mm: thickness, width_mm: width } = specimen.block;
+  const { length_mm: length, thickness_mm: thickness, width_mm: width, wedge_mm: wedge = 0 } = specimen.block;
   const isFront = axis !== "width";
   return {
     axis,
     length,
     height: isFront ? width : thickness,
     depth: isFront ? thickness : width,
+    // Of a wedge, at its thick end.
+    deepest: isFront ? thickness + Math.abs(wedge) / 2 : width,
     up: isFront ? "z" : "y",
     through: isFront ? "y" : "z",
   };
+}
+
+/** Half of the extent across the section at x: of a wedge, whose holes run along its thickness, it goes along x. */
+export function halfDepth(specimen, section, x) {
+  const { thickness_mm: thickness, wedge_mm: wedge = 0 } = specimen.block;
+  return (section.depth / 2) * (section.up === "z" ? 1 + (wedge / thickness) * (x / section.length) : 1);
 }
 
 /** What an outline may be, and what it is called. */

@@ -83,6 +83,7 @@ export function specimenForm(model, library, edited) {
         if (v === "uniaxial") {
           delete sp.drive_angle_deg;
           delete sp.precompression_mm;
+          delete sp.block.wedge_mm;
         } else delete sp.outline;
       },
       changed: edited,
@@ -112,6 +113,18 @@ export function specimenForm(model, library, edited) {
               sp.precompression_mm = v;
             },
             meaning: "Before they are driven, and kept so. A negative number pulls them apart.",
+            changed: edited,
+          }),
+          field({
+            label: "Wedge, mm",
+            kind: "number",
+            value: sp.block.wedge_mm ?? 0,
+            example: "0",
+            pointer: "/specimen/block/wedge_mm",
+            put: (v) => {
+              sp.block.wedge_mm = v;
+            },
+            meaning: "By how much the block is thicker at x = +length/2 than at −length/2; thickness is that in the middle.",
             changed: edited,
           }),
         ]),

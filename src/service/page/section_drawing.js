@@ -4,7 +4,7 @@ import { s } from "./dom.js";
 import { holeShape, reachOf } from "./hole.js";
 import { brokenLigaments } from "./ligaments.js";
 import { digits, farthest, plain } from "./numbers.js";
-import { outlinePath, sectionOf } from "./outline.js";
+import { halfDepth, outlinePath, sectionOf } from "./outline.js";
 
 /** Sizes of a drawing, mm of the specimen: `text` is the height of letters, `margin` the room for dimensions. */
 function layout(section, isSheared) {
@@ -14,7 +14,7 @@ function layout(section, isSheared) {
   // Plates seen from their edge stand above and below the section; they and their words need room there.
   const isEdge = isSheared && section.up === "y";
   const below = isEdge ? 3.2 * text : 1.7 * text;
-  const side = section.height / 2 + gap + (isEdge ? 1.6 * text : 0) + section.depth / 2;
+  const side = section.height / 2 + gap + (isEdge ? 1.6 * text : 0) + section.deepest / 2;
   return { text, margin, top: isEdge ? 3.4 * text : 2 * text, below, side };
 }
 
@@ -65,11 +65,17 @@ const grips = (section, center, height, thick) =>
     plate(side < 0 ? -section.length / 2 - thick : section.length / 2, center - height / 2, thick, height),
   );
 
-/** Plates above and below a sheared specimen, in the view in which they are seen from their edge. */
-const plates = (section, center, height, thick) =>
-  [-1, 1].map((side) =>
-    plate(-section.length / 2, side < 0 ? center - height / 2 - thick : center + height / 2, section.length, thick),
-  );
+/** Plates above and below a sheared specimen, in the view in which they are seen from their edge; `half` is half of
+ * the gap between them at both ends. */
+const plates = (section, center, half, thick) =>
+  [-1, 1].map((side) => {
+    const face = [-1, 1].map((end, i) => [(end * section.length) / 2, center + side * half[i]]);
+    const back = face.map(([x, y]) => [x, y + side * thick]).reverse();
+    return s("polygon", { class: "held", points: [...face, ...back].join(" ") });
+  });
+
+/** Half of the extent across the section at both ends. */
+const ends = (specimen, section) => [-1, 1].map((end) => halfDepth(specimen, section, (end * section.length) / 2));
 
 /** What holds and moves the specimen. */
 function held(model, section, at) {
@@ -96,10 +102,10 @@ function held(model, section, at) {
   // Plates lie along y: they are seen from their edge where y is drawn, else they cover the section.
   const isEdge = section.up === "y";
   const center = isEdge ? 0 : side;
-  const height = isEdge ? section.height : section.depth;
+  const height = isEdge ? section.height : section.deepest;
   const reach = Math.min(section.length * 0.3, 5 * text);
   return [
-    plates(section, center, height, thick),
+    plates(section, center, isEdge ? [height / 2, height / 2] : ends(model.specimen, section), thick),
     arrow(
       text,
       [section.length / 2 - reach, center - height / 2 - thick - 0.6 * text],
@@ -114,7 +120,7 @@ function held(model, section, at) {
     words(
       text,
       -section.length / 2,
-      (isEdge ? side - section.depth / 2 : -section.height / 2) - 0.6 * text,
+      (isEdge ? side - section.deepest / 2 : -section.height / 2) - 0.6 * text,
       "between the plates",
       { "text-anchor": "start" },
     ),
@@ -124,21 +130,29 @@ function held(model, section, at) {
 /** The view from the side, holes as hidden lines. */
 function sideView(model, section, { text, side }) {
   const { length, depth } = section;
-  const top = side - depth / 2;
+  const half = (x) => halfDepth(model.specimen, section, x);
+  const [left, right] = ends(model.specimen, section);
+  const corners = [
+    [-length / 2, side - left],
+    [length / 2, side - right],
+    [length / 2, side + right],
+    [-length / 2, side + left],
+  ];
+  const told = left === right ? plain(depth) : `${plain(2 * left)} to ${plain(2 * right)}`;
   return [
-    s("rect", { class: "outline", x: -length / 2, y: top, width: length, height: depth }),
+    s("polygon", { class: "outline", points: corners.join(" ") }),
     model.specimen.holes.flatMap((hole) =>
       [-1, 1]
         .map((e) => hole.center_mm[0] + e * reachOf(hole, [1, 0]))
         // A notch in an end ends there.
         .filter((x) => Math.abs(x) < length / 2)
-        .map((x) => line("concealed", [x, top], [x, top + depth])),
+        .map((x) => line("concealed", [x, side - half(x)], [x, side + half(x)])),
     ),
     dimension(
       text,
-      [-length / 2 - 1.3 * text, top + depth],
-      [-length / 2 - 1.3 * text, top],
-      `${section.through} ${plain(depth)}`,
+      [-length / 2 - 1.3 * text, side + left],
+      [-length / 2 - 1.3 * text, side - left],
+      `${section.through} ${told}`,
     ),
   ];
 }
@@ -176,14 +190,14 @@ export function drawSection(svg, model) {
   const section = sectionOf(model.specimen);
   const at = layout(section, model.specimen.test !== "uniaxial");
   const { text, margin, top, below, side } = at;
-  const { length, height, depth } = section;
+  const { length, height, deepest } = section;
   svg.setAttribute(
     "viewBox",
     [
       -length / 2 - margin,
       -height / 2 - top,
       length + margin + 4.5 * text,
-      height / 2 + top + side + depth / 2 + 2.4 * text,
+      height / 2 + top + side + deepest / 2 + 2.4 * text,
     ]
       .map((v) => v.toFixed(3))
       .join(" "),

@@ -5,7 +5,7 @@ use super::super::{Face, MeasuredComponents, Surface, VoxelGrid};
 use super::*;
 use crate::kinematics::decompose;
 use crate::mesh::{ElementKind, MeshOptions, Mirror, mesh_specimen};
-use crate::specimen::TestKind;
+use crate::specimen::{Taper, TestKind};
 
 /// A structured mesh of hexahedra of the solid block (or its half z ≥ 0): a section in (x, y), its nodes moved by a
 /// smooth map so that the cells are curved while the block's faces stay in place, extruded along z.
@@ -43,6 +43,7 @@ pub(crate) fn block_mesh(specimen: &Specimen, num: [usize; 3], mirror: Mirror, b
         element_kind: ElementKind::Hex27,
         nodes,
         connectivity,
+        taper: Taper::default(),
         mirror,
         fixed_nodes: vec![],
         moved_nodes: vec![],
@@ -141,7 +142,7 @@ fn homogeneous_deformation_on_real_meshes() {
     let across = Hole::circle(HoleAxis::Width, [3.0, 0.2], 3.0);
     let dumbbell = Specimen {
         test: TestKind::Uniaxial,
-        block: Block { length_mm: 35.0, thickness_mm: 2.0, width_mm: 6.0 },
+        block: Block::new(35.0, 2.0, 6.0),
         outline: Outline::Iso37Type4,
         ..solid()
     };
@@ -277,4 +278,106 @@ fn mismatched_input_is_an_error() {
         VoxelOperator::new(&specimen, &mesh, &far, none),
         Err(VoxelError::InvalidSampling { value: 0, .. })
     ));
+}
+
+fn wedge(mut specimen: Specimen, wedge_mm: f64) -> Specimen {
+    specimen.block.wedge_mm = wedge_mm;
+    specimen
+}
+
+/// A grid that covers a wedge wherever it lies, and all voxels that hold any of it.
+fn all_of(specimen: &Specimen, voxel_mm: [f64; 3]) -> VoxelMask {
+    let extents = specimen.block.extents_mm();
+    let shape = [0, 1, 2].map(|a| (extents[a] / voxel_mm[a]).ceil() as usize + 2);
+    let origin = [0, 1, 2].map(|a| -0.5 * extents[a] - [0.3, 0.4, 0.7][a] * voxel_mm[a]);
+    let grid = VoxelGrid::new(origin, voxel_mm, shape).unwrap();
+    VoxelMask::from_flags(specimen, grid.clone(), &vec![true; grid.num_voxels()], 0.0).unwrap()
+}
+
+/// In a wedge too an affine field has an exact gradient, and inner voxels the exact mean.
+#[test]
+fn homogeneous_deformation_of_wedges() {
+    // Mirror symmetric in z.
+    let f = [[1.2, 0.5, 0.0], [0.02, 0.9, 0.0], [0.0, 0.0, 1.1]];
+    for specimen in [wedge(solid(), 3.0), wedge(two_hole(), -4.0)] {
+        for force_prisms in [false, true] {
+            let mesh =
+                mesh_specimen(&specimen, &MeshOptions { force_prisms, ..MeshOptions::search(&specimen) }).unwrap();
+            let mask = VoxelMask::covering(&specimen, [0.8, 0.4, 0.6]).unwrap();
+            let operator = VoxelOperator::new(&specimen, &mesh, &mask, Sampling::default()).unwrap();
+            // As without a wedge.
+            assert!(operator.num_dropped_points() * 500 < operator.num_points(), "{}", operator.num_dropped_points());
+            let u = affine(&mesh, &f);
+            for found in operator.deformation_gradients(&u).unwrap() {
+                for (found, exact) in found.iter().flatten().zip(f.iter().flatten()) {
+                    // As without a wedge; the locator loses a digit or two more.
+                    assert!((found - exact).abs() < 1e-9, "{found} {exact}");
+                }
+            }
+            let whole = mask.material_fraction.iter().map(|part| *part > 1.0 - 1e-9);
+            for ((mean, &voxel), _) in
+                operator.average(&u).unwrap().iter().zip(&mask.voxels).zip(whole).filter(|(_, is_whole)| *is_whole)
+            {
+                let x = mask.grid.center_mm(voxel as usize);
+                for i in 0..3 {
+                    let exact = (0..3).map(|j| f[i][j] * x[j]).sum::<f64>() - x[i];
+                    assert!((mean[i] - exact).abs() < 1e-9, "{mean:?} {exact}");
+                }
+            }
+        }
+    }
+}
+
+/// Over all voxels, filled parts add up to the volume, and means to the first and second moments of the wedge:
+/// ∫ x dV = W w L²/12 and ∫ y² dV = W/12 ∫ t(x)³ dx.
+#[test]
+fn moments_of_a_wedge() {
+    let (specimen, w) = (wedge(solid(), 4.0), 4.0);
+    let [length, thickness, width] = [25.4, 6.4, 19.1];
+    let mesh = mesh_specimen(&specimen, &MeshOptions::standard(&specimen)).unwrap();
+    let mask = all_of(&specimen, [1.0, 0.4, 0.75]);
+    let operator = VoxelOperator::new(&specimen, &mesh, &mask, Sampling::default()).unwrap();
+    assert_eq!(operator.num_dropped_points(), 0);
+    let field: Vec<[f64; 3]> = mesh.nodes.iter().map(|x| [x[0], x[1] * x[1], 0.0]).collect();
+    let means = operator.average(&field).unwrap();
+    let volume_mm3 = mask.grid.voxel_volume_mm3();
+    let sum = |of: usize| -> f64 {
+        means.iter().zip(&mask.material_fraction).map(|(mean, part)| volume_mm3 * part * mean[of]).sum()
+    };
+    // Slices of voxels that the faces cut: of second order in 1/32 of them.
+    assert!((mask.material_volume_mm3() / (length * thickness * width) - 1.0).abs() < 1e-5);
+    let first = width * w * length * length / 12.0;
+    // Six slices of each cut voxel, about a sixth of all; its part is known to 32.
+    assert!((sum(0) / first - 1.0).abs() < 1e-3, "{} {first}", sum(0));
+    let [a, b] = specimen.block.end_thicknesses_mm();
+    let second = width * length * (b.powi(4) - a.powi(4)) / (4.0 * w) / 12.0;
+    assert!((sum(1) / second - 1.0).abs() < 1e-3, "{} {second}", sum(1));
+}
+
+/// Filled parts of a wedge with holes add up to its closed form, of a free face to the face's area; at least half
+/// filled voxels lie in it with their centres.
+#[test]
+fn filled_parts_of_wedges() {
+    for specimen in [wedge(two_hole(), 6.0), wedge(two_hole(), -2.0)] {
+        let all = all_of(&specimen, [0.7, 0.3, 0.6]);
+        // Slices of voxels that walls cut, as in blocks.
+        assert!((all.material_volume_mm3() / specimen.volume_mm3() - 1.0).abs() < 2e-4);
+        let half = VoxelMask::covering(&specimen, [0.7, 0.3, 0.6]).unwrap();
+        let in_layers = half.voxels.iter().map(|&v| half.grid.center_mm(v as usize));
+        // The faces slant by less than a layer across a voxel.
+        assert!(in_layers.into_iter().all(|x| x[1].abs() <= specimen.half_gap_mm(x[0]) + 1e-9));
+        for face in [Face::MinusZ, Face::PlusZ] {
+            let surface = Surface { face, components: MeasuredComponents::InPlane };
+            let grid = VoxelGrid::planned(&specimen, [0.35, 0.2, 1.0], Some(surface)).unwrap();
+            let seen = VoxelMask::from_flags(&specimen, grid.clone(), &vec![true; grid.num_voxels()], 0.0).unwrap();
+            // Half of a subset at an edge of the grid may be missing: 0.1 of 6.4 mm.
+            assert!((seen.material_area_mm2().unwrap() / (25.4 * 6.4) - 1.0).abs() < 0.02);
+            let mesh = mesh_specimen(&specimen, &MeshOptions::search(&specimen)).unwrap();
+            let operator = VoxelOperator::new(&specimen, &mesh, &seen, Sampling::default()).unwrap();
+            let f = [[1.2, 0.5, 0.0], [0.02, 0.9, 0.0], [0.0, 0.0, 1.1]];
+            for found in operator.deformation_gradients(&affine(&mesh, &f)).unwrap() {
+                assert!((0..9).all(|n| (found[n / 3][n % 3] - f[n / 3][n % 3]).abs() < 1e-9));
+            }
+        }
+    }
 }
