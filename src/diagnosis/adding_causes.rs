@@ -12,7 +12,7 @@ use super::interior::InteriorTest;
 use super::leftover::leftover;
 use super::metric::Metric;
 use super::nominal::fit_with_terms;
-use super::rounds::{Asked, RoundLimits, add_causes, fit_round, score_round};
+use super::rounds::{Asked, RoundLimits, ToAsk, add_causes, fit_round, score_round};
 use super::set_up::{fit_set_up, is_set_up_promising, simplest_set_up};
 use super::stand_ins::with_sponge_for_stand_ins;
 use super::supposed::Supposed;
@@ -62,6 +62,14 @@ fn explain_ever_less(lefts: &[f64]) -> bool {
     }
 }
 
+/// Whether causes make up a motion of the plates from several plain ones (`plain`, special cases of free ones) and do
+/// not quite come to it: they leave more than the error of a mesh, or a smooth field takes up the rest.
+fn make_up_motions(causes: &[Supposed], plain: &[CauseName], leaves_more_than_a_mesh: bool) -> bool {
+    let num_plain = causes.iter().filter(|s| plain.contains(&s.cause.name())).count();
+    let has_sponge = causes.iter().any(|s| s.cause.is_sponge());
+    num_plain > 1 && (has_sponge || leaves_more_than_a_mesh)
+}
+
 /// What was found with the set-up as a whole in the fit.
 struct WithSetUp {
     findings: Findings,
@@ -76,7 +84,7 @@ impl Run<'_> {
     pub(super) fn add_causes(&mut self) -> Result<(), DiagnosisError> {
         let measured = self.measured();
         let limits = RoundLimits { max_causes: self.options.max_causes, has_load_curve: self.load.is_some() };
-        if self.findings.causes.len() >= limits.max_causes {
+        if self.findings.num_of_fit() >= limits.max_causes {
             return Ok(());
         }
         let at_boundary = self.registry.clone().without_inside();
@@ -88,7 +96,8 @@ impl Run<'_> {
         } else {
             everything
         };
-        let Run { inference, findings, observed, .. } = self;
+        let observed = self.observed;
+        let Run { inference, findings, .. } = self;
         let left_mm =
             |fitted: &CauseFit, metric: &Metric| leftover(observed, &fitted.residual, metric).structured_rms_mm;
         let before_mm = left_mm(&findings.current, &inference.metric);
@@ -115,7 +124,7 @@ impl Run<'_> {
         if fit_round(inference, findings, &measured, &scored)? {
             add_causes(inference, findings, &measured, limits, &to_ask)?;
         }
-        self.replace_stand_ins(&measured, limits)?;
+        self.replace_stand_ins(&measured, limits, &to_ask)?;
         let are_all_asked = !(does_inside_wait || are_given_up.get());
         if are_all_asked {
             self.start_otherwise(begun, &measured, limits)?;
@@ -141,16 +150,21 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Puts a smooth field in the place of causes that stand in for it, and goes on with rounds from there.
-    fn replace_stand_ins(&mut self, measured: &Trace, limits: RoundLimits) -> Result<(), DiagnosisError> {
+    /// Puts a smooth field in the place of causes that stand in for it, and goes on from there with the rounds that are
+    /// still `to_ask` for.
+    fn replace_stand_ins(
+        &mut self,
+        measured: &Trace,
+        limits: RoundLimits,
+        to_ask: ToAsk<'_, '_>,
+    ) -> Result<(), DiagnosisError> {
         let Run { inference, registry, findings, .. } = self;
         if let Some(other) = with_sponge_for_stand_ins(inference, registry, measured, &findings.current)? {
             self.findings.current = other;
             self.findings.alternatives.clear();
             self.name_causes_of_fit()?;
-            let Run { inference, registry, findings, options, .. } = self;
-            let everything = Asked { registry, with_terms: options.prior.is_none(), evidence: EVIDENCE };
-            add_causes(inference, findings, measured, limits, &|_, _| Some(everything))?;
+            let Run { inference, findings, .. } = self;
+            add_causes(inference, findings, measured, limits, to_ask)?;
         }
         Ok(())
     }
@@ -264,10 +278,12 @@ impl Run<'_> {
     /// for, or has no fit.
     fn with_set_up(&mut self, measured: &Trace, limits: RoundLimits) -> Result<Option<WithSetUp>, DiagnosisError> {
         let parts = self.registry.set_up(self.observed);
-        let of_parts: Vec<Supposed> =
-            parts.into_iter().map(|cause| Supposed { values: cause.start(), cause }).collect();
+        let of_parts: Vec<Supposed> = parts.into_iter().map(Supposed::at_start).collect();
         let special_cases = self.registry.special_cases(&of_parts);
-        let is_asked = !self.is_explained_by(&self.findings) || self.makes_up_motions(&special_cases);
+        let current = &self.findings.current;
+        let leaves_more_than_a_mesh = self.left_mm(current) > self.inference.allowance_mm;
+        let is_asked = !self.is_explained_by(&self.findings)
+            || make_up_motions(&current.causes, &special_cases, leaves_more_than_a_mesh);
         if of_parts.is_empty() || !is_asked {
             return Ok(None);
         }
@@ -287,15 +303,6 @@ impl Run<'_> {
         Ok([together, alone].into_iter().flatten().min_by(|a, b| left_mm(a).total_cmp(&left_mm(b))))
     }
 
-    /// Whether the fit makes up a motion of the plates from several plain ones (`plain`, special cases of free ones)
-    /// and does not quite come to it: more than the error of a mesh is left, or a smooth field takes it up.
-    fn makes_up_motions(&self, plain: &[CauseName]) -> bool {
-        let current = &self.findings.current;
-        let num_plain = current.causes.iter().filter(|s| plain.contains(&s.cause.name())).count();
-        let has_sponge = current.causes.iter().any(|s| s.cause.is_sponge());
-        num_plain > 1 && (has_sponge || self.left_mm(current) > self.inference.allowance_mm)
-    }
-
     /// The set-up as a whole beside some causes, with further causes added to them; `None` where it has no fit.
     fn set_up_beside(
         &mut self,
@@ -313,9 +320,9 @@ impl Run<'_> {
             causes: artefacts_of(&self.findings.current).into_iter().chain(beside).collect(),
             ..self.findings.nominal.clone()
         };
-        let Run { inference, registry, .. } = self;
+        let Run { inference, registry, options, .. } = self;
         let fitted = fit_set_up(inference, registry, measured, &start)
-            .and_then(|fitted| simplest_set_up(inference, registry, measured, fitted));
+            .and_then(|fitted| simplest_set_up(inference, registry, measured, fitted, options.prior.is_none()));
         let found = match fitted {
             Ok(fitted) => self.and_causes(fitted, measured, limits),
             Err(error) => Err(error),
@@ -351,11 +358,12 @@ impl Run<'_> {
     fn add_causes_to_set_up(&mut self, measured: &Trace, limits: RoundLimits) -> Result<(), DiagnosisError> {
         self.name_causes_of_fit()?;
         let Run { inference, registry, findings, options, .. } = self;
-        let everything = Asked { registry, with_terms: options.prior.is_none(), evidence: EVIDENCE };
+        let with_terms = options.prior.is_none();
+        let everything = Asked { registry, with_terms, evidence: EVIDENCE };
         let num_before = findings.current.causes.len();
         add_causes(inference, findings, measured, limits, &|_, _| Some(everything))?;
         if findings.current.causes.len() > num_before {
-            findings.current = simplest_set_up(inference, registry, measured, findings.current.clone())?;
+            findings.current = simplest_set_up(inference, registry, measured, findings.current.clone(), with_terms)?;
             self.name_causes_of_fit()?;
         }
         Ok(())
@@ -373,6 +381,8 @@ impl Run<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnosis::registry::Registry;
+    use crate::specimen::Specimen;
 
     /// Three causes alike: a third, a half, all. Causes that stand for others: a half, then less and less.
     #[test]
@@ -380,5 +390,22 @@ mod tests {
         assert!(!explain_ever_less(&[9.0]));
         assert!(!explain_ever_less(&[9.0, 6.0]) && !explain_ever_less(&[9.0, 6.0, 3.0]));
         assert!(explain_ever_less(&[9.0, 8.0]) && explain_ever_less(&[9.0, 5.0, 3.5]));
+    }
+
+    /// One plain motion is itself. Several that leave something, or beside a smooth field, stand for a free one.
+    #[test]
+    fn several_plain_motions_that_leave_something_make_up_a_free_one() {
+        let (registry, specimen) =
+            (Registry::standard(), Specimen::from_json(include_str!("../../geometries/solid-shear.json")).unwrap());
+        let tested = registry.tested(&specimen);
+        let causes_of = |names: &[&str]| -> Vec<Supposed> {
+            tested.iter().filter(|c| names.contains(&c.name().as_str())).cloned().map(Supposed::at_start).collect()
+        };
+        let plain = ["offaxis", "mount", "compliance"].map(CauseName::new);
+        let makes_up = |names: &[&str], leaves_more: bool| make_up_motions(&causes_of(names), &plain, leaves_more);
+        assert!(!makes_up(&["mount"], true) && !makes_up(&["mount", "background"], true));
+        assert!(!makes_up(&["mount", "offaxis"], false));
+        assert!(makes_up(&["mount", "offaxis"], true));
+        assert!(makes_up(&["offaxis", "compliance", "background"], false));
     }
 }

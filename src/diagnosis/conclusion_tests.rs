@@ -82,7 +82,7 @@ fn voxels_kept_back_are_predicted_as_by_fits_to_the_others() {
         progress: &|_| {},
     };
     let measured = inference.laboratory.measured();
-    let supposed = Supposed { values: tilt.start(), cause: tilt };
+    let supposed = Supposed::at_start(tilt);
     let fits = [Vec::new(), vec![supposed]].map(|causes| inference.fit(&measured, &material(), &causes).unwrap());
     let seen = [measured.clone(), measured.clone()];
     let to_first_order = kept_back(&mut inference, &seen, [&fits[0], &fits[1]]).unwrap();

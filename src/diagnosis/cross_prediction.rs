@@ -152,7 +152,7 @@ impl Predictor<'_> {
         case.laboratory.forget();
         let material = &case.found.corrected.material;
         let mut all = carried.all();
-        all.push(Supposed { values: shifts.start(), cause: shifts });
+        all.push(Supposed::at_start(shifts));
         let num_held = carried.others.len();
         let Some(all) = self.fitted(case, material, all, num_held, Weighed::ByWhatIsLeft)? else {
             return Ok(None);
@@ -194,7 +194,7 @@ impl Predictor<'_> {
     ) -> Result<Option<Misfit>, DiagnosisError> {
         let mut all = causes.all();
         let num_held = all.len();
-        all.push(Supposed { values: own.start(), cause: own.clone() });
+        all.push(Supposed::at_start(own.clone()));
         match self.fitted(case, material, all, num_held, Weighed::ByNoise)? {
             Some(all) => self.misfit(case, material, &all),
             None => Ok(None),

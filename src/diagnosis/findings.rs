@@ -49,6 +49,11 @@ impl Findings {
         }
     }
 
+    /// How many causes the displacement is fitted with; a fit of the load curve has its own.
+    pub(super) fn num_of_fit(&self) -> usize {
+        self.causes.iter().filter(|c| c.is_of_fit()).count()
+    }
+
     /// How much of the deviance causes have explained.
     pub(super) fn explained(&self) -> f64 {
         self.nominal.deviance - self.current.deviance

@@ -2,7 +2,7 @@
 
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
-use super::evidence::{EVIDENCE, is_large_force};
+use super::evidence::{EVIDENCE, is_large_force, penalty};
 use super::fit::{Member, deviance_at, fit, fit_member, scales};
 use super::laboratory::Laboratory;
 use super::leftover::leftover;
@@ -96,6 +96,12 @@ impl<'a> Inference<'a> {
     /// How much of a fit's deviance noise does not account for.
     pub(super) fn misfit_beyond_noise(&self, fitted: &CauseFit) -> f64 {
         (fitted.deviance - self.metric.num_data() as f64).max(0.0)
+    }
+
+    /// The deviance of a fit and what its parameters cost: of two fits the one that costs less explains more for their
+    /// number.
+    pub(super) fn cost_of(&self, fitted: &CauseFit) -> f64 {
+        fitted.deviance + penalty(&self.metric, fitted.num_parameters())
     }
 
     /// Fits a material and causes from where they are.

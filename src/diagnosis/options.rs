@@ -15,8 +15,9 @@ pub struct DiagnosisOptions {
     pub allowance_mm: Option<f64>,
     /// The material as believed; its number of terms is then the nominal one.
     pub prior: Option<Material>,
-    /// Most causes that are named, however they were found; artefacts of the image do not count. No round begins once
-    /// the count is reached.
+    /// Most causes that the displacement is fitted with: no round begins once the count is reached. Effects that the
+    /// load curve tells of do not count (they may go again, once it is known what the displacement tells), nor do
+    /// artefacts of the image.
     pub max_causes: usize,
     /// Drift of the load cell where the recording does not state it, N.
     pub force_sd_n: f64,

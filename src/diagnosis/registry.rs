@@ -168,6 +168,12 @@ impl Registry {
         self.entries.iter().flat_map(of_entry).chain(self.own.iter().cloned()).collect()
     }
 
+    /// The smooth fields without a mechanism ([`Cause::is_sponge`]), from where they start.
+    pub(super) fn sponges(&self, specimen: &Specimen) -> Vec<Supposed> {
+        let sponges = self.tested(specimen).into_iter().filter(|c| c.is_sponge());
+        sponges.map(Supposed::at_start).collect()
+    }
+
     /// The parameters of the causes for which every recording of a specimen is tested, each once: the cause, the
     /// parameter's number among those of that name, and its name.
     pub fn tested_parameters(&self, specimen: &Specimen) -> Vec<(CauseName, usize, String)> {

@@ -80,7 +80,7 @@ pub(super) struct Scored {
 /// How far rounds go.
 #[derive(Clone, Copy)]
 pub(super) struct RoundLimits {
-    /// Most causes that are named in all.
+    /// Most causes of the displacement.
     pub(super) max_causes: usize,
     /// Whether a load curve was read.
     pub(super) has_load_curve: bool,
@@ -96,6 +96,9 @@ pub(super) struct Asked<'r> {
     /// How much each must lower the deviance, beyond ln n per parameter.
     pub(super) evidence: f64,
 }
+
+/// What the next round asks for, given what was found so far; `None` where there is to be none.
+pub(super) type ToAsk<'f, 'r> = &'f dyn Fn(&Inference, &Findings) -> Option<Asked<'r>>;
 
 /// The first half of a round: tests all suspects to first order. Where what is left is no more than a mesh's error, it
 /// has no cause but in the image, for which far more evidence is called for.
@@ -196,9 +199,9 @@ pub(super) fn add_causes<'r>(
     findings: &mut Findings,
     measured: &Trace,
     limits: RoundLimits,
-    to_ask: &dyn Fn(&Inference, &Findings) -> Option<Asked<'r>>,
+    to_ask: ToAsk<'_, 'r>,
 ) -> Result<(), DiagnosisError> {
-    while findings.causes.len() < limits.max_causes {
+    while findings.num_of_fit() < limits.max_causes {
         let Some(asked) = to_ask(inference, findings) else { break };
         let scored = score_round(inference, asked, findings, limits)?;
         if !fit_round(inference, findings, measured, &scored)? {

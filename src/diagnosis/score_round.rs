@@ -177,7 +177,7 @@ pub(super) fn directions_of(
         .iter()
         .map(|cause| {
             let mut all = causes.to_vec();
-            all.push(Supposed { cause: cause.clone(), values: cause.start() });
+            all.push(Supposed::at_start(cause.clone()));
             all
         })
         .collect();

@@ -9,10 +9,11 @@
 //! take the place of free ones where they explain as much.
 
 use super::candidate::Candidate;
-use super::cause::{Cause, Course};
+use super::cause::Course;
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
-use super::evidence::penalty;
+use super::evidence::{EVIDENCE, counted_part, penalty};
+use super::further_term::further_term;
 use super::inference::Inference;
 use super::leftover::leftover;
 use super::registry::Registry;
@@ -20,7 +21,6 @@ use super::score_round::{has_several_drives, score_of_set_up};
 use super::supposed::Supposed;
 use super::thinning::{Needed, thinned};
 use super::trace::Trace;
-use std::sync::Arc;
 
 /// Most iterations of a fit whose weights are still to change.
 const ROUGH_ITERATIONS: usize = 5;
@@ -34,9 +34,6 @@ const SETTLED: f64 = 0.05;
 /// Where a single cause explains more than this part of the misfit, to first order, what the set-up promises is not
 /// worked out.
 const SINGLE_EXPLAINS: f64 = 0.75;
-
-/// A smooth field takes the place of motions where it leaves less than this part of what they leave (rms).
-const SPONGE_LEAVES: f64 = 0.5;
 
 /// Whether the set-up as a whole may explain more than any of `candidates`, to first order.
 ///
@@ -75,8 +72,7 @@ pub(super) fn fit_set_up(
     start: &CauseFit,
 ) -> Result<CauseFit, DiagnosisError> {
     let mut causes = start.causes.clone();
-    let of_cause = |cause: Arc<dyn Cause>| Supposed { values: cause.start(), cause };
-    causes.extend(registry.set_up(inference.laboratory.observed()).into_iter().map(of_cause));
+    causes.extend(registry.set_up(inference.laboratory.observed()).into_iter().map(Supposed::at_start));
     inference.accept_discrepancy(&start.residual);
     let fitted = roughly(inference, |inference| inference.fit(measured, &start.material, &causes))?;
     settled(inference, measured, fitted)
@@ -136,18 +132,18 @@ pub(super) fn with_plain_motions(
         .into_iter()
         .filter(|c| special_cases.contains(&c.name()) && (has_several_drives || !c.needs_several_drives()))
         .filter(|c| !fitted.causes.iter().any(|s| s.cause.identity() == c.identity()))
-        .map(|cause| Supposed { values: cause.start(), cause });
+        .map(Supposed::at_start);
     let is_kept = |c: &&Supposed| registry.special_cases(std::slice::from_ref(*c)).is_empty();
     let mut causes: Vec<Supposed> = fitted.causes.iter().filter(is_kept).cloned().collect();
     causes.extend(plain);
     let Ok(other) = inference.fit(measured, &fitted.material, &causes) else { return Ok(fitted) };
     let other = thinned(inference, measured, other, Needed::BeyondAMesh)?;
-    let cost = |fit: &CauseFit| fit.deviance + penalty(&inference.metric, fit.num_parameters());
-    Ok(if cost(&other) < cost(&fitted) { other } else { fitted })
+    Ok(if inference.cost_of(&other) < inference.cost_of(&fitted) { other } else { fitted })
 }
 
 /// The fit with a smooth field that is alike at all drives in place of motions of the plates that are alike at all
-/// drives, too, or free at each: where it leaves less than [`SPONGE_LEAVES`] of what they leave.
+/// drives, too, or free at each: where it explains more, its gain over theirs counting in part as that of any such field
+/// does. Each of the two has the Ogden terms that it calls for (`with_terms`), so that a missing one does not decide.
 ///
 /// # Errors
 /// As [`fit_set_up`].
@@ -156,18 +152,61 @@ fn with_sponge_for_motions(
     registry: &Registry,
     measured: &Trace,
     fitted: CauseFit,
+    with_terms: bool,
 ) -> Result<CauseFit, DiagnosisError> {
     let observed = inference.laboratory.observed();
     let may_be_alike = |s: &Supposed| s.cause.moves_only_plates() && s.cause.course() != Course::InProportion;
     if !has_several_drives(observed) || !fitted.causes.iter().any(may_be_alike) {
         return Ok(fitted);
     }
-    let sponges = registry.tested(&observed.specimen).into_iter().filter(|c| c.is_sponge());
-    let sponges = sponges.map(|cause| Supposed { values: cause.start(), cause });
+    let sponges = registry.sponges(&observed.specimen);
     let causes: Vec<Supposed> = fitted.causes.iter().filter(|s| !may_be_alike(s)).cloned().chain(sponges).collect();
-    let Ok(other) = inference.fit(measured, &fitted.material, &causes) else { return Ok(fitted) };
-    let left = |fit: &CauseFit| leftover(observed, &fit.residual, &inference.metric).structured_rms_mm;
-    Ok(if left(&other) < SPONGE_LEAVES * left(&fitted) { other } else { fitted })
+    let with_motions = inference.discrepancy_mm2;
+    let left_mm =
+        |inference: &Inference, fit: &CauseFit| leftover(observed, &fit.residual, &inference.metric).structured_rms_mm;
+    // What the motions left must not be what the other fit is weighed by.
+    let other = roughly(inference, |inference| inference.fit(measured, &fitted.material, &causes))
+        .and_then(|other| settled(inference, measured, other))
+        .and_then(|other| if with_terms { with_further_terms(inference, measured, other) } else { Ok(other) });
+    let other = match other {
+        Ok(other) if left_mm(inference, &other) < left_mm(inference, &fitted) => other,
+        Err(error) if (inference.is_cancelled)() => return Err(error),
+        _ => {
+            inference.weigh_by(with_motions);
+            return Ok(fitted);
+        }
+    };
+    // The motions are asked for as many terms.
+    let with_sponge = inference.discrepancy_mm2;
+    inference.weigh_by(with_motions);
+    let fitted = if with_terms { with_further_terms(inference, measured, fitted)? } else { fitted };
+    let with_motions = inference.discrepancy_mm2;
+    inference.weigh_by(with_sponge);
+    let cost = |fit: &CauseFit| inference.misfit_of(&fit.residual) + penalty(&inference.metric, fit.num_parameters());
+    let counted = |s: &Supposed| counted_part(&*s.cause);
+    let counts = other.causes.iter().map(counted).fold(1.0, f64::min);
+    let gain = counts * (cost(&fitted) - cost(&other));
+    (inference.progress)(&format!("a smooth field in place of motions gains {gain:.0}; {EVIDENCE:.0} are called for"));
+    if gain > EVIDENCE {
+        return Ok(other);
+    }
+    inference.weigh_by(with_motions);
+    Ok(fitted)
+}
+
+/// The fit with the further Ogden terms that it calls for, each weighed by what the one before left.
+///
+/// # Errors
+/// As [`fit_set_up`].
+fn with_further_terms(
+    inference: &mut Inference,
+    measured: &Trace,
+    mut fitted: CauseFit,
+) -> Result<CauseFit, DiagnosisError> {
+    while let Some((richer, _)) = further_term(inference, measured, &fitted)? {
+        fitted = settled(inference, measured, richer)?;
+    }
+    Ok(fitted)
 }
 
 /// As far as the set-up is in a fit: the fit without what it does not need.
@@ -179,10 +218,11 @@ pub(super) fn simplest_set_up(
     registry: &Registry,
     measured: &Trace,
     fitted: CauseFit,
+    with_terms: bool,
 ) -> Result<CauseFit, DiagnosisError> {
     let fitted = thinned(inference, measured, fitted, Needed::BeyondAMesh)?;
     let fitted = with_plain_motions(inference, registry, measured, fitted)?;
-    let fitted = with_sponge_for_motions(inference, registry, measured, fitted)?;
+    let fitted = with_sponge_for_motions(inference, registry, measured, fitted, with_terms)?;
     let fitted = settled(inference, measured, fitted)?;
     inference.fit(measured, &fitted.material, &fitted.causes)
 }

@@ -7,7 +7,7 @@
 
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
-use super::evidence::{EVIDENCE, penalty};
+use super::evidence::EVIDENCE;
 use super::inference::Inference;
 use super::registry::Registry;
 use super::score_round::has_several_drives;
@@ -35,8 +35,7 @@ pub(super) fn with_sponge_for_stand_ins(
     if takes_up_already || !may_stand_in || !has_several_drives(observed) {
         return Ok(None);
     }
-    let sponges = registry.tested(&observed.specimen).into_iter().filter(|c| c.is_sponge());
-    let sponges = sponges.map(|cause| Supposed { values: cause.start(), cause });
+    let sponges = registry.sponges(&observed.specimen);
     let causes: Vec<Supposed> = fitted.causes.iter().cloned().chain(sponges).collect();
     if causes.len() == fitted.causes.len() {
         return Ok(None);
@@ -49,8 +48,7 @@ pub(super) fn with_sponge_for_stand_ins(
     };
     let other = thinned(inference, measured, other, Needed::BeyondAMesh)?;
     let has_sponge = other.causes.iter().any(|s| s.cause.is_sponge());
-    let cost = |fit: &CauseFit| fit.deviance + penalty(&inference.metric, fit.num_parameters());
-    let explains_more = cost(&other) + EVIDENCE < cost(fitted);
+    let explains_more = inference.cost_of(&other) + EVIDENCE < inference.cost_of(fitted);
     Ok((has_sponge && other.causes.len() <= fitted.causes.len() && explains_more).then_some(other))
 }
 
@@ -71,7 +69,7 @@ mod tests {
         let (registry, mut inference) = (Registry::standard(), inference_of(&observed));
         let may_stand_in = |c: &Arc<dyn Cause>| ["slack", "offaxis"].contains(&c.name().as_str());
         let causes = registry.tested(&observed.specimen).into_iter().filter(may_stand_in);
-        let causes: Vec<Supposed> = causes.map(|cause| Supposed { values: cause.start(), cause }).collect();
+        let causes: Vec<Supposed> = causes.map(Supposed::at_start).collect();
         assert_eq!(causes.len(), 2);
         let measured = inference.laboratory.measured();
         let fitted = inference.fit(&measured, &material(), &causes).unwrap();

@@ -13,6 +13,13 @@ pub struct Supposed {
     pub values: Vec<f64>,
 }
 
+impl Supposed {
+    /// A cause with the values from which its fit starts.
+    pub fn at_start(cause: Arc<dyn Cause>) -> Supposed {
+        Supposed { values: cause.start(), cause }
+    }
+}
+
 /// The scene of some causes.
 pub fn scene_of(causes: &[Supposed]) -> Scene {
     let mut scene = Scene::default();

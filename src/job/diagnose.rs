@@ -46,7 +46,7 @@ pub struct DiagnosisRequest {
     #[serde(default)]
     #[schema(default = Boundary::default)]
     pub boundary: Boundary,
-    /// Most causes.
+    /// Most causes that the displacement is fitted with.
     #[serde(default = "max_causes")]
     #[schema(minimum = 1, maximum = 20, default = max_causes)]
     pub max_causes: usize,
