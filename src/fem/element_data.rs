@@ -201,6 +201,7 @@ pub struct ElementOutput {
     pub basis: [[Lanes; MAX_GROUPS]; 4],
     /// ∇φ, which is constant over the element, 1/mm.
     pub(super) basis_slope: [[f64; 3]; 4],
+    /// A, `[3 i + J][3 k + L]`; for a stiffness weighted, and pulled back to the reference element.
     pub(super) tangent: Vec<[[Lanes; 9]; 9]>,
     pub(super) work: Box<StiffnessWork>,
 }
