@@ -13,6 +13,16 @@ pub const MAX_NODES: usize = 27;
 /// Groups of eight lanes that cover them.
 pub const MAX_GROUPS: usize = 4;
 
+/// Most places of nodes (and of quadrature points) in the section of an element.
+pub const MAX_SECTION: usize = 9;
+/// Levels l of the row and l′ of the column of what the lower triangle of a stiffness is made of.
+pub const PAIRED_LEVELS: [[usize; 2]; 6] = [[1, 0], [2, 0], [2, 1], [0, 0], [1, 1], [2, 2]];
+/// Groups of lanes that hold a 3×3 block of each of them.
+pub const BLOCK_GROUPS: usize = 7;
+/// For a place s of the rows and a place s′ of the columns: the 3×3 block of each of [`PAIRED_LEVELS`]. The first eight
+/// entries, column by column, stand in a group of lanes of their own, the ninth ones together in the last group.
+pub type Blocks = [Lanes; BLOCK_GROUPS];
+
 /// Constant tables of an element kind.
 pub struct ElementTables {
     /// Nodes, and equally quadrature points (27 or 21).
@@ -26,6 +36,12 @@ pub struct ElementTables {
     pub(super) gradient_by_node: Vec<[[Lanes; MAX_GROUPS]; 3]>,
     /// Quadrature weights; zero in padding lanes.
     pub(super) weight: [Lanes; MAX_GROUPS],
+    /// Nodes, and equally quadrature points, of a section.
+    pub(super) section: usize,
+    /// `[t][c][s]`: the factor of ∂N_a/∂ξ_c that depends on the places of node and point in the section.
+    pub(super) section_functions: [[[f64; MAX_SECTION]; 3]; MAX_SECTION],
+    /// `[3 c + d][m]`: λ_lc(m) λ_l′d(m) of all [`PAIRED_LEVELS`], where λ_lc is the factor that depends on the levels.
+    pub(super) line_products: [[Lanes; 3]; 9],
 }
 
 impl ElementTables {
@@ -42,7 +58,11 @@ impl ElementTables {
             gradient_by_point: vec![[zero; 3]; num],
             gradient_by_node: vec![[zero; 3]; num],
             weight: zero,
+            section: num / 3,
+            section_functions: [[[0.0; MAX_SECTION]; 3]; MAX_SECTION],
+            line_products: [[Lanes::ZERO; 3]; 9],
         };
+        tables.factorise(kind);
         for slot in 0..groups * LANES {
             // Padding lanes repeat the first point with weight zero, so that nothing divides by zero there.
             let q = if slot < num { slot } else { 0 };
@@ -61,6 +81,35 @@ impl ElementTables {
             }
         }
         tables
+    }
+
+    /// Takes the shape functions apart into those of the section and those of the line. Either sum to 1.
+    fn factorise(&mut self, kind: ElementKind) {
+        let (points, section) = (kind.quadrature(), self.section);
+        for t in 0..section {
+            let (n, g) = (kind.shape_functions(points[t].0), kind.shape_gradients(points[t].0));
+            for a in 0..self.num {
+                for c in 0..2 {
+                    self.section_functions[t][c][a % section] += g[a][c];
+                }
+                self.section_functions[t][2][a % section] += n[a];
+            }
+        }
+        for m in 0..3 {
+            let at = points[section * m].0;
+            let (n, g) = (kind.shape_functions(at), kind.shape_gradients(at));
+            let mut line = [[0.0; 3]; 3];
+            for a in 0..self.num {
+                for c in 0..3 {
+                    line[c][a / section] += if c == 2 { g[a][2] } else { n[a] };
+                }
+            }
+            for cd in 0..9 {
+                for (pair, [row, column]) in PAIRED_LEVELS.into_iter().enumerate() {
+                    self.line_products[cd][m].0[pair] = line[cd / 3][row] * line[cd % 3][column];
+                }
+            }
+        }
     }
 
     /// Number of nodes and of quadrature points.
@@ -130,8 +179,8 @@ pub struct ElementOutput {
     pub pressure: [f64; 4],
     /// B: `[m][i][group of nodes]`.
     pub divergence: [[[Lanes; MAX_GROUPS]; 3]; 4],
-    /// K: `[3 b + k][i][group of nodes a]`, valid for a ≥ 8⌊b/8⌋.
-    pub stiffness: Vec<[[Lanes; MAX_GROUPS]; 3]>,
+    /// K: `[9 s′ + s]`, of l = l′ for s ≥ s′ alone.
+    pub stiffness: Vec<Blocks>,
     /// Smallest det F over the quadrature points (the element is unusable where it is not positive).
     pub min_jacobian: f64,
     /// Smallest determinant of the geometry map.
@@ -152,7 +201,25 @@ pub struct ElementOutput {
     pub basis: [[Lanes; MAX_GROUPS]; 4],
     /// ∇φ, which is constant over the element, 1/mm.
     pub(super) basis_slope: [[f64; 3]; 4],
+    /// A, `[3 i + J][3 k + L]`; for a stiffness weighted, and pulled back to the reference element.
     pub(super) tangent: Vec<[[Lanes; 9]; 9]>,
+    pub(super) work: Box<StiffnessWork>,
+}
+
+/// What a stiffness is made of, on the way; see [`super::stiffness_kernel`].
+pub(super) struct StiffnessWork {
+    /// Moduli pulled back to the reference element, `[point][3 c + d]`: the first eight components 3 k + i.
+    pub(super) moduli: [[Lanes; 9]; MAX_NODES],
+    /// The ninth component.
+    pub(super) last_modulus: [[f64; 9]; MAX_NODES],
+    /// A^ll′, `[t][3 c + d]`.
+    pub(super) along_line: [[Blocks; 9]; MAX_SECTION],
+    /// T of a group of lanes, `[s′][t][c]`.
+    pub(super) traction: [[[Lanes; 3]; MAX_SECTION]; MAX_SECTION],
+    /// B of the rows, `[s][m]`.
+    pub(super) divergence: [[Blocks; 4]; MAX_SECTION],
+    /// D B of the columns, `[s′][m]`.
+    pub(super) stiffened: [[Blocks; 4]; MAX_SECTION],
 }
 
 impl Default for ElementOutput {
@@ -164,7 +231,7 @@ impl Default for ElementOutput {
             bulk: [[0.0; 4]; 4],
             pressure: [0.0; 4],
             divergence: [[[Lanes::ZERO; MAX_GROUPS]; 3]; 4],
-            stiffness: vec![[[Lanes::ZERO; MAX_GROUPS]; 3]; 3 * MAX_NODES],
+            stiffness: vec![[Lanes::ZERO; BLOCK_GROUPS]; MAX_SECTION * MAX_SECTION],
             min_jacobian: 0.0,
             min_geometry_jacobian: 0.0,
             deformation_gradient: [tensor; MAX_GROUPS],
@@ -177,6 +244,14 @@ impl Default for ElementOutput {
             basis: [[Lanes::ZERO; MAX_GROUPS]; 4],
             basis_slope: [[0.0; 3]; 4],
             tangent: vec![[[Lanes::ZERO; 9]; 9]; MAX_GROUPS],
+            work: Box::new(StiffnessWork {
+                moduli: [[Lanes::ZERO; 9]; MAX_NODES],
+                last_modulus: [[0.0; 9]; MAX_NODES],
+                along_line: [[[Lanes::ZERO; BLOCK_GROUPS]; 9]; MAX_SECTION],
+                traction: [[[Lanes::ZERO; 3]; MAX_SECTION]; MAX_SECTION],
+                divergence: [[[Lanes::ZERO; BLOCK_GROUPS]; 4]; MAX_SECTION],
+                stiffened: [[[Lanes::ZERO; BLOCK_GROUPS]; 4]; MAX_SECTION],
+            }),
         }
     }
 }

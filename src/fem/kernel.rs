@@ -15,12 +15,13 @@
 //! The constraint is on J, not on ln J: p ln J has the curvature −p/J² in volume changes that θ does not resolve, which
 //! destabilises elements under tension next to the singular bonded edges (seen as indefinite tangents on fine meshes).
 //!
-//! Quadrature points are worked on eight at a time, nodes of the stiffness likewise.
+//! Quadrature points are worked on eight at a time. How K and B are summed over them, [`super::stiffness_kernel`] says.
 
 use super::element_data::{ElementInput, ElementOutput, ElementTables, MAX_GROUPS, MAX_NODES};
 use super::fibre_kernel::{add_fibre_stress, add_fibre_tangent};
 use super::law_kernel::{add_law_stress, add_law_tangent};
-use crate::material::{LANES, Lanes, SpectralState, Tensor};
+use super::stiffness_kernel::{add_pulled_back, stiffness};
+use crate::material::{Lanes, SpectralState, Tensor};
 
 /// A vector at the nodes of an element.
 pub type NodalVector = [[f64; 3]; MAX_NODES];
@@ -286,23 +287,21 @@ pub(super) fn element<const FMA: bool, const TANGENT: bool>(
             }
         }
         if TANGENT {
-            state.material_tangent::<FMA>(input.material, kirchhoff, kirchhoff, &mut out.tangent[g]);
-            if let Some(law) = &input.law {
-                let f = &out.deformation_gradient[g];
-                add_law_tangent(law, f, out.jacobian[g], &out.cofactor[g], &mut out.tangent[g]);
+            let (f, map, moduli) = (&out.deformation_gradient[g], &out.inverse_map[g], &mut out.tangent[g]);
+            let weight = factor * out.volume[g];
+            state.pulled_back(map).material_tangent::<FMA>(input.material, kirchhoff, kirchhoff, moduli);
+            for x in moduli.iter_mut().flatten() {
+                *x = *x * weight;
             }
-            for row in &mut out.tangent[g] {
-                for x in row.iter_mut() {
-                    *x = *x * factor;
-                }
+            if let Some(law) = &input.law {
+                let mut own = [[Lanes::ZERO; 9]; 9];
+                add_law_tangent(law, f, out.jacobian[g], &out.cofactor[g], &mut own);
+                add_pulled_back::<FMA>(&own, map, weight, moduli);
             }
             if let Some(fibre) = &input.fibre {
-                add_fibre_tangent(fibre, &out.deformation_gradient[g], &mut out.tangent[g]);
-            }
-            for row in &mut out.tangent[g] {
-                for x in row.iter_mut() {
-                    *x = *x * out.volume[g];
-                }
+                let mut own = [[Lanes::ZERO; 9]; 9];
+                add_fibre_tangent(fibre, f, &mut own);
+                add_pulled_back::<FMA>(&own, map, out.volume[g], moduli);
             }
         }
     }
@@ -312,116 +311,4 @@ pub(super) fn element<const FMA: bool, const TANGENT: bool>(
         stiffness::<FMA>(tables, out);
     }
     true
-}
-
-/// K and B from the weighted tangents.
-#[inline(always)]
-fn stiffness<const FMA: bool>(tables: &ElementTables, out: &mut ElementOutput) {
-    // Physical gradients with the nodes in lanes: [q][J][group].
-    let mut physical = [[[Lanes::ZERO; MAX_GROUPS]; 3]; MAX_NODES];
-    let mut divergence = [[[Lanes::ZERO; MAX_GROUPS]; 3]; 4];
-    for q in 0..tables.num {
-        let (g, l) = (q / LANES, q % LANES);
-        for j in 0..3 {
-            for c in 0..3 {
-                let m = Lanes::splat(out.inverse_map[g][c][j].0[l]);
-                for n in 0..tables.groups {
-                    physical[q][j][n] = m.mul_add::<FMA>(tables.gradient_by_node[q][c][n], physical[q][j][n]);
-                }
-            }
-        }
-        for i in 0..3 {
-            for n in 0..tables.groups {
-                let mut d = Lanes::ZERO;
-                for j in 0..3 {
-                    d = Lanes::splat(out.cofactor[g][i][j].0[l]).mul_add::<FMA>(physical[q][j][n], d);
-                }
-                for m in 0..4 {
-                    let w = Lanes::splat(out.basis[m][g].0[l] * out.volume[g].0[l]);
-                    divergence[m][i][n] = w.mul_add::<FMA>(d, divergence[m][i][n]);
-                }
-            }
-        }
-    }
-    out.divergence = divergence;
-    // D B.
-    let mut stiffened = [[[Lanes::ZERO; MAX_GROUPS]; 3]; 4];
-    for m in 0..4 {
-        for n in 0..4 {
-            for i in 0..3 {
-                for g in 0..tables.groups {
-                    stiffened[m][i][g] = (divergence[n][i][g] * out.bulk[m][n]) + stiffened[m][i][g];
-                }
-            }
-        }
-    }
-    // For eight columns b and one component k: traction[q][J][i] = Σ_L A_iJkL ∂N_b/∂X_L,
-    // then K_ab = Σ_qJ ∂N_a/∂X_J · traction[q][J][i].
-    let mut traction = [[[Lanes::ZERO; 3]; 3]; MAX_NODES];
-    for block in 0..tables.groups {
-        for k in 0..3 {
-            for q in 0..tables.num {
-                let (g, l) = (q / LANES, q % LANES);
-                let a = &out.tangent[g];
-                for j in 0..3 {
-                    for i in 0..3 {
-                        let row = &a[3 * i + j];
-                        let mut t = Lanes::splat(row[3 * k].0[l]) * physical[q][0][block];
-                        t = Lanes::splat(row[3 * k + 1].0[l]).mul_add::<FMA>(physical[q][1][block], t);
-                        t = Lanes::splat(row[3 * k + 2].0[l]).mul_add::<FMA>(physical[q][2][block], t);
-                        traction[q][j][i] = t;
-                    }
-                }
-            }
-            for lane in 0..LANES.min(tables.num - block * LANES) {
-                let b = block * LANES + lane;
-                let mut column = [[Lanes::ZERO; MAX_GROUPS]; 3];
-                match tables.groups - block {
-                    4 => column_of::<FMA, 4>(tables.num, block, lane, &physical, &traction, &mut column),
-                    3 => column_of::<FMA, 3>(tables.num, block, lane, &physical, &traction, &mut column),
-                    2 => column_of::<FMA, 2>(tables.num, block, lane, &physical, &traction, &mut column),
-                    _ => column_of::<FMA, 1>(tables.num, block, lane, &physical, &traction, &mut column),
-                }
-                for m in 0..4 {
-                    let s = Lanes::splat(stiffened[m][k][block].0[lane]);
-                    for i in 0..3 {
-                        for n in block..tables.groups {
-                            column[i][n] = s.mul_add::<FMA>(divergence[m][i][n], column[i][n]);
-                        }
-                    }
-                }
-                out.stiffness[3 * b + k] = column;
-            }
-        }
-    }
-}
-
-/// One column of the stiffness; `N` groups of rows from `block` on, all accumulators in registers.
-#[inline(always)]
-fn column_of<const FMA: bool, const N: usize>(
-    num: usize,
-    block: usize,
-    lane: usize,
-    physical: &[[[Lanes; MAX_GROUPS]; 3]; MAX_NODES],
-    traction: &[[[Lanes; 3]; 3]; MAX_NODES],
-    column: &mut [[Lanes; MAX_GROUPS]; 3],
-) {
-    let mut sum = [[Lanes::ZERO; N]; 3];
-    for q in 0..num {
-        for j in 0..3 {
-            let t = &traction[q][j];
-            let s = [Lanes::splat(t[0].0[lane]), Lanes::splat(t[1].0[lane]), Lanes::splat(t[2].0[lane])];
-            for n in 0..N {
-                let x = physical[q][j][block + n];
-                for i in 0..3 {
-                    sum[i][n] = s[i].mul_add::<FMA>(x, sum[i][n]);
-                }
-            }
-        }
-    }
-    for i in 0..3 {
-        for n in 0..N {
-            column[i][block + n] = sum[i][n];
-        }
-    }
 }

@@ -57,6 +57,7 @@ mod result;
 mod rotation;
 mod stages;
 mod stiffness;
+mod stiffness_kernel;
 mod substitution;
 mod tangent;
 #[cfg(test)]

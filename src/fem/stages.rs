@@ -44,9 +44,10 @@ impl ForwardModel {
         self.fine.linearisation.system.factor_operations()
     }
 
-    /// Floating-point operations of the matrix products without which no tangent is made, all elements together: the
-    /// lower half of Σ_q ∇N : A : ∇N and of Bᵀ D B. What [`ForwardModel::assemble_stage`] does beside them (kinematics,
-    /// stresses and moduli of the material, adding up) is not counted.
+    /// Floating-point operations of the matrix products that the tangents are made of, all elements together: the sums
+    /// over levels and over places of the section (`fem/stiffness_kernel.rs`), and Bᵀ D B. What
+    /// [`ForwardModel::assemble_stage`] does beside them (kinematics, stresses and moduli of the material, adding up)
+    /// is not counted.
     pub fn stiffness_operations(&self) -> f64 {
         let assembler = &self.fine.assembler;
         stiffness_operations(assembler.tables().num) * assembler.mesh().num_elements() as f64
@@ -55,12 +56,16 @@ impl ForwardModel {
 
 /// Of one element of `num` nodes and as many quadrature points; see [`ForwardModel::stiffness_operations`].
 fn stiffness_operations(num: usize) -> f64 {
-    let unknowns = 3 * num;
-    // At each point A : ∇N_b for all unknowns b: nine entries of three products each.
-    let tractions = num * unknowns * 9 * 3;
-    // Of each entry on or below the diagonal: three products at each point, and four of the pressure.
-    let entries = unknowns * (unknowns + 1) / 2;
-    let products = tractions + entries * (3 * num + 4);
+    let section = num / 3;
+    // Components k, i of three pairs of levels l > l′ and of three with l = l′.
+    let (below, along) = (3 * 9, 3 * 9);
+    // At each place of the section, for c and d: three levels.
+    let line = section * 9 * 3 * (below + along);
+    // Of each place of a node and each of a point, for c: three products.
+    let tractions = section * section * 3 * 3 * (below + along);
+    // Each entry: three products at each place of a point, and four of the pressure.
+    let entries = below * section * section + along * section * (section + 1) / 2;
+    let products = line + tractions + entries * (3 * section + 4);
     // A product is added to a sum.
     2.0 * products as f64
 }
@@ -81,9 +86,9 @@ mod tests {
         let operations = model.factor_operations().expect("a small mesh has a factor");
         let num = model.num_unknowns() as f64;
         assert!(operations < num.powi(3) / 3.0 && operations > 9.0 * num, "{operations} of {num} unknowns");
-        // 81 unknowns: 27·81·27 + 3321·85 products of a hexahedron.
+        // A hexahedron: 9·9·3·54 products along the line, 9·9·9·54 of tractions, 31 of each of 27·(81 + 45) entries.
         let per_element = model.stiffness_operations() / model.mesh().num_elements() as f64;
-        assert_eq!(per_element, 2.0 * (59_049.0 + 282_285.0));
+        assert_eq!(per_element, 2.0 * (13_122.0 + 39_366.0 + 105_462.0));
         assert_eq!(per_element, stiffness_operations(27));
     }
 }

@@ -1,51 +1,49 @@
 //! Element stiffnesses into the blocks of the sparse lower triangle.
 
-use super::element_data::{MAX_GROUPS, MAX_NODES};
+use super::element_data::{BLOCK_GROUPS, Blocks, MAX_NODES, MAX_SECTION, PAIRED_LEVELS};
 use super::topology::{NOT_FREE, Topology};
-use crate::material::{LANES, Lanes};
+
+/// Place among [`PAIRED_LEVELS`].
+fn pair_of(row: usize, column: usize) -> usize {
+    PAIRED_LEVELS.iter().position(|&levels| levels == [row, column]).unwrap_or_default()
+}
 
 impl Topology {
     /// Adds the stiffness of element `e` with these nodes, in the layout of
     /// [`ElementOutput::stiffness`](super::element_data::ElementOutput::stiffness), to the blocks of the lower
     /// triangle.
-    pub(super) fn add_element(
-        &self,
-        e: usize,
-        nodes: &[u32],
-        stiffness: &[[[Lanes; MAX_GROUPS]; 3]],
-        blocks: &mut [[f64; 9]],
-    ) {
-        let n = nodes.len();
+    pub(super) fn add_element(&self, e: usize, nodes: &[u32], stiffness: &[Blocks], blocks: &mut [[f64; 9]]) {
+        let section = nodes.len() / 3;
         let mut places = [NOT_FREE; MAX_NODES];
         for (place, &v) in places.iter_mut().zip(nodes) {
             *place = self.place[v as usize];
         }
+        // In the order of the pairs a ≥ b, b-major.
         let mut pairs = self.pair_blocks(e);
-        for b in 0..n {
-            let (now, rest) = pairs.split_at(n - b);
-            pairs = rest;
-            if places[b] == NOT_FREE {
-                continue;
-            }
-            let columns = &stiffness[3 * b..3 * b + 3];
-            for (a, &block) in (b..n).zip(now) {
-                if places[a] == NOT_FREE {
-                    continue;
-                }
-                let (group, lane) = (a / LANES, a % LANES);
-                let target = &mut blocks[block as usize];
-                if places[a] >= places[b] {
-                    for k in 0..3 {
-                        for i in 0..3 {
-                            target[3 * k + i] += columns[k][i][group].0[lane];
+        for b in 0..nodes.len() {
+            let columns = &stiffness[MAX_SECTION * (b % section)..][..section];
+            for level in b / section..3 {
+                let pair = pair_of(level, b / section);
+                let first = if level == b / section { b % section } else { 0 };
+                let rows = &places[section * level..section * (level + 1)];
+                let (now, rest) = pairs.split_at(section - first);
+                pairs = rest;
+                for ((own, &place), &block) in columns[first..].iter().zip(&rows[first..]).zip(now) {
+                    if place == NOT_FREE || places[b] == NOT_FREE {
+                        continue;
+                    }
+                    let (most, last) = (&own[pair].0, own[BLOCK_GROUPS - 1].0[pair]);
+                    let target = &mut blocks[block as usize];
+                    if place >= places[b] {
+                        for ki in 0..8 {
+                            target[ki] += most[ki];
+                        }
+                    } else {
+                        for ki in 0..8 {
+                            target[ki] += most[3 * (ki % 3) + ki / 3];
                         }
                     }
-                } else {
-                    for k in 0..3 {
-                        for i in 0..3 {
-                            target[3 * k + i] += columns[i][k][group].0[lane];
-                        }
-                    }
+                    target[8] += last;
                 }
             }
         }

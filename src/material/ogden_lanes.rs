@@ -116,6 +116,19 @@ impl SpectralState {
         state
     }
 
+    /// The same state seen from other reference coordinates ξ, `map` being ∂ξ_c/∂X_J: its stress and its tangent are
+    /// P and ∂P/∂F with c in place of J, and d in place of L.
+    #[inline(always)]
+    pub fn pulled_back(mut self, map: &Tensor) -> SpectralState {
+        let axes = self.reference_axes;
+        for c in 0..3 {
+            for a in 0..3 {
+                self.reference_axes[c][a] = map[c][0] * axes[0][a] + map[c][1] * axes[1][a] + map[c][2] * axes[2][a];
+            }
+        }
+        self
+    }
+
     /// α_p, e_ap and m_p of all terms, and of the term that a law acts like.
     #[inline(always)]
     fn powers<'a>(&'a self, material: &'a Material) -> impl Iterator<Item = (f64, &'a [Lanes; 3], Lanes)> {
