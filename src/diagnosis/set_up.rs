@@ -143,7 +143,8 @@ pub(super) fn with_plain_motions(
 
 /// The fit with a smooth field that is alike at all drives in place of motions of the plates that are alike at all
 /// drives, too, or free at each: where it explains more, its gain over theirs counting in part, as that of any such
-/// field does. Each of the two has the Ogden terms that it calls for (`with_terms`), so that a missing one does not decide.
+/// field does. Each of the two has the Ogden terms that it calls for (`with_terms`), so that a missing one does not
+/// decide.
 ///
 /// # Errors
 /// As [`fit_set_up`].
