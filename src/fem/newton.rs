@@ -21,7 +21,7 @@ const LAST_STEP_BELOW: f64 = 1e-4;
 const LOOSE_STEP: f64 = 1e-2;
 
 /// Relative residual below which the tangent at hand is kept for the steps that follow (the chord method): it hardly
-/// changes any more, and a residual alone costs a quarter of residual and tangent.
+/// changes any more, and an element's residual takes a third of the time of both.
 pub(super) const KEEP_TANGENT_BELOW: f64 = 1e-2;
 
 /// A step with a kept tangent must bring the residual down to this part of what it was; else a new one is assembled.
