@@ -94,7 +94,7 @@ impl TextTable {
             }
         }
         // Some programs write the header as a comment, the last one above the numbers.
-        let above = comments.iter().filter(|(line, _)| *line < lines[0].0).next_back();
+        let above = comments.iter().rfind(|(line, _)| *line < lines[0].0);
         if let Some(header) =
             above.map(|&(line, comment)| (line, comment.trim_start().trim_start_matches('#').trim_start()))
             && let Some(separator) = separator_of(header.1)
