@@ -183,10 +183,17 @@ fn bad_input_ends_with_code_two_and_says_why() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("bad.csv"), "a,b\n1,2\n").unwrap();
     std::fs::write(folder.path().join("unit.csv"), "stretch,p11\n1,0\n1.2,3\n").unwrap();
+    std::fs::write(folder.path().join("binary.csv"), b"strain;stress_kpa\n0,1;2\n\xff\0").unwrap();
+    std::fs::write(folder.path().join("soft.json"), r#"{ "schema": "material/1", "terms": [] }"#).unwrap();
     for (arguments, words) in [
         (vec!["uniaxial", "nowhere.csv"], "cannot read"),
         (vec!["uniaxial", "bad.csv"], "no column"),
         (vec!["uniaxial", "unit.csv"], "unit"),
+        (vec!["uniaxial", "binary.csv"], "not text"),
+        (
+            vec!["export", "material", "soft.json"],
+            r#"it must be "ogden/1" or "yeoh/1" or "gent/1" or "arruda_boyce/1""#,
+        ),
         (vec!["curves", "twist=bad.csv"], "twist"),
         (vec!["curves", "unit.csv"], "TEST=FILE"),
     ] {
@@ -195,6 +202,31 @@ fn bad_input_ends_with_code_two_and_says_why() {
         let said = String::from_utf8_lossy(&out.stderr).into_owned();
         assert!(said.contains(words), "{arguments:?}: {said}");
     }
+}
+
+/// The same file in UTF-8, Latin-1 and UTF-16 of either byte order is the same curve.
+#[test]
+fn files_of_older_programs_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows =
+        (1..=8).map(|i| 0.1 * f64::from(i)).map(|e| format!("{};{}\n", 2e4 * e, 17.0 * (1.0 + e - (1.0 + e).powi(-2))));
+    let text = format!("Prüfer;A\nVerlängerung [µm];Spannung [kPa]\n{}", rows.collect::<String>());
+    let utf16 = |bytes: fn(u16) -> [u8; 2]| format!("\u{feff}{text}").encode_utf16().flat_map(bytes).collect();
+    let files: [Vec<u8>; 4] = [
+        text.clone().into_bytes(),
+        text.chars().map(|c| u8::try_from(c).unwrap()).collect(),
+        utf16(u16::to_le_bytes),
+        utf16(u16::to_be_bytes),
+    ];
+    let fits = files.map(|bytes| {
+        std::fs::write(folder.path().join("curve.csv"), bytes).unwrap();
+        let out = run(folder.path(), &["uniaxial", "curve.csv", "--length", "20", "--terms", "1", "--json"]);
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let fit: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+        (fit["files"].to_string(), fit["parameters"].to_string())
+    });
+    assert!(fits[0].0.contains("Verlängerung [µm]") && fits[0].1.contains("alpha_1"), "{:?}", fits[0]);
+    assert!(fits.iter().all(|fit| *fit == fits[0]));
 }
 
 /// Stress of a neo-Hookean strip with one relaxation, at two rates: the command names it and predicts the third rate.

@@ -23,6 +23,6 @@ fuzz_target!(|data: &[u8]| {
     let _ = LoadCurve::from_csv(text, path);
     for face in [None, Some(Face::PlusZ)] {
         let surface = face.map(|face| Surface { face, components: MeasuredComponents::InPlane });
-        let _ = read_points(text, path, surface, &memory());
+        let _ = read_points(text, path, surface, 1.0, &memory());
     }
 });

@@ -63,3 +63,10 @@ pub(super) fn same_mesh(material: &Material) -> (Bench, SyntheticScan) {
     let operator = VoxelOperator::new(&specimen, model.mesh(), &synthetic.mask, Sampling::default()).unwrap();
     (Bench::of_one(model, operator), synthetic)
 }
+
+/// Bounds of s²/σ² over `n` draws at two-sided 99.9 % (Wilson and Hilferty's cube-root approximation of χ²).
+pub(super) fn variance_bounds(n: usize) -> [f64; 2] {
+    let f = (n - 1) as f64;
+    let a = 2.0 / (9.0 * f);
+    [-3.29, 3.29].map(|z: f64| (1.0 - a + z * a.sqrt()).powi(3))
+}

@@ -1,4 +1,4 @@
-use super::super::test_problem::{block, coarse, ogden, scan, truth};
+use super::super::test_problem::{block, coarse, ogden, scan, truth, variance_bounds};
 use super::*;
 use crate::fem::SolveOptions;
 
@@ -13,13 +13,6 @@ fn options(draws: usize) -> VerifyOptions {
         seed: 11,
         fit: FitOptions::default(),
     }
-}
-
-/// Bounds of s²/σ² over `n` draws at two-sided 99.9 % (Wilson and Hilferty's cube-root approximation of χ²).
-fn variance_bounds(n: usize) -> [f64; 2] {
-    let f = (n - 1) as f64;
-    let a = 2.0 / (9.0 * f);
-    [-3.29, 3.29].map(|z: f64| (1.0 - a + z * a.sqrt()).powi(3))
 }
 
 /// On one mesh the scatter is the promised one and nothing shifts.

@@ -2,7 +2,7 @@
 
 use super::error::CliError;
 use super::flag::{Flag, Written};
-use super::input::{read_json, read_study, read_text};
+use super::input::{read_json, read_study, read_table};
 use super::job_command::{Asked, JobCommand, files, value, values};
 use super::results::stem;
 use crate::job::kind_of_command;
@@ -433,7 +433,7 @@ fn read_curves(
         let path = PathBuf::from(file);
         let test = test_named(test, option)?;
         let name = stem(&path);
-        let csv = read_text(&path)?;
+        let csv = read_table(&path)?;
         curves.push(json!({ "test": test, "name": name, "csv": csv, "is_kept_back": is_kept_back(&name, test) }));
         asked.sources.push((format!("/curves/{index}"), path.display().to_string()));
         first.get_or_insert(path);
@@ -476,7 +476,7 @@ fn of_curve(command: Command) -> Command {
 
 fn curve(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliError> {
     let path = PathBuf::from(value(matches, "CURVE"));
-    asked.set("csv", read_text(&path)?, path.display().to_string());
+    asked.set("csv", read_table(&path)?, path.display().to_string());
     asked.set("name", path.display().to_string(), path.display().to_string());
     Ok(path)
 }

@@ -107,7 +107,7 @@ impl Flag {
         let Some(text) = matches.get_one::<String>(self.name) else { return Ok(()) };
         let value = match self.written {
             Written::JsonFile => input::read_json(Path::new(text))?,
-            Written::TextFile => input::read_text(Path::new(text))?.into(),
+            Written::TextFile => input::read_table(Path::new(text))?.into(),
             Written::OrAuto if text == "auto" => return Ok(()),
             Written::MeshFactor => {
                 let size: MeshSize =

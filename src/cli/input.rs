@@ -14,12 +14,40 @@ const MAX_FILE_BYTES: u64 = 256 << 20;
 /// # Errors
 /// [`CliError::Read`]; [`CliError::Input`] for a file that is no regular one, too large, or not text.
 pub fn read_text(path: &Path) -> Result<String, CliError> {
-    let bad = |message: String| CliError::Input { path: path.into(), message };
-    let bytes = read_limited(path, MAX_FILE_BYTES).map_err(|e| match e {
+    let no_text = |_| CliError::Input { path: path.into(), message: "it is not text in UTF-8".into() };
+    String::from_utf8(read_bytes(path)?).map_err(no_text)
+}
+
+/// Text of a table as programs of test machines write it: in UTF-8, in UTF-16 where the file begins with its mark, and
+/// else in Latin-1, in which `µ`, `ü` and `²` are one byte each.
+///
+/// # Errors
+/// As [`read_text`].
+pub fn read_table(path: &Path) -> Result<String, CliError> {
+    let bytes = read_bytes(path)?;
+    let utf16 = |of_pair: fn([u8; 2]) -> u16| {
+        let (pairs, rest) = bytes[2..].as_chunks::<2>();
+        let text = String::from_utf16(&pairs.iter().map(|pair| of_pair(*pair)).collect::<Vec<_>>());
+        text.ok().filter(|_| rest.is_empty())
+    };
+    let text = match bytes.as_slice() {
+        [0xff, 0xfe, ..] => utf16(u16::from_le_bytes),
+        [0xfe, 0xff, ..] => utf16(u16::from_be_bytes),
+        _ => match std::str::from_utf8(&bytes) {
+            Ok(text) => Some(text.into()),
+            Err(_) if bytes.contains(&0) => None,
+            Err(_) => Some(bytes.iter().map(|&byte| char::from(byte)).collect()),
+        },
+    };
+    let message = "it is not text in UTF-8, UTF-16 or Latin-1";
+    text.ok_or_else(|| CliError::Input { path: path.into(), message: message.into() })
+}
+
+fn read_bytes(path: &Path) -> Result<Vec<u8>, CliError> {
+    read_limited(path, MAX_FILE_BYTES).map_err(|e| match e {
         ReadError::Io(source) => CliError::Read { path: path.into(), source },
-        other => bad(other.to_string()),
-    })?;
-    String::from_utf8(bytes).map_err(|_| bad("it is not text in UTF-8".into()))
+        other => CliError::Input { path: path.into(), message: other.to_string() },
+    })
 }
 
 /// JSON of a file.

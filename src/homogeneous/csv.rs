@@ -1,9 +1,10 @@
 //! Reading curves as test machines write them: columns and units by their names.
 //!
 //! The header is the first line that names a drive and a stress; what stands before it is skipped and counted, and so
-//! are empty lines and comments (`#`). Cells are parted by semicolons, tabs, commas or blanks; with the first two, and
-//! in quotation marks, numbers may have decimal commas. Upper and lower case, blanks and underscores are alike. Units
-//! end the name (`Load [N]`, `Weg/mm`, `force_n`) or stand in a line below the header.
+//! are empty lines and comments (`#`), but for the last comment above the numbers where no line is a header. Cells are
+//! parted by semicolons, tabs, commas or blanks; with the first two, and in quotation marks, numbers may have decimal
+//! commas. Upper and lower case, blanks and underscores are alike. Units end the name (`Load [N]`, `Weg/mm`, `force_n`)
+//! or stand in a line below the header.
 //!
 //! | What | Column names, in order of preference |
 //! |---|---|
@@ -211,6 +212,7 @@ mod tests {
         let none = CsvOptions::default();
         assert!(matches!(read("", &none), Err(CsvError::Empty { what: "header" })));
         assert!(matches!(read("stretch,stress_kpa\n", &none), Err(CsvError::Empty { what: "rows" })));
+        assert!(matches!(read("0,0\n0.1,2\n", &none), Err(CsvError::Empty { what: "header" })));
         assert!(matches!(read("a,b\n1,2\n", &none), Err(CsvError::NoColumn { .. })));
         assert!(matches!(read("stretch,p11\n1,2\n", &none), Err(CsvError::NoUnit { .. })));
         assert!(matches!(read("stretch,stress_kpa\n1,x\n", &none), Err(CsvError::NotANumber { line: 2, .. })));
@@ -269,9 +271,24 @@ mod tests {
         assert_eq!((c.drive[0], c.stress[0], c.reading.num_preamble_lines), (1.5, 2.0, 1));
     }
 
+    /// Cells that say that there is no number are left out; a header may be the comment above the numbers.
+    #[test]
+    fn gaps_and_headers_in_comments_are_read() {
+        let none = CsvOptions::default();
+        let c = read("strain,stress_kpa\n0,0\n0.1,---\n-,1\n0.2,N/A\n0.3,#NV\n0.4,8\n", &none).unwrap();
+        assert_eq!((c.drive, c.stress, c.num_left_out), (vec![1.0, 1.4], vec![0.0, 8.0], 4));
+        let c = read("# made by a script\n# strain stress_kpa\n0.0 0.0\n0.5 2.0\n# end\n", &none).unwrap();
+        assert_eq!((c.drive, c.stress), (vec![1.0, 1.5], vec![0.0, 2.0]));
+        let c = read("# strain of the grips, stress_kpa\nstretch,stress_kpa\n1.5,2.0\n", &none).unwrap();
+        assert_eq!((c.drive, c.stress), (vec![1.5], vec![2.0]));
+    }
+
     #[test]
     fn compression_is_turned() {
         let none = CsvOptions::default();
+        let c = read("Compression [%],force_n\n0,0\n10,5\n", &CsvOptions { area_mm2: Some(100.0), ..none.clone() });
+        let c = c.unwrap();
+        assert_eq!((c.drive[1], c.stress[1]), (0.9, -50.0));
         let c = read("Compressive strain [%];Compressive stress [kPa]\n0;0\n10;5\n", &none).unwrap();
         assert_eq!((c.drive[1], c.stress[1]), (0.9, -5.0));
     }

@@ -97,6 +97,9 @@ impl Header {
             let best = ["engineering strain", "nominal strain", "strain", "dehnung"];
             return Some((best.iter().position(|n| self.is(&[n])).map_or(5, |p| p + 1), strain));
         }
+        if matches!(self.unit, Some(Unit::Ratio(_))) && self.is(&["compression"]) {
+            return Some((5, strain));
+        }
         if !may_be_length {
             return None;
         }

@@ -8,6 +8,9 @@ const MAX_ROWS: usize = 1_000_000;
 /// Most lines before the header.
 const MAX_PREAMBLE: usize = 500;
 
+/// What stands in a cell without a number, beside dashes.
+const NO_NUMBER: [&str; 5] = ["n/a", "na", "#n/a", "#nv", "null"];
+
 /// What parts the cells of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Separator {
@@ -78,23 +81,25 @@ impl TextTable {
     /// [`CsvError`]. Where no line is a header, the names are those of the line that could best be one, and there are
     /// no rows.
     pub fn read(text: &str, is_header: &dyn Fn(&[String]) -> bool) -> Result<TextTable, CsvError> {
-        let is_said = |line: &str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
-        let lines: Vec<Line> = text
-            .trim_start_matches('\u{feff}')
-            .lines()
-            .enumerate()
-            .filter(|(_, l)| is_said(l))
-            .map(|(index, l)| (index + 1, l))
-            .collect();
+        let all = text.trim_start_matches('\u{feff}').lines().enumerate().map(|(index, l)| (index + 1, l));
+        let (comments, lines): (Vec<Line>, Vec<Line>) =
+            all.filter(|(_, l)| !l.trim().is_empty()).partition(|(_, l)| l.trim_start().starts_with('#'));
         if lines.is_empty() {
             return Err(CsvError::Empty { what: "header" });
         }
+        let separator_of = |line: &str| Separator::ALL.into_iter().find(|s| is_header(&s.cells(line)));
         for at in 0..lines.len().min(MAX_PREAMBLE) {
-            for separator in Separator::ALL {
-                if is_header(&separator.cells(lines[at].1)) {
-                    return TextTable::below(&lines, at, separator);
-                }
+            if let Some(separator) = separator_of(lines[at].1) {
+                return TextTable::below(&lines, at, separator);
             }
+        }
+        // Some programs write the header as a comment, the last one above the numbers.
+        let above = comments.iter().rfind(|(line, _)| *line < lines[0].0);
+        if let Some(header) =
+            above.map(|&(line, comment)| (line, comment.trim_start().trim_start_matches('#').trim_start()))
+            && let Some(separator) = separator_of(header.1)
+        {
+            return TextTable::below(&[&[header], &lines[..]].concat(), 0, separator);
         }
         // The line above the first numbers is what was meant: the caller says which column it does not find in it.
         let numbers = |cells: &[String]| cells.iter().filter(|c| is_number(c, true)).count();
@@ -104,7 +109,7 @@ impl TextTable {
             Separator::ALL.into_iter().rev().max_by_key(cells).unwrap_or(Separator::Comma)
         };
         let first = lines.iter().position(|(_, line)| numbers(&most_cells(line).cells(line)) >= 2).unwrap_or(1);
-        let at = first.saturating_sub(1);
+        let Some(at) = first.checked_sub(1) else { return Err(CsvError::Empty { what: "header" }) };
         let names = most_cells(lines[at].1).cells(lines[at].1);
         Ok(TextTable { names, units: Vec::new(), num_preamble: at, has_decimal_comma: false, rows: Vec::new() })
     }
@@ -155,14 +160,14 @@ impl TextTable {
         self.rows.len()
     }
 
-    /// The number in a cell; NaN where it is empty.
+    /// The number in a cell; NaN where it is empty or says that there is none.
     ///
     /// # Errors
     /// [`CsvError::NotANumber`].
     pub fn number(&self, row: usize, column: usize) -> Result<f64, CsvError> {
         let (line, cells) = &self.rows[row];
         let cell = cells[column].as_str();
-        if cell.is_empty() {
+        if cell.trim_matches('-').is_empty() || NO_NUMBER.iter().any(|text| cell.eq_ignore_ascii_case(text)) {
             return Ok(f64::NAN);
         }
         let refused = || CsvError::NotANumber { line: *line, text: cell.into() };

@@ -400,7 +400,10 @@ impl CheckedImport {
                     let num_bytes = std::fs::metadata(path).map_err(|e| fail(&e))?.len();
                     memory.take("a table of points", num_bytes).map_err(|e| fail(&e))?;
                     let text = crate::file::read_text_limited(path, num_bytes).map_err(|e| fail(&e))?;
-                    steps.push(read_points(&text, path, self.request.surface, &memory).map_err(|e| fail(&e))?);
+                    steps.push(
+                        read_points(&text, path, self.request.surface, options.unit_mm, &memory)
+                            .map_err(|e| fail(&e))?,
+                    );
                     memory.give_back(num_bytes);
                 }
                 let voxel = options.voxel_mm_by_index;

@@ -163,7 +163,18 @@ impl RequestSchema {
     }
 
     /// One branch must fit; of those that do not, the errors of the one that fits best are told.
+    /// Files of several formats say themselves which one is meant.
     fn check_branches(&self, branches: &[Value], value: &Value, pointer: &str, errors: &mut Vec<FieldError>) {
+        let formats: Option<Vec<&Value>> = branches.iter().map(|branch| self.format_of(branch)).collect();
+        if let (Some(formats), Value::Object(fields)) = (formats, value) {
+            let said = fields.get("schema");
+            if let Some(at) = said.and_then(|said| formats.iter().position(|format| *format == said)) {
+                return self.check(&branches[at], value, pointer, errors);
+            }
+            let words: Vec<String> = formats.into_iter().map(Value::to_string).collect();
+            let said = said.map(shown).unwrap_or_default();
+            return errors.push(FieldError::new(format!("{pointer}/schema"), said, words.join(" or ")));
+        }
         let mut best: Option<Vec<FieldError>> = None;
         for branch in branches {
             let mut found = Vec::new();
@@ -179,6 +190,15 @@ impl RequestSchema {
             }
         }
         errors.extend(best.unwrap_or_default());
+    }
+
+    /// The only text that the field `schema` of an object may hold; `None` of other types.
+    fn format_of<'a>(&'a self, schema: &'a Value) -> Option<&'a Value> {
+        let field = self.resolved(self.resolved(schema).get("properties")?.get("schema")?);
+        match field.get("enum").and_then(Value::as_array)?.as_slice() {
+            [only] => Some(only),
+            _ => None,
+        }
     }
 
     fn check_object(&self, schema: &Value, fields: &Map<String, Value>, pointer: &str, errors: &mut Vec<FieldError>) {

@@ -90,7 +90,8 @@ pub fn axes_of_affine(named: &NamedImage) -> Result<[IndexAxis; 3], ImportError>
 }
 
 /// A recording from images: those with a vector per voxel are its steps (several, where they hold several times), in
-/// their order; one with a number per voxel is the mask.
+/// their order; one with a number per voxel is the mask. Without one the sample is where all displacements are numbers
+/// and one at least is not zero.
 ///
 /// The frame of the vectors is `frame`, else [`VectorFrame::Lps`] for the intent of a plain vector, which ITK and ANTs
 /// write, and [`VectorFrame::Ras`] for any other. `unit_mm` of the options is the unit of the displacements, and of the
@@ -113,6 +114,10 @@ pub fn recording_from_images(
     let num_voxels: usize = size.iter().product();
     let numeric = |values: Vec<f64>| MatValue::Numeric { dims: size.to_vec(), values, imaginary: None };
     let (mut steps, mut mask) = (Vec::new(), None);
+    // Registration programs write zeros or no numbers where there is no sample.
+    memory.take("where the sample is", 2 * num_voxels as u64)?;
+    let mut is_sample = vec![false; num_voxels];
+    let mut is_number = vec![true; num_voxels];
     for named in images {
         let image = &named.image;
         let is_same = [0, 1, 2].map(|i| image.shape[i]) == size
@@ -137,6 +142,10 @@ pub fn recording_from_images(
         };
         let by_intent = if image.intent == INTENT_VECTOR { VectorFrame::Lps } else { VectorFrame::Ras };
         let along = directions_of_vectors(frame.unwrap_or(by_intent), &units);
+        for (n, &value) in image.values.iter().enumerate() {
+            is_sample[n % num_voxels] |= value.abs() > 0.0;
+            is_number[n % num_voxels] &= value.is_finite();
+        }
         for time in 0..num_times {
             memory.take_values::<f64>("displacements", 3 * num_voxels as u64)?;
             let start = |component: usize| (component * num_times + time) * num_voxels;
@@ -151,6 +160,11 @@ pub fn recording_from_images(
     if steps.is_empty() {
         let found = images.iter().map(|n| n.path.display().to_string()).collect::<Vec<_>>().join(", ");
         return Err(ImportError::Missing { what: "with a displacement per voxel", found });
+    }
+    is_sample.iter_mut().zip(is_number).for_each(|(is_sample, is_number)| *is_sample &= is_number);
+    if mask.is_none() && is_sample.contains(&false) && is_sample.contains(&true) {
+        memory.take_values::<f64>("a mask", num_voxels as u64)?;
+        mask = Some(numeric(is_sample.iter().map(|&is_sample| f64::from(u8::from(is_sample))).collect()));
     }
     let mut variables = vec![("U_t".to_string(), MatValue::Cell { dims: vec![1, steps.len()], members: steps })];
     variables.extend(mask.map(|mask| ("mask".to_string(), mask)));

@@ -123,6 +123,30 @@ fn axes_follow_from_the_affine() {
     }
 }
 
+/// Zeros or no numbers around the sample, as registration programs write them, are no part of it: the box that is
+/// centred is the sample's.
+#[test]
+fn zeros_around_the_sample_are_a_mask() {
+    let inner = image(axes("x,y,z"), &rotation(0, 0.0), VectorFrame::Ras, INTENT_DISPLACEMENT);
+    let options = ImportOptions { axes: axes("x,y,z"), ..ImportOptions::default() };
+    for around in [0.0, f64::NAN] {
+        // One layer of voxels before and three behind along the length, two behind along the thickness.
+        let (before, shape) = (1, [SHAPE[0] + 4, SHAPE[1] + 2, SHAPE[2]]);
+        let (n, large) = (SHAPE.iter().product::<usize>(), shape.iter().product::<usize>());
+        let mut values = vec![around; 3 * large];
+        for v in 0..n {
+            let at = [v % SHAPE[0], v / SHAPE[0] % SHAPE[1], v / (SHAPE[0] * SHAPE[1])];
+            for c in 0..3 {
+                values[c * large + at[0] + before + shape[0] * (at[1] + shape[1] * at[2])] =
+                    inner.image.values[c * n + v];
+            }
+        }
+        let image = Image { shape: [shape[0], shape[1], shape[2], 1, 3], values, ..inner.image.clone() };
+        let named = NamedImage { path: "u.nii.gz".into(), image };
+        check(&recording_from_images(&[named], &specimen(), None, &options, &memory()).unwrap());
+    }
+}
+
 #[test]
 fn masks_and_times_are_read_and_other_grids_refused() {
     let plain = rotation(0, 0.0);

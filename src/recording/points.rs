@@ -34,8 +34,10 @@ pub struct DisplacementPoint {
     pub sd: Option<f64>,
 }
 
-/// Reads a table with a header. Column names may carry a unit (`x_mm`, `ux_mm`); their order is free. Of points on a
-/// `surface`, the position along its normal may be left out, and the displacement along it where it is not measured.
+/// Reads a table with a header, whose cells are parted by commas, or by semicolons or tabs, where numbers may have
+/// decimal commas. The order of columns is free. A name may carry a unit (`x_mm`, `U [um]`); other numbers have the
+/// file's, `unit_mm`. The displacements may be called `u`, `v`, `w`. Of points on a `surface`, the position along its
+/// normal may be left out, and the displacement along it where it is not measured.
 ///
 /// # Errors
 /// [`ImportError::Table`].
@@ -43,21 +45,17 @@ pub fn read_points(
     text: &str,
     path: &Path,
     surface: Option<Surface>,
+    unit_mm: f64,
     memory: &ReadingMemory,
 ) -> Result<Vec<DisplacementPoint>, ImportError> {
     let fail = |line: usize, message: String| ImportError::Table { path: path.into(), line, message };
     let mut lines = text.lines().enumerate();
     let header = lines.next().map_or("", |(_, l)| l.trim().trim_start_matches('\u{feff}'));
-    if header.split(',').nth(MAX_COLUMNS).is_some() {
+    let separator = [';', '\t'].into_iter().find(|s| header.contains(*s)).unwrap_or(',');
+    if header.split(separator).nth(MAX_COLUMNS).is_some() {
         return Err(fail(1, format!("more than {MAX_COLUMNS} columns; x,y,z,ux,uy,uz,w,sd are known")));
     }
-    let names: Vec<String> = header
-        .split(',')
-        .map(|n| {
-            let name = n.trim().to_lowercase();
-            name.trim_end_matches("_mm").trim_end_matches("_um").trim_end_matches("_m").to_string()
-        })
-        .collect();
+    let (names, units_mm) = names_and_units(header.split(separator));
     let column = |name: &str| names.iter().position(|n| n == name);
     let needed = needed_columns(surface);
     let mut columns = [None; 6];
@@ -79,13 +77,16 @@ pub fn read_points(
         }
         // A list that grows holds its old place beside the new one.
         memory.take_values::<[DisplacementPoint; 2]>("the points", 1)?;
-        let fields: Vec<&str> = line.split(',').take(names.len()).map(str::trim).collect();
+        let fields: Vec<&str> = line.split(separator).take(names.len()).map(|f| f.trim().trim_matches('"')).collect();
         let number = |column: usize| -> Result<f64, ImportError> {
-            match fields.get(column) {
+            let value: Result<f64, _> = match fields.get(column) {
                 Some(&("" | "nan" | "NaN")) => Ok(f64::NAN),
-                Some(text) => text.parse().map_err(|_| fail(n + 1, format!("'{text}' is not a number"))),
-                None => Err(fail(n + 1, format!("{} fields where {} are needed", fields.len(), names.len()))),
-            }
+                Some(text) if separator != ',' && !text.contains('.') => text.replacen(',', ".", 1).parse(),
+                Some(text) => text.parse(),
+                None => return Err(fail(n + 1, format!("{} fields where {} are needed", fields.len(), names.len()))),
+            };
+            let in_unit = units_mm[column].map_or(1.0, |own_mm| own_mm / unit_mm);
+            value.map(|v| v * in_unit).map_err(|_| fail(n + 1, format!("'{}' is not a number", fields[column])))
         };
         let mut values = [0.0; 6];
         for (value, &column) in values.iter_mut().zip(&columns) {
@@ -106,6 +107,32 @@ pub fn read_points(
         return Err(fail(1, "there is no point".into()));
     }
     Ok(points)
+}
+
+/// Names of columns in lower case, and the units that they end in, mm.
+fn names_and_units<'a>(cells: impl Iterator<Item = &'a str>) -> (Vec<String>, Vec<Option<f64>>) {
+    let of_cell = |cell: &str| {
+        let text = cell.trim().trim_matches('"').trim().to_lowercase();
+        let end = text.rfind(['_', '[', '(']).unwrap_or(text.len());
+        let unit_mm = match text[end..].trim_matches(['_', '[', ']', '(', ')', ' ']) {
+            "mm" => 1.0,
+            "um" | "µm" | "μm" => 1e-3,
+            "m" => 1e3,
+            _ => return (text, None),
+        };
+        (text[..end].trim_end().to_string(), Some(unit_mm))
+    };
+    let (mut names, units_mm): (Vec<String>, Vec<Option<f64>>) = cells.map(of_cell).unzip();
+    let has = |name: &str| names.iter().any(|n| n == name);
+    // Programs of cameras call the displacements so; beside other names `w` is a weight.
+    if has("u") && has("v") && !["ux", "uy", "uz"].into_iter().any(has) {
+        for name in &mut names {
+            if let Some((_, ours)) = [("u", "ux"), ("v", "uy"), ("w", "uz")].into_iter().find(|(own, _)| own == name) {
+                *name = ours.into();
+            }
+        }
+    }
+    (names, units_mm)
 }
 
 /// The columns of positions and displacements.

@@ -32,7 +32,7 @@ fn points_on_a_grid_become_voxels() {
     }
     lines.rotate_left(117);
     let text = format!("x_mm,y_mm,z_mm,ux_mm,uy_mm,uz_mm,sd\n{}\n", lines.join("\n"));
-    let points = read_points(&text, path(), None, &memory(1 << 20)).unwrap();
+    let points = read_points(&text, path(), None, 1.0, &memory(1 << 20)).unwrap();
     assert_eq!(points.len(), 319);
     let r =
         recording_from_points(&[points], &specimen(), None, None, &ImportOptions::default(), &memory(1 << 26)).unwrap();
@@ -57,7 +57,7 @@ fn scattered_points_are_averaged() {
         text +=
             &format!("{x},{y},{z},{},0,0,{}\n", if n % 2 == 0 { 1.0 } else { 4.0 }, if n % 2 == 0 { 2.0 } else { 1.0 });
     }
-    let points = read_points(&text, path(), None, &memory(1 << 23)).unwrap();
+    let points = read_points(&text, path(), None, 1.0, &memory(1 << 23)).unwrap();
     let read = |voxel| {
         recording_from_points(
             std::slice::from_ref(&points),
@@ -93,7 +93,7 @@ fn points_of_a_face_are_its_subsets() {
     let of_one = seen(Face::PlusZ, MeasuredComponents::InPlane);
     let read = |text: &str, surface, unit_mm| {
         let options = ImportOptions { unit_mm, ..ImportOptions::default() };
-        let points = read_points(text, path(), surface, &memory(1 << 20))?;
+        let points = read_points(text, path(), surface, 1.0, &memory(1 << 20))?;
         recording_from_points(&[points], &specimen(), None, surface, &options, &memory(1 << 26))
     };
     for text in [&plain, &with_place] {
@@ -106,7 +106,7 @@ fn points_of_a_face_are_its_subsets() {
         }
     }
     // Averaged in subsets of 5.08 × 1.6 mm: means of linear fields.
-    let points = read_points(&plain, path(), of_one, &memory(1 << 20)).unwrap();
+    let points = read_points(&plain, path(), of_one, 1.0, &memory(1 << 20)).unwrap();
     let options = ImportOptions::default();
     let voxel = Some([5.08, 1.6, 1.0]);
     let r = recording_from_points(&[points], &specimen(), voxel, of_one, &options, &memory(1 << 26)).unwrap();
@@ -131,14 +131,47 @@ fn poor_tables_are_typed_errors() {
         "x,y,z,ux,uy,uz\nnan,2,3,4,5,6\n",
         "x,y,z,ux,uy,uz,w\n1,2,3,4,5,6,-1\n",
     ] {
-        assert!(matches!(read_points(text, path(), None, &memory(2000)), Err(ImportError::Table { .. })), "{text}");
+        assert!(
+            matches!(read_points(text, path(), None, 1.0, &memory(2000)), Err(ImportError::Table { .. })),
+            "{text}"
+        );
     }
     let many = "x,y,z,ux,uy,uz\n".to_string() + &"1,2,3,4,5,6\n".repeat(11);
-    assert!(matches!(read_points(&many, path(), None, &memory(1000)), Err(ImportError::Memory(_))));
-    let one = read_points("x,y,z,ux,uy,uz\n1,2,3,4,5,6\n", path(), None, &memory(2000)).unwrap();
+    assert!(matches!(read_points(&many, path(), None, 1.0, &memory(1000)), Err(ImportError::Memory(_))));
+    let one = read_points("x,y,z,ux,uy,uz\n1,2,3,4,5,6\n", path(), None, 1.0, &memory(2000)).unwrap();
     let read = |steps: &[Vec<DisplacementPoint>]| {
         recording_from_points(steps, &specimen(), None, None, &ImportOptions::default(), &memory(1 << 26)).unwrap_err()
     };
     assert!(matches!(read(std::slice::from_ref(&one)), ImportError::NoGrid { .. }));
     assert!(matches!(read(&[one.clone(), one]), ImportError::Drives { .. }));
+}
+
+/// One table as several programs write it.
+#[test]
+fn tables_of_cameras_are_read() {
+    let read = |text: &str, surface: &str, unit_mm: f64| {
+        read_points(text, path(), surface.parse().ok(), unit_mm, &memory(1 << 20)).unwrap()
+    };
+    let expected = read("x,y,z,ux,uy,uz\n1,2,9.5,0.25,,0.125\n", "+z,all", 1.0);
+    for text in [
+        "\"X [mm]\";\"Y [mm]\";Z [mm];U [um];V [um];W [um]\n1,0;2,0;9,5;250;;125\n",
+        "x\ty\tz\tu\tv\tw\n\"1,0\"\t2.0\t9,5\t0,25\tnan\t0,125\n",
+        "x_um,y_um,z_um,ux_m,uy_m,uz_m\n1000,2000,9500,2.5e-4,,1.25e-4\n",
+    ] {
+        let points = read(text, "+z,all", 1.0);
+        assert_eq!(points.len(), 1);
+        for (found, wanted) in [points[0].position, points[0].displacement]
+            .iter()
+            .flatten()
+            .zip([expected[0].position, expected[0].displacement].iter().flatten())
+        {
+            // The factors of units round.
+            assert!((found - wanted).abs() < 1e-14 || found.is_nan() && wanted.is_nan(), "{text}: {points:?}");
+        }
+    }
+    let weighed = read("x,y,ux,uy,w\n1,2,3,4,5\n", "+z", 1.0);
+    assert_eq!((weighed[0].weight, weighed[0].displacement[..2].to_vec()), (5.0, vec![3.0, 4.0]));
+    // In a file of metres a column of millimetres is one of thousandths.
+    let metres = read("x,y,ux_mm,uy\n1,2,3,4\n", "+z", 1e3);
+    assert!((metres[0].displacement[0] - 3e-3).abs() < 1e-17 && metres[0].position[0].total_cmp(&1.0).is_eq());
 }

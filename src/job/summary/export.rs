@@ -9,8 +9,8 @@ pub(in crate::job) fn export_material(name: &str, cards: &[Card]) -> String {
     for card in cards {
         text += &format!("\n{}\n  volume: {}\n", card.program, card.volumetric_law.meaning());
         for c in &card.constants {
-            let unit = if c.unit == "1" { "" } else { c.unit.as_str() };
-            text += &format!("  {:<8} {:>14} {unit}\n", c.name, num(c.value, 6));
+            let unit = if c.unit == "1" { String::new() } else { format!(" {}", c.unit) };
+            text += &format!("  {:<8} {:>14}{unit}\n", c.name, num(c.value, 6));
         }
     }
     text
