@@ -111,6 +111,8 @@ impl Run<'_> {
             && is_set_up_promising(inference, first.registry, &findings.current, &scored.candidates)?;
         // What was left of the deviance after each cause so far.
         let lefts = RefCell::new(vec![inference.misfit_beyond_noise(&findings.current)]);
+        // Whether the last round asked for all causes.
+        let are_all_asked = Cell::new(!does_inside_wait);
         let are_given_up = Cell::new(false);
         let to_ask = |inference: &Inference, findings: &Findings| {
             let left = left_mm(&findings.current, &inference.metric);
@@ -118,14 +120,16 @@ impl Run<'_> {
             let is_explained = is_explained(left, before_mm, inference.allowance_mm);
             are_given_up.set(is_promising && !is_explained && explain_ever_less(&lefts.borrow()));
             let are_most_explained = matches!(lefts.borrow()[..], [before, .., last] if last < MOST * before);
-            let asked = if is_explained || are_most_explained { everything } else { first };
-            (!are_given_up.get()).then_some(asked)
+            let asks_all = !does_inside_wait || is_explained || are_most_explained;
+            let asked = (!are_given_up.get()).then_some(if asks_all { everything } else { first });
+            are_all_asked.set(asks_all && asked.is_some());
+            asked
         };
         if fit_round(inference, findings, &measured, &scored)? {
             add_causes(inference, findings, &measured, limits, &to_ask)?;
         }
         self.replace_stand_ins(&measured, limits, &to_ask)?;
-        let are_all_asked = !(does_inside_wait || are_given_up.get());
+        let are_all_asked = are_all_asked.get();
         if are_all_asked {
             self.start_otherwise(begun, &measured, limits)?;
             self.fit_material_anew(&measured, limits)?;

@@ -21,8 +21,14 @@ fn shared_residuals_widen_intervals_as_much_as_they_scatter_estimates() {
     let mut laboratory = Laboratory::new(&observed, &MeshOptions::scaled(&observed.specimen, MESH_FACTOR)).unwrap();
     let metric = Metric::new(&observed, 1e-6, &|_| true);
     let bulk = BulkPrior { center_kpa: material().bulk_kpa, log_sd: 0.5 };
-    let settings =
-        FitSettings { max_iterations: 12, bulk, shear: None, tolerance: 0.1 * EVIDENCE, relative_tolerance: 0.0 };
+    let settings = FitSettings {
+        max_iterations: 12,
+        bulk,
+        shear: None,
+        tolerance: 0.1 * EVIDENCE,
+        relative_tolerance: 0.0,
+        goal: None,
+    };
     let measured = laboratory.measured();
     let fitted = fit(&mut laboratory, &metric, &measured, &material(), &[], &settings, &|| false).unwrap();
     let columns = derivatives(&mut laboratory, &fitted.material, &[], &fitted.prediction).unwrap();

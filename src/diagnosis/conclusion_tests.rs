@@ -72,7 +72,14 @@ fn voxels_kept_back_are_predicted_as_by_fits_to_the_others() {
     let mut inference = Inference {
         laboratory: Laboratory::new(&observed, &MeshOptions::scaled(&observed.specimen, MESH_FACTOR)).unwrap(),
         metric: Metric::new(&observed, allowance_mm, &|_| true),
-        settings: FitSettings { max_iterations: 20, bulk, shear: None, tolerance: 1e-3, relative_tolerance: 0.0 },
+        settings: FitSettings {
+            max_iterations: 20,
+            bulk,
+            shear: None,
+            tolerance: 1e-3,
+            relative_tolerance: 0.0,
+            goal: None,
+        },
         nominal_bulk: bulk,
         believed_bulk: bulk,
         allowance_mm,

@@ -149,6 +149,7 @@ impl<'a> Run<'a> {
             shear,
             tolerance: TOLERANCE,
             relative_tolerance: 0.0,
+            goal: None,
         };
         progress(&format!("fitting the nominal model ({num_unknowns} unknowns)"));
         let mut inference = Inference {

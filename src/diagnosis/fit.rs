@@ -3,7 +3,7 @@
 use super::cause::CauseParameter;
 use super::cause_fit::CauseFit;
 use super::error::DiagnosisError;
-use super::laboratory::{Laboratory, Prediction};
+use super::laboratory::{Laboratory, Prediction, Starts};
 use super::metric::{Metric, Weighed};
 use super::prior::{FitSettings, shear_modulus};
 use super::supposed::{Path, Supposed, paths_of, scene_of};
@@ -26,6 +26,9 @@ pub const STEP: f64 = 0.02;
 const LARGEST_STEP: f64 = 0.4;
 /// Largest change of a cause's parameter in one step, in scales of the parameter.
 const LARGEST_CAUSE_STEP: f64 = 6.0;
+/// A fit lowers the deviance by so many times what its next step promises at most: a step may be shortened, or the way
+/// bend, but what promises less than a tenth of what is called for does not lead there.
+const MOST_OF_PROMISED: f64 = 10.0;
 
 /// Changes of the prediction with each scaled parameter: with ln κ, with the relative change of each other material
 /// parameter, and with each parameter of the causes in its scales.
@@ -145,13 +148,13 @@ pub fn fit_members(
     let Some(settings) = members.first().map(|m| m.settings) else { return Ok(Vec::new()) };
     let num = members.iter().flat_map(|m| &m.places).max().map_or(0, |last| last + 1);
     let causes: Vec<Vec<Supposed>> = members.iter().map(|m| m.causes.clone()).collect();
-    let mut at = evaluate(members, material.clone(), causes, is_cancelled)?;
+    let mut at = evaluate(members, material.clone(), causes, Starts::Any, is_cancelled)?;
     let columns = match columns_at(members, &at) {
         Ok(columns) => columns,
         // A state reached from another material's may be an unstable one; from rest the stable branch is followed.
         Err(_) if !is_cancelled() => {
             members.iter_mut().for_each(|m| m.laboratory.forget());
-            at = evaluate(members, at.material, at.causes, is_cancelled)?;
+            at = evaluate(members, at.material, at.causes, Starts::Any, is_cancelled)?;
             columns_at(members, &at)?
         }
         Err(error) => return Err(error),
@@ -223,12 +226,13 @@ impl LeastSquares for MembersProblem<'_, '_, '_> {
         let promised = 2.0 * gradient.dot(&change) - change.dot(&(matrix * &change));
         let beyond_noise = (at.deviance() - self.num_data).max(0.0);
         let tolerance = self.settings.tolerance.max(self.settings.relative_tolerance * beyond_noise);
-        Ok(if promised < tolerance { None } else { Some(Step { change, promised }) })
+        let is_hopeless = self.settings.goal.is_some_and(|goal| at.deviance() - MOST_OF_PROMISED * promised > goal);
+        Ok(if promised < tolerance || is_hopeless { None } else { Some(Step { change, promised }) })
     }
 
     fn trial(&mut self, at: &Point, _: &Self::Linear, step: &Step, part: f64) -> Result<Option<Point>, DiagnosisError> {
         let (material, causes) = moved(self.members, at, &(&step.change * part));
-        match evaluate(self.members, material, causes, self.is_cancelled) {
+        match evaluate(self.members, material, causes, Starts::FoundLast, self.is_cancelled) {
             Ok(next) => Ok(Some(next)),
             Err(_) if !(self.is_cancelled)() => Ok(None),
             Err(error) => Err(error),
@@ -257,11 +261,12 @@ fn evaluate(
     members: &mut [Member],
     material: Material,
     causes: Vec<Vec<Supposed>>,
+    starts: Starts,
     is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Point, DiagnosisError> {
     let (mut predictions, mut deviances) = (Vec::new(), Vec::new());
     for (m, causes) in members.iter_mut().zip(&causes) {
-        let prediction = m.laboratory.predict(&material, &scene_of(causes), is_cancelled)?;
+        let prediction = m.laboratory.predict_from(&material, &scene_of(causes), starts, is_cancelled)?;
         deviances.push(deviance_of(m.metric, m.measured, &prediction, &material, causes, &m.settings));
         predictions.push(prediction);
     }
@@ -482,3 +487,7 @@ pub fn scales(material: &Material, causes: &[Supposed]) -> Vec<f64> {
     let of_material = material.parameters().into_iter().map(|p| material.value(p).abs());
     of_material.chain(causes.iter().flat_map(|c| c.cause.parameters()).map(|p| p.scale)).collect()
 }
+
+#[cfg(test)]
+#[path = "fit_tests.rs"]
+mod tests;

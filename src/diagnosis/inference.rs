@@ -117,19 +117,17 @@ impl<'a> Inference<'a> {
         fit(&mut self.laboratory, &self.metric, measured, material, causes, &self.settings, self.is_cancelled)
     }
 
-    /// As [`Self::fit`], with `known` changes of the prediction for all parameters but the last cause's (none known:
-    /// all are worked out), and then from where the last cause could leap to, as long as that explains more.
+    /// Fits again from where the last cause of a fit could leap to, as long as that explains more; `known` as in
+    /// [`Self::fit_beyond`].
     ///
     /// # Errors
     /// As [`fit`].
-    pub(super) fn fit_with_leaps(
+    pub(super) fn with_leaps(
         &mut self,
         measured: &Trace,
-        material: &Material,
-        causes: &[Supposed],
+        mut found: CauseFit,
         known: &[Trace],
     ) -> Result<CauseFit, DiagnosisError> {
-        let mut found = self.fit_beyond(measured, material, causes, known)?;
         for _ in 0..MAX_LEAPS {
             let limit = WORSE_BEFORE_BETTER * found.deviance;
             let Some((_, leapt)) = self.best_leap(measured, &found)?.filter(|leap| leap.0 < limit) else { break };
@@ -142,7 +140,12 @@ impl<'a> Inference<'a> {
         Ok(found)
     }
 
-    fn fit_beyond(
+    /// As [`Self::fit`], with `known` changes of the prediction for all parameters but the last cause's; none known: all
+    /// are worked out.
+    ///
+    /// # Errors
+    /// As [`fit`].
+    pub(super) fn fit_beyond(
         &mut self,
         measured: &Trace,
         material: &Material,
@@ -154,6 +157,20 @@ impl<'a> Inference<'a> {
         let causes = causes.to_vec();
         let member = Member { laboratory, metric, measured, causes, settings: *settings, known, places };
         fit_member(member, material, *is_cancelled)
+    }
+
+    /// The deviance of a material and causes as they are.
+    ///
+    /// # Errors
+    /// As [`fit`].
+    pub(super) fn deviance_at(
+        &mut self,
+        measured: &Trace,
+        material: &Material,
+        causes: &[Supposed],
+    ) -> Result<f64, DiagnosisError> {
+        let Inference { laboratory, metric, settings, is_cancelled, .. } = self;
+        deviance_at(laboratory, metric, measured, material, causes, settings, *is_cancelled)
     }
 
     /// Of the leaps of a fit's last cause the one with the smallest deviance, and that deviance; the material stays.
@@ -169,10 +186,7 @@ impl<'a> Inference<'a> {
             if let Some(last) = leapt.last_mut() {
                 last.values = values;
             }
-            let (laboratory, settings) = (&mut self.laboratory, &self.settings);
-            let deviance =
-                deviance_at(laboratory, &self.metric, measured, &found.material, &leapt, settings, self.is_cancelled);
-            match deviance {
+            match self.deviance_at(measured, &found.material, &leapt) {
                 Ok(deviance) if best.as_ref().is_none_or(|b| deviance < b.0) => best = Some((deviance, leapt)),
                 Err(error) if (self.is_cancelled)() => return Err(error),
                 _ => {}

@@ -28,6 +28,16 @@ pub struct Prediction {
     pub(super) seen: Vec<Vec<[f64; 3]>>,
 }
 
+/// From where equilibria are looked for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Starts {
+    /// From those found last, and where these lead to none from the step before, from rest and by parts.
+    Any,
+    /// From those found last alone, where there are any. A fit's trial that is too far from these costs a shorter step,
+    /// which is cheaper than to ask from everywhere whether it has an equilibrium.
+    FoundLast,
+}
+
 /// Predicts recordings of scenes.
 pub struct Laboratory<'a> {
     observed: &'a Observed,
@@ -105,6 +115,20 @@ impl<'a> Laboratory<'a> {
         scene: &Scene,
         is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Prediction, DiagnosisError> {
+        self.predict_from(material, scene, Starts::Any, is_cancelled)
+    }
+
+    /// As [`Self::predict`], from equilibria that `starts` says.
+    ///
+    /// # Errors
+    /// As [`Self::predict`].
+    pub(super) fn predict_from(
+        &mut self,
+        material: &Material,
+        scene: &Scene,
+        starts: Starts,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Prediction, DiagnosisError> {
         let at = self.stations.at(scene)?;
         // A cancellation is seen between the steps' equilibria, of which each takes a second at most.
         let warm = if is_cancelled() { Vec::new() } else { self.warm_states(at, material, scene) };
@@ -112,9 +136,10 @@ impl<'a> Laboratory<'a> {
         let mut warm = warm.into_iter();
         for (n, step) in self.observed.steps.iter().enumerate() {
             self.num_solves += 1;
-            let state = match warm.next().flatten().filter(|_| !is_cancelled()) {
-                Some(state) => state,
-                None => {
+            let state = match warm.next().flatten() {
+                Some(Ok(state)) if !is_cancelled() => state,
+                Some(Err(error)) if starts == Starts::FoundLast => return Err(error.into()),
+                _ => {
                     let departures = self.departures(material, scene, n);
                     let mut model = self.stations[at].model.departed(&departures);
                     self.cold_state(&mut model, material, step.drive_mm, states.last(), is_cancelled)?
@@ -179,13 +204,18 @@ impl<'a> Laboratory<'a> {
     }
 
     /// Equilibria from those that the station last found, steps side by side; `None` for a step that has none to start
-    /// from or finds none from there.
-    fn warm_states(&self, at: usize, material: &Material, scene: &Scene) -> Vec<Option<Equilibrium>> {
+    /// from.
+    fn warm_states(
+        &self,
+        at: usize,
+        material: &Material,
+        scene: &Scene,
+    ) -> Vec<Option<Result<Equilibrium, SolveError>>> {
         let station = &self.stations[at];
         let solved = |n: usize| {
             let near = station.states.get(n)?;
             let mut model = station.model.departed(&self.departures(material, scene, n));
-            model.solve(material, self.observed.steps[n].drive_mm, Some(near), &self.solve, &|| false).ok()
+            Some(model.solve(material, self.observed.steps[n].drive_mm, Some(near), &self.solve, &|| false))
         };
         (0..self.observed.steps.len()).into_par_iter().map(solved).collect()
     }

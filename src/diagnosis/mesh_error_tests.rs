@@ -57,6 +57,7 @@ fn a_finer_mesh_corrects_estimates() {
         shear: None,
         tolerance: 1e-3,
         relative_tolerance: 0.0,
+        goal: None,
     };
     let swelling = Registry::standard()
         .tested(&observed.specimen)

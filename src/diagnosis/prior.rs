@@ -49,6 +49,8 @@ pub struct FitSettings {
     pub tolerance: f64,
     /// It also ends when a step promises less than this part of what noise does not account for.
     pub relative_tolerance: f64,
+    /// A fit that is of no use above this deviance ends where it can no longer come to it.
+    pub goal: Option<f64>,
 }
 
 /// ½ Σ μᵢαᵢ, kPa.

@@ -13,6 +13,7 @@ use super::findings::Findings;
 use super::found::FoundCause;
 use super::further_term::further_term;
 use super::inference::Inference;
+use super::prior::FitSettings;
 use super::ranked::Ranked;
 use super::registry::Registry;
 use super::score_round::{RoundScope, RoundScores, leading, score_suspects};
@@ -30,6 +31,16 @@ const AMBIGUITY: f64 = 15.0;
 /// for: a full fit may explain several times what first order promises.
 const LEAST_PROMISE: f64 = 0.25;
 
+/// Trials after which fits side by side are compared, and those that cannot be the best let go.
+const FIRST_TRIALS: usize = 3;
+
+/// A fit is gone on with where it may still explain this part of what the best one does by then. Less than
+/// [`AMBIGUITY`] apart are fits that differ by far less.
+const MAY_LEAD: f64 = 0.9;
+
+/// A fit that may be the best goes on to its end where it explains this part of what is called for.
+const WORTH_AN_END: f64 = 0.5;
+
 /// How often fits are gone on with as what they look like.
 const MAX_LOOK_ALIKES: usize = 2;
 
@@ -44,16 +55,58 @@ struct Trial<'a> {
     /// Fall of the deviance, less ln n per parameter of the cause.
     gain: f64,
     fit: CauseFit,
-    /// Whether the fit went on to its end.
-    is_settled: bool,
+    /// How far it has come.
+    stage: Stage,
     /// What it was made with.
     inference: Inference<'a>,
 }
 
-impl Trial<'_> {
+/// How far a fit of a round has come.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Stage {
+    /// It made its first trials.
+    Begun,
+    /// It ended early, and leapt from there.
+    Compared,
+    /// It went on to its end.
+    Settled,
+}
+
+impl<'a> Trial<'a> {
+    /// A fit that `inference` has begun.
+    fn begun(inference: Inference<'a>, current: &CauseFit, fit: CauseFit) -> Trial<'a> {
+        Trial { gain: gain_of(&inference, current, &fit), fit, stage: Stage::Begun, inference }
+    }
+
+    /// What counts of its gain against others, as a part.
+    fn part(&self) -> f64 {
+        self.fit.causes.last().map_or(1.0, |c| counted_part(&*c.cause))
+    }
+
     /// Its gain as it counts against others.
     fn counted(&self) -> f64 {
-        self.fit.causes.last().map_or(1.0, |c| counted_part(&*c.cause)) * self.gain
+        self.part() * self.gain
+    }
+
+    /// Goes on with the fit by `go_on`, to `stage`; what has no fit from there stays as it was.
+    ///
+    /// # Errors
+    /// [`DiagnosisError`]: the work was cancelled.
+    fn go_on(
+        &mut self,
+        current: &CauseFit,
+        stage: Stage,
+        go_on: impl FnOnce(&mut Inference<'a>, &CauseFit) -> Result<CauseFit, DiagnosisError>,
+    ) -> Result<(), DiagnosisError> {
+        match go_on(&mut self.inference, &self.fit) {
+            Ok(fit) => {
+                (self.gain, self.stage) = (gain_of(&self.inference, current, &fit), stage);
+                self.fit = fit;
+                Ok(())
+            }
+            Err(error) if (self.inference.is_cancelled)() => Err(error),
+            Err(_) => Ok(()),
+        }
     }
 
     /// The cause that it adds, in words.
@@ -222,12 +275,12 @@ fn fit_leading<'a>(
     findings: &mut Findings,
     measured: &Trace,
 ) -> Result<Vec<Trial<'a>>, DiagnosisError> {
-    let Scored { candidates, known, .. } = scored;
+    let candidates = &scored.candidates;
     let mut trials: Vec<Trial> = Vec::new();
     let least = LEAST_PROMISE * smallest_share(&findings.current.causes) * findings.explained();
     let starts = leading(candidates, &findings.current).into_iter().filter(|c| c.score > least);
     let starts: Vec<Start> = starts.map(|c| (c.cause.clone(), c.values.clone())).collect();
-    fit_starts(inference, findings, measured, known, &starts, &mut trials)?;
+    fit_starts(inference, findings, measured, scored, &starts, &mut trials)?;
     let (specimen, names) = (&inference.laboratory.observed().specimen, scored.registry.names());
     let mut from = 0;
     for _ in 0..MAX_LOOK_ALIKES {
@@ -242,7 +295,7 @@ fn fit_leading<'a>(
             fitted: None,
             round: findings.num_rounds,
         }));
-        fit_starts(inference, findings, measured, known, &starts, &mut trials)?;
+        fit_starts(inference, findings, measured, scored, &starts, &mut trials)?;
     }
     trials.sort_by(|a, b| b.counted().total_cmp(&a.counted()));
     Ok(trials)
@@ -260,7 +313,7 @@ fn fit_starts<'a>(
     inference: &mut Inference<'a>,
     findings: &mut Findings,
     measured: &Trace,
-    known: &[Trace],
+    scored: &Scored,
     starts: &[Start],
     trials: &mut Vec<Trial<'a>>,
 ) -> Result<(), DiagnosisError> {
@@ -271,16 +324,40 @@ fn fit_starts<'a>(
     let tolerance = settings.tolerance.max(ROUGH_TOLERANCE * inference.misfit_beyond_noise(&findings.current));
     let round = findings.num_rounds;
     let twins: Vec<(Inference, &Start)> = starts.iter().map(|start| (inference.twin(), start)).collect();
-    let current = &findings.current;
-    let found: Vec<Option<Trial>> = twins
+    let (current, least) = (&findings.current, called_for(findings, scored.evidence));
+    let begun: Vec<Option<Trial>> = twins
         .into_par_iter()
         .map(|(mut twin, start)| {
             twin.settings.relative_tolerance = ROUGH_TOLERANCE;
-            let fitted = tried(&mut twin, current, round, measured, known, start);
-            twin.settings = settings;
-            fitted.map(|(gain, fit)| Trial { gain, fit, is_settled: false, inference: twin })
+            twin.settings.max_iterations = FIRST_TRIALS;
+            let fit = begin(&mut twin, current, round, measured, &scored.known, start)?;
+            Some(Trial::begun(twin, current, fit))
         })
         .collect();
+    let begun_trials = || begun.iter().flatten();
+    let best = trials.iter().chain(begun_trials()).map(Trial::counted).fold(f64::NEG_INFINITY, f64::max);
+    // What a fit must come to, beyond what its parameters cost, to be named or told from what is.
+    let needed = |trial: &Trial| (least / trial.part()).max(MAY_LEAD * best);
+    let compare = |mut trial: Trial<'a>| {
+        let num = trial.fit.causes.last().map_or(0, |c| c.values.len());
+        let goal = current.deviance - penalty(&trial.inference.metric, num) - needed(&trial);
+        let rough = FitSettings { relative_tolerance: ROUGH_TOLERANCE, goal: Some(goal), ..settings };
+        trial.inference.settings = rough;
+        trial.go_on(current, Stage::Compared, |twin, fit| {
+            let is_at_its_end = fit.iterations < FIRST_TRIALS;
+            let ended = match is_at_its_end {
+                true => fit.clone(),
+                false => twin.fit_beyond(measured, &fit.material, &fit.causes, &scored.known)?,
+            };
+            twin.with_leaps(measured, ended, &scored.known)
+        })?;
+        trial.inference.settings = settings;
+        Ok(trial)
+    };
+    let found = begun
+        .into_par_iter()
+        .map(|trial| trial.map(compare).transpose())
+        .collect::<Result<Vec<Option<Trial>>, DiagnosisError>>()?;
     for ((cause, _), trial) in starts.iter().zip(&found) {
         // Suspects without an identity of their own, as two balls, share the last entry.
         let identity = cause.identity();
@@ -293,16 +370,9 @@ fn fit_starts<'a>(
     let best = trials.iter().map(Trial::counted).fold(f64::NEG_INFINITY, f64::max);
     let near = (best - 2.0 * AMBIGUITY).max(EVIDENCE) - NEAR_TOLERANCES * tolerance;
     let current = &findings.current;
-    trials.par_iter_mut().filter(|t| !t.is_settled && t.counted() > near).try_for_each(|trial| {
-        match trial.inference.fit(measured, &trial.fit.material, &trial.fit.causes) {
-            Ok(fit) => {
-                (trial.gain, trial.is_settled) = (gain_of(&trial.inference, current, &fit), true);
-                trial.fit = fit;
-                Ok(())
-            }
-            Err(error) if (trial.inference.is_cancelled)() => Err(error),
-            Err(_) => Ok(()),
-        }
+    let may_be_named = |t: &&mut Trial| t.counted() > near && t.counted() > WORTH_AN_END * least;
+    trials.par_iter_mut().filter(|t| t.stage != Stage::Settled).filter(may_be_named).try_for_each(|trial| {
+        trial.go_on(current, Stage::Settled, |twin, fit| twin.fit(measured, &fit.material, &fit.causes))
     })?;
     for trial in trials {
         inference.laboratory.num_solves += std::mem::take(&mut trial.inference.laboratory.num_solves);
@@ -310,15 +380,15 @@ fn fit_starts<'a>(
     Ok(())
 }
 
-/// The fit with one more cause, which ends early, and what it gains; `None` where it has none or the work is cancelled.
-fn tried(
+/// The first trials of a fit with one more cause; `None` where it has none or the work is cancelled.
+fn begin(
     inference: &mut Inference,
     current: &CauseFit,
     round: usize,
     measured: &Trace,
     known: &[Trace],
     (cause, values): &Start,
-) -> Option<(f64, CauseFit)> {
+) -> Option<CauseFit> {
     if (inference.is_cancelled)() {
         return None;
     }
@@ -326,10 +396,9 @@ fn tried(
     let mut fit_from = |values: Vec<f64>| {
         let mut supposed = current.causes.clone();
         supposed.push(Supposed { cause: cause.clone(), values });
-        inference.fit_with_leaps(measured, &current.material, &supposed, known).ok()
+        inference.fit_beyond(measured, &current.material, &supposed, known).ok()
     };
-    let fit = SHORTER_STARTS.into_iter().find_map(|part| fit_from(between(&cause.start(), values, part)))?;
-    Some((gain_of(inference, current, &fit), fit))
+    SHORTER_STARTS.into_iter().find_map(|part| fit_from(between(&cause.start(), values, part)))
 }
 
 /// A start `part` of the way from one to the other.
@@ -341,6 +410,11 @@ fn between(from: &[f64], to: &[f64], part: f64) -> Vec<f64> {
 fn gain_of(inference: &Inference, current: &CauseFit, fit: &CauseFit) -> f64 {
     let num = fit.causes.last().map_or(0, |c| c.values.len());
     current.deviance - fit.deviance - penalty(&inference.metric, num)
+}
+
+/// The gain that is called for of a cause: `evidence`, and some part of what was explained before it.
+fn called_for(findings: &Findings, evidence: f64) -> f64 {
+    evidence.max(smallest_share(&findings.current.causes) * findings.explained())
 }
 
 /// Names the best trial as a cause where the evidence for it is strong enough, with what cannot be told apart from it;
@@ -355,7 +429,7 @@ fn take_best<'a>(
     evidence: f64,
 ) -> Result<bool, DiagnosisError> {
     let Some(leading) = trials.first() else { return Ok(false) };
-    let least = evidence.max(smallest_share(&findings.current.causes) * findings.explained());
+    let least = called_for(findings, evidence);
     (inference.progress)(&format!(
         "round {}: '{}' lowers the deviance by {:.0}, of which {:.0} count; {least:.0} are called for",
         findings.num_rounds,
@@ -439,9 +513,9 @@ mod tests {
         let cause = registry.tested(specimen).into_iter().find(|c| c.name().as_str() == name).unwrap();
         let start = (cause.clone(), cause.start());
         let mut inference = inference.twin();
-        let (gain, fit) = tried(&mut inference, current, 1, measured, &[], &start).unwrap();
+        let fit = begin(&mut inference, current, 1, measured, &[], &start).unwrap();
         let effect = fit.prediction.trace.plus(-1.0, &current.prediction.trace);
-        (Trial { gain, fit, is_settled: true, inference }, effect.rms_mm())
+        (Trial::begun(inference, current, fit), effect.rms_mm())
     }
 
     /// A background of 0.03 mm that a displaced plate takes up in part. Where that plate does less than a mesh could

@@ -15,6 +15,8 @@ pub struct Score {
     pub explained: f64,
     /// Best coefficients of the directions.
     pub coefficients: Vec<f64>,
+    /// How far the nuisance directions follow in their place.
+    pub followed: Vec<f64>,
 }
 
 /// A residual and nuisance directions (the material's), against which directions are tested.
@@ -59,7 +61,9 @@ impl<'a> ScoreTest<'a> {
     pub fn test(&self, directions: &[Trace]) -> Score {
         let prepared = self.prepare(directions);
         let (explained, coefficients) = prepared.solve();
-        Score { explained, coefficients }
+        let changed = &prepared.projected * DVector::from_column_slice(&coefficients);
+        let followed = &self.inverse * &self.nuisance_residual - changed;
+        Score { explained, coefficients, followed: followed.iter().copied().collect() }
     }
 }
 

@@ -99,7 +99,14 @@ pub(super) fn inference_of(observed: &Observed) -> Inference<'_> {
     Inference {
         laboratory: Laboratory::new(observed, &MeshOptions::scaled(&observed.specimen, MESH_FACTOR)).unwrap(),
         metric: Metric::new(observed, allowance_mm, &|_| true),
-        settings: FitSettings { max_iterations: 12, bulk, shear: None, tolerance: 0.1, relative_tolerance: 0.0 },
+        settings: FitSettings {
+            max_iterations: 12,
+            bulk,
+            shear: None,
+            tolerance: 0.1,
+            relative_tolerance: 0.0,
+            goal: None,
+        },
         nominal_bulk: bulk,
         believed_bulk: bulk,
         allowance_mm,
