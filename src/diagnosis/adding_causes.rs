@@ -12,7 +12,7 @@ use super::interior::InteriorTest;
 use super::leftover::leftover;
 use super::metric::Metric;
 use super::nominal::fit_with_terms;
-use super::rounds::{Asked, RoundLimits, ToAsk, add_causes, fit_round, score_round};
+use super::rounds::{Asked, RoundLimits, ToAsk, add_causes, fit_round, look_for_artefacts_again, score_round};
 use super::set_up::{fit_set_up, is_set_up_promising, simplest_set_up};
 use super::stand_ins::with_sponge_for_stand_ins;
 use super::supposed::Supposed;
@@ -266,13 +266,14 @@ impl Run<'_> {
 
     /// Takes out of the fit the causes that `measured`, or later causes, have made needless.
     pub(super) fn leave_out_what_is_not_needed(&mut self, measured: &Trace) -> Result<(), DiagnosisError> {
-        let Run { inference, findings, .. } = self;
+        let Run { inference, registry, findings, .. } = self;
+        let are_artefacts_others = look_for_artefacts_again(inference, registry, findings, measured)?;
         let num_causes = findings.current.causes.len();
         if num_causes > 1 {
             findings.current = thinned(inference, measured, findings.current.clone(), Needed::ByEvidence)?;
-            if findings.current.causes.len() < num_causes {
-                self.name_causes_of_fit()?;
-            }
+        }
+        if are_artefacts_others || findings.current.causes.len() < num_causes {
+            self.name_causes_of_fit()?;
         }
         Ok(())
     }

@@ -93,8 +93,8 @@ pub(super) fn diagnose_among(
     run.attempt("causes", Run::add_causes)?;
     run.attempt("the load curve with the causes", |run| run.read_load_curve_again(recording))?;
     run.attempt("the material's own law with the causes", Run::question_material_again)?;
-    run.name_artefacts();
     let seen = run.correct_fits()?;
+    run.name_artefacts();
     run.conclude(&seen)
 }
 

@@ -3,8 +3,8 @@ use crate::calibration::Observed;
 use crate::diagnosis::scene::Scene;
 use crate::diagnosis::test_recordings::{FORCE_SD_N, MESH_FACTOR, inference_of, material, recorded};
 
-/// A material that is off in modulus and exponent: a fit finds the right one. One that is to come below any deviance ends where it starts,
-/// because no step promises that; one whose goal is within reach ends where it would without.
+/// A material that is off in modulus and exponent: a fit finds the right one. One that is to come below any deviance
+/// ends where it starts, because no step promises that; one whose goal is within reach ends where it would without.
 #[test]
 fn a_fit_that_cannot_come_to_its_goal_ends() {
     let recording = recorded(&material(), &Scene::default(), MESH_FACTOR);

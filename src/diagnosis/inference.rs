@@ -140,8 +140,8 @@ impl<'a> Inference<'a> {
         Ok(found)
     }
 
-    /// As [`Self::fit`], with `known` changes of the prediction for all parameters but the last cause's; none known: all
-    /// are worked out.
+    /// As [`Self::fit`], with `known` changes of the prediction for all parameters but the last cause's; none known:
+    /// all are worked out.
     ///
     /// # Errors
     /// As [`fit`].
