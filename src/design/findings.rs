@@ -166,7 +166,10 @@ fn which_are_equal(ranked: &[DesignEntry], Equals { equal_to_best, simplest }: E
         )
     };
     let (noun, verb) = if others.len() == 1 { ("design", "is") } else { ("designs", "are") };
-    Some(format!("{open} Within that, {noun} {} of the list {verb} as good as the first. {advice}", others.join(", ")))
+    let others = others.join(", ");
+    Some(format!(
+        "{open} By what they leave open of differences, {noun} {others} of the list {verb} as good as the first. {advice}"
+    ))
 }
 
 /// Holes of all samples.

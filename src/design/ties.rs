@@ -13,7 +13,9 @@ const LARGEST_DIFFERENCE: f64 = 0.02;
 /// Differences of ln objectives below this are of no use to anybody.
 const NO_DIFFERENCE: f64 = 0.002;
 
-/// The places in `ranked` of the designs within every limit that are equal to the first, the first included.
+/// The places in `ranked`, best first, of the designs within every limit that are equal to the first, the first
+/// included. What is better than one that is equal to the first is equal to it, too, however well its difference is
+/// known: a worse design must not be preferred to it.
 pub(super) fn equal_to_best(study: &Study, base: &Confirmed, ranked: &[Confirmed]) -> Vec<usize> {
     let Some(best) = ranked.first() else { return Vec::new() };
     let of_best = best.log_objectives(study, base);
@@ -22,8 +24,14 @@ pub(super) fn equal_to_best(study: &Study, base: &Confirmed, ranked: &[Confirmed
         let mean = apart.iter().sum::<f64>() / (apart.len() as f64).max(1.0);
         mean.abs() <= (EQUAL_WITHIN * standard_error(&apart)).clamp(NO_DIFFERENCE, LARGEST_DIFFERENCE)
     };
-    let within = ranked.iter().enumerate().filter(|(_, c)| c.is_within_limits == best.is_within_limits);
-    within.filter(|(place, c)| *place == 0 || is_equal(c)).map(|(place, _)| place).collect()
+    let judged = ranked.iter().map(|c| (c.is_within_limits == best.is_within_limits).then(|| is_equal(c)));
+    down_to_the_last_equal(&judged.collect::<Vec<_>>())
+}
+
+/// The places of what is judged (`None`: not to be compared), from the first to the last that is equal to it.
+fn down_to_the_last_equal(judged: &[Option<bool>]) -> Vec<usize> {
+    let last = judged.iter().rposition(|j| *j == Some(true)).unwrap_or(0);
+    (0..=last).filter(|&place| place == 0 || judged[place].is_some()).collect()
 }
 
 /// Of the designs at `places`, the place of the one that is simplest to make: fewest holes, then fewest that are not
@@ -56,6 +64,16 @@ fn num_outlines(specimen: &Specimen) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The third differs from the first by little, but surely; the fifth by more, and it is not known by how much. The
+    /// fourth breaks a limit.
+    #[test]
+    fn what_is_better_than_an_equal_is_equal() {
+        let judged = [Some(true), Some(false), Some(false), None, Some(true), Some(false)];
+        assert_eq!(down_to_the_last_equal(&judged), [0, 1, 2, 4]);
+        assert_eq!(down_to_the_last_equal(&[Some(true), Some(false), None]), [0]);
+        assert_eq!(down_to_the_last_equal(&[None]), [0]);
+    }
 
     #[test]
     fn diameters_are_counted_once() {
