@@ -6,7 +6,7 @@ use crate::fem::{ForwardModel, SolveOptions};
 use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::recording::{Filter, LoadCurve, RecordedStep, Recording};
-use crate::sensitivity::{Protocol, ScanSettings, ScannedVoxels};
+use crate::sensitivity::{Encoding, Protocol, ScanSettings, ScannedVoxels};
 use crate::specimen::Specimen;
 use crate::voxel::{HammingFilter, Sampling, VoxelMask, VoxelOperator};
 use rand::SeedableRng;
@@ -27,6 +27,9 @@ pub struct Measurement {
     pub weights: Vec<f64>,
     /// The part of a scan's time that each drive got: its weights are as much smaller. Whole scans where it is empty.
     pub shares: Vec<f64>,
+    /// Per drive and voxel, where the scan says how it encodes: the part of the signal that is left by direction, by
+    /// which the noise is larger; of voxels that are missing it does not count.
+    pub signal: Vec<Vec<[f64; 3]>>,
     /// Forces read at other drives, where nothing was scanned.
     pub on_the_way: Vec<ForceOnTheWay>,
     /// What is unknown of the load cell.
@@ -39,13 +42,15 @@ impl Measurement {
         self.drives_mm.iter().copied().chain(self.on_the_way.iter().map(|r| r.drive_mm)).collect()
     }
 
-    /// Weights of the voxels at one drive: zero where a component is missing (not finite).
-    pub(super) fn weights_of(&self, drive_index: usize) -> Vec<f64> {
-        self.displacements[drive_index]
-            .iter()
-            .zip(&self.weights)
-            .map(|(u, w)| if u.iter().all(|x| x.is_finite()) { *w * self.share(drive_index) } else { 0.0 })
-            .collect()
+    /// Weights of the voxels at one drive, by direction: zero where a component is missing (not finite).
+    pub(super) fn weights_of(&self, drive_index: usize) -> Vec<[f64; 3]> {
+        let (share, signal) = (self.share(drive_index), self.signal.get(drive_index));
+        let of_voxel = |(voxel, (u, w)): (usize, (&[f64; 3], &f64))| {
+            let left = signal.map_or([1.0; 3], |signal| signal[voxel]);
+            let is_whole = u.iter().all(|x| x.is_finite());
+            left.map(|part| if is_whole { w * share * part * part } else { 0.0 })
+        };
+        self.displacements[drive_index].iter().zip(&self.weights).enumerate().map(of_voxel).collect()
     }
 
     fn share(&self, drive_index: usize) -> f64 {
@@ -78,7 +83,7 @@ impl Measurement {
             length("displacement field", field.len(), num_voxels)?;
             let force = self.forces_n[d];
             value("a force (N)", force, force.is_finite() && force.abs() > 0.0, "finite and not zero")?;
-            let num_used = self.weights_of(d).iter().filter(|w| **w > 0.0).count() as f64;
+            let num_used = self.weights_of(d).iter().filter(|w| w[0] > 0.0).count() as f64;
             value("the number of voxels with a displacement", num_used, num_used > 0.0, "positive")?;
         }
         Ok(())
@@ -129,9 +134,11 @@ impl SyntheticScan {
             forces_n: vec![0.0; num_drives],
             weights: Vec::new(),
             shares: protocol.scan_share.clone(),
+            signal: Encoding::of(scan).map_or(Vec::new(), |_| vec![Vec::new(); num_drives]),
             on_the_way: forces_mm.iter().map(reading).collect(),
             load_cell: LoadCell::of_protocol(protocol),
         };
+        let encoding = Encoding::of(scan);
         let mut masks = Vec::new();
         for (sample, count) in specimen.samples().iter().zip(specimen.num_scanned(protocol.blocks_scanned)) {
             let mut model = ForwardModel::of_specimen(sample, &mesh.carried(specimen, sample))?;
@@ -150,10 +157,22 @@ impl SyntheticScan {
             for (voxels, state) in truth.displacements.iter_mut().zip(&path) {
                 voxels.extend(operator.average(&state.displacement)?);
             }
+            if let Some(encoding) = encoding {
+                for (of_drive, state) in truth.signal.iter_mut().zip(&path) {
+                    let gradients = operator.deformation_gradients(&state.displacement)?;
+                    let averages = operator.average(&state.displacement)?;
+                    of_drive.extend(encoding.signal_left(&mask, &averages, &gradients));
+                }
+            }
             truth.weights.extend(weights.iter().map(|w| f64::from(count) * w));
             masks.push(Some((mask, voxels_each)));
         }
         let other_masks = masks.split_off(1).into_iter().map(|of_kind| Some(of_kind?.0)).collect();
+        for (voxels, signal) in truth.displacements.iter_mut().zip(&truth.signal) {
+            // What tells nothing is missing.
+            let lost = voxels.iter_mut().zip(signal).filter(|(_, left)| left[0] == 0.0);
+            lost.for_each(|(u, _)| *u = [f64::NAN; 3]);
+        }
         // The first block is always scanned.
         let Some((mask, voxels_each)) = masks.pop().flatten() else {
             let name = "the number of scanned blocks";
@@ -252,8 +271,8 @@ impl SyntheticScan {
         };
         let mut noisy = self.truth.clone();
         for (drive, displacements) in noisy.displacements.iter_mut().enumerate() {
-            for (u, weight) in displacements.iter_mut().zip(self.truth.weights_of(drive)) {
-                for (value, sd) in u.iter_mut().zip(self.scan.noise().displacement_sd_mm) {
+            for (u, weights) in displacements.iter_mut().zip(self.truth.weights_of(drive)) {
+                for ((value, sd), weight) in u.iter_mut().zip(self.scan.noise().displacement_sd_mm).zip(weights) {
                     // A voxel without weight, or a component without bound to its noise, is not measured; what stands
                     // there does not count.
                     *value += if weight > 0.0 && sd.is_finite() { normal(sd / weight.sqrt()) } else { 0.0 };

@@ -104,11 +104,15 @@ impl<'a> Target<'a> {
         let weight = 1.0 / (scan.force_sd_n * scan.force_sd_n);
         // The variance of a voxel of weight w is σ²/w.
         let sd_mm = scan.noise().displacement_sd_mm;
-        let noise_of = |w: &f64| where_bounded(sd_mm.map(|sd| if *w > 0.0 { sd * sd / w } else { 0.0 }));
+        let noise_of = |w: &[f64; 3]| {
+            let variance = |c: usize| if w[c] > 0.0 { sd_mm[c] * sd_mm[c] / w[c] } else { 0.0 };
+            where_bounded([0, 1, 2].map(variance))
+        };
+        let precision_of = |w: &[f64; 3]| [0, 1, 2].map(|c| w[c] / (sd_mm[c] * sd_mm[c]));
         let steps = (0..data.drives_mm.len())
             .map(|d| TargetStep {
                 measured: &data.displacements[d],
-                precision: data.weights_of(d).iter().map(|w| sd_mm.map(|sd| w / (sd * sd))).collect(),
+                precision: data.weights_of(d).iter().map(precision_of).collect(),
                 noise_mm2: data.weights_of(d).iter().map(noise_of).collect(),
                 force: Some(TargetForce { value_n: data.forces_n[d], sd_n: scan.force_sd_n, weight }),
             })

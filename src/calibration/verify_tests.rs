@@ -1,6 +1,7 @@
 use super::super::test_problem::{block, coarse, ogden, scan, truth, variance_bounds};
 use super::*;
 use crate::fem::SolveOptions;
+use crate::sensitivity::{DriveSelection, Evaluation, EvaluationOptions, evaluate};
 
 fn options(draws: usize) -> VerifyOptions {
     let specimen = block();
@@ -132,32 +133,47 @@ fn unlike_blocks_are_fitted_together() {
     let mesh = coarse(&specimen);
     let protocol =
         Protocol { blocks_scanned: 2, scan_share: vec![0.3, 0.7], force_drive_mm: vec![1.0], ..Protocol::default() };
-    let draws = 32usize;
-    let options = VerifyOptions { truth_mesh: mesh, fit_mesh: mesh, correction_mesh: None, protocol, ..options(draws) };
-    let both = verify(&specimen, &truth(), &scan(), &options, &|| (), &|| false).unwrap();
-    for s in &both {
+    let options = VerifyOptions { truth_mesh: mesh, fit_mesh: mesh, protocol, ..options(32) };
+    fitted_as_promised(&specimen, &scan(), &options);
+}
+
+/// A scan of phases that change by some two radians over a voxel: voxels count by the signal that they keep, some tell
+/// nothing, and what is promised is found.
+#[test]
+fn encoded_scans_are_fitted_as_promised() {
+    let encoded = ScanSettings { mm_per_radian: Some([0.18; 3]), ..scan() };
+    let found = fitted_as_promised(&block(), &encoded, &options(32));
+    let loss = found.steps[0].phase_loss.expect("the scan says how it encodes");
+    assert!(loss.num_voxels_lost > 0 && loss.num_voxels_lost < found.steps[0].num_voxels / 4, "{loss:?}");
+    assert!(loss.mean_signal[0] < 0.85 && loss.mean_signal[2] > 0.98, "{loss:?}");
+}
+
+/// Draws of a scan made on the mesh of the fits: they are right on average and scatter as promised, and an evaluation
+/// promises the same. The evaluation.
+fn fitted_as_promised(specimen: &Specimen, scan: &ScanSettings, options: &VerifyOptions) -> Evaluation {
+    let spreads = verify(specimen, &truth(), scan, options, &|| (), &|| false).unwrap();
+    for s in &spreads {
         let promised = s.promised_sd.unwrap();
         let ratio = s.found_sd / promised;
         // 99.9 % of s/σ of 32 draws lie between 0.62 and 1.42 (χ² with 31 degrees of freedom).
         assert!(ratio > 0.62 && ratio < 1.42, "{}: {ratio}", s.parameter);
-        let shift = (s.mean - s.truth) / promised * (draws as f64).sqrt();
+        let shift = (s.mean - s.truth) / promised * (options.draws as f64).sqrt();
         assert!(shift.abs() < 3.5, "{}: {shift}", s.parameter);
         // The same mesh made the data: what is left is the fit's tolerance.
         assert!(s.discretisation_bias.unwrap().abs() < 0.05 * promised, "{}", s.parameter);
     }
-    // The promise of the fit is that of an evaluation with the same protocol and mesh.
-    let evaluation = crate::sensitivity::EvaluationOptions {
-        mesh,
+    let evaluation = EvaluationOptions {
+        mesh: options.fit_mesh,
         protocol: options.protocol.clone(),
-        ..crate::sensitivity::EvaluationOptions::standard(&specimen)
+        ..EvaluationOptions::standard(specimen)
     };
-    let drives = crate::sensitivity::DriveSelection::DriveMm(specimen.drive_mm.clone());
-    let (found, _) =
-        crate::sensitivity::evaluate(&specimen, &truth(), &scan(), &drives, &evaluation, &|| false).unwrap();
-    for (s, p) in both.iter().zip(&found.promised_sd) {
+    let drives = DriveSelection::DriveMm(specimen.drive_mm.clone());
+    let (found, _) = evaluate(specimen, &truth(), scan, &drives, &evaluation, &|| false).unwrap();
+    for (s, p) in spreads.iter().zip(&found.promised_sd) {
         // The same sums in another order; equilibria to the solver's tolerance.
         assert!((s.promised_sd.unwrap() / p.value.unwrap() - 1.0).abs() < 1e-5, "{}", s.parameter);
     }
+    found
 }
 
 /// Cancelled work is an error; draws that fail are counted, and no number is made up for them.

@@ -75,6 +75,7 @@ const EVALUATE: &[Flag] = &[
     Flag::of("grid", "scan/grid"),
     Flag::read("surface", "scan/surface", FaceSeen),
     Flag::of("noise", "scan/noise_sd_mm"),
+    Flag::of("mm-per-radian", "scan/mm_per_radian"),
     Flag::of("force-sd", "scan/force_sd_n"),
     Flag::of("force-drives", "protocol/force_drive_mm"),
     Flag::of("force-gain-sd", "protocol/force_gain_sd"),

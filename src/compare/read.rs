@@ -73,6 +73,10 @@ fn conditions_of(e: &Evaluation) -> Vec<(String, String)> {
         ("voxel size in mm", format!("{:?}", scan.voxel_mm)),
         ("noise of the displacement in mm", format!("{:?}", scan.noise_sd_mm)),
         ("noise of the force in N", format!("{}", scan.force_sd_n)),
+        (
+            "displacement per phase in mm/rad",
+            scan.mm_per_radian.map_or_else(|| "not stated".into(), |s| format!("{s:?}")),
+        ),
         ("weight of partly filled voxels", format!("{:?}", scan.partial_voxels)),
         ("where the scan's grid lies", format!("{:?}", scan.grid)),
         ("normalisation of the sensitivities", e.notes.integrated_sensitivity.clone()),

@@ -42,6 +42,12 @@ impl ObjectiveKind {
         matches!(self, ObjectiveKind::IntegratedSensitivity | ObjectiveKind::SensitivityAndPromisedSd)
     }
 
+    /// Whether it is of promised standard deviations and nothing else, so that designs compare in any scan.
+    pub(super) fn is_of_promises_alone(self) -> bool {
+        use ObjectiveKind::{AOptimal, DOptimal, EOptimal, WorstRelativeSd};
+        matches!(self, DOptimal | AOptimal | EOptimal | WorstRelativeSd)
+    }
+
     /// The kind in words.
     pub fn words(self) -> &'static str {
         match self {

@@ -19,8 +19,8 @@ use crate::fem::Equilibrium;
 use crate::kinematics::principal_stretches;
 use crate::mesh::MeshOptions;
 use crate::sensitivity::{
-    DriveSelection, Evaluation, EvaluationError, EvaluationMaps, EvaluationOptions, Fixture, MaterialState, SharedTime,
-    best_shares, evaluate_fixture,
+    DriveSelection, Evaluation, EvaluationError, EvaluationMaps, EvaluationOptions, Fixture, MaterialState,
+    ScanSettings, SharedTime, best_shares, evaluate_fixture,
 };
 use crate::specimen::{LimitMargin, Specimen, TestResponse, farthest_from_zero};
 use crate::voxel::Sampling;
@@ -445,6 +445,16 @@ impl Confirmed {
     /// Gains and margins, counted from a reference to the base's confirmed responses.
     pub(super) fn judged(&self, reference: &Reference) -> Judged {
         reference.judge(&Evaluated { responses: self.responses.clone(), gradients: Vec::new() })
+    }
+
+    /// The order of rank: best objective first, those within every limit before others.
+    pub(super) fn by_rank(a: &Confirmed, b: &Confirmed) -> std::cmp::Ordering {
+        b.is_within_limits.cmp(&a.is_within_limits).then(b.objective.total_cmp(&a.objective))
+    }
+
+    /// The scan that it was confirmed in; `None` of a study without a material.
+    pub(super) fn scan(&self) -> Option<&ScanSettings> {
+        self.by_material.first().map(|m| &m.evaluation.scan)
     }
 
     /// The limit with the smallest relative margin.

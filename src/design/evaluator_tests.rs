@@ -1,8 +1,9 @@
 //! Gradients of responses against solves on moved meshes.
 
 use super::*;
+use crate::design::range::{AngleRange, OffsetRange, Range};
 use crate::design::space::subspaces;
-use crate::design::study::{AngleRange, NotchedSide, OffsetRange, Range, VaryHoleShapes};
+use crate::design::study::{NotchedSide, VaryHoleShapes};
 use crate::mesh::{mesh_specimen, morphed};
 use crate::sensitivity::Protocol;
 use std::path::Path;
@@ -12,9 +13,9 @@ fn study() -> Study {
     let text = std::fs::read_to_string(folder.join("two-hole-shear.json")).expect("the study is there");
     let mut study = Study::from_json(&text, &folder).expect("the study is valid");
     study.limits.symmetry = crate::specimen::Symmetry::None;
-    study.vary.thickness_mm = Some(super::super::study::Range { min: 5.0, max: 8.0 });
-    study.vary.length_mm = Some(super::super::study::Range { min: 20.0, max: 30.0 });
-    study.vary.width_mm = Some(super::super::study::Range { min: 15.0, max: 22.0 });
+    study.vary.thickness_mm = Some(super::super::range::Range { min: 5.0, max: 8.0 });
+    study.vary.length_mm = Some(super::super::range::Range { min: 20.0, max: 30.0 });
+    study.vary.width_mm = Some(super::super::range::Range { min: 15.0, max: 22.0 });
     study.materials.iter_mut().for_each(|m| m.relative_sd = 0.0);
     // So that the materials' distance is evaluated too.
     study.objective.kind = ObjectiveKind::TellApart;
@@ -141,7 +142,7 @@ fn gradients_of_a_gauge_pass_the_taylor_test() {
     study.base = Specimen::from_json(include_str!("../../geometries/short-dumbbell.json")).expect("shipped");
     study.base.drive_mm = vec![5.0];
     study.vary.tests = vec![crate::specimen::TestKind::Uniaxial];
-    study.vary.hole_count = crate::design::study::CountRange { min: 0, max: 0 };
+    study.vary.hole_count = crate::design::range::CountRange { min: 0, max: 0 };
     study.vary.length_mm = Some(Range { min: 35.0, max: 45.0 });
     study.vary.width_mm = Some(Range { min: 10.0, max: 14.0 });
     study.vary.thickness_mm = None;
@@ -236,7 +237,7 @@ fn gradients_of_unlike_blocks() {
     study.base.samples_in_parallel = 1;
     let block = crate::specimen::Block { thickness_mm: 7.5, ..study.base.block };
     study.base.other_samples = vec![crate::specimen::Sample { block, holes: study.base.holes.clone() }];
-    let thickness_mm = Some(super::super::study::Range { min: 5.0, max: 9.0 });
+    let thickness_mm = Some(super::super::range::Range { min: 5.0, max: 9.0 });
     study.vary.other_samples =
         vec![super::super::study::VarySample { is_like_first: true, thickness_mm, ..Default::default() }];
     study.validate().expect("a study");

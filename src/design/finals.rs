@@ -2,18 +2,16 @@
 //! the search and break it there.
 
 use super::aim::ObjectiveKind;
-use super::confirm::{Confirmed, confirm};
-use super::evaluation_failure::EvaluationFailure;
+use super::confirm::Confirmed;
 use super::local::{LocalSettings, improve};
 use super::material_samples::sample_materials;
 use super::objective::Reference;
 use super::rounding::in_steps;
 use super::search_error::SearchError;
-use super::search_run::{Progress, SearchRun};
+use super::search_run::{Confirmation, Progress, SearchRun};
 use super::space::Subspace;
 use super::state::{Finalist, State, is_same};
 use super::structure_problem::StructureProblem;
-use crate::provenance::input_hash;
 use crate::specimen::Specimen;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -24,17 +22,10 @@ const MAX_REPAIRS: usize = 2;
 /// Evaluations of one repair at most.
 const REPAIR_EVALUATIONS: usize = 6;
 
-/// A confirmation, or why there is none; `None` where it was cancelled.
-type Confirmation = Option<Result<Confirmed, EvaluationFailure>>;
-
 impl SearchRun<'_> {
-    /// A design's confirmation: from the checkpoint where it is known.
+    /// A design's confirmation in the study's scan.
     fn confirmed(&self, specimen: &Specimen) -> Confirmation {
-        let key = input_hash(&serde_json::json!({ "specimen": specimen, "kind": "confirm" }));
-        self.checkpoint.get_or(&key, || match confirm(self.study, specimen, &|| (self.is_cancelled)()) {
-            Err(EvaluationFailure::Cancelled) => None,
-            other => Some(other),
-        })
+        self.confirmed_in(&self.study.scan, specimen)
     }
 
     /// The base, confirmed and compared with itself.
@@ -124,7 +115,7 @@ impl SearchRun<'_> {
             itself.remark = Some(format!("The base specimen itself: no other design {why} at confirmation."));
             ranked.push(itself);
         }
-        ranked.sort_by(|a, b| b.is_within_limits.cmp(&a.is_within_limits).then(b.objective.total_cmp(&a.objective)));
+        ranked.sort_by(Confirmed::by_rank);
         if !ranked.first().is_some_and(|best| best.is_within_limits) {
             return Err(SearchError::NothingFeasible { tried: state.candidates.len() });
         }

@@ -72,7 +72,7 @@ pub fn findings(
     said.extend(what_is_simpler(ranked, equals));
     said.extend(what_size_does(study, base, best));
     said.extend(gain_anywhere.map(|gain| where_the_grid_lies(best.objective, gain)));
-    said.extend(where_voxels_end(&best.specimen, study.scan));
+    said.extend(where_voxels_end(&best.specimen, best.evaluation.scan));
     said.extend(how_far_apart(base, best));
     if study.objective.kind == ObjectiveKind::Detect {
         said.extend(sizes_in_words(study, base, best));

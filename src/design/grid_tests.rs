@@ -18,7 +18,8 @@ fn two_variables(kind: ObjectiveKind) -> Study {
     study.vary.drive_mm = Range { min: 5.0, max: 5.0 };
     (study.vary.length_mm, study.vary.thickness_mm, study.vary.width_mm) = (None, None, None);
     study.objective = Objective { kind, guard_promised_sd: Guard::None, ..Objective::default() };
-    study.budget = Budget { explore: 16, refine: 2, iterations: 10, propose: 0, confirm: 1, variants_in_search: true };
+    study.budget =
+        Budget { explore: 16, refine: 2, iterations: 10, propose: 0, confirm: 1, scans: 1, variants_in_search: true };
     study
 }
 

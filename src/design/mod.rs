@@ -21,10 +21,12 @@ mod local;
 mod material_samples;
 mod objective;
 mod propose;
+mod range;
 mod recommendation;
 mod response;
 mod result;
 mod rounding;
+mod scan_choice;
 mod search;
 mod search_error;
 mod search_run;
@@ -48,6 +50,7 @@ mod tell_apart;
 mod ties;
 mod trend;
 mod unfinished;
+mod vary_scan;
 mod words;
 
 pub use aim::{Combine, Guard, Normalisation, Objective, ObjectiveKind};
@@ -64,6 +67,7 @@ pub(crate) use inline::Inline;
 pub use local::{Improved, LocalModel, LocalProblem, LocalSettings, improve};
 pub use material_samples::{MaterialSample, sample_materials};
 pub use objective::{Judged, Reference};
+pub use range::{AngleRange, CountRange, EdgeRange, OffsetRange, Range};
 pub use recommendation::Recommendation;
 pub use response::{Response, TEARING_FRACTION, tearing_stretch};
 pub use result::{DesignResult, MaterialVerification, Verification};
@@ -72,11 +76,9 @@ pub use search_error::SearchError;
 pub use search_run::{Progress, ProgressSink};
 pub use space::{Subspace, Variable, subspaces};
 pub use structure::{Orbit, Structure};
-pub use study::{
-    AngleRange, Budget, CountRange, MaterialPrior, NotchedSide, OffsetRange, Range, Study, Vary, VaryHoleShapes,
-    VarySample, VerificationSettings,
-};
+pub use study::{Budget, MaterialPrior, NotchedSide, Study, Vary, VaryHoleShapes, VarySample, VerificationSettings};
 pub use study_error::StudyError;
 pub use study_hash::study_hash;
 pub use unfinished::Unfinished;
+pub use vary_scan::{ChosenScan, VaryScan};
 pub use words::{block_in_brief, holes_in_brief, plates_in_words};

@@ -4,8 +4,9 @@
 use super::entry::DesignEntry;
 use super::findings::{Equals, symbol};
 use super::study::Study;
+use super::vary_scan::ChosenScan;
 use super::words::{listed, plates_in_words, sample_in_words, short_number};
-use crate::sensitivity::{GridPlace, Protocol};
+use crate::sensitivity::{GridPlace, Protocol, ScanSettings};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -21,15 +22,25 @@ pub struct Recommendation {
     pub assumptions: String,
 }
 
+/// What is assumed of a scan that was found.
+const SAME_TIME: &str = " The scan takes the time of the study's: its noise follows from that one's by the voxels' volume and \
+                         the displacement per phase.";
+
 impl Recommendation {
     /// Of the design that is simplest to make of those equal to the best.
-    pub(super) fn new(study: &Study, base: &DesignEntry, ranked: &[DesignEntry], equals: Equals) -> Recommendation {
+    pub(super) fn new(
+        study: &Study,
+        base: &DesignEntry,
+        ranked: &[DesignEntry],
+        (equals, scan): (Equals, Option<&ChosenScan>),
+    ) -> Recommendation {
         let Some(chosen) = ranked.get(equals.simplest).or(ranked.first()) else { return Recommendation::default() };
         let advice = if chosen.is_design_of(base) {
-            format!(
-                "Keep the base specimen. {} No design within the limits was found to be better.",
-                scan_like_this(study, chosen)
-            )
+            let found = match scan {
+                Some(_) => because(base, ranked, equals, chosen, scan),
+                None => "No design within the limits was found to be better.".into(),
+            };
+            format!("Keep the base specimen. {} {found}", scan_like_this(study, chosen))
         } else {
             let number = if equals.simplest == 0 {
                 String::new()
@@ -41,10 +52,14 @@ impl Recommendation {
                 chosen.specimen.name,
                 shape(chosen),
                 scan_like_this(study, chosen),
-                because(base, ranked, equals, chosen)
+                because(base, ranked, equals, chosen, scan)
             )
         };
-        Recommendation { make: advice, precision: precision(base, chosen), assumptions: assumptions(study, chosen) }
+        Recommendation {
+            make: advice,
+            precision: precision(base, chosen),
+            assumptions: assumptions(study, chosen, scan),
+        }
     }
 }
 
@@ -87,13 +102,35 @@ fn scan_like_this(study: &Study, entry: &DesignEntry) -> String {
         }
     };
     let plates = plates_in_words(&entry.specimen).map_or(String::new(), |plates| format!(", its {plates} before"));
-    format!("Scan it {scans}{plates}{blocks}{on_the_way}.")
+    format!("Scan it {scans}{plates}{blocks}{on_the_way}{}.", in_voxels(study, &entry.evaluation.scan))
 }
 
-fn because(base: &DesignEntry, ranked: &[DesignEntry], equals: Equals, chosen: &DesignEntry) -> String {
+/// Voxels and encoding, where they are not the study's.
+fn in_voxels(study: &Study, scan: &ScanSettings) -> String {
+    if *scan == study.scan {
+        return String::new();
+    }
+    let triple = |values: [f64; 3], between: &str| values.map(short_number).join(between);
+    let phase = scan.mm_per_radian.map_or(String::new(), |scale| {
+        format!(", encoded with {} mm of displacement per radian along x, y and z", triple(scale, ", "))
+    });
+    format!(", in voxels of {} mm{phase}", triple(scan.voxel_mm, " × "))
+}
+
+fn because(
+    base: &DesignEntry,
+    ranked: &[DesignEntry],
+    equals: Equals,
+    chosen: &DesignEntry,
+    scan: Option<&ChosenScan>,
+) -> String {
     let gain = format!("{:.3} ± {:.3} times", chosen.objective, chosen.objective * chosen.mesh_relative_sd);
-    let scanned = format!("the base specimen scanned in the same way at {} mm", short_number(drive_mm(base)));
-    match ranked.first() {
+    let way = if scan.is_some() { "as the study says" } else { "in the same way" };
+    let scanned = format!("the base specimen scanned {way} at {} mm", short_number(drive_mm(base)));
+    let of_scan = scan.and_then(|s| s.base_objective);
+    let of_scan =
+        of_scan.map_or(String::new(), |factor| format!(" The scan alone makes the base {factor:.3} times as good."));
+    let why = match ranked.first() {
         Some(best) if equals.simplest > 0 => format!(
             "Why: it is simpler to make than the best that was found, and as good within what meshes leave open ({gain} as good as \
              {scanned} by the study's objective; the best: {:.3}).",
@@ -102,7 +139,8 @@ fn because(base: &DesignEntry, ranked: &[DesignEntry], equals: Equals, chosen: &
         _ => format!(
             "Why: by the study's objective it is {gain} as good as {scanned}, and nothing better was found within the limits."
         ),
-    }
+    };
+    why + &of_scan
 }
 
 /// Relative standard deviations of every μᵢ and αᵢ of each material, those of the base beside them.
@@ -124,8 +162,8 @@ fn precision(base: &DesignEntry, chosen: &DesignEntry) -> String {
 }
 
 /// The scan and the load cell that the figures are of.
-fn assumptions(study: &Study, entry: &DesignEntry) -> String {
-    let (scan, protocol) = (&study.scan, &study.protocol);
+fn assumptions(study: &Study, entry: &DesignEntry, chosen: Option<&ChosenScan>) -> String {
+    let (scan, protocol) = (&entry.evaluation.scan, &study.protocol);
     let [x, y, z] = scan.voxel_mm.map(short_number);
     let [a, b, c] = scan.noise_sd_mm.map(short_number);
     let noise = if a == b && b == c {
@@ -144,9 +182,10 @@ fn assumptions(study: &Study, entry: &DesignEntry) -> String {
     };
     format!(
         "Assumed are voxels of {x} × {y} × {z} mm {grid}, whose displacement has a noise of {noise}, a force of all samples together \
-         read to {} N{}, and {blocks}.",
+         read to {} N{}, and {blocks}.{}",
         short_number(scan.force_sd_n),
-        set_up(protocol)
+        set_up(protocol),
+        chosen.map_or("", |_| SAME_TIME)
     )
 }
 

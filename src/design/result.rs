@@ -9,6 +9,7 @@ use super::search::Found;
 use super::study::Study;
 use super::study_hash::study_hash;
 use super::ties::{equal_to_best, simplest};
+use super::vary_scan::ChosenScan;
 use crate::calibration::ParameterSpread;
 use crate::provenance::VERSION;
 use crate::sensitivity::Protocol;
@@ -37,6 +38,9 @@ pub struct DesignResult {
     /// specimen; absent where the study takes it to do so, or its objective does not hang on it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub objective_grid_anywhere: Option<f64>,
+    /// The scan that was found for the winner, in which all of `ranked` are confirmed; absent where it is the study's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scan: Option<ChosenScan>,
     /// Every confirmed design, best first, those within every limit before others.
     pub ranked: Vec<DesignEntry>,
     /// Indices in `ranked` of the designs that are equal to the best within what meshes leave open, the best included.
@@ -126,10 +130,11 @@ impl DesignResult {
             schema: "design/1".into(),
             name: study.name.clone(),
             pareto: pareto(&ranked),
-            recommendation: Recommendation::new(study, &base, &ranked, equals),
+            recommendation: Recommendation::new(study, &base, &ranked, (equals, found.scan.as_ref())),
             protocol: study.protocol.clone(),
             findings: findings(study, &base, &ranked, &disagreement, equals, found.gain_anywhere),
             objective_grid_anywhere: found.gain_anywhere,
+            scan: found.scan,
             equal_to_best,
             simplest,
             disagreement,

@@ -20,6 +20,7 @@ use super::state::{MOST_FINE_FAILURES, State};
 use super::structure_problem::StructureProblem;
 use super::study::Study;
 use super::unfinished::Unfinished;
+use super::vary_scan::ChosenScan;
 use crate::specimen::Specimen;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -43,6 +44,8 @@ pub struct Found {
     /// The objective of the best over the base's if the scan's grid lay anywhere; `None` where the study takes it to do
     /// so, or its objective does not hang on it.
     pub gain_anywhere: Option<f64>,
+    /// The scan that was found for the best, in which all of `ranked` are confirmed; `None` where it is the study's.
+    pub scan: Option<ChosenScan>,
     /// Every design evaluated, in order.
     pub candidates: Vec<Candidate>,
     /// Largest objective within limits after each evaluation.
@@ -121,9 +124,11 @@ impl SearchRun<'_> {
             self.race(&RaceRules::of_solid(study.budget.propose, &spaces), &fine, &spaces, &mut state)?;
         }
         let ranked = self.confirm_all(&base, &spaces, &mut state)?;
-        let gain_anywhere = ranked.first().and_then(|best| self.gain_anywhere(&base.specimen, &best.specimen));
+        let (ranked, scan) = self.with_best_scan(&base, ranked, &mut state)?;
+        let anywhere = |best: &Confirmed| self.gain_anywhere(&base.specimen, &best.specimen, best.scan()?);
         Ok(Found {
-            gain_anywhere,
+            gain_anywhere: ranked.first().and_then(anywhere),
+            scan,
             base,
             ranked,
             history: state.history,
@@ -151,7 +156,7 @@ impl SearchRun<'_> {
     }
 
     /// Gains over a base with this evaluation.
-    fn reference_from(&self, base: Option<Attempt>, state: &State) -> Result<Reference<'_>, SearchError> {
+    pub(super) fn reference_from(&self, base: Option<Attempt>, state: &State) -> Result<Reference<'_>, SearchError> {
         match base {
             None => Err(state.stopped(self.study, "base")),
             Some(Err(cause)) => Err(SearchError::Base { cause }),

@@ -2,7 +2,7 @@
 
 use super::aim::ObjectiveKind;
 use super::checkpoint::Checkpoint;
-use super::confirm::estimate;
+use super::confirm::{Confirmed, confirm, estimate};
 use super::evaluation_failure::EvaluationFailure;
 use super::evaluator::{Evaluated, Evaluator};
 use super::fidelity::Fidelity;
@@ -16,7 +16,7 @@ use crate::specimen::Specimen;
 /// How far a search is.
 #[derive(Clone, Debug)]
 pub struct Progress {
-    /// `base`, `explore`, `refine`, `propose`, `solid`, `confirm`, `repair`, `verify`.
+    /// `base`, `explore`, `refine`, `propose`, `solid`, `confirm`, `repair`, `scan`, `verify`.
     pub stage: &'static str,
     /// Finished in this stage.
     pub done: usize,
@@ -33,6 +33,8 @@ pub type ProgressSink<'a> = &'a (dyn Fn(&Progress) + Sync);
 
 /// An evaluation, or why there is none.
 pub(super) type Attempt = Result<Evaluated, EvaluationFailure>;
+/// A confirmation, or why there is none; `None` where it was cancelled.
+pub(super) type Confirmation = Option<Result<Confirmed, EvaluationFailure>>;
 
 /// What designs are judged by: gains over the base, both solved at one fidelity.
 pub(super) struct Judge<'a> {
@@ -52,35 +54,49 @@ pub(super) struct SearchRun<'a> {
 impl SearchRun<'_> {
     /// What a design is judged by in the search: from the checkpoint where it is known. `None` where it was cancelled.
     pub fn estimated(&self, specimen: &Specimen, fidelity: Fidelity) -> Option<Attempt> {
-        let key = input_hash(&serde_json::json!({ "specimen": specimen, "kind": "estimate", "fidelity": fidelity }));
-        self.checkpoint.get_or(&key, || match estimate(self.study, specimen, fidelity, &|| (self.is_cancelled)()) {
+        self.estimated_in(&self.study.scan, specimen, fidelity)
+    }
+
+    /// The same in another scan than the study's.
+    pub fn estimated_in(&self, scan: &ScanSettings, specimen: &Specimen, fidelity: Fidelity) -> Option<Attempt> {
+        let key = self.key_of("estimate", scan, &serde_json::json!({ "specimen": specimen, "fidelity": fidelity }));
+        let study = Study { scan: *scan, ..self.study.clone() };
+        self.checkpoint.get_or(&key, || match estimate(&study, specimen, fidelity, &|| (self.is_cancelled)()) {
             Err(EvaluationFailure::Cancelled) => None,
             other => Some(other),
         })
     }
 
-    /// The objective of `design` over that of `base` if the scan's grid lay anywhere, in place of on the middle of
-    /// each: `None` where the study takes it to do so, where its objective does not look at voxels or asks for a
+    /// A design's confirmation in a scan: from the checkpoint where it is known.
+    pub fn confirmed_in(&self, scan: &ScanSettings, specimen: &Specimen) -> Confirmation {
+        let key = self.key_of("confirm", scan, &serde_json::json!({ "specimen": specimen }));
+        let study = Study { scan: *scan, ..self.study.clone() };
+        self.checkpoint.get_or(&key, || match confirm(&study, specimen, &|| (self.is_cancelled)()) {
+            Err(EvaluationFailure::Cancelled) => None,
+            other => Some(other),
+        })
+    }
+
+    /// Under which the checkpoint keeps what was found of a design in a scan.
+    fn key_of(&self, kind: &str, scan: &ScanSettings, of_what: &serde_json::Value) -> String {
+        let other = (*scan != self.study.scan).then_some(scan);
+        input_hash(&serde_json::json!({ "kind": kind, "scan": other, "of": of_what }))
+    }
+
+    /// The objective of `design` in `scan` over that of `base` in the study's if the grid lay anywhere, in place of on
+    /// the middle of each: `None` where the study takes it to do so, where its objective does not look at voxels or asks for a
     /// diagnosis, or where it was cancelled.
-    pub fn gain_anywhere(&self, base: &Specimen, design: &Specimen) -> Option<f64> {
+    pub fn gain_anywhere(&self, base: &Specimen, design: &Specimen, scan: &ScanSettings) -> Option<f64> {
         let looks_at_voxels = !matches!(self.study.objective.kind, ObjectiveKind::TellApart | ObjectiveKind::Detect);
         if self.study.scan.grid != GridPlace::Centred || !looks_at_voxels {
             return None;
         }
-        let scan = ScanSettings { grid: GridPlace::Anywhere, ..self.study.scan };
-        let study = Study { scan, ..self.study.clone() };
-        let evaluated = |specimen: &Specimen| {
-            let key = input_hash(&serde_json::json!({ "specimen": specimen, "kind": "anywhere" }));
-            let attempt: Option<Attempt> = self.checkpoint.get_or(&key, || {
-                match estimate(&study, specimen, Fidelity::Fine, &|| (self.is_cancelled)()) {
-                    Err(EvaluationFailure::Cancelled) => None,
-                    other => Some(other),
-                }
-            });
-            attempt?.ok()
+        let evaluated = |specimen: &Specimen, scan: &ScanSettings| {
+            let anywhere = ScanSettings { grid: GridPlace::Anywhere, ..*scan };
+            self.estimated_in(&anywhere, specimen, Fidelity::Fine)?.ok()
         };
-        let (base, design) = (evaluated(base)?, evaluated(design)?);
-        let reference = Reference::new(&study, self.evaluator.samples(), &base.responses);
+        let (base, design) = (evaluated(base, &self.study.scan)?, evaluated(design, scan)?);
+        let reference = Reference::new(self.study, self.evaluator.samples(), &base.responses);
         Some(reference.objective(&reference.judge(&design)).exp())
     }
 

@@ -20,7 +20,8 @@ fn small_study() -> Study {
     let mut study = Study::from_json(&text, &folder).expect("the study is valid");
     study.vary.hole_count = CountRange { min: 0, max: 1 };
     study.materials[0].relative_sd = 0.0;
-    study.budget = Budget { explore: 6, refine: 1, iterations: 3, propose: 12, confirm: 2, variants_in_search: true };
+    study.budget =
+        Budget { explore: 6, refine: 1, iterations: 3, propose: 12, confirm: 2, scans: 1, variants_in_search: true };
     study
 }
 
@@ -185,7 +186,8 @@ fn unlike_samples_are_searched() {
     study.vary.other_samples = vec![VarySample { is_like_first: true, thickness_mm, ..VarySample::default() }];
     study.scan.voxel_mm = [1.0, 0.5, 1.0];
     study.protocol.blocks_scanned = 2;
-    study.budget = Budget { explore: 4, refine: 1, iterations: 2, propose: 4, confirm: 1, variants_in_search: false };
+    study.budget =
+        Budget { explore: 4, refine: 1, iterations: 2, propose: 4, confirm: 1, scans: 1, variants_in_search: false };
     study.validate().expect("a study");
     let found = search(&study, &Checkpoint::in_memory(), &quiet, &|| false).expect("the search succeeds");
     let result = DesignResult::new(&study, &found).expect("something was confirmed");
@@ -230,6 +232,37 @@ fn an_earlier_scan_is_searched() {
         }
     }
     assert!(result.base.evaluation.scan_share.is_empty());
+}
+
+/// Voxels and encoding that are better for the best design are found, rounded, in the ranges, and the same at any number
+/// of threads; all designs are then confirmed in that scan, and the base is not.
+#[test]
+fn a_scan_is_chosen() {
+    let mut study = short_study();
+    study.vary.hole_count = CountRange { min: 1, max: 1 };
+    study.scan.mm_per_radian = Some([0.3; 3]);
+    let voxel_mm = EdgeRange { min: study.scan.voxel_mm.map(|e| 0.8 * e), max: study.scan.voxel_mm.map(|e| 2.0 * e) };
+    study.vary.scan = Some(VaryScan { voxel_mm: Some(voxel_mm), mm_per_radian: Some(Range { min: 0.1, max: 0.6 }) });
+    assert!(matches!(study.validate(), Err(StudyError::Scan(_))), "gradients take the noise to be even");
+    study.budget = Budget { explore: 3, refine: 0, propose: 2, confirm: 2, scans: 19, ..study.budget };
+    study.validate().expect("a study");
+    let text = result_of(&study, &Checkpoint::in_memory(), 1);
+    assert_eq!(text, result_of(&study, &Checkpoint::in_memory(), 2));
+    let result: DesignResult = serde_json::from_str(&text).expect("a result");
+    let chosen = result.scan.expect("a better scan than weak encoding in small voxels");
+    assert_eq!(chosen.num_tried, 19);
+    assert!(result.ranked.iter().all(|e| e.evaluation.scan == chosen.scan));
+    assert_eq!(result.base.evaluation.scan, study.scan);
+    let [x, y, z] = [0, 1, 2].map(|a| voxel_mm.min[a] * 0.96 <= chosen.scan.voxel_mm[a]);
+    assert!(x && y && z, "{chosen:?}");
+    let of_base = chosen.base_objective.expect("the base can be scanned so");
+    assert!(of_base > 1.05 && result.best.objective > of_base - 1e-9, "{of_base} {}", result.best.objective);
+    let said = result.recommendation.make;
+    assert!(said.contains("in voxels of") && said.contains("The scan alone makes the base"), "{said}");
+    // The promise is that of the same evaluation by itself.
+    let alone = Study { scan: chosen.scan, ..study.clone() };
+    let again = confirm(&alone, &result.best.specimen, &|| false).expect("it is confirmed");
+    assert_eq!(again.by_material[0].evaluation.promised_sd, result.best.evaluation.promised_sd);
 }
 
 /// The base is a design like any other: its structure's vector gives it back, symmetric studies included.
@@ -467,8 +500,15 @@ fn random_studies_never_return_what_breaks_a_limit() {
         // Shorter bars than those of the geometry alone: every design is solved.
         study.base.block.length_mm = 24.0;
         study.vary.length_mm = study.vary.length_mm.map(|_| Range { min: 20.0, max: 28.0 });
-        study.budget =
-            Budget { explore: 4, refine: 1, iterations: 3, propose: 12, confirm: 2, variants_in_search: true };
+        study.budget = Budget {
+            explore: 4,
+            refine: 1,
+            iterations: 3,
+            propose: 12,
+            confirm: 2,
+            scans: 1,
+            variants_in_search: true,
+        };
         match search(&study, &Checkpoint::in_memory(), &quiet, &|| false) {
             Ok(found) => {
                 num_found += 1;

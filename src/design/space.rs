@@ -1,7 +1,8 @@
 //! The search space: a few discrete structures, each with a continuous vector.
 
+use super::range::Range;
 use super::structure::{Orbit, Structure, structures};
-use super::study::{Range, Study};
+use super::study::Study;
 use crate::mesh::DesignVariable;
 use crate::specimen::{Block, Dumbbell, Hole, HoleAxis, HoleKind, HoleShape, MIRROR_TOLERANCE_MM, Specimen, TestKind};
 

@@ -2,7 +2,9 @@
 //! what is sought and how hard.
 
 use super::aim::Objective;
-use super::study_limits::{AngleDeg, Count, CountOrNone, HoleCount, LengthMm, OffsetMm};
+use super::range::{AngleRange, CountRange, OffsetRange, Range};
+use super::study_limits::{Count, CountOrNone};
+use super::vary_scan::VaryScan;
 use crate::material::Material;
 use crate::sensitivity::{Protocol, ScanSettings};
 use crate::specimen::{HoleAxis, HoleKind, ManufacturingLimits, Specimen, TestKind};
@@ -57,25 +59,6 @@ pub struct VaryHoleShapes {
     /// Angle, degrees; any where absent.
     #[serde(default)]
     pub angle_deg: AngleRange,
-}
-
-/// Two angles, degrees, both included.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct AngleRange {
-    /// Smallest.
-    #[schema(value_type = AngleDeg)]
-    pub min: f64,
-    /// Largest.
-    #[schema(value_type = AngleDeg)]
-    pub max: f64,
-}
-
-/// Every angle: a hole looks alike after half a turn.
-impl Default for AngleRange {
-    fn default() -> Self {
-        AngleRange { min: -90.0, max: 90.0 }
-    }
 }
 
 /// What may vary; what is absent stays as in the base specimen.
@@ -137,6 +120,11 @@ pub struct Vary {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 7)]
     pub other_samples: Vec<VarySample>,
+    /// The scan's voxels and encoding: those that are best for the best design are found once designs are ranked. The
+    /// base is scanned as the study says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub scan: Option<VaryScan>,
 }
 
 /// Sides of a block that notches may open to.
@@ -157,44 +145,6 @@ impl NotchedSide {
             NotchedSide::Sides => 1,
         }
     }
-}
-
-/// Two counts, both included.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct CountRange {
-    /// Smallest.
-    #[schema(value_type = HoleCount)]
-    pub min: usize,
-    /// Largest.
-    #[schema(value_type = HoleCount)]
-    pub max: usize,
-}
-
-/// Two lengths, mm, both included.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-#[schema(as = RangeMm)]
-#[serde(deny_unknown_fields)]
-pub struct Range {
-    /// Smallest.
-    #[schema(value_type = LengthMm)]
-    pub min: f64,
-    /// Largest.
-    #[schema(value_type = LengthMm)]
-    pub max: f64,
-}
-
-/// Two lengths either way, mm, both included.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-#[schema(as = OffsetRangeMm)]
-#[serde(deny_unknown_fields)]
-pub struct OffsetRange {
-    /// Smallest.
-    #[schema(value_type = OffsetMm)]
-    pub min: f64,
-    /// Largest.
-    #[schema(value_type = OffsetMm)]
-    pub max: f64,
 }
 
 /// How many evaluations.
@@ -219,6 +169,10 @@ pub struct Budget {
     /// Designs confirmed on a finer mesh with the scan's voxels.
     #[schema(value_type = Count)]
     pub confirm: usize,
+    /// Scans that are tried for the best design, where the scan may vary.
+    #[serde(default = "default_scans", skip_serializing_if = "is_default_scans")]
+    #[schema(value_type = Count, default = default_scans)]
+    pub scans: usize,
     /// Whether the search judges every design at the priors' stiffer and softer variants too. If not, it is judged at
     /// the central values, three times as many designs are seen in the same time, limits are lowered by what the
     /// confirmation of the base shows for the variants, and the variants themselves enter at confirmation.
@@ -227,8 +181,24 @@ pub struct Budget {
 
 impl Default for Budget {
     fn default() -> Self {
-        Budget { explore: 160, refine: 0, iterations: 12, propose: 200, confirm: 10, variants_in_search: true }
+        Budget {
+            explore: 160,
+            refine: 0,
+            iterations: 12,
+            propose: 200,
+            confirm: 10,
+            scans: 80,
+            variants_in_search: true,
+        }
     }
+}
+
+fn default_scans() -> usize {
+    Budget::default().scans
+}
+
+fn is_default_scans(scans: &usize) -> bool {
+    *scans == default_scans()
 }
 
 /// Budgets without an evolution are written as they were before there was one.

@@ -2,8 +2,9 @@
 
 use super::aim::ObjectiveKind;
 use super::detection::{countable, counted};
+use super::range::Range;
 use super::structure::can_be_notched;
-use super::study::{MaterialPrior, Range, Study, VaryHoleShapes};
+use super::study::{MaterialPrior, Study, VaryHoleShapes};
 use super::study_error::StudyError;
 use super::study_limits::{
     MAX_COUNT, MAX_HOLES_TO_TRY, MAX_LENGTH_MM, MAX_RELATIVE_SD, MAX_WEIGHT, MIN_LENGTH_MM, MIN_WEIGHT,
@@ -50,6 +51,7 @@ impl Study {
         self.check_materials(&mut problems);
         self.check_variation(&mut problems);
         self.check_blocks(&mut problems);
+        self.check_scan(&mut problems);
         if self.objective.kind == ObjectiveKind::TellApart && self.materials.len() < 2 {
             problems.push(StudyError::NothingToTellApart { count: self.materials.len() });
         }
@@ -64,6 +66,7 @@ impl Study {
             ("budget", "iterations", self.budget.iterations, 1),
             ("budget", "propose", self.budget.propose, 0),
             ("budget", "confirm", self.budget.confirm, 1),
+            ("budget", "scans", self.budget.scans, 1),
             ("verification", "draws", self.verification.draws, 1),
         ] {
             if !(least..=MAX_COUNT).contains(&count) {
@@ -154,6 +157,19 @@ impl Study {
             problems.push(StudyError::OtherSamplesInTension);
         }
         self.check_wedge(problems);
+    }
+
+    /// Whether what is sought knows what the scan's encoding costs, and the scan can vary as it is to.
+    fn check_scan(&self, problems: &mut Vec<StudyError>) {
+        let kind = self.objective.kind;
+        if self.budget.refine > 0 || matches!(kind, ObjectiveKind::TellApart | ObjectiveKind::Detect) {
+            let remedy =
+                "gradients, tell_apart and detect take it so: set budget.refine to 0 and choose another objective.kind";
+            problems.extend(self.scan.needs_even_noise(remedy).err().map(StudyError::Scan));
+        }
+        if let Some(vary) = &self.vary.scan {
+            problems.extend(vary.field_errors(&self.scan, kind).into_iter().map(StudyError::VaryScan));
+        }
     }
 
     /// Whether all that is tried can be done with a wedge, which stays as it is in the base.

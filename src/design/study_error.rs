@@ -40,6 +40,9 @@ pub enum StudyError {
     /// The scan is not usable.
     #[error("scan: {0}")]
     Scan(FieldError),
+    /// The scan cannot vary as it is to.
+    #[error("vary.scan: {0}")]
+    VaryScan(FieldError),
     /// The protocol is not usable.
     #[error("protocol: {0}")]
     Protocol(FieldError),
@@ -256,6 +259,7 @@ impl StudyError {
             E::Base(error) => error.field_error().below("/base"),
             E::Limits(error) => error.field_error().below("/limits"),
             E::Scan(error) => error.clone().below("/scan"),
+            E::VaryScan(error) => error.clone().below("/vary/scan"),
             E::Protocol(error) => error.clone().below("/protocol"),
             E::NoMaterials => FieldError::new("/materials", "[]", "a list of at least one material"),
             E::Material { index, error, .. } => error.field_error().below(&format!("/materials/{index}/material")),

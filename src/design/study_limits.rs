@@ -1,6 +1,6 @@
 //! What a study may hold.
 
-use crate::field::schema::{integer_within, number_within, schema_type};
+use crate::field::schema::{integer_within, number_above, number_within, numbers, schema_type};
 use crate::specimen::MAX_HOLE_ANGLE_DEG;
 
 /// The schema that this version reads and writes.
@@ -35,6 +35,8 @@ schema_type! {
     pub(super) HoleCount = integer_within(0..=MAX_HOLES_TO_TRY);
     /// A length or a drive, mm.
     pub(super) LengthMm = number_within(MIN_LENGTH_MM..=MAX_LENGTH_MM);
+    /// Three lengths along x, y and z, mm, each above 0.
+    pub(super) EdgesMm = numbers(number_above(0.0), 3..=3);
     /// A length either way, mm.
     pub(super) OffsetMm = number_within(-MAX_LENGTH_MM..=MAX_LENGTH_MM);
     /// An angle of a hole, degrees.

@@ -11,7 +11,8 @@ use crate::specimen::Specimen;
 pub struct PlannedScan<'a> {
     /// The specimen; samples of other kinds beside it are no part of its recording.
     pub specimen: &'a Specimen,
-    /// Voxels and noise. Partly filled voxels count like others, as in a diagnosis.
+    /// Voxels and noise, which is taken to be the same in all. Partly filled voxels count like others, as in a
+    /// diagnosis.
     pub scan: &'a ScanSettings,
     /// Drives that are scanned, mm.
     pub drives_mm: &'a [f64],

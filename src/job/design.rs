@@ -14,7 +14,6 @@ use crate::mesh::MeshOptions;
 use crate::provenance::input_hash;
 use crate::report::design_report;
 use crate::sensitivity::Protocol;
-use crate::specimen::Specimen;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -51,6 +50,7 @@ impl Request for Study {
             .saturating_add(budget.explore)
             .saturating_add(budget.propose)
             .saturating_add(budget.confirm)
+            .saturating_add(self.vary.scan.map_or(0, |_| budget.scans))
             .saturating_mul(self.materials.len());
         if evaluations > MAX_EVALUATIONS {
             let found = format!("a budget of about {evaluations} evaluations");
@@ -184,7 +184,7 @@ impl CheckedStudy {
             let on = |options: VerifyOptions| {
                 let protocol = Protocol { scan_share: entry.evaluation.scan_share.clone(), ..study.protocol.clone() };
                 let options = VerifyOptions { protocol, ..options };
-                self.verified_on((&entry.specimen, material), &options, checkpoint, &on_draw, context)
+                self.verified_on((entry, material), &options, checkpoint, &on_draw, context)
             };
             let mut verified = on(VerifyOptions::new(&entry.specimen, draws, study.seed))?;
             if verified.spreads.is_empty() {
@@ -217,19 +217,20 @@ impl CheckedStudy {
     /// One specimen with one material, from the checkpoint where it is known; `None` where it was stopped.
     fn verified_on(
         &self,
-        (specimen, material): (&Specimen, &Material),
+        (entry, material): (&DesignEntry, &Material),
         options: &VerifyOptions,
         checkpoint: &Checkpoint,
         on_draw: &(dyn Fn() + Sync),
         context: &Context,
     ) -> Option<Verified> {
         let is_cancelled = || context.is_cancelled();
+        let (specimen, scan) = (&entry.specimen, &entry.evaluation.scan);
         let key = input_hash(&json!({
             "specimen": specimen, "material": material, "kind": "verification", "truth_mesh": options.truth_mesh,
-            "fit_mesh": options.fit_mesh, "max_iterations": options.fit.max_iterations, "protocol": options.protocol,
+            "fit_mesh": options.fit_mesh, "max_iterations": options.fit.max_iterations, "protocol": options.protocol, "scan": scan,
         }));
         let (spreads, failure) = checkpoint.get_or(&key, || {
-            match verify_in_full(specimen, material, &self.0.scan, options, on_draw, &is_cancelled) {
+            match verify_in_full(specimen, material, scan, options, on_draw, &is_cancelled) {
                 Ok(found) => {
                     let reason = found.fits.iter().find_map(|fit| fit.as_ref().err().map(ToString::to_string));
                     Some((found.spreads, reason))

@@ -21,14 +21,15 @@ pub(super) fn pictures(
     let material = &prior.material;
     let mut evaluated = Vec::new();
     let mut deformed = Vec::new();
-    for (label, specimen) in [("base", &result.base.specimen), ("best", &result.best.specimen)] {
+    for (label, entry) in [("base", &result.base), ("best", &result.best)] {
+        let specimen = &entry.specimen;
         let options = EvaluationOptions {
             mesh: MeshOptions::search(specimen),
             protocol: Protocol { blocks_scanned: study.protocol.blocks_scanned, ..Protocol::default() },
             ..EvaluationOptions::standard(specimen)
         };
         let drives = DriveSelection::DriveMm(specimen.drive_mm.clone());
-        let mut fixture = Fixture::new(specimen, &study.scan, &options).map_err(|e| failed(&e))?;
+        let mut fixture = Fixture::new(specimen, &entry.evaluation.scan, &options).map_err(|e| failed(&e))?;
         let (_, maps) =
             evaluate_fixture(&mut fixture, material, &drives, &[], &options, &|| false).map_err(|e| failed(&e))?;
         for (index, (part, sample)) in fixture.parts().iter().zip(&maps.samples).enumerate() {

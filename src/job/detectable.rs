@@ -24,6 +24,9 @@ pub(super) fn check_detectable(
 ) -> Result<(), FieldError> {
     let refused = |allowed: &str| FieldError::new("/has_detectable", true, allowed);
     scan.needs_volume("a diagnosis, whose errors are told, is of scans of the volume: leave out has_detectable")
+        .and_then(|()| {
+            scan.needs_even_noise("what a diagnosis would find is told of even noise: leave out one of the two")
+        })
         .map_err(|e| e.below("/scan"))?;
     if !specimen.other_samples.is_empty() || protocol.blocks_scanned > 1 {
         let allowed = "false where the specimen has other_samples or several blocks are scanned";

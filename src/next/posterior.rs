@@ -233,6 +233,7 @@ impl Seen {
                     // The states that the law was fitted to are those visited.
                     beyond: vec![0.0; weights.len()],
                     weights,
+                    signal: None,
                     noise_mm2: recording.noise_sd_mm.map(|sd| sd * sd * recording.noise_correlation()),
                     voxel_mm3: recording.mask.grid.voxel_volume_mm3(),
                     force: measured.force.map(|force| ForceRead {

@@ -47,6 +47,8 @@ pub(super) struct ScannedStep {
     pub(super) by_unknown: Vec<Option<Vec<[f64; 3]>>>,
     /// By voxel: 0 where it does not count.
     pub(super) weights: Vec<f64>,
+    /// By voxel, where the scan says how it encodes: the part of its signal that it keeps by direction.
+    pub(super) signal: Option<Vec<[f64; 3]>>,
     /// By voxel: distance beyond the states visited.
     pub(super) beyond: Vec<f64>,
     /// Variance of a voxel's noise per component, mm².
@@ -74,9 +76,13 @@ impl ScannedStep {
             .weights
             .iter()
             .zip(&self.beyond)
-            .map(|(weight, beyond)| {
+            .enumerate()
+            .map(|(voxel, (weight, beyond))| {
                 let growth = (1.0 + beyond).powi(2);
-                [0, 1, 2].map(|c| (weight / (self.noise_mm2[c] / num + shared[c] * growth)).sqrt())
+                let signal = self.signal.as_ref().map_or([1.0; 3], |signal| signal[voxel]);
+                // Without signal the noise has no bound, and the voxel no weight.
+                let noise_mm2 = [0, 1, 2].map(|c| self.noise_mm2[c] / (num * signal[c] * signal[c]));
+                [0, 1, 2].map(|c| (weight / (noise_mm2[c] + shared[c] * growth)).sqrt())
             })
             .collect();
         // In units of its own standard deviation every value has the noise 1.
@@ -116,6 +122,7 @@ mod tests {
             by_parameter: vec![vec![[0.0; 3]; 4], vec![[1.0, 0.0, 0.0]; 4], vec![[0.0, 1.0, 0.0]; 4]],
             by_unknown: vec![],
             weights: vec![1.0; 4],
+            signal: None,
             beyond: vec![0.0, 0.0, 1.0, 3.0],
             noise_mm2: [0.04; 3],
             voxel_mm3: 2.0,
@@ -127,6 +134,19 @@ mod tests {
         let material = Material::new(200.0, [(17.0, 2.0)]).unwrap();
         let joint = step().information(&material, 0, num, discrepancy).unwrap();
         joint.about_material(&material, &[]).unwrap().matrix()[(1, 1)]
+    }
+
+    /// A voxel with half its signal has twice the noise, one without signal counts for nothing; the discrepancy is
+    /// neither smaller nor larger for it.
+    #[test]
+    fn lost_signal_is_noise() {
+        let material = Material::new(200.0, [(17.0, 2.0)]).unwrap();
+        let found = Discrepancy { variance_mm2: [0.01; 3], volume_mm3: 6.0, force_relative_variance: 0.0 };
+        let seen = ScannedStep { signal: Some(vec![[1.0; 3], [0.5; 3], [0.0; 3], [0.0; 3]]), ..step() };
+        let joint = seen.information(&material, 0, 2.0, &found).unwrap();
+        let of_mu = joint.about_material(&material, &[]).unwrap().matrix()[(1, 1)];
+        let by_hand = 1.0 / (0.04 / 2.0 + 0.03) + 1.0 / (4.0 * 0.04 / 2.0 + 0.03);
+        assert!((of_mu / by_hand - 1.0).abs() < 1e-12);
     }
 
     /// By hand: noise averages, the discrepancy does not, and grows by g² = 1, 1, 4, 16.

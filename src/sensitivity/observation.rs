@@ -1,13 +1,14 @@
 //! What the scan sees at one drive: voxel states, sensitivities and information of one equilibrium.
 
 use super::covariance::PromisedSd;
+use super::encoding::Encoding;
 use super::error::EvaluationError;
 use super::information::{FisherInformation, MeasurementNoise};
 use super::integrated::{IntegratedSensitivity, integrate_over_voxels, sensitivity_map, shear_parameters};
 use super::joint_information::{JointInformation, NuisanceColumn};
 use super::scan_settings::{ScanSettings, ScannedVoxels};
 use crate::fem::ParameterSensitivity;
-use crate::kinematics::{Decomposition, decompose};
+use crate::kinematics::{Decomposition, Tensor, decompose};
 use crate::material::{Material, Parameter};
 use crate::mesh::Mesh;
 use crate::specimen::Specimen;
@@ -43,6 +44,9 @@ pub struct EvaluationStep {
     /// Voxels in the masks of all blocks that are scanned, on average over the places of the grid where it may lie
     /// anywhere; what follows is over these.
     pub num_voxels: usize,
+    /// What encoding costs, where the scan says how it encodes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub phase_loss: Option<PhaseLoss>,
     /// Median of λ over voxels.
     pub median_stretch: f64,
     /// Median of k over the voxels that have one; null where none has.
@@ -58,6 +62,18 @@ pub struct EvaluationStep {
     pub integrated_sensitivity: Vec<IntegratedSensitivity>,
     /// Standard deviations that this drive alone promises.
     pub promised_sd: Vec<PromisedSd>,
+}
+
+/// What encoding displacement as a phase costs at one drive.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct PhaseLoss {
+    /// Voxels that tell nothing, because a phase of theirs cannot be told from their neighbours' or drowns in noise;
+    /// they are counted in `num_voxels`.
+    pub num_voxels_lost: usize,
+    /// Part of the signal that the other voxels keep on average along x, y and z; 0 where there are none.
+    pub mean_signal: [f64; 3],
 }
 
 /// Voxel fields at one drive, in the mask's order. For plots.
@@ -82,6 +98,9 @@ pub struct Observation {
     pub maps: DriveMaps,
     /// For how many voxels of a scan each of the maps stands.
     pub voxels_each: f64,
+    /// Where the scan says how it encodes: the part of its signal that each voxel keeps by direction, zeros where it
+    /// tells nothing.
+    pub signal: Option<Vec<[f64; 3]>>,
     /// 𝒮 per parameter.
     pub integrated_sensitivity: Vec<IntegratedSensitivity>,
     /// What the voxels tell of the material and the unknowns of the set-up; the force is not in it.
@@ -131,6 +150,7 @@ pub struct Scanner {
     /// Voxel averages of fields on the mesh.
     pub operator: VoxelOperator,
     noise: MeasurementNoise,
+    encoding: Option<Encoding>,
     weights: Vec<f64>,
     /// For how many voxels of a scan each of the mask stands.
     voxels_each: f64,
@@ -144,12 +164,28 @@ impl Scanner {
     pub fn new(specimen: &Specimen, mesh: &Mesh, scan: &ScanSettings, sampling: Sampling) -> Result<Self, VoxelError> {
         let ScannedVoxels { mask, voxels_each, weights } = scan.voxels(specimen)?;
         let operator = VoxelOperator::new(specimen, mesh, &mask, sampling)?;
-        Ok(Scanner { mask, operator, noise: scan.noise(), weights, voxels_each })
+        Ok(Scanner { mask, operator, noise: scan.noise(), encoding: Encoding::of(scan), weights, voxels_each })
     }
 
     /// Weight of each voxel of the mask.
     pub fn weights(&self) -> &[f64] {
         &self.weights
+    }
+
+    /// The part of its signal that each voxel keeps by direction at some nodal displacements, mm; zeros where a voxel
+    /// tells nothing, `None` where the scan does not say how it encodes. The voxels' mean deformation gradients are
+    /// those of the same displacements.
+    ///
+    /// # Errors
+    /// [`VoxelError::LengthMismatch`].
+    pub fn signal_left(
+        &self,
+        displacement: &[[f64; 3]],
+        deformation_gradients: &[Tensor],
+    ) -> Result<Option<Vec<[f64; 3]>>, VoxelError> {
+        let Some(encoding) = self.encoding else { return Ok(None) };
+        let averages = self.operator.average(displacement)?;
+        Ok(Some(encoding.signal_left(&self.mask, &averages, deformation_gradients)))
     }
 
     /// λ of every voxel for nodal displacements in mm.
@@ -167,14 +203,19 @@ impl Scanner {
     /// Lengths that do not match, noise that is not positive: [`EvaluationError::Voxel`],
     /// [`EvaluationError::Information`].
     pub fn observe(&self, material: &Material, state: &DrivenState) -> Result<Observation, EvaluationError> {
-        let states: Vec<Decomposition> =
-            self.operator.deformation_gradients(state.displacement)?.iter().map(decompose).collect();
+        let gradients = self.operator.deformation_gradients(state.displacement)?;
+        let states: Vec<Decomposition> = gradients.iter().map(decompose).collect();
+        let signal = self.signal_left(state.displacement, &gradients)?;
+        // A voxel whose noise is larger by some factor tells as much as one that changes less by it.
+        let changes = |field: &[[f64; 3]]| -> Result<Vec<[f64; 3]>, VoxelError> {
+            let mut changes = self.operator.average(field)?;
+            for (change, left) in changes.iter_mut().zip(signal.iter().flatten()) {
+                *change = [0, 1, 2].map(|a| change[a] * left[a]);
+            }
+            Ok(changes)
+        };
         let displacement = self.operator.average(state.displacement)?;
-        let fields = state
-            .sensitivities
-            .iter()
-            .map(|s| self.operator.average(&s.displacement))
-            .collect::<Result<Vec<_>, _>>()?;
+        let fields = state.sensitivities.iter().map(|s| changes(&s.displacement)).collect::<Result<Vec<_>, _>>()?;
         // The force is that of all samples together: it is not a voxel's.
         let no_forces = vec![0.0; fields.len()];
         let alone = FisherInformation::of_drive(material, &fields, &self.weights, &no_forces, &self.noise)?;
@@ -182,7 +223,7 @@ impl Scanner {
             .unknowns
             .iter()
             .map(|u| {
-                let field = u.displacement.as_ref().map(|d| self.operator.average(d)).transpose()?;
+                let field = u.displacement.as_ref().map(|d| changes(d)).transpose()?;
                 Ok(NuisanceColumn { field, force_n: 0.0 })
             })
             .collect::<Result<Vec<_>, VoxelError>>()?;
@@ -197,7 +238,7 @@ impl Scanner {
         let integrated_sensitivity = integrate_over_voxels(material, &states, &self.mask, self.voxels_each);
         let sensitivities = shear_parameters(material).map(|p| (p, sensitivity_map(material, p, &states))).collect();
         let maps = DriveMaps { drive_mm: state.drive_mm, displacement, states, sensitivities, histogram };
-        Ok(Observation { maps, voxels_each: self.voxels_each, integrated_sensitivity, joint })
+        Ok(Observation { maps, voxels_each: self.voxels_each, signal, integrated_sensitivity, joint })
     }
 }
 
@@ -221,6 +262,24 @@ impl SeenBlocks {
             f64::from(*count) * seen.voxels_each * seen.maps.states.iter().filter(|s| is_counted(s)).count() as f64
         };
         self.kinds.iter().map(of_kind).sum()
+    }
+
+    /// What encoding costs over all of their voxels.
+    fn phase_loss(&self) -> Option<PhaseLoss> {
+        let (mut num_lost, mut num_kept, mut sum) = (0.0, 0.0, [0.0; 3]);
+        for (count, seen) in &self.kinds {
+            let each = f64::from(*count) * seen.voxels_each;
+            for left in seen.signal.as_ref()? {
+                if left.iter().all(|part| *part > 0.0) {
+                    num_kept += each;
+                    sum.iter_mut().zip(left).for_each(|(sum, part)| *sum += each * part);
+                } else {
+                    num_lost += each;
+                }
+            }
+        }
+        let mean_signal = sum.map(|s| if num_kept > 0.0 { s / num_kept } else { 0.0 });
+        Some(PhaseLoss { num_voxels_lost: num_lost.round() as usize, mean_signal })
     }
 
     /// 𝒮 over all of their voxels.
@@ -253,6 +312,7 @@ impl SeenBlocks {
             force_by_kind_n: if forces_n.len() > 1 { forces_n.to_vec() } else { Vec::new() },
             normal_force_n,
             num_voxels: self.num_voxels(|_| true).round() as usize,
+            phase_loss: self.phase_loss().filter(|_| !self.kinds.is_empty()),
             median_stretch: median(self.states().map(|s| s.stretch_amplitude)).unwrap_or(1.0),
             median_mode: median(self.states().filter_map(|s| s.deformation_mode)),
             largest_voxel_stretch: self.states().map(|s| s.stretch_amplitude).fold(1.0, f64::max),
@@ -310,6 +370,21 @@ mod tests {
         let integrated = &alone.integrated_sensitivity[0];
         assert!((integrated.volume_integral / (432.0 * s_mu) - 1.0).abs() < 1e-10);
         assert!((integrated.sum / (2304.0 * s_mu) - 1.0).abs() < 1e-10);
+        // Encoded, the phase of x changes by 0.6 × 0.25 / 0.1 rad over a voxel: its noise is larger by one over the sinc
+        // of half of that, and nothing else changes.
+        let encoded = ScanSettings { mm_per_radian: Some([0.1; 3]), ..scan };
+        let left = 0.75f64.sin() / 0.75;
+        let noisier = ScanSettings { noise_sd_mm: [0.05 / left, 0.05, 0.05], ..scan };
+        let [encoded, noisier] = [encoded, noisier].map(|scan| {
+            let scanner = Scanner::new(&specimen, &mesh, &scan, Sampling::default()).unwrap();
+            scanner.observe(&one_term(), &state).unwrap()
+        });
+        let about = |o: &Observation| o.joint.about_material(&one_term(), &[]).unwrap().matrix().clone();
+        // Rounding of sums over 2304 voxels.
+        assert!((about(&encoded) - about(&noisier)).norm() < 1e-11 * about(&noisier).norm());
+        let loss = SeenBlocks { kinds: vec![(2, encoded)] }.step(2.4, (&[1.5], None), stretch).phase_loss.unwrap();
+        assert_eq!(loss.num_voxels_lost, 0);
+        assert!((loss.mean_signal[0] - left).abs() < 1e-11 && loss.mean_signal[2] == 1.0, "{loss:?}");
         let json = serde_json::to_string(&alone).unwrap();
         assert!(json.contains("\"integrated_sensitivity\":[{\"parameter\":\"mu_1\",\"sum\":"), "{json}");
         assert!(!json.contains("force_by_kind_n"), "a specimen of one kind of sample is written as ever: {json}");

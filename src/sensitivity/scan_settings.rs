@@ -12,6 +12,8 @@ use serde::{Deserialize, Serialize};
 schema_type! {
     /// Three lengths along x, y and z, mm, each above 0.
     PositiveTripleMm = numbers(number_above(0.0), 3..=3);
+    /// Displacement per phase along x, y and z, mm/rad, each above 0.
+    PositiveTriple = numbers(number_above(0.0), 3..=3);
     /// A standard deviation of the force, N.
     ForceSdN = number_above(0.0);
 }
@@ -94,6 +96,13 @@ pub struct ScanSettings {
     /// Where the grid lies relative to the sample.
     #[serde(default, skip_serializing_if = "GridPlace::is_default")]
     pub grid: GridPlace,
+    /// Displacement per phase of each direction, mm/rad, where the scan is one of phases: `noise_sd_mm` is then that of
+    /// a voxel that is displaced evenly. Where the displacement changes within a voxel there is less signal and so much
+    /// more noise, and a voxel whose phase cannot be told from its neighbours' does not count. Left out, all voxels have
+    /// `noise_sd_mm`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schema(value_type = PositiveTriple, nullable = false))]
+    pub mm_per_radian: Option<[f64; 3]>,
     /// The face whose displacements cameras measure (digital image correlation), in place of a scan of the volume.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(nullable = false))]
@@ -109,6 +118,7 @@ impl Default for ScanSettings {
             force_sd_n: 0.02,
             partial_voxels: PartialVoxels::default(),
             grid: GridPlace::default(),
+            mm_per_radian: None,
             surface: None,
         }
     }
@@ -136,6 +146,30 @@ impl ScanSettings {
         Ok(ScannedVoxels { mask, voxels_each, weights })
     }
 
+    /// The error of work that takes the noise to be the same in all voxels, where the scan encodes displacement as a
+    /// phase; `remedy` says what to do.
+    ///
+    /// # Errors
+    /// A pointer to `mm_per_radian`.
+    pub fn needs_even_noise(&self, remedy: &str) -> Result<(), FieldError> {
+        let Some(scale) = self.mm_per_radian else { return Ok(()) };
+        let allowed = "left out: the same noise in all voxels";
+        Err(FieldError::new("/mm_per_radian", format!("{scale:?}"), allowed).remedy(remedy))
+    }
+
+    /// The same scanner in the same time with other voxels, and another displacement per phase where it has one: the
+    /// signal of a voxel goes with its volume, and the noise in mm with the displacement per phase over the signal.
+    pub fn with_voxels(&self, voxel_mm: [f64; 3], mm_per_radian: Option<[f64; 3]>) -> ScanSettings {
+        let volume = |edges: [f64; 3]| edges.iter().product::<f64>();
+        let of_signal = volume(self.voxel_mm) / volume(voxel_mm);
+        let of_phase = |axis: usize| match (mm_per_radian, self.mm_per_radian) {
+            (Some(own), Some(before)) => own[axis] / before[axis],
+            _ => 1.0,
+        };
+        let noise_sd_mm = [0, 1, 2].map(|axis| self.noise_sd_mm[axis] * of_signal * of_phase(axis));
+        ScanSettings { voxel_mm, noise_sd_mm, mm_per_radian, ..*self }
+    }
+
     /// The error of work that only a scan of the volume can do, where a surface is seen; `remedy` says what to do.
     ///
     /// # Errors
@@ -160,6 +194,13 @@ impl ScanSettings {
             check(FieldPath::of("noise_sd_mm").index(axis), sd, LEAST_SD);
         }
         check(FieldPath::of("force_sd_n"), self.force_sd_n, LEAST_SD);
+        for (axis, scale) in self.mm_per_radian.into_iter().flatten().enumerate() {
+            check(FieldPath::of("mm_per_radian").index(axis), scale, 0.0);
+        }
+        if self.surface.is_some() && self.mm_per_radian.is_some() {
+            let error = FieldError::new("/mm_per_radian", "given", "left out where a surface is seen");
+            errors.push(error.remedy("cameras see no phase"));
+        }
         if self.surface.is_some() && self.partial_voxels == PartialVoxels::Signal {
             let error = FieldError::new("/partial_voxels", "signal", "uniform where a surface is seen");
             errors
@@ -185,6 +226,25 @@ mod tests {
         assert_eq!(pointers, ["/voxel_mm/0", "/voxel_mm/2", "/noise_sd_mm/1", "/force_sd_n"]);
         let fine = ScanSettings { voxel_mm: [1.0; 3], noise_sd_mm: [0.05; 3], force_sd_n: 0.02, ..scan };
         assert_eq!(fine.field_errors(), []);
+    }
+
+    /// By hand: eight times the volume is an eighth of the noise, twice the displacement per phase twice the noise.
+    #[test]
+    fn other_voxels_have_other_noise() {
+        let scan = ScanSettings { mm_per_radian: Some([0.2, 0.3, 0.4]), ..ScanSettings::default() };
+        let larger = scan.with_voxels([2.0, 0.375, 1.5], scan.mm_per_radian);
+        // Rounding alone.
+        larger.noise_sd_mm.iter().for_each(|sd| assert!((sd - 0.05 / 8.0).abs() < 1e-15));
+        let weaker = scan.with_voxels(scan.voxel_mm, Some([0.4, 0.3, 0.2]));
+        for (sd, expected) in weaker.noise_sd_mm.iter().zip([0.1, 0.05, 0.025]) {
+            assert!((sd - expected).abs() < 1e-15);
+        }
+        assert_eq!(weaker.field_errors(), []);
+        let bad = ScanSettings { mm_per_radian: Some([0.2, 0.0, 0.4]), ..scan };
+        let pointers: Vec<String> = bad.field_errors().into_iter().map(|e| e.pointer).collect();
+        assert_eq!(pointers, ["/mm_per_radian/1"]);
+        assert_eq!(scan.needs_even_noise("").expect_err("phases").pointer, "/mm_per_radian");
+        ScanSettings::default().needs_even_noise("").expect("no phases");
     }
 
     /// Settings without a surface are read and written as before; with one, the component along its normal is not

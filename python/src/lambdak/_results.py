@@ -163,6 +163,16 @@ class IntegratedSensitivity:
 
 
 @dataclass(frozen=True)
+class PhaseLoss:
+    """What encoding displacement as a phase costs at one drive."""
+
+    num_voxels_lost: int
+    """Voxels whose phase cannot be unwrapped; they are counted in `num_voxels`."""
+    mean_signal: Tuple[float, float, float]
+    """The part of their signal that the others keep along x, y and z."""
+
+
+@dataclass(frozen=True)
 class EvaluationStep:
     """What the scan at one drive would see. Parameters are looked up by name, such as `mu_1`."""
 
@@ -177,6 +187,15 @@ class EvaluationStep:
     """Across the plates of a double-lap test, positive where it pulls them together."""
     force_discretisation_n: Optional[float] = None
     """What the mesh may put the force wrong by."""
+    phase_loss: Optional[PhaseLoss] = None
+    """Where the scan says how it encodes (`ScanSettings.mm_per_radian`)."""
+
+
+def _phase_loss(value: Optional[Mapping[str, Any]]) -> Optional[PhaseLoss]:
+    if value is None:
+        return None
+    x, y, z = value["mean_signal"]
+    return PhaseLoss(value["num_voxels_lost"], (x, y, z))
 
 
 def _promised(entries: Iterable[Mapping[str, Any]]) -> Dict[str, PromisedSd]:
@@ -204,6 +223,7 @@ def _evaluation_step(step: Mapping[str, Any]) -> EvaluationStep:
         promised_sd=_promised(step["promised_sd"]),
         normal_force_n=step.get("normal_force_n"),
         force_discretisation_n=step.get("force_discretisation_n"),
+        phase_loss=_phase_loss(step.get("phase_loss")),
     )
 
 

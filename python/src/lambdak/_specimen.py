@@ -398,6 +398,9 @@ class ScanSettings:
     """The face that cameras see in place of a scan of the volume, such as `{"face": "+z", "components": "all"}`."""
     grid: Optional[str] = None
     """Where the grid lies relative to the sample: `"centred"` unless it is `"anywhere"`, the mean over all places."""
+    mm_per_radian: Optional[Tuple[float, float, float]] = None
+    """Displacement per phase along x, y, z, mm/rad, where lost signal and phases that cannot be unwrapped are to count;
+    `noise_sd_mm` is then that of a voxel that is displaced evenly."""
 
     def to_dict(self) -> Dict[str, Any]:
         """As requests and studies hold it."""

@@ -21,6 +21,7 @@ mod tests;
 
 pub use image::{WrappedImage, wrapped};
 
+use crate::sensitivity::{MAX_PHASE_SD, MIN_MARGIN};
 use graph::Graph;
 use std::f64::consts::TAU;
 
@@ -57,7 +58,12 @@ pub struct UnwrapOptions {
 
 impl Default for UnwrapOptions {
     fn default() -> Self {
-        UnwrapOptions { method: Method::default(), max_phase_sd: 0.7, min_margin: 2.0, needs_agreement: true }
+        UnwrapOptions {
+            method: Method::default(),
+            max_phase_sd: MAX_PHASE_SD,
+            min_margin: MIN_MARGIN,
+            needs_agreement: true,
+        }
     }
 }
 

@@ -29,6 +29,13 @@ pub(in crate::job) fn evaluation(name: &str, evaluation: &Evaluation) -> String 
             num(step.median_stretch, 4),
             num(step.largest_voxel_stretch, 4)
         );
+        if let Some(loss) = step.phase_loss {
+            let [x, y, z] = loss.mean_signal.map(|part| num(part, 3));
+            text += &format!(
+                "  phases: {} voxels cannot be unwrapped; the others keep {x}, {y} and {z} of their signal along x, y and z\n",
+                loss.num_voxels_lost
+            );
+        }
         if let Some(share) = evaluation.scan_share.get(index) {
             text += &format!("  scanned in {} % of the time of one scan\n", num(100.0 * share, 3));
         }

@@ -34,6 +34,7 @@ const READERS = {
   numbers: (example) => numbers(example),
   triple: (example) => numbers(example, 3),
   optional: (example) => (text) => (text.trim() === "" ? undefined : number(example)(text)),
+  optionalTriple: (example) => (text) => (text.trim() === "" ? undefined : numbers(example, 3)(text)),
 };
 
 let made = 0;

@@ -30,6 +30,21 @@ export const scanForm = (model, edited) =>
       changed: edited,
     }),
     field({
+      label: "Displacement per phase x, y, z, mm/rad",
+      kind: "optionalTriple",
+      value: model.scan.mm_per_radian?.join(", "),
+      example: "0.1, 0.1, 0.1",
+      pointer: "/scan/mm_per_radian",
+      put: (v) => {
+        if (v === undefined) delete model.scan.mm_per_radian;
+        else model.scan.mm_per_radian = v;
+      },
+      meaning:
+        "Empty: every voxel has the noise above. Given, voxels count by the signal that is left where the displacement " +
+        "changes within them, and those whose phase cannot be unwrapped do not count.",
+      changed: edited,
+    }),
+    field({
       label: "Noise of the force, N",
       value: model.scan.force_sd_n,
       example: "0.02",
