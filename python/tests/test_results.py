@@ -108,6 +108,17 @@ class Results(Scratch):
         self.assertEqual(sizes["diameter_error_mm"].description[:6], "hole 0")
         self.assertIn(sizes["diameter_error_mm"].limited_by, ("noise", "allowance", "rival"))
 
+    def test_an_encoded_scan(self):
+        scanner = lk.ScanSettings((1.0, 0.5, 0.5), (0.05, 0.05, 0.05), 0.005, mm_per_radian=(0.5, 0.5, 0.5))
+        one = lk.evaluate(bar(), ecoflex(), scan=scanner, mesh="search", has_files=False)
+        loss = one.steps[-1].phase_loss
+        self.assertTrue(0 <= loss.num_voxels_lost < one.steps[-1].num_voxels)
+        # Pulled along x, the bar's displacement changes most along x.
+        self.assertTrue(loss.mean_signal[0] < loss.mean_signal[1] <= 1 and loss.mean_signal[0] < loss.mean_signal[2])
+        even = lk.evaluate(bar(), ecoflex(), scan=dataclasses.replace(scanner, mm_per_radian=None), mesh="search")
+        self.assertIsNone(even.steps[-1].phase_loss)
+        self.assertGreater(one.promised_sd["alpha_1"].value, even.promised_sd["alpha_1"].value)
+
     def test_a_diagnosis_of_two(self):
         first, second = (lk.scan(block(), ecoflex(), seed=seed, name=f"s{seed}", **COARSE).folder for seed in (5, 6))
         both = lk.diagnose_together([first, lk.Recording.read(second)], mesh_factor=2.5, max_causes=1)
