@@ -101,6 +101,16 @@ pub fn map_pictures(sample: &SampleMaps) -> Vec<(String, String)> {
             field("deformation mode k".into(), "", &mode, ColorMap::Viridis),
         ]),
     )];
+    if let Some(signal) = &drive.signal {
+        // Voxels that tell nothing stay empty.
+        let left = |axis: usize| signal.iter().map(|s| if s[axis] > 0.0 { s[axis] } else { f64::NAN }).collect();
+        let fields = ["x", "y", "z"].into_iter().enumerate().map(|(axis, name)| {
+            let values: Vec<f64> = left(axis);
+            let title = format!("signal left in the image of displacement along {name}");
+            VoxelField { range: Some([0.0, 1.0]), ..field(title, "", &values, ColorMap::Viridis) }
+        });
+        pictures.push(("map-signal".into(), picture(fields.collect())));
+    }
     for (parameter, values) in &drive.sensitivities {
         let name = parameter.name();
         let unit = if parameter.is_modulus() { "" } else { "kPa" };

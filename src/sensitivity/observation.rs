@@ -85,6 +85,9 @@ pub struct DriveMaps {
     pub displacement: Vec<[f64; 3]>,
     /// J, stretches, λ, k of the averaged F.
     pub states: Vec<Decomposition>,
+    /// Where the scan says how it encodes: the part of its signal that each voxel keeps by direction, zeros where it
+    /// tells nothing.
+    pub signal: Option<Vec<[f64; 3]>>,
     /// S_ξ per voxel for every μᵢ and αᵢ.
     pub sensitivities: Vec<(Parameter, Vec<f64>)>,
     /// Numbers of voxels over (λ, k).
@@ -98,9 +101,6 @@ pub struct Observation {
     pub maps: DriveMaps,
     /// For how many voxels of a scan each of the maps stands.
     pub voxels_each: f64,
-    /// Where the scan says how it encodes: the part of its signal that each voxel keeps by direction, zeros where it
-    /// tells nothing.
-    pub signal: Option<Vec<[f64; 3]>>,
     /// 𝒮 per parameter.
     pub integrated_sensitivity: Vec<IntegratedSensitivity>,
     /// What the voxels tell of the material and the unknowns of the set-up; the force is not in it.
@@ -237,8 +237,8 @@ impl Scanner {
         )?;
         let integrated_sensitivity = integrate_over_voxels(material, &states, &self.mask, self.voxels_each);
         let sensitivities = shear_parameters(material).map(|p| (p, sensitivity_map(material, p, &states))).collect();
-        let maps = DriveMaps { drive_mm: state.drive_mm, displacement, states, sensitivities, histogram };
-        Ok(Observation { maps, voxels_each: self.voxels_each, signal, integrated_sensitivity, joint })
+        let maps = DriveMaps { drive_mm: state.drive_mm, displacement, states, signal, sensitivities, histogram };
+        Ok(Observation { maps, voxels_each: self.voxels_each, integrated_sensitivity, joint })
     }
 }
 
@@ -269,7 +269,7 @@ impl SeenBlocks {
         let (mut num_lost, mut num_kept, mut sum) = (0.0, 0.0, [0.0; 3]);
         for (count, seen) in &self.kinds {
             let each = f64::from(*count) * seen.voxels_each;
-            for left in seen.signal.as_ref()? {
+            for left in seen.maps.signal.as_ref()? {
                 if left.iter().all(|part| *part > 0.0) {
                     num_kept += each;
                     sum.iter_mut().zip(left).for_each(|(sum, part)| *sum += each * part);

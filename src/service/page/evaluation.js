@@ -65,6 +65,7 @@ export function evaluation(result, files, request) {
       ["integrated-sensitivity.svg", "Integrated sensitivities, sums over voxels"],
     ]),
     figureSheet(files, [["map-stretch-and-mode.svg", "λ and k through the specimen"]]),
+    figureSheet(files, [["map-signal.svg", "Signal that is left, and voxels that are lost"]]),
     figureSheet(
       files,
       maps.map((n) => [n, `Sensitivity to ${symbol(n.slice(16, -4))}`]),
