@@ -289,7 +289,7 @@ fn columns_and_signs_are_chosen() {
     let text = run(folder.path(), &[&by_number[..], &["--turned", "stress", "--terms", "1", "--json"]].concat());
     let value: serde_json::Value = serde_json::from_slice(&text.stdout).unwrap();
     assert!((value["initial_shear_modulus_kpa"]["value"].as_f64().unwrap() / 14.0 - 1.0).abs() < 1e-3, "{value}");
-    refused(&["curves", "uniaxial=down.csv", "--second-area", "3"], &["--second-area", "no test is biaxial"]);
+    refused(&["curves", "uniaxial=down.csv", "--second-area", "3"], &["no test is biaxial"]);
     refused(&["curves", "uniaxial=down.csv", "--keep-back", "up"], &["'up' is neither a test nor the name of a file"]);
     refused(&["curves", "biaxial=down.csv"], &["no column for the stretch"]);
     refused(&["diagnose", "--curve", "biaxial=down.csv"], &["a test with one drive"]);

@@ -174,10 +174,10 @@ const COLUMNS: [Flag; 6] = [
 ];
 /// The same of the second axis of biaxial tests.
 const SECOND_COLUMNS: [Flag; 4] = [
-    Flag::of("second-drive-column", "columns/second_drive_column"),
-    Flag::of("second-stress-column", "columns/second_stress_column"),
-    Flag::of("second-length", "columns/second_length_mm"),
-    Flag::of("second-area", "columns/second_area_mm2"),
+    Flag::of("second-drive-column", "second_axis/drive_column"),
+    Flag::of("second-stress-column", "second_axis/stress_column"),
+    Flag::of("second-length", "second_axis/length_mm"),
+    Flag::of("second-area", "second_axis/area_mm2"),
 ];
 /// Options of fits to curves.
 const FITS: [Flag; 5] = [

@@ -25,14 +25,6 @@ pub struct CurveColumns {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(max_length = 200)]
     pub stress_column: Option<String>,
-    /// Column of stretch, strain or displacement along the second axis of a biaxial test.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(max_length = 200)]
-    pub second_drive_column: Option<String>,
-    /// Column of nominal stress or force along the second axis of a biaxial test.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(max_length = 200)]
-    pub second_stress_column: Option<String>,
     /// Unit of a stress column whose name does not say it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stress_unit: Option<StressUnit>,
@@ -44,18 +36,32 @@ pub struct CurveColumns {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-6, maximum = 1e12)]
     pub area_mm2: Option<f64>,
-    /// Gauge length along the second axis of a biaxial test in mm; that of the first where it is left out.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-6, maximum = 1e6)]
-    pub second_length_mm: Option<f64>,
-    /// Area under the force along the second axis of a biaxial test in mm²; that of the first where it is left out.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(minimum = 1e-6, maximum = 1e12)]
-    pub second_area_mm2: Option<f64>,
     /// Columns whose sign is turned: tension and what lengthens are positive, and a file may have it the other way round.
     /// Columns that are called compressive are turned without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub turned: Option<Turned>,
+}
+
+/// The same of the second axis of biaxial tests.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SecondAxisColumns {
+    /// Column of stretch, strain or displacement along the second axis of a biaxial test, by name or number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(max_length = 200)]
+    pub drive_column: Option<String>,
+    /// Column of nominal stress or force along the second axis of a biaxial test, by name or number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(max_length = 200)]
+    pub stress_column: Option<String>,
+    /// Gauge length along the second axis of a biaxial test in mm; that of the first where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub length_mm: Option<f64>,
+    /// Area under the force along the second axis of a biaxial test in mm²; that of the first where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-6, maximum = 1e12)]
+    pub area_mm2: Option<f64>,
 }
 
 /// What was read of a curve's file, and what was left out.
@@ -125,31 +131,12 @@ impl CurveColumns {
         CsvOptions {
             drive_column: self.drive_column.clone(),
             stress_column: self.stress_column.clone(),
-            second_drive_column: self.second_drive_column.clone(),
-            second_stress_column: self.second_stress_column.clone(),
             stress_unit: self.stress_unit,
             length_mm: self.length_mm,
             area_mm2: self.area_mm2,
-            second_length_mm: self.second_length_mm,
-            second_area_mm2: self.second_area_mm2,
             turned: self.turned,
+            ..CsvOptions::default()
         }
-    }
-
-    /// Fields that only a biaxial test has, where none is given.
-    pub(super) fn without_biaxial_test(&self) -> Vec<FieldError> {
-        let text = |value: &Option<String>| value.as_ref().map(|v| serde_json::json!(v));
-        let number = |value: Option<f64>| value.map(|v| serde_json::json!(v));
-        let fields = [
-            ("second_drive_column", text(&self.second_drive_column)),
-            ("second_stress_column", text(&self.second_stress_column)),
-            ("second_length_mm", number(self.second_length_mm)),
-            ("second_area_mm2", number(self.second_area_mm2)),
-        ];
-        let error = |(name, value): (&str, Option<serde_json::Value>)| {
-            Some(FieldError::new(format!("/columns/{name}"), value?, "left out where no test is biaxial"))
-        };
-        fields.into_iter().filter_map(error).collect()
     }
 
     /// A curve's text as read; `pointer` is that of the text.
@@ -249,14 +236,21 @@ impl TestCurve {
     pub(super) fn curves(
         &self,
         name: &str,
-        columns: &CurveColumns,
+        (columns, second): (&CurveColumns, &SecondAxisColumns),
         fit: &CurveFitSettings,
         pointer: &str,
     ) -> Result<(Vec<Curve>, CurveReport), FieldError> {
         let pointer = format!("{pointer}/csv");
         let shown = self.name.as_deref().unwrap_or(self.test.name());
         let Some(test) = self.test.with_one_drive() else {
-            return self.biaxial_curves(name, shown, columns, fit, &pointer);
+            let options = CsvOptions {
+                second_drive_column: second.drive_column.clone(),
+                second_stress_column: second.stress_column.clone(),
+                second_length_mm: second.length_mm,
+                second_area_mm2: second.area_mm2,
+                ..columns.options()
+            };
+            return self.biaxial_curves(name, shown, &options, fit, &pointer);
         };
         let mut csv = columns.read(&self.csv, test, &pointer)?;
         needs_stress_and_stretch(csv.is_displacement, csv.is_force, &pointer)?;
@@ -269,11 +263,11 @@ impl TestCurve {
         &self,
         name: &str,
         shown: &str,
-        columns: &CurveColumns,
+        options: &CsvOptions,
         fit: &CurveFitSettings,
         pointer: &str,
     ) -> Result<(Vec<Curve>, CurveReport), FieldError> {
-        let mut csv = read_biaxial_csv(&self.csv, &columns.options()).map_err(|e| unfit(pointer, &e))?;
+        let mut csv = read_biaxial_csv(&self.csv, options).map_err(|e| unfit(pointer, &e))?;
         needs_stress_and_stretch(csv.is_displacement, csv.is_force, pointer)?;
         let unloading = if fit.has_all_branches { None } else { csv.take_first_loading() };
         let stresses = csv.stresses.each_ref().map(Option::as_deref);

@@ -1,7 +1,8 @@
 //! Curves: joint fits to homogeneous tests, and the prediction of a test kept back.
 
 use super::curve_files::{
-    CurveColumns, CurveFitSettings, CurveReport, TestCurve, add_material, fit_failed, reports_in_words,
+    CurveColumns, CurveFitSettings, CurveReport, SecondAxisColumns, TestCurve, add_material, fit_failed,
+    reports_in_words,
 };
 use super::{Context, JobError, Outcome, Request, ResultSchema, Run, summary};
 use crate::field::FieldError;
@@ -30,6 +31,9 @@ pub struct CurvesRequest {
     /// How columns are understood.
     #[serde(default)]
     pub columns: CurveColumns,
+    /// How those of the second axis of biaxial tests are understood.
+    #[serde(default)]
+    pub second_axis: SecondAxisColumns,
     /// Settings of the fits.
     #[serde(default)]
     pub fit: CurveFitSettings,
@@ -96,7 +100,12 @@ impl Request for CurvesRequest {
         let (mut fitted, mut kept_back, mut errors) = (Vec::new(), Vec::new(), Vec::new());
         let (mut files, mut kept_files) = (Vec::new(), Vec::new());
         for (index, entry) in self.curves.iter().enumerate() {
-            match entry.curves(&self.name_of(index), &self.columns, &self.fit, &format!("/curves/{index}")) {
+            match entry.curves(
+                &self.name_of(index),
+                (&self.columns, &self.second_axis),
+                &self.fit,
+                &format!("/curves/{index}"),
+            ) {
                 Ok((mut curves, report)) if entry.is_kept_back => {
                     kept_back.append(&mut curves);
                     kept_files.push(report);
@@ -108,8 +117,9 @@ impl Request for CurvesRequest {
                 Err(error) => errors.push(error),
             }
         }
-        if self.curves.iter().all(|entry| entry.test.with_one_drive().is_some()) {
-            errors.extend(self.columns.without_biaxial_test());
+        let is_biaxial = |entry: &TestCurve| entry.test.with_one_drive().is_none();
+        if self.second_axis != SecondAxisColumns::default() && !self.curves.iter().any(is_biaxial) {
+            errors.push(FieldError::new("/second_axis", "given", "left out where no test is biaxial"));
         }
         if errors.is_empty() && fitted.is_empty() {
             errors.push(FieldError::new("/curves", "all kept back", "at least one curve that is fitted"));

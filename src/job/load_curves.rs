@@ -81,7 +81,7 @@ impl Request for LoadCurvesRequest {
     }
 
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
-        let (mut curves, mut errors) = (Vec::new(), self.columns.without_biaxial_test());
+        let (mut curves, mut errors) = (Vec::new(), Vec::new());
         for (index, entry) in self.curves.iter().enumerate() {
             match self.curve(index, entry) {
                 Ok(curve) => curves.push(curve),

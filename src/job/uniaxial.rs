@@ -107,7 +107,6 @@ impl Request for UniaxialRequest {
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let mut errors: Vec<FieldError> =
             self.specimen.field_errors().into_iter().map(|e| e.below("/specimen")).collect();
-        errors.extend(self.columns.without_biaxial_test());
         match self.columns.read(&self.csv, HomogeneousTest::Uniaxial, "/csv") {
             Ok(csv) if csv.is_displacement && !csv.is_force => {
                 let message = "displacements of a dumb-bell come with forces in N; give length_mm for plain strips";
