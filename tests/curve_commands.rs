@@ -204,8 +204,8 @@ fn bad_input_ends_with_code_two_and_says_why() {
     }
 }
 
-/// Stretches and stresses of a biaxial test there and back, with a ripple of 0.2 % in place of noise; the way back has a
-/// tenth less stress.
+/// Stretches and stresses of a biaxial test there and back, with a ripple of 0.2 % in place of noise; the way back has
+/// a tenth less stress.
 fn write_biaxial(folder: &Path, name: &str, header: &str, ratio: f64) {
     let terms = [ShearTerm { modulus_kpa: 3.0, alpha: 6.0 }, ShearTerm { modulus_kpa: 28.0, alpha: 1.6 }];
     let mut text = format!("{header}\n");

@@ -2,7 +2,7 @@
 
     python3 make_curves.py MATERIAL.json FOLDER
 
-leaves uniaxial.csv, equibiaxial.csv, pure-shear.csv, biaxial-3-4.csv and biaxial-1-2.csv in FOLDER. Only Python's standard library
+leaves uniaxial.csv, equibiaxial.csv, pure-shear.csv, ratio-3-4.csv and ratio-1-2.csv in FOLDER. Only Python's standard library
 is needed.
 
 The nominal stress of a stretch λ along the pull is Σ μᵢ (λ^(αᵢ − 1) − λ^(−m αᵢ − 1)), where the thickness stretches by λ^(−m):
@@ -28,7 +28,7 @@ for test, power, largest in [("uniaxial", 0.5, 2.5), ("equibiaxial", 2.0, 1.8), 
         rows.append(f"{100.0 * (stretch - 1.0):.3f};{stress + noise.gauss(0.0, 0.05):.4f}")
     (folder / f"{test}.csv").write_text("\n".join(rows) + "\n")
 
-for name, ratio in [("biaxial-3-4", 0.75), ("biaxial-1-2", 0.5)]:
+for name, ratio in [("ratio-3-4", 0.75), ("ratio-1-2", 0.5)]:
     rows = ["Ecoflex 00-20, made by make_curves.py", "Strain X [%];Strain Y [%];P11 [kPa];P22 [kPa]"]
     for n in range(1, 61):
         x, y = 1.0 + 0.8 * n / 60, 1.0 + ratio * 0.8 * n / 60
@@ -36,4 +36,4 @@ for name, ratio in [("biaxial-3-4", 0.75), ("biaxial-1-2", 0.5)]:
         noisy = ";".join(f"{stress + noise.gauss(0.0, 0.05):.4f}" for stress in along)
         rows.append(f"{100.0 * (x - 1.0):.3f};{100.0 * (y - 1.0):.3f};{noisy}")
     (folder / f"{name}.csv").write_text("\n".join(rows) + "\n")
-print(f"{folder}: uniaxial.csv, equibiaxial.csv, pure-shear.csv, biaxial-3-4.csv, biaxial-1-2.csv")
+print(f"{folder}: uniaxial.csv, equibiaxial.csv, pure-shear.csv, ratio-3-4.csv, ratio-1-2.csv")

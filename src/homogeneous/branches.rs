@@ -205,8 +205,8 @@ mod tests {
         assert_eq!(found.take_first_loading(), None);
     }
 
-    /// A strip whose width is held but for scatter, there and back, with a fifth less of both stresses on the way back: the
-    /// work of both counts, over what their own stretches go.
+    /// A strip whose width is held but for scatter, there and back, with a fifth less of both stresses on the way back:
+    /// the work of both counts, over what their own stretches go.
     #[test]
     fn a_biaxial_test_turns_with_its_leading_drive() {
         let row = |i: i32, part: f64| {

@@ -34,8 +34,8 @@ use super::stress_unit::StressUnit;
 /// What the reader is told beyond the file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CsvOptions {
-    /// Column of the drive in place of the table above, by name or by number from 1; in a biaxial test that of the first
-    /// axis.
+    /// Column of the drive in place of the table above, by name or by number from 1; in a biaxial test that of the
+    /// first axis.
     pub drive_column: Option<String>,
     /// Column of stress or force, by name or by number from 1.
     pub stress_column: Option<String>,

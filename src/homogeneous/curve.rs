@@ -222,7 +222,7 @@ impl Curve {
         root_mean_square(&self.nominal_stress_kpa)
     }
 
-    /// What a residual is divided by: the noise where known, else the scale, of a biaxial test that of all its stresses.
+    /// What a residual is divided by: the noise where known, else the scale, of a biaxial test that of all stresses.
     pub fn weight_kpa(&self) -> f64 {
         let scale_kpa = || self.biaxial.map_or_else(|| self.scale_kpa(), |of| of.test_scale_kpa);
         self.noise_sd_kpa.unwrap_or_else(scale_kpa)

@@ -15,13 +15,13 @@ use utoipa::ToSchema;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CurveColumns {
-    /// Column of stretch, strain, shear or displacement, by its name or by its number from 1; found by the names that are
-    /// known where it is left out. In a biaxial test that of the first axis.
+    /// Column of stretch, strain, shear or displacement, by its name or by its number from 1; found by the names that
+    /// are known where it is left out. In a biaxial test that of the first axis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(max_length = 200)]
     pub drive_column: Option<String>,
-    /// Column of nominal stress or force, by its name or by its number from 1; found by the names that are known where it
-    /// is left out. In a biaxial test that of the first axis.
+    /// Column of nominal stress or force, by its name or by its number from 1; found by the names that are known where
+    /// it is left out. In a biaxial test that of the first axis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(max_length = 200)]
     pub stress_column: Option<String>,
@@ -36,8 +36,8 @@ pub struct CurveColumns {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-6, maximum = 1e12)]
     pub area_mm2: Option<f64>,
-    /// Columns whose sign is turned: tension and what lengthens are positive, and a file may have it the other way round.
-    /// Columns that are called compressive are turned without it.
+    /// Columns whose sign is turned: tension and what lengthens are positive, and a file may have it the other way
+    /// round. Columns that are called compressive are turned without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub turned: Option<Turned>,
 }

@@ -172,8 +172,8 @@ fn files_of_another_program_become_a_recording() {
     }
 }
 
-/// A table of points as cameras' programs in Europe write it, with `µ` in one byte or in UTF-16, becomes a recording from
-/// the page as from the command.
+/// A table of points as cameras' programs in Europe write it, with `µ` in one byte or in UTF-16, becomes a recording
+/// from the page as from the command.
 #[test]
 fn tables_in_other_codes_become_a_recording() {
     let folder = tempfile::tempdir().unwrap();
