@@ -56,12 +56,13 @@ mod tests {
         for surface in [None, of_face(MeasuredComponents::All), of_face(MeasuredComponents::InPlane)] {
             let memory = MemoryLimit::body(1 << 26).begin();
             let specimen = specimen();
-            let layers = if surface.is_some() { 1 } else { 3 };
+            let layers = if surface.is_some() { 1 } else { 4 };
             let mut points = Vec::new();
-            for (i, j, k) in (0..8).flat_map(|i| (0..5).flat_map(move |j| (0..layers).map(move |k| (i, j, k)))) {
-                let top = Face::PlusZ.position_mm(&specimen);
-                let position = [-9.0 + 2.5 * f64::from(i), -2.0 + f64::from(j), top - 3.0 * f64::from(k)];
-                let mut displacement = [0.1 * f64::from(i) / 3.0, 0.01 * f64::from(j), -0.02 * f64::from(k)];
+            for (i, j, k) in (0..10).flat_map(|i| (0..8).flat_map(move |j| (0..layers).map(move |k| (i, j, k)))) {
+                let top = if surface.is_some() { Face::PlusZ.position_mm(&specimen) } else { 7.1625 };
+                let y = -2.8 + 0.8 * f64::from(j);
+                let position = [-11.43 + 2.54 * f64::from(i), y, top - 4.775 * f64::from(k)];
+                let mut displacement = [0.7 * y, 0.5 + 0.01 * f64::from(i), 0.25 - 0.02 * f64::from(k)];
                 match (i, j, k) {
                     (1, 1, 0) => continue,
                     (2, 3, 0) => displacement = [f64::NAN; 3],
