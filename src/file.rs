@@ -89,6 +89,34 @@ pub fn read_text_limited(path: &Path, max_bytes: u64) -> Result<String, ReadErro
     Ok(String::from_utf8(read_limited(path, max_bytes)?).map_err(no_text)?)
 }
 
+/// The text of a table as programs of test machines and cameras write it: in UTF-8, in UTF-16 where it begins with the
+/// mark of one, and else in Latin-1, in which `µ`, `ü` and `²` are one byte each. None where the bytes are no text.
+pub fn table_text(bytes: Vec<u8>) -> Option<String> {
+    let utf16 = |of_pair: fn([u8; 2]) -> u16| {
+        let (pairs, rest) = bytes[2..].as_chunks::<2>();
+        let text = String::from_utf16(&pairs.iter().map(|pair| of_pair(*pair)).collect::<Vec<_>>());
+        text.ok().filter(|_| rest.is_empty())
+    };
+    match bytes.as_slice() {
+        [0xff, 0xfe, ..] => utf16(u16::from_le_bytes),
+        [0xfe, 0xff, ..] => utf16(u16::from_be_bytes),
+        _ => match String::from_utf8(bytes) {
+            Ok(text) => Some(text),
+            Err(error) if error.as_bytes().contains(&0) => None,
+            Err(error) => Some(error.as_bytes().iter().map(|&byte| char::from(byte)).collect()),
+        },
+    }
+}
+
+/// The text of a table in a regular file of at most `max_bytes` ([`table_text`]).
+///
+/// # Errors
+/// [`ReadError`]; [`io::ErrorKind::InvalidData`] where the content is no text.
+pub fn read_table_limited(path: &Path, max_bytes: u64) -> Result<String, ReadError> {
+    let no_text = || io::Error::new(io::ErrorKind::InvalidData, "it is not text in UTF-8, UTF-16 or Latin-1");
+    Ok(table_text(read_limited(path, max_bytes)?).ok_or_else(no_text)?)
+}
+
 /// The JSON text of a regular file of at most `max_bytes`, whose values fit in the memory of a command's reading.
 ///
 /// # Errors
@@ -152,6 +180,26 @@ mod tests {
         fs::write(place("b/1/pdata/x"), "one").expect("written");
         fs::rename(place("b/2"), place("b/3")).expect("renamed");
         assert_ne!(digest("a"), digest("b"));
+    }
+
+    /// The same words in every code; what is none of them is no text.
+    #[test]
+    fn tables_are_text_in_several_codes() {
+        let words = "Prüfer;Weg [µm]\n1;2\n";
+        let utf16 = |bytes: fn(u16) -> [u8; 2]| format!("\u{feff}{words}").encode_utf16().flat_map(bytes).collect();
+        let codes: [Vec<u8>; 4] = [
+            words.as_bytes().to_vec(),
+            words.chars().map(|c| u8::try_from(c).expect("Latin-1")).collect(),
+            utf16(u16::to_le_bytes),
+            utf16(u16::to_be_bytes),
+        ];
+        for bytes in codes {
+            let text = table_text(bytes).expect("text");
+            assert_eq!(text.trim_start_matches('\u{feff}'), words);
+        }
+        for bytes in [&b"1;2\n\xff\0"[..], b"\xff\xfea", b"\xff\xfe\0\xd8"] {
+            assert_eq!(table_text(bytes.to_vec()), None);
+        }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! `lambdak uniaxial` and `lambdak curves` as a user runs them.
 
-use lambdak::homogeneous::{CurveLaw, HomogeneousTest, ShearTerm, incompressible_stress};
+use lambdak::homogeneous::{CurveLaw, Deformation, HomogeneousTest, ShearTerm, incompressible_stress};
 use lambdak::material::{Gent, InvariantLaw, Material};
 use std::path::Path;
 use std::process::{Command, Output};
@@ -202,6 +202,97 @@ fn bad_input_ends_with_code_two_and_says_why() {
         let said = String::from_utf8_lossy(&out.stderr).into_owned();
         assert!(said.contains(words), "{arguments:?}: {said}");
     }
+}
+
+/// Stretches and stresses of a biaxial test there and back, with a ripple of 0.2 % in place of noise; the way back has
+/// a tenth less stress.
+fn write_biaxial(folder: &Path, name: &str, header: &str, ratio: f64) {
+    let terms = [ShearTerm { modulus_kpa: 3.0, alpha: 6.0 }, ShearTerm { modulus_kpa: 28.0, alpha: 1.6 }];
+    let mut text = format!("{header}\n");
+    for i in (1..=40).chain((10..40).rev()).enumerate().map(|(n, i)| (f64::from(i), if n < 40 { 1.0 } else { 0.9 })) {
+        let (i, part) = i;
+        let ripple = part * (1.0 + 0.002 * (7.3 * i * i).sin());
+        let [a, b] = [1.0 + 0.8 * i / 40.0, 1.0 + 0.8 * ratio * i / 40.0];
+        let stress = |stretches| ripple * incompressible_stress(&terms, &Deformation::Biaxial { stretches });
+        text += &format!("{a};{b};{};{}\n", stress([a, b]), stress([b, a]));
+    }
+    std::fs::write(folder.join(name), text).unwrap();
+}
+
+/// Biaxial tests with both stresses and with one are fitted, one is kept back by its name; what was read, the way back
+/// and both stresses of each file are said and drawn, and the material is one that other programs read.
+#[test]
+fn biaxial_tests_are_fitted() {
+    let folder = tempfile::tempdir().unwrap();
+    write_biaxial(folder.path(), "equal.csv", "lambda_x;lambda_y;P_x [kPa];P_y [kPa]", 1.0);
+    write_biaxial(folder.path(), "half.csv", "stretch_1;stretch_2;stress_1_kpa;stress_2_kpa", 0.5);
+    write_biaxial(folder.path(), "held.csv", "F11;F22;unused;P22 [kPa]", 0.0);
+    let tests = ["curves", "biaxial=equal.csv", "biaxial=half.csv", "biaxial=held.csv", "--keep-back", "held"];
+    let text = run(folder.path(), &[&tests[..], &["--out", "fit"]].concat());
+    let shown = String::from_utf8_lossy(&text.stdout).into_owned();
+    assert!(text.status.success(), "{}", String::from_utf8_lossy(&text.stderr));
+    for words in [
+        "equal: P_x [kPa] and P_y [kPa] over lambda_x and lambda_y, 40 rows",
+        "held: P22 [kPa] over F11 and F22, 40 rows",
+        "the test turns at 1.800: 30 rows after that are left out",
+        "biaxial equal P2",
+        "biaxial half P1",
+        "predicted, kept back: biaxial held P2",
+    ] {
+        assert!(shown.contains(words), "{words}: {shown}");
+    }
+    let picture = std::fs::read_to_string(folder.path().join("fit/curves.svg")).unwrap();
+    assert!(picture.contains("biaxial held P2 over λ1"), "{picture}");
+    let export =
+        run(folder.path(), &["export", "material", "fit/material.json", "--format", "abaqus", "--out", "cards"]);
+    assert!(export.status.success(), "{}", String::from_utf8_lossy(&export.stderr));
+    let json = run(folder.path(), &[&tests[..], &["--json"]].concat());
+    let value: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+    assert_eq!((&value["num_terms"], &value["fits"]["selection"]["num_data"]), (&2.into(), &160.into()));
+    assert_eq!(value["files"][0]["second_stress_column"], "P_y [kPa]");
+    assert_eq!(value["files"][2].get("second_stress_column"), None);
+    // The ripple is 0.14 % rms.
+    for (parameter, truth) in value["parameters"].as_array().unwrap().iter().zip([0.5, 6.0, 17.5, 1.6]) {
+        let [low, high] = [0, 1].map(|end| parameter["interval_95"][end].as_f64().unwrap());
+        assert!(low <= truth && truth <= high && high - low < 0.2 * truth, "{truth}: {parameter}");
+    }
+    assert!(value["kept_back"][0]["relative_rms_error"].as_f64().unwrap() < 0.01);
+    // A compressible material of the same files.
+    let held = run(folder.path(), &[&tests[..], &["--bulk", "500", "--law", "gent", "--json"]].concat());
+    let value: serde_json::Value = serde_json::from_slice(&held.stdout).unwrap();
+    assert_eq!((&value["material"]["bulk_kpa"], &value["is_bulk_held"]), (&500.0.into(), &true.into()));
+}
+
+/// Columns by number, columns of the second axis, signs: what is asked for is done, and what cannot be is refused with
+/// the options that change it.
+#[test]
+fn columns_and_signs_are_chosen() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows = |turned: f64| {
+        let of = |i: i32| 1.0 - 0.02 * f64::from(i);
+        let row = |l: f64| format!("{l},{},7\n", turned * 14.0 * (l - l.powi(-2)));
+        (1..20).map(of).map(row).collect::<String>()
+    };
+    std::fs::write(folder.path().join("down.csv"), format!("stretch,stress_kpa,stress_kpa\n{}", rows(-1.0))).unwrap();
+    let refused = |arguments: &[&str], words: &[&str]| {
+        let out = run(folder.path(), arguments);
+        assert_eq!(out.status.code(), Some(2), "{arguments:?}");
+        let said = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(words.iter().all(|w| said.contains(w)), "{arguments:?}: {said}");
+    };
+    let number = ["--stress-column", "2"];
+    refused(&["curves", "uniaxial=down.csv"], &["2 \"stress_kpa\", 3 \"stress_kpa\"", "number"]);
+    let by_number = [&["curves", "uniaxial=down.csv"], &number[..]].concat();
+    refused(&by_number, &["negative", "turn the sign", "--turned"]);
+    refused(&[&["uniaxial", "down.csv"], &number[..]].concat(), &["negative", "--turned"]);
+    refused(&[&by_number[..], &["--turned", "both"]].concat(), &["stretches, which are positive"]);
+    let text = run(folder.path(), &[&by_number[..], &["--turned", "stress", "--terms", "1", "--json"]].concat());
+    let value: serde_json::Value = serde_json::from_slice(&text.stdout).unwrap();
+    assert!((value["initial_shear_modulus_kpa"]["value"].as_f64().unwrap() / 14.0 - 1.0).abs() < 1e-3, "{value}");
+    refused(&["curves", "uniaxial=down.csv", "--second-area", "3"], &["no test is biaxial"]);
+    refused(&["curves", "uniaxial=down.csv", "--keep-back", "up"], &["'up' is neither a test nor the name of a file"]);
+    refused(&["curves", "biaxial=down.csv"], &["no column for the stretch"]);
+    refused(&["diagnose", "--curve", "biaxial=down.csv"], &["a test with one drive"]);
 }
 
 /// The same file in UTF-8, Latin-1 and UTF-16 of either byte order is the same curve.

@@ -128,3 +128,38 @@ fn images_alone_are_imported() {
     assert_eq!(bad.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&bad.stderr).contains("ras or lps or index"));
 }
+
+/// What one camera saw of a face is exported as a table of points, with what is not measured left out, and comes back
+/// from it, in another code as well.
+#[test]
+fn faces_are_exported_and_imported_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    let (film, tables, again) = (place("film"), place("tables"), place("again"));
+    let specimen = "geometries/solid-shear.json";
+    let scan = ["scan", specimen, "--surface", "+z", "--voxel", "1.6", "--noise", "0.005", "--drive", "2,4"];
+    json(&lambdak(&[&scan[..], &["--mesh", "search", "--seed", "3", "--json", "--out", &film]].concat()));
+    let export = json(&lambdak(&["export", "recording", &film, "--json", "--out", &tables]));
+    let files = ["recording.mat", "recording.h5", "recording-1.csv", "recording-2.csv"];
+    assert_eq!(export["files"], serde_json::json!(files));
+    let table = std::fs::read_to_string(Path::new(&tables).join("recording-2.csv")).unwrap();
+    assert_eq!(table.lines().next(), Some("x_mm,y_mm,z_mm,ux_mm,uy_mm,sd_mm"));
+    let utf16: Vec<u8> = format!("\u{feff}{table}").encode_utf16().flat_map(u16::to_le_bytes).collect();
+    std::fs::write(Path::new(&tables).join("recording-2.csv"), utf16).unwrap();
+    let [first, second] = [1, 2].map(|n| format!("{tables}/recording-{n}.csv"));
+    let points = ["import", &first, &second, "--form", "points", "--surface", "+z", "--specimen", specimen];
+    json(&lambdak(&[&points[..], &["--drive", "2,4", "--json", "--out", &again]].concat()));
+    let [film, again] = [&film, &again].map(|f| Recording::read(Path::new(f), &ReadLimits::default()).unwrap());
+    assert_eq!(film.num_voxels(), again.num_voxels());
+    for (a, b) in film.steps.iter().zip(&again.steps) {
+        let of = |r: &Recording, u: &[[f64; 3]]| -> Vec<[f64; 3]> {
+            u.iter().zip(&r.mask).filter(|(_, m)| **m).map(|(u, _)| *u).collect()
+        };
+        for (a, b) in of(&film, &a.displacement).into_iter().zip(of(&again, &b.displacement)) {
+            assert!((0..2).all(|c| (a[c] - b[c]).abs() < 1e-6 || (a[c].is_nan() && b[c].is_nan())), "{a:?} {b:?}");
+        }
+    }
+    let raw = lambdak(&["export", "recording", &place("film"), "--raw", "--format", "points"]);
+    assert_eq!(raw.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&raw.stderr).contains("import the phases first"));
+}

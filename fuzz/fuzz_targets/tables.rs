@@ -1,7 +1,7 @@
 //! Load curves and tables of points: comma-separated text of machines and other programs.
 #![no_main]
 
-use lambdak::homogeneous::{CsvOptions, HomogeneousTest, read_csv};
+use lambdak::homogeneous::{CsvOptions, HomogeneousTest, read_biaxial_csv, read_csv};
 use lambdak::recording::{LoadCurve, read_points};
 use lambdak::voxel::{Face, MeasuredComponents, Surface};
 use lambdak_fuzz::memory;
@@ -19,6 +19,10 @@ fuzz_target!(|data: &[u8]| {
                 assert!(curve.drive.iter().chain(&curve.stress).all(|x| x.is_finite()));
             }
         }
+    }
+    if let Ok(test) = read_biaxial_csv(text, &CsvOptions::default()) {
+        assert!(test.stresses.iter().flatten().all(|stress| stress.len() == test.drives.len()));
+        assert!(test.drives.iter().flatten().chain(test.stresses.iter().flatten().flatten()).all(|x| x.is_finite()));
     }
     let _ = LoadCurve::from_csv(text, path);
     for face in [None, Some(Face::PlusZ)] {

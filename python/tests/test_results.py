@@ -185,6 +185,10 @@ class Results(Scratch):
         self.assertEqual(fit.num_terms, 1)
         self.assertFalse(fit.is_bulk_held)
         self.assertGreater(fit.initial_shear_modulus.interval_95[1], fit.initial_shear_modulus.value)
+        text = (self.folder / "zug.csv").read_bytes().decode("cp1252")
+        (self.folder / "zug.csv").write_bytes(text.encode("utf-16"))
+        again = lk.uniaxial(self.folder / "zug.csv", drive_column="Dehnung", max_terms=1)
+        self.assertEqual(again.initial_shear_modulus, fit.initial_shear_modulus)
 
     def test_curves_of_a_law(self):
         stretch = [1 + 0.05 * n for n in range(1, 31)]
@@ -201,6 +205,43 @@ class Results(Scratch):
         self.assertEqual(next(iter(fit.bic_above_best)), "Gent")
         cards = lk.export_material(fit.material, folder=self.folder / "cards").cards
         self.assertEqual(set(cards), {"ansys", "comsol", "febio"})
+
+    def test_biaxial_curves(self):
+        # Incompressible, one term of 20 kPa and 2.2, three ratios of the strains, but for a little waviness.
+        def stress(own, other, n):
+            return 20 * (own**1.2 - (own * other) ** -2.2 / own) * (1 + 1e-3 * math.sin(7.3 * n * n))
+
+        def test(ratio):
+            first = [1 + 0.02 * n for n in range(1, 31)]
+            second = [1 + ratio * (s - 1) for s in first]
+            pairs = list(zip(first, second))
+            return {
+                "stretch_x": first,
+                "stretch_y": second,
+                "P_x_kPa": [stress(a, b, n) for n, (a, b) in enumerate(pairs)],
+                "P_y_kPa": [stress(b, a, n + 40) for n, (a, b) in enumerate(pairs)],
+            }
+
+        fit = lk.curves({"biaxial": [test(ratio) for ratio in (1.0, 0.75, 0.5)]}, max_terms=2)
+        self.assertEqual(fit.num_terms, 1)
+        for name, truth in [("mu_1", 20.0), ("alpha_1", 2.2)]:
+            self.assertAlmostEqual(fit.parameters[name].value, truth, delta=0.005 * truth)
+        # Columns by number; the stress along the second axis alone.
+        names = dict(zip(("a", "b", "c", "d"), test(0.5).values()))
+        names["c"] = [float("nan")] * 30
+        with self.assertRaisesRegex(lk.InputError, "no column for the stretch"):
+            lk.curves({"biaxial": names})
+        columns = {"drive_column": 1, "second_drive_column": "b", "stress_column": "c", "second_stress_column": 4}
+        one = lk.curves({"biaxial": names}, stress_unit="kpa", max_terms=1, **columns)
+        self.assertAlmostEqual(one.parameters["mu_1"].value, 20.0, delta=0.2)
+
+    def test_signs_are_asked_for(self):
+        stretch = [1 - 0.02 * n for n in range(1, 20)]
+        down = {"stretch": stretch, "stress_kpa": [-14 * (s - s**-2) for s in stretch]}
+        with self.assertRaisesRegex(lk.InputError, "turn the sign"):
+            lk.uniaxial(down)
+        fit = lk.uniaxial(down, turned="stress", max_terms=1)
+        self.assertAlmostEqual(fit.initial_shear_modulus.value, 14.0, delta=0.01)
 
     def test_what_the_program_does_not_know_is_nan(self):
         from lambdak._results import _estimates
@@ -284,10 +325,10 @@ class Requests(unittest.TestCase):
             for name in fields:
                 top, _, below = name.partition(".")
                 # `fit` and `columns` of curves are arguments of their own.
-                is_spread = top in ("fit", "columns")
-                if (below and not is_spread) or (is_spread and not below):
+                spread = {"fit": "", "columns": "", "second_axis": "second_"}
+                if bool(below) != (top in spread):
                     continue
-                asked = below or self.OTHER_NAMES.get(top, top)
+                asked = spread[top] + below if below else self.OTHER_NAMES.get(top, top)
                 self.assertIn(asked, taken, f"{kind}: {name}")
 
     def test_every_function_takes_the_common_arguments(self):

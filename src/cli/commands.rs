@@ -165,12 +165,20 @@ const NEXT: &[Flag] = &[
     Flag::read("no-mesh-correction", "has_mesh_correction", Off),
 ];
 /// Options of commands that read curves.
-const COLUMNS: [Flag; 5] = [
+const COLUMNS: [Flag; 6] = [
     Flag::of("drive-column", "columns/drive_column"),
     Flag::of("stress-column", "columns/stress_column"),
     Flag::of("stress-unit", "columns/stress_unit"),
     Flag::of("length", "columns/length_mm"),
     Flag::of("area", "columns/area_mm2"),
+    Flag::of("turned", "columns/turned"),
+];
+/// The same of the second axis of biaxial tests.
+const SECOND_COLUMNS: [Flag; 4] = [
+    Flag::of("second-drive-column", "second_axis/drive_column"),
+    Flag::of("second-stress-column", "second_axis/stress_column"),
+    Flag::of("second-length", "second_axis/length_mm"),
+    Flag::of("second-area", "second_axis/area_mm2"),
 ];
 /// Options of fits to curves.
 const FITS: [Flag; 5] = [
@@ -188,6 +196,11 @@ const CURVES: &[Flag] = &[
     COLUMNS[2],
     COLUMNS[3],
     COLUMNS[4],
+    COLUMNS[5],
+    SECOND_COLUMNS[0],
+    SECOND_COLUMNS[1],
+    SECOND_COLUMNS[2],
+    SECOND_COLUMNS[3],
     FITS[0],
     FITS[1],
     FITS[2],
@@ -202,6 +215,7 @@ const UNIAXIAL: &[Flag] = &[
     COLUMNS[2],
     COLUMNS[3],
     COLUMNS[4],
+    COLUMNS[5],
     FITS[0],
     FITS[1],
     FITS[2],
@@ -381,8 +395,8 @@ fn of_recordings_or_curves(command: Command) -> Command {
 
 /// What `diagnose --curve` asks for.
 const LOAD_CURVES_KIND: &str = "diagnose-curves";
-const LOAD_CURVES: [Flag; 6] =
-    [Flag::of("shape-factor", "shape_factor"), COLUMNS[0], COLUMNS[1], COLUMNS[2], COLUMNS[3], COLUMNS[4]];
+const LOAD_CURVES: [Flag; 7] =
+    [Flag::of("shape-factor", "shape_factor"), COLUMNS[0], COLUMNS[1], COLUMNS[2], COLUMNS[3], COLUMNS[4], COLUMNS[5]];
 
 fn diagnosed(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliError> {
     let curves = values(matches, "curve");
@@ -432,7 +446,8 @@ fn read_curves(
             return Err(CliError::Option { option, message });
         };
         let path = PathBuf::from(file);
-        let test = test_named(test, option)?;
+        let unknown = || format!("'{test}' is not uniaxial, equibiaxial, pure-shear, simple-shear or biaxial");
+        let test = test_named(test).ok_or_else(|| CliError::Option { option, message: unknown() })?;
         let name = stem(&path);
         let csv = read_table(&path)?;
         curves.push(json!({ "test": test, "name": name, "csv": csv, "is_kept_back": is_kept_back(&name, test) }));
@@ -443,31 +458,43 @@ fn read_curves(
     Ok(first.unwrap_or_default())
 }
 
-/// The name of a homogeneous test as requests spell it.
-fn test_named(name: &str, option: &'static str) -> Result<&'static str, CliError> {
+/// The name of a test as requests spell it.
+fn test_named(name: &str) -> Option<&'static str> {
     match name.replace('_', "-").as_str() {
-        "uniaxial" => Ok("uniaxial"),
-        "equibiaxial" => Ok("equibiaxial"),
-        "pure-shear" | "planar" => Ok("pure_shear"),
-        "simple-shear" => Ok("simple_shear"),
-        other => {
-            let message = format!("'{other}' is not uniaxial, equibiaxial, pure-shear or simple-shear");
-            Err(CliError::Option { option, message })
-        }
+        "uniaxial" => Some("uniaxial"),
+        "equibiaxial" => Some("equibiaxial"),
+        "pure-shear" | "planar" => Some("pure_shear"),
+        "simple-shear" => Some("simple_shear"),
+        "biaxial" => Some("biaxial"),
+        _ => None,
     }
 }
 
 fn of_curves(command: Command) -> Command {
-    let help = "Tests and their curves (CSV): uniaxial=FILE equibiaxial=FILE pure-shear=FILE simple-shear=FILE";
+    let help = "Tests and their curves (CSV): uniaxial=FILE equibiaxial=FILE pure-shear=FILE simple-shear=FILE biaxial=FILE; \
+                of one test there may be several";
     let kept = Arg::new("keep-back").long("keep-back").value_name("TEST").value_delimiter(',');
-    let kept = kept.action(ArgAction::Append).help("Tests that are predicted, not fitted, comma-separated");
+    let help_kept =
+        "Tests, or files by their names without folder and ending, that are predicted, not fitted, comma-separated";
+    let kept = kept.action(ArgAction::Append).help(help_kept);
     command.arg(files("CURVES", "TEST=FILE", help)).arg(kept)
 }
 
 fn curves(matches: &ArgMatches, asked: &mut Asked) -> Result<PathBuf, CliError> {
-    let kept: Vec<&str> =
-        values(matches, "keep-back").iter().map(|n| test_named(n, "keep-back")).collect::<Result<_, _>>()?;
-    read_curves(&values(matches, "CURVES"), "curves", asked, &mut |_, test| kept.contains(&test))
+    let kept = values(matches, "keep-back");
+    let mut found = vec![false; kept.len()];
+    let path = read_curves(&values(matches, "CURVES"), "curves", asked, &mut |name, test| {
+        let is_meant: Vec<bool> = kept.iter().map(|k| k == name || test_named(k) == Some(test)).collect();
+        found.iter_mut().zip(&is_meant).for_each(|(found, is)| *found |= is);
+        is_meant.contains(&true)
+    })?;
+    if let Some((missing, _)) = kept.iter().zip(&found).find(|(_, found)| !**found) {
+        let message = format!(
+            "'{missing}' is neither a test nor the name of a file (without folder and ending) among those given"
+        );
+        return Err(CliError::Option { option: "keep-back", message });
+    }
+    Ok(path)
 }
 
 fn of_curve(command: Command) -> Command {

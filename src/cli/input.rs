@@ -1,7 +1,7 @@
 //! Reading what the commands are given.
 
 use super::error::CliError;
-use crate::file::{ReadError, read_json_text, read_limited};
+use crate::file::{ReadError, read_json_text, read_limited, table_text};
 use serde_json::Value;
 use std::path::Path;
 
@@ -18,29 +18,13 @@ pub fn read_text(path: &Path) -> Result<String, CliError> {
     String::from_utf8(read_bytes(path)?).map_err(no_text)
 }
 
-/// Text of a table as programs of test machines write it: in UTF-8, in UTF-16 where the file begins with its mark, and
-/// else in Latin-1, in which `µ`, `ü` and `²` are one byte each.
+/// Text of a table as programs of test machines write it ([`table_text`]).
 ///
 /// # Errors
 /// As [`read_text`].
 pub fn read_table(path: &Path) -> Result<String, CliError> {
-    let bytes = read_bytes(path)?;
-    let utf16 = |of_pair: fn([u8; 2]) -> u16| {
-        let (pairs, rest) = bytes[2..].as_chunks::<2>();
-        let text = String::from_utf16(&pairs.iter().map(|pair| of_pair(*pair)).collect::<Vec<_>>());
-        text.ok().filter(|_| rest.is_empty())
-    };
-    let text = match bytes.as_slice() {
-        [0xff, 0xfe, ..] => utf16(u16::from_le_bytes),
-        [0xfe, 0xff, ..] => utf16(u16::from_be_bytes),
-        _ => match std::str::from_utf8(&bytes) {
-            Ok(text) => Some(text.into()),
-            Err(_) if bytes.contains(&0) => None,
-            Err(_) => Some(bytes.iter().map(|&byte| char::from(byte)).collect()),
-        },
-    };
     let message = "it is not text in UTF-8, UTF-16 or Latin-1";
-    text.ok_or_else(|| CliError::Input { path: path.into(), message: message.into() })
+    table_text(read_bytes(path)?).ok_or_else(|| CliError::Input { path: path.into(), message: message.into() })
 }
 
 fn read_bytes(path: &Path) -> Result<Vec<u8>, CliError> {

@@ -63,3 +63,29 @@ impl FieldFormat {
         }
     }
 }
+
+/// A file of a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RecordingFormat {
+    /// MATLAB, version 7.3.
+    Mat,
+    /// HDF5.
+    Hdf5,
+    /// Tables of points, one per drive, that an import reads again; of displacements alone.
+    Points,
+}
+
+impl RecordingFormat {
+    /// All formats.
+    pub const ALL: [RecordingFormat; 3] = [RecordingFormat::Mat, RecordingFormat::Hdf5, RecordingFormat::Points];
+
+    /// The same among the formats of arrays.
+    pub fn of_arrays(self) -> Option<ArrayFormat> {
+        match self {
+            RecordingFormat::Mat => Some(ArrayFormat::Mat),
+            RecordingFormat::Hdf5 => Some(ArrayFormat::Hdf5),
+            RecordingFormat::Points => None,
+        }
+    }
+}

@@ -35,6 +35,7 @@ mod model_file;
 mod number;
 mod programs;
 mod recording_arrays;
+mod recording_points;
 #[cfg(feature = "matlab")]
 mod solution_arrays;
 mod voxel_arrays;
@@ -42,7 +43,7 @@ mod voxel_arrays;
 mod vtkhdf;
 
 #[cfg(feature = "matlab")]
-pub use array_format::{ArrayFormat, FieldFormat};
+pub use array_format::{ArrayFormat, FieldFormat, RecordingFormat};
 pub use arrays::{Array, Axis, Member, Tree, Values};
 #[cfg(feature = "matlab")]
 pub use arrays_error::ArraysError;
@@ -59,6 +60,7 @@ pub use model::Model;
 pub use model_file::{ModelFormat, model_file};
 pub use programs::MaterialFormat;
 pub use recording_arrays::{raw_recording_arrays, recording_arrays};
+pub use recording_points::recording_points;
 #[cfg(feature = "matlab")]
 pub use solution_arrays::{FieldSeries, solution_arrays};
 #[cfg(feature = "matlab")]

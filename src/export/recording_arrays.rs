@@ -17,8 +17,11 @@ pub fn recording_arrays(recording: &Recording) -> Tree {
     });
     add_states(&mut tree, states.collect());
     add_grid(&mut tree, grid, recording.mask.clone());
+    if let Some(surface) = grid.surface {
+        tree.text("face", surface.face.name());
+    }
     let displacement = vectors(steps.iter().map(|s| &s.displacement[..]));
-    let about = "displacement u of the voxel; NaN where missing";
+    let about = "displacement u of the voxel, or of the subset of the face; NaN where missing or not measured";
     tree.array("displacement_mm", "mm", about, &vector_axes(grid, steps.len()), displacement);
     add_noise(&mut tree, recording.noise_sd_mm);
     add_load(&mut tree, recording.load.as_ref());

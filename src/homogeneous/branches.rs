@@ -5,6 +5,7 @@
 //! materials therefore take the first branch alone, and say so.
 
 use super::csv::CsvCurve;
+use super::csv_biaxial::BiaxialCsv;
 use serde::Serialize;
 
 /// A way back counts from this part of the drive's whole range on; less is scatter.
@@ -68,50 +69,111 @@ fn work(points: &[(f64, f64)], low: f64, high: f64) -> f64 {
     points.windows(2).map(piece).sum()
 }
 
+/// The order of the rows by their times, where they have them and the drive then goes a shorter way in all: some
+/// sources have damaged times and rows in the right order.
+fn order_by_time(time_s: &[f64], drive: &[f64]) -> Option<Vec<usize>> {
+    if time_s.len() != drive.len() || time_s.is_sorted() {
+        return None;
+    }
+    let mut order: Vec<usize> = (0..drive.len()).collect();
+    order.sort_by(|&a, &b| time_s[a].total_cmp(&time_s[b]));
+    let by_time: Vec<f64> = order.iter().map(|&i| drive[i]).collect();
+    (way(&by_time) < way(drive)).then_some(order)
+}
+
+fn reorder<T: Copy>(list: &mut Vec<T>, order: &[usize]) {
+    *list = order.iter().map(|&i| list[i]).collect();
+}
+
+fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)])
+}
+
+/// The rows of the first way there and back.
+struct Turn {
+    start: usize,
+    /// The last row of the way there.
+    at: usize,
+    /// The last row of the way back.
+    end: usize,
+}
+
+impl Turn {
+    /// The first one of a drive; none where it does not go back.
+    fn of(drive: &[f64]) -> Option<Turn> {
+        let [low, high] = range(drive.iter().copied());
+        let least = LEAST_RETURN * (high - low);
+        let mut start = 0;
+        loop {
+            let (at, certain) = turn_from(drive, start, least)?;
+            if !is_jump(drive, start, at) {
+                let next = turn_from(drive, at, least).map_or(drive.len() - 1, |(end, _)| end);
+                return Some(Turn { start, at, end: next.max(certain) });
+            }
+            start = at + 1;
+        }
+    }
+
+    /// The work done on the way there and given on the way back by a stress over its drive, where both ways lie.
+    fn work(&self, drive: &[f64], stress: &[f64]) -> [f64; 2] {
+        let points = |from: usize, to: usize| (from..=to).map(|i| (drive[i], stress[i])).collect::<Vec<_>>();
+        let (out, back) = (points(self.start, self.at), points(self.at, self.end));
+        let ([a, b], [c, d]) = (range(out.iter().map(|p| p.0)), range(back.iter().map(|p| p.0)));
+        let (low, high) = (a.max(c), b.min(d));
+        [work(&out, low, high), work(&back, low, high)]
+    }
+
+    /// What follows it in all `num_rows` rows of `drive`.
+    fn unloading(&self, drive: &[f64], [done, given]: [f64; 2]) -> Unloading {
+        Unloading {
+            turn: drive[self.at],
+            num_rows: drive.len() - 1 - self.at,
+            dissipated_part: if done == 0.0 { 0.0 } else { 1.0 - given / done },
+        }
+    }
+}
+
 impl CsvCurve {
     /// Leaves the first loading branch, and says what followed it; `None`, and nothing is left out, where the test does
     /// not go back. Rows are put into the order of their times where the drive then goes a shorter way in all.
     pub fn take_first_loading(&mut self) -> Option<Unloading> {
-        if self.time_s.len() == self.drive.len() && !self.time_s.is_sorted() {
-            let mut order: Vec<usize> = (0..self.drive.len()).collect();
-            order.sort_by(|&a, &b| self.time_s[a].total_cmp(&self.time_s[b]));
-            let by_time: Vec<f64> = order.iter().map(|&i| self.drive[i]).collect();
-            // Some sources have damaged times and rows in the right order: the drive says which of both is right.
-            if way(&by_time) >= way(&self.drive) {
-                order = (0..self.drive.len()).collect();
-            }
+        if let Some(order) = order_by_time(&self.time_s, &self.drive) {
             for list in [&mut self.time_s, &mut self.drive, &mut self.stress] {
-                *list = order.iter().map(|&i| list[i]).collect();
+                reorder(list, &order);
             }
         }
-        let drive = &self.drive;
-        let [low, high] = drive.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], d| [l.min(*d), h.max(*d)]);
-        let least = LEAST_RETURN * (high - low);
-        let mut start = 0;
-        let (turn, end) = loop {
-            let (extreme, certain) = turn_from(drive, start, least)?;
-            if !is_jump(drive, start, extreme) {
-                let next = turn_from(drive, extreme, least).map_or(drive.len() - 1, |(end, _)| end);
-                break (extreme, next.max(certain));
-            }
-            start = extreme + 1;
+        let turn = Turn::of(&self.drive)?;
+        let unloading = turn.unloading(&self.drive, turn.work(&self.drive, &self.stress));
+        self.drive.truncate(turn.at + 1);
+        self.stress.truncate(turn.at + 1);
+        self.time_s.truncate(turn.at + 1);
+        Some(unloading)
+    }
+}
+
+impl BiaxialCsv {
+    /// The same of a biaxial test, which turns where the drive with the larger range does; the work is that of all
+    /// stresses that were measured.
+    pub fn take_first_loading(&mut self) -> Option<Unloading> {
+        let of_axis = |axis: usize, drives: &[[f64; 2]]| drives.iter().map(|d| d[axis]).collect::<Vec<f64>>();
+        let extent = |axis: usize| {
+            let [low, high] = range(self.drives.iter().map(|d| d[axis]));
+            high - low
         };
-        let points = |from: usize, to: usize| (from..=to).map(|i| (self.drive[i], self.stress[i])).collect::<Vec<_>>();
-        let (out, back) = (points(start, turn), points(turn, end));
-        let span = |list: &[(f64, f64)]| {
-            list.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], p| [l.min(p.0), h.max(p.0)])
-        };
-        let ([a, b], [c, d]) = (span(&out), span(&back));
-        let (low, high) = (a.max(c), b.min(d));
-        let (done, given) = (work(&out, low, high), work(&back, low, high));
-        let unloading = Unloading {
-            turn: drive[turn],
-            num_rows: drive.len() - 1 - turn,
-            dissipated_part: if done == 0.0 { 0.0 } else { 1.0 - given / done },
-        };
-        self.drive.truncate(turn + 1);
-        self.stress.truncate(turn + 1);
-        self.time_s.truncate(turn + 1);
+        let leading = usize::from(extent(1) > extent(0));
+        if let Some(order) = order_by_time(&self.time_s, &of_axis(leading, &self.drives)) {
+            reorder(&mut self.time_s, &order);
+            reorder(&mut self.drives, &order);
+            self.stresses.iter_mut().flatten().for_each(|stress| reorder(stress, &order));
+        }
+        let drives = [0, 1].map(|axis| of_axis(axis, &self.drives));
+        let turn = Turn::of(&drives[leading])?;
+        let measured = drives.iter().zip(&self.stresses).filter_map(|(drive, stress)| Some((drive, stress.as_ref()?)));
+        let work = measured.map(|(drive, stress)| turn.work(drive, stress));
+        let unloading = turn.unloading(&drives[leading], work.fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]));
+        self.drives.truncate(turn.at + 1);
+        self.time_s.truncate(turn.at + 1);
+        self.stresses.iter_mut().flatten().for_each(|stress| stress.truncate(turn.at + 1));
         Some(unloading)
     }
 }
@@ -119,6 +181,7 @@ impl CsvCurve {
 #[cfg(test)]
 mod tests {
     use super::super::csv::{CsvOptions, read_csv};
+    use super::super::csv_biaxial::read_biaxial_csv;
     use super::super::deformation::HomogeneousTest;
     use super::*;
 
@@ -139,6 +202,26 @@ mod tests {
         assert_eq!((found.drive.len(), unloading.num_rows, unloading.turn), (21, 60, 2.0));
         // The first piece of the way back joins the two lines: ½ × 2 × 0.05 of 5 less than a fifth.
         assert!((unloading.dissipated_part - (0.2 - 0.01)).abs() < 1e-12, "{unloading:?}");
+        assert_eq!(found.take_first_loading(), None);
+    }
+
+    /// A strip whose width is held but for scatter, there and back, with a fifth less of both stresses on the way back:
+    /// the work of both counts, over what their own stretches go.
+    #[test]
+    fn a_biaxial_test_turns_with_its_leading_drive() {
+        let row = |i: i32, part: f64| {
+            let e = 0.05 * f64::from(i);
+            let width = 1.0 + 1e-3 * f64::from(i % 2);
+            format!("{},{width},{},{}\n", 1.0 + e, part * 10.0 * e, part * 5.0 * e)
+        };
+        let rows: String = (0..=20).map(|i| row(i, 1.0)).chain((0..20).rev().map(|i| row(i, 0.8))).collect();
+        let text = format!("stretch_1,stretch_2,stress_1_kpa,stress_2_kpa\n{rows}");
+        let mut found = read_biaxial_csv(&text, &CsvOptions::default()).unwrap();
+        let unloading = found.take_first_loading().unwrap();
+        assert_eq!((found.drives.len(), unloading.num_rows, unloading.turn), (21, 20, 2.0));
+        assert!(found.stresses.iter().flatten().all(|stress| stress.len() == 21));
+        // The stress over the scattered width does a thousandth of the work of the other.
+        assert!((unloading.dissipated_part - (0.2 - 0.01)).abs() < 5e-3, "{unloading:?}");
         assert_eq!(found.take_first_loading(), None);
     }
 

@@ -1,6 +1,6 @@
 //! Which columns of a table are drive, stress and time: by their names and units, in English and German.
 
-use super::csv_error::CsvError;
+use super::csv_error::{CsvColumn, CsvError};
 use super::csv_unit::{Unit, name_and_unit};
 use super::deformation::HomogeneousTest;
 use super::stress_unit::StressUnit;
@@ -43,11 +43,14 @@ pub(super) struct Found<K> {
 }
 
 /// A column's name in lower case and its unit.
+#[derive(Clone)]
 pub(super) struct Header {
     /// As it stands in the file.
-    text: String,
-    name: String,
-    unit: Option<Unit>,
+    pub text: String,
+    /// In lower case with single blanks, without the unit.
+    pub name: String,
+    /// The unit, where it is said.
+    pub unit: Option<Unit>,
 }
 
 /// The columns of `names`, with the units of the line below where names have none.
@@ -143,16 +146,53 @@ impl Header {
     }
 }
 
-/// The column that `wanted` names, by the whole header or by its name without unit.
-fn named(all: &[Header], wanted: &str, what: &'static str) -> Result<usize, CsvError> {
-    let lower = wanted.trim().to_lowercase();
-    let whole = all.iter().position(|h| h.text.trim().to_lowercase() == lower);
-    let found = whole.or_else(|| all.iter().position(|h| h.name == name_and_unit(wanted).0));
-    found.ok_or_else(|| no_column(all, what))
+/// A column that was asked for, by index.
+enum Chosen {
+    /// By its name.
+    Named(usize),
+    /// By its number.
+    Numbered(usize),
 }
 
-fn no_column(all: &[Header], what: &'static str) -> CsvError {
-    CsvError::NoColumn { what, found: all.iter().map(|h| h.text.clone()).collect() }
+impl Chosen {
+    /// The column that `wanted` means: by the whole header, else by its name without unit, else by its number from 1.
+    ///
+    /// # Errors
+    /// [`CsvError::Ambiguous`], [`CsvError::UnknownColumn`].
+    fn of(all: &[Header], wanted: &str, what: &'static str) -> Result<Chosen, CsvError> {
+        let matching = |is: &dyn Fn(&Header) -> bool| (0..all.len()).filter(|&at| is(&all[at])).collect::<Vec<_>>();
+        let lower = wanted.trim().to_lowercase();
+        let mut found = matching(&|h| h.text.trim().to_lowercase() == lower);
+        if found.is_empty() {
+            found = matching(&|h| h.name == name_and_unit(wanted).0);
+        }
+        let number = || lower.parse::<usize>().ok().and_then(|n| n.checked_sub(1)).filter(|at| *at < all.len());
+        match found[..] {
+            [at] => Ok(Chosen::Named(at)),
+            [] => number().map(Chosen::Numbered).ok_or_else(|| CsvError::UnknownColumn {
+                wanted: wanted.into(),
+                what,
+                found: listed(all, 0..all.len()),
+            }),
+            _ => Err(CsvError::Ambiguous { what, found: listed(all, found) }),
+        }
+    }
+
+    fn index(&self) -> usize {
+        match *self {
+            Chosen::Named(at) | Chosen::Numbered(at) => at,
+        }
+    }
+}
+
+/// Some of the columns with their numbers.
+fn listed(all: &[Header], indices: impl IntoIterator<Item = usize>) -> Vec<CsvColumn> {
+    indices.into_iter().map(|at| CsvColumn { number: at + 1, name: all[at].text.clone() }).collect()
+}
+
+/// That nothing was found.
+pub(super) fn no_column(all: &[Header], what: &'static str) -> CsvError {
+    CsvError::NoColumn { what, found: listed(all, 0..all.len()) }
 }
 
 /// The column that fits best.
@@ -167,19 +207,31 @@ fn best<K: Copy>(
     let equal: Vec<&(usize, usize, K)> = ranked.iter().filter(|(r, ..)| *r == first).collect();
     match equal[..] {
         [&(_, at, kind)] => Ok((at, kind)),
-        _ => Err(CsvError::Ambiguous { what, found: equal.iter().map(|(_, at, _)| all[*at].text.clone()).collect() }),
+        _ => Err(CsvError::Ambiguous { what, found: listed(all, equal.iter().map(|(_, at, _)| *at)) }),
     }
 }
 
 /// Whether one of the columns may be the drive and another one the stress, or both are those that are wanted.
 pub(super) fn is_header(all: &[Header], test: HomogeneousTest, wanted: [Option<&str>; 2]) -> bool {
+    let [drives, stresses] = candidates(all, test, wanted);
+    drives.iter().any(|d| stresses.iter().any(|s| s != d))
+}
+
+/// Indices of the columns that may be the drive, and of those that may be the stress; of one that is wanted itself
+/// alone, where it may be. A number says nothing of a line: its cell has to be such a column's name, too.
+pub(super) fn candidates(all: &[Header], test: HomogeneousTest, wanted: [Option<&str>; 2]) -> [Vec<usize>; 2] {
     let is_shear = test == HomogeneousTest::SimpleShear;
-    let is_wanted = |at: usize, name: &str| named(all, name, "column").is_ok_and(|found| found == at);
-    let fits = |at: usize, wanted: Option<&str>, ranks: bool| wanted.map_or(ranks, |name| is_wanted(at, name));
-    let is_drive = |at: usize| fits(at, wanted[0], all[at].as_drive(is_shear).is_some());
-    let is_stress = |at: usize| fits(at, wanted[1], all[at].as_stress(component(test)).is_some());
-    let indices = || 0..all.len();
-    indices().any(|d| is_drive(d) && indices().any(|s| s != d && is_stress(s)))
+    let of = |wanted: Option<&str>, ranks: &dyn Fn(&Header) -> bool| {
+        let ranked = (0..all.len()).filter(|&at| ranks(&all[at]));
+        match wanted.map(|name| Chosen::of(all, name, "column")) {
+            None => ranked.collect(),
+            Some(Ok(Chosen::Named(at))) => vec![at],
+            Some(Ok(Chosen::Numbered(number))) => ranked.filter(|&at| at == number).collect(),
+            Some(Err(_)) => Vec::new(),
+        }
+    };
+    let is_stress = |h: &Header| h.as_stress(component(test)).is_some();
+    [of(wanted[0], &|h| h.as_drive(is_shear).is_some()), of(wanted[1], &is_stress)]
 }
 
 /// The component of the stress that a test measures, as columns name it.
@@ -200,7 +252,7 @@ pub(super) fn drive_column(
     let (at, kind) = match wanted {
         None => best(all, "stretch, strain or displacement", &|h| h.as_drive(is_shear))?,
         Some(wanted) => {
-            let at = named(all, wanted, "drive")?;
+            let at = Chosen::of(all, wanted, "drive")?.index();
             let by_unit = match all[at].unit {
                 Some(Unit::Length(_)) if all[at].is_compressive() => DriveKind::Compression,
                 Some(Unit::Length(_)) => DriveKind::Displacement,
@@ -236,7 +288,7 @@ pub(super) fn stress_column(
     let (at, kind) = match wanted {
         None => best(all, "nominal stress or force", &|h| h.as_stress(component))?,
         Some(wanted) => {
-            let at = named(all, wanted, "stress")?;
+            let at = Chosen::of(all, wanted, "stress")?.index();
             let by_unit = match all[at].unit {
                 Some(Unit::Force(_)) => StressKind::Force,
                 _ => StressKind::Stress,

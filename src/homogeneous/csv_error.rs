@@ -1,5 +1,19 @@
 //! Why a table is refused.
 
+/// A column of a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CsvColumn {
+    /// Its number, from 1.
+    pub number: usize,
+    /// Its name as the header has it.
+    pub name: String,
+}
+
+/// `1 "Time [s]", 2 "Load [N]"`.
+fn listed(columns: &[CsvColumn]) -> String {
+    columns.iter().map(|c| format!("{} {:?}", c.number, c.name)).collect::<Vec<_>>().join(", ")
+}
+
 /// Why a CSV is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -11,20 +25,36 @@ pub enum CsvError {
         what: &'static str,
     },
     /// A needed column is not there.
-    #[error("no column for the {what} among {found:?}; name it with an option")]
+    #[error("no column for the {what} among {}; give its name or number with an option", listed(found))]
     NoColumn {
         /// What is looked for.
         what: &'static str,
         /// The header.
-        found: Vec<String>,
+        found: Vec<CsvColumn>,
+    },
+    /// There is no column of this name or number.
+    #[error("{wanted:?} is neither name nor number of a column for the {what}; there are {}", listed(found))]
+    UnknownColumn {
+        /// What was asked for.
+        wanted: String,
+        /// What it was asked for.
+        what: &'static str,
+        /// The header.
+        found: Vec<CsvColumn>,
     },
     /// Several columns may be meant.
-    #[error("the columns {found:?} may all be the {what}; name one with an option")]
+    #[error("the columns {} may all be the {what}; give name or number of one with an option", listed(found))]
     Ambiguous {
         /// What is looked for.
         what: &'static str,
         /// The columns.
-        found: Vec<String>,
+        found: Vec<CsvColumn>,
+    },
+    /// A stretch whose sign should be turned.
+    #[error("column {column:?} holds stretches, which are positive; turn the sign of the stress alone")]
+    TurnedStretch {
+        /// The column.
+        column: String,
     },
     /// A cell is not a number.
     #[error(

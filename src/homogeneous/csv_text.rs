@@ -78,8 +78,7 @@ impl TextTable {
     /// The table in `text`, whose header is the first line for which `is_header` holds.
     ///
     /// # Errors
-    /// [`CsvError`]. Where no line is a header, the names are those of the line that could best be one, and there are
-    /// no rows.
+    /// [`CsvError`]. Where no line is a header, the names are those of the line above the first numbers.
     pub fn read(text: &str, is_header: &dyn Fn(&[String]) -> bool) -> Result<TextTable, CsvError> {
         let all = text.trim_start_matches('\u{feff}').lines().enumerate().map(|(index, l)| (index + 1, l));
         let (comments, lines): (Vec<Line>, Vec<Line>) =
@@ -109,9 +108,19 @@ impl TextTable {
             Separator::ALL.into_iter().rev().max_by_key(cells).unwrap_or(Separator::Comma)
         };
         let first = lines.iter().position(|(_, line)| numbers(&most_cells(line).cells(line)) >= 2).unwrap_or(1);
-        let Some(at) = first.checked_sub(1) else { return Err(CsvError::Empty { what: "header" }) };
-        let names = most_cells(lines[at].1).cells(lines[at].1);
-        Ok(TextTable { names, units: Vec::new(), num_preamble: at, has_decimal_comma: false, rows: Vec::new() })
+        let Some(mut at) = first.checked_sub(1) else { return Err(CsvError::Empty { what: "header" }) };
+        let separator = most_cells(lines[at].1);
+        let mut names = separator.cells(lines[at].1);
+        if at > 0 && names.iter().any(|n| is_unit_cell(n)) {
+            let above = separator.cells(lines[at - 1].1);
+            if above.len() == names.len() {
+                (at, names) = (at - 1, above);
+            }
+        }
+        let without_rows =
+            TextTable { names, units: Vec::new(), num_preamble: at, has_decimal_comma: false, rows: Vec::new() };
+        // Columns that are asked for by their numbers need no names that are known.
+        Ok(TextTable::below(&lines, at, separator).unwrap_or(without_rows))
     }
 
     /// The table whose header is line `at` of `lines`.

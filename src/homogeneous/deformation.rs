@@ -81,6 +81,15 @@ impl Deformation {
         }
     }
 
+    /// `a stretch of 1.2`, `stretches of 1.2 and 1.1`, `a shear of 0.4`.
+    pub(super) fn in_words(&self) -> String {
+        match *self {
+            Deformation::Uniaxial { stretch } => format!("a stretch of {stretch}"),
+            Deformation::Biaxial { stretches: [a, b] } => format!("stretches of {a} and {b}"),
+            Deformation::SimpleShear { shear } => format!("a shear of {shear}"),
+        }
+    }
+
     /// Principal log stretches of the incompressible state. For simple shear the first belongs to asinh(γ/2), whatever
     /// its sign.
     pub fn log_stretches(&self) -> [f64; 3] {

@@ -195,3 +195,7 @@ fn refine<L: CurveLaw>(curves: &[Curve], start: &L, options: &CurveFitOptions) -
 #[cfg(test)]
 #[path = "fit_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "biaxial_tests.rs"]
+mod biaxial_tests;

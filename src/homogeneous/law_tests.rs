@@ -90,8 +90,9 @@ fn rows_pass_the_taylor_test() {
     fn check<L: CurveLaw>(law: &L, bulk_kpa: Option<f64>) {
         let material = |law: &L| bulk_kpa.map(|bulk| law.material(bulk));
         let x = law.unknowns();
-        for (test, end) in TESTS {
-            let state = test.at(0.8 * end);
+        // Both rows of a biaxial test: the stress along either axis.
+        let biaxial = [[1.6, 1.2], [1.2, 1.6]].map(|stretches| Deformation::Biaxial { stretches });
+        for state in TESTS.map(|(test, end)| test.at(0.8 * end)).into_iter().chain(biaxial) {
             let mut row = vec![0.0; x.len()];
             let stress = law.stress_and_row(material(law).as_ref(), &state, 1.0, &mut row).unwrap();
             for u in 0..x.len() {
@@ -107,7 +108,7 @@ fn rows_pass_the_taylor_test() {
                 let remainder = |h: f64| one_side(h) + one_side(-h);
                 let (coarse, fine) = (remainder(1e-2), remainder(1e-3));
                 // Newton's tolerance is 1e-13 of κ; a remainder near it has no rate.
-                assert!(fine < 0.02 * coarse + 1e-9, "{test:?} {u}: {coarse} {fine}");
+                assert!(fine < 0.02 * coarse + 1e-9, "{state:?} {u}: {coarse} {fine}");
             }
         }
     }

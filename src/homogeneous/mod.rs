@@ -5,11 +5,13 @@
 //! * [`fit_curves`]: one to N of Ogden's terms to several curves together, chosen by decrement, F-test and BIC, or a
 //!   law in the first invariant; [`compare_laws`]: all laws side by side. A law is a [`CurveLaw`].
 //! * [`fit_dumbbell`]: the traditional route from a dumb-bell's force over grip displacement.
-//! * [`read_csv`]: curves from text.
+//! * [`read_csv`]: curves from text; [`read_biaxial_csv`]: tests with two stretches and their two stresses.
 
 mod branches;
 mod compressible;
 mod csv;
+mod csv_axes;
+mod csv_biaxial;
 mod csv_columns;
 mod csv_error;
 mod csv_text;
@@ -34,9 +36,10 @@ mod table;
 pub use crate::material::ShearTerm;
 pub use branches::Unloading;
 pub use compressible::{HomogeneousError, Response, respond};
-pub use csv::{CsvCurve, CsvOptions, CsvReading, read_csv};
-pub use csv_error::CsvError;
-pub use curve::{Curve, CurveError, CurveMatch};
+pub use csv::{CsvCurve, CsvOptions, CsvReading, Turned, read_csv};
+pub use csv_biaxial::{BiaxialCsv, read_biaxial_csv};
+pub use csv_error::{CsvColumn, CsvError};
+pub use curve::{BiaxialStress, Curve, CurveError, CurveMatch};
 pub use curve_law::{CurveLaw, LawValue, OgdenTerms};
 pub use deformation::{Deformation, HomogeneousTest, incompressible_derivative, incompressible_stress};
 pub use dumbbell::{DumbbellError, DumbbellFit, DumbbellOptions, GaugePoint, fit_dumbbell, gauge_stretches};

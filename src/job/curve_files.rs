@@ -3,8 +3,8 @@
 use super::{JobError, Outcome};
 use crate::field::FieldError;
 use crate::homogeneous::{
-    BULK_OVER_SHEAR, CsvCurve, CsvOptions, CsvReading, Curve, CurveFitOptions, HomogeneousTest, StressUnit, Unloading,
-    read_csv,
+    BULK_OVER_SHEAR, CsvCurve, CsvOptions, CsvReading, Curve, CurveError, CurveFitOptions, HomogeneousTest, StressUnit,
+    Turned, Unloading, read_biaxial_csv, read_csv,
 };
 use crate::material::{LawKind, Material, MaterialError};
 use crate::report::plain_number;
@@ -15,11 +15,13 @@ use utoipa::ToSchema;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CurveColumns {
-    /// Column of stretch, strain, shear or displacement; by its name where it is left out.
+    /// Column of stretch, strain, shear or displacement, by its name or by its number from 1; found by the names that
+    /// are known where it is left out. In a biaxial test that of the first axis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(max_length = 200)]
     pub drive_column: Option<String>,
-    /// Column of nominal stress or force; by its name where it is left out.
+    /// Column of nominal stress or force, by its name or by its number from 1; found by the names that are known where
+    /// it is left out. In a biaxial test that of the first axis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(max_length = 200)]
     pub stress_column: Option<String>,
@@ -31,6 +33,32 @@ pub struct CurveColumns {
     #[schema(minimum = 1e-6, maximum = 1e6)]
     pub length_mm: Option<f64>,
     /// Area under the force in mm², for force columns.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-6, maximum = 1e12)]
+    pub area_mm2: Option<f64>,
+    /// Columns whose sign is turned: tension and what lengthens are positive, and a file may have it the other way
+    /// round. Columns that are called compressive are turned without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub turned: Option<Turned>,
+}
+
+/// The same of the second axis of biaxial tests.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SecondAxisColumns {
+    /// Column of stretch, strain or displacement along the second axis of a biaxial test, by name or number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(max_length = 200)]
+    pub drive_column: Option<String>,
+    /// Column of nominal stress or force along the second axis of a biaxial test, by name or number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(max_length = 200)]
+    pub stress_column: Option<String>,
+    /// Gauge length along the second axis of a biaxial test in mm; that of the first where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-6, maximum = 1e6)]
+    pub length_mm: Option<f64>,
+    /// Area under the force along the second axis of a biaxial test in mm²; that of the first where it is left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-6, maximum = 1e12)]
     pub area_mm2: Option<f64>,
@@ -57,7 +85,13 @@ impl CurveReport {
     /// What a reader of the result should know.
     fn in_words(&self) -> String {
         let reading = &self.reading;
-        let mut text = format!("{}: {} over {}", self.name, reading.stress_column, reading.drive_column);
+        let both = |first: &str, second: &Option<String>| match second {
+            Some(second) => format!("{first} and {second}"),
+            None => first.to_string(),
+        };
+        let stresses = both(&reading.stress_column, &reading.second_stress_column);
+        let drives = both(&reading.drive_column, &reading.second_drive_column);
+        let mut text = format!("{}: {stresses} over {drives}", self.name);
         let mut said = vec![format!("{} rows", self.num_rows)];
         if reading.num_preamble_lines > 0 {
             said.push(format!("{} lines before the header skipped", reading.num_preamble_lines));
@@ -100,6 +134,8 @@ impl CurveColumns {
             stress_unit: self.stress_unit,
             length_mm: self.length_mm,
             area_mm2: self.area_mm2,
+            turned: self.turned,
+            ..CsvOptions::default()
         }
     }
 
@@ -117,12 +153,57 @@ pub(super) fn unfit(pointer: &str, error: &dyn std::fmt::Display) -> FieldError 
     FieldError::new(pointer, "a curve that cannot be used", "a table of a drive and a stress").remedy(error.to_string())
 }
 
+/// What a curve does not say that was recorded with another sign: option and field.
+const TURNED: &str = "--turned or columns.turned";
+
+/// A curve whose values cannot be.
+pub(super) fn unfit_curve(pointer: &str, error: &CurveError) -> FieldError {
+    match error {
+        CurveError::Sign { .. } => unfit(pointer, &format!("{error} ({TURNED})")),
+        _ => unfit(pointer, error),
+    }
+}
+
+/// A test whose curve is fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CurveTest {
+    /// Stretch along one axis, free across. Nominal stress along it.
+    Uniaxial,
+    /// The same stretch along two axes. Nominal stress along one of them.
+    Equibiaxial,
+    /// Stretch along one axis, none across (planar tension). Nominal stress along it.
+    PureShear,
+    /// An amount of shear between plates. Nominal shear stress.
+    SimpleShear,
+    /// Two stretches that are prescribed independently. Nominal stress along both axes, or along one of them.
+    Biaxial,
+}
+
+impl CurveTest {
+    /// `uniaxial`, `equibiaxial`, `pure_shear`, `simple_shear`, `biaxial`.
+    pub fn name(self) -> &'static str {
+        self.with_one_drive().map_or("biaxial", HomogeneousTest::name)
+    }
+
+    /// The test where one number is its drive; none of a biaxial test.
+    pub fn with_one_drive(self) -> Option<HomogeneousTest> {
+        match self {
+            CurveTest::Uniaxial => Some(HomogeneousTest::Uniaxial),
+            CurveTest::Equibiaxial => Some(HomogeneousTest::Equibiaxial),
+            CurveTest::PureShear => Some(HomogeneousTest::PureShear),
+            CurveTest::SimpleShear => Some(HomogeneousTest::SimpleShear),
+            CurveTest::Biaxial => None,
+        }
+    }
+}
+
 /// A test and its curve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TestCurve {
     /// The test.
-    pub test: HomogeneousTest,
+    pub test: CurveTest,
     /// Name in results; the test's where it is left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(max_length = 200)]
@@ -136,34 +217,69 @@ pub struct TestCurve {
 }
 
 /// Refuses columns whose unit is not that of a stretch and a stress.
-pub(super) fn needs_stress_and_stretch(csv: &CsvCurve, pointer: &str) -> Result<(), FieldError> {
-    if csv.is_displacement {
+pub(super) fn needs_stress_and_stretch(is_displacement: bool, is_force: bool, pointer: &str) -> Result<(), FieldError> {
+    if is_displacement {
         return Err(unfit(pointer, &"the drive is a displacement; give length_mm, or a column of stretch or strain"));
     }
-    if csv.is_force {
+    if is_force {
         return Err(unfit(pointer, &"the stress is a force; give area_mm2, or a column of nominal stress"));
     }
     Ok(())
 }
 
 impl TestCurve {
-    /// The curve of stretch and stress with what was read; `pointer` is that of this entry.
+    /// The curves of stretch and stress with what was read: one, or one for each stress of a biaxial test, called
+    /// `name`; `pointer` is that of this entry.
     ///
     /// # Errors
     /// The field and what is wrong with its content.
-    pub(super) fn curve(
+    pub(super) fn curves(
         &self,
-        columns: &CurveColumns,
+        name: &str,
+        (columns, second): (&CurveColumns, &SecondAxisColumns),
         fit: &CurveFitSettings,
         pointer: &str,
-    ) -> Result<(Curve, CurveReport), FieldError> {
+    ) -> Result<(Vec<Curve>, CurveReport), FieldError> {
         let pointer = format!("{pointer}/csv");
-        let mut csv = columns.read(&self.csv, self.test, &pointer)?;
-        needs_stress_and_stretch(&csv, &pointer)?;
-        let report = fit.elastic_rows(self.name.as_deref().unwrap_or(self.test.name()), &mut csv);
-        let curve =
-            Curve::new(self.test.name(), self.test, &csv.drive, &csv.stress).map_err(|e| unfit(&pointer, &e))?;
-        Ok((curve, report))
+        let shown = self.name.as_deref().unwrap_or(self.test.name());
+        let Some(test) = self.test.with_one_drive() else {
+            let options = CsvOptions {
+                second_drive_column: second.drive_column.clone(),
+                second_stress_column: second.stress_column.clone(),
+                second_length_mm: second.length_mm,
+                second_area_mm2: second.area_mm2,
+                ..columns.options()
+            };
+            return self.biaxial_curves(name, shown, &options, fit, &pointer);
+        };
+        let mut csv = columns.read(&self.csv, test, &pointer)?;
+        needs_stress_and_stretch(csv.is_displacement, csv.is_force, &pointer)?;
+        let report = fit.elastic_rows(shown, &mut csv);
+        let curve = Curve::new(name, test, &csv.drive, &csv.stress).map_err(|e| unfit_curve(&pointer, &e))?;
+        Ok((vec![curve], report))
+    }
+
+    fn biaxial_curves(
+        &self,
+        name: &str,
+        shown: &str,
+        options: &CsvOptions,
+        fit: &CurveFitSettings,
+        pointer: &str,
+    ) -> Result<(Vec<Curve>, CurveReport), FieldError> {
+        let mut csv = read_biaxial_csv(&self.csv, options).map_err(|e| unfit(pointer, &e))?;
+        needs_stress_and_stretch(csv.is_displacement, csv.is_force, pointer)?;
+        let unloading = if fit.has_all_branches { None } else { csv.take_first_loading() };
+        let stresses = csv.stresses.each_ref().map(Option::as_deref);
+        let curves = Curve::biaxial(name, &csv.drives, stresses).map_err(|e| unfit_curve(pointer, &e))?;
+        let report = CurveReport {
+            name: shown.into(),
+            num_rows: csv.drives.len(),
+            num_incomplete_rows: csv.num_left_out,
+            unloading,
+            reading: csv.reading,
+        };
+        Ok((curves, report))
     }
 }
 

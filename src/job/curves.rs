@@ -1,7 +1,8 @@
 //! Curves: joint fits to homogeneous tests, and the prediction of a test kept back.
 
 use super::curve_files::{
-    CurveColumns, CurveFitSettings, CurveReport, TestCurve, add_material, fit_failed, reports_in_words,
+    CurveColumns, CurveFitSettings, CurveReport, SecondAxisColumns, TestCurve, add_material, fit_failed,
+    reports_in_words,
 };
 use super::{Context, JobError, Outcome, Request, ResultSchema, Run, summary};
 use crate::field::FieldError;
@@ -30,6 +31,9 @@ pub struct CurvesRequest {
     /// How columns are understood.
     #[serde(default)]
     pub columns: CurveColumns,
+    /// How those of the second axis of biaxial tests are understood.
+    #[serde(default)]
+    pub second_axis: SecondAxisColumns,
     /// Settings of the fits.
     #[serde(default)]
     pub fit: CurveFitSettings,
@@ -67,6 +71,18 @@ struct CheckedCurves {
     files: Vec<CurveReport>,
 }
 
+impl CurvesRequest {
+    /// What an entry is called in results: its test, with its own name or number where there are several of the test.
+    fn name_of(&self, index: usize) -> String {
+        let entry = &self.curves[index];
+        let test = entry.test.name();
+        if self.curves.iter().filter(|other| other.test == entry.test).count() == 1 {
+            return test.into();
+        }
+        entry.name.as_ref().map_or_else(|| format!("{test} {}", index + 1), |name| format!("{test} {name}"))
+    }
+}
+
 impl Request for CurvesRequest {
     const COMMAND: &'static str = "curves";
     const COLLECTION: &'static str = "curve-fits";
@@ -84,17 +100,26 @@ impl Request for CurvesRequest {
         let (mut fitted, mut kept_back, mut errors) = (Vec::new(), Vec::new(), Vec::new());
         let (mut files, mut kept_files) = (Vec::new(), Vec::new());
         for (index, entry) in self.curves.iter().enumerate() {
-            match entry.curve(&self.columns, &self.fit, &format!("/curves/{index}")) {
-                Ok((curve, report)) if entry.is_kept_back => {
-                    kept_back.push(curve);
+            match entry.curves(
+                &self.name_of(index),
+                (&self.columns, &self.second_axis),
+                &self.fit,
+                &format!("/curves/{index}"),
+            ) {
+                Ok((mut curves, report)) if entry.is_kept_back => {
+                    kept_back.append(&mut curves);
                     kept_files.push(report);
                 }
-                Ok((curve, report)) => {
-                    fitted.push(curve);
+                Ok((mut curves, report)) => {
+                    fitted.append(&mut curves);
                     files.push(report);
                 }
                 Err(error) => errors.push(error),
             }
+        }
+        let is_biaxial = |entry: &TestCurve| entry.test.with_one_drive().is_none();
+        if self.second_axis != SecondAxisColumns::default() && !self.curves.iter().any(is_biaxial) {
+            errors.push(FieldError::new("/second_axis", "given", "left out where no test is biaxial"));
         }
         if errors.is_empty() && fitted.is_empty() {
             errors.push(FieldError::new("/curves", "all kept back", "at least one curve that is fitted"));

@@ -1,11 +1,12 @@
-//! Export of a recording: its images, drives and forces as arrays for other tools.
+//! Export of a recording: its images, drives and forces as arrays for other tools, and as tables of points.
 
 use super::array_files::add_arrays;
 use super::input_use::{InputForm, InputUse};
 use super::{Context, JobError, Outcome, Request, ResultSchema, Run, defaults, summary};
-use crate::export::{ArrayFormat, Tree, raw_recording_arrays, recording_arrays};
+use crate::export::{ArrayFormat, RecordingFormat, Tree, raw_recording_arrays, recording_arrays, recording_points};
 use crate::field::FieldError;
 use crate::provenance::VERSION;
+use crate::recording::Recording;
 use crate::voxel::VoxelGrid;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -19,10 +20,10 @@ pub struct ExportRecordingRequest {
     /// Whether the recording holds wrapped phases and magnitudes in place of displacements.
     #[serde(default)]
     pub is_raw: bool,
-    /// Files that it is written as; all where the list is left out.
+    /// Files that it is written as; all where the list is left out, without tables of points where it holds phases.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(min_items = 1, max_items = 2)]
-    pub formats: Option<Vec<ArrayFormat>>,
+    #[schema(min_items = 1, max_items = 3)]
+    pub formats: Option<Vec<RecordingFormat>>,
 }
 
 /// Result (`export-recording/1`).
@@ -33,7 +34,7 @@ struct ExportRecordingResult {
     input_hash: String,
     /// Name of the recording.
     id: String,
-    /// Voxels along x, y, z.
+    /// Voxels along x, y, z; one along the normal of a face that cameras saw.
     shape: [usize; 3],
     drive_mm: Vec<f64>,
     /// The files.
@@ -43,7 +44,8 @@ struct ExportRecordingResult {
 impl Request for ExportRecordingRequest {
     const COMMAND: &'static str = "export-recording";
     const COLLECTION: &'static str = "recording-exports";
-    const ABOUT: &'static str = "A recording's displacements or phases, drives and forces for MATLAB and Python.";
+    const ABOUT: &'static str =
+        "A recording's displacements or phases, drives and forces for MATLAB and Python, and as tables of points.";
 
     fn example() -> serde_json::Value {
         serde_json::json!({ "recording": defaults::EXAMPLE_RECORDING, "formats": ["mat"] })
@@ -54,13 +56,34 @@ impl Request for ExportRecordingRequest {
     }
 
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
+        if self.is_raw && self.formats.as_ref().is_some_and(|formats| formats.contains(&RecordingFormat::Points)) {
+            let error = FieldError::new("/formats", "points", "formats of arrays where the recording holds phases");
+            return Err(vec![error.remedy("tables of points hold displacements; import the phases first")]);
+        }
         Ok(Box::new(self))
     }
 }
 
 impl ExportRecordingRequest {
-    fn formats(&self) -> &[ArrayFormat] {
-        self.formats.as_deref().unwrap_or(&ArrayFormat::ALL)
+    fn formats(&self) -> &[RecordingFormat] {
+        self.formats.as_deref().unwrap_or(&RecordingFormat::ALL)
+    }
+
+    fn array_formats(&self) -> Vec<ArrayFormat> {
+        let wanted: Vec<ArrayFormat> = self.formats().iter().filter_map(|f| f.of_arrays()).collect();
+        ArrayFormat::ALL.into_iter().filter(|f| wanted.contains(f)).collect()
+    }
+
+    /// Tables of points, name and text: one per drive.
+    fn tables(&self, context: &Context) -> Vec<(String, String)> {
+        if !self.formats().contains(&RecordingFormat::Points) {
+            return Vec::new();
+        }
+        let of_steps = |recording: &Recording| {
+            let steps = recording.steps.iter().enumerate();
+            steps.map(|(n, step)| (format!("{STEM}-{}.csv", n + 1), recording_points(recording, step))).collect()
+        };
+        context.recordings.first().map_or_else(Vec::new, |read| of_steps(&read.recording))
     }
 
     /// What is written of the recording that was read.
@@ -92,9 +115,14 @@ impl Run for ExportRecordingRequest {
         vec![InputUse { pointer: "/recording".into(), name: self.recording.clone(), form }]
     }
 
+    fn takes_surfaces(&self) -> bool {
+        true
+    }
+
     fn run(&self, context: &Context) -> Result<Outcome, JobError> {
         let (id, grid, drive_mm, tree) = self.content(context)?;
-        let files = ArrayFormat::ALL.into_iter().filter(|f| self.formats().contains(f));
+        let (formats, tables) = (self.array_formats(), self.tables(context));
+        let files = formats.iter().map(|f| f.file_name(STEM)).chain(tables.iter().map(|(name, _)| name.clone()));
         let result = ExportRecordingResult {
             schema: "export-recording/1",
             version: VERSION,
@@ -102,11 +130,14 @@ impl Run for ExportRecordingRequest {
             id,
             shape: grid.shape,
             drive_mm,
-            files: files.map(|f| f.file_name(STEM)).collect(),
+            files: files.collect(),
         };
         let text = summary::export_recording(&result.id, result.shape, result.drive_mm.len(), &result.files);
         let mut outcome = Outcome::new("export-recording.json", &result, text)?;
-        add_arrays(&mut outcome, STEM, tree, self.formats(), context)?;
+        add_arrays(&mut outcome, STEM, tree, &formats, context)?;
+        for (name, text) in tables {
+            outcome.add(name, text);
+        }
         Ok(outcome)
     }
 }

@@ -398,13 +398,15 @@ impl CheckedImport {
                 for (index, path) in files.iter().enumerate() {
                     let fail = |e: &dyn std::fmt::Display| unfit(&format!("/files/{index}"), path, e);
                     let num_bytes = std::fs::metadata(path).map_err(|e| fail(&e))?.len();
-                    memory.take("a table of points", num_bytes).map_err(|e| fail(&e))?;
-                    let text = crate::file::read_text_limited(path, num_bytes).map_err(|e| fail(&e))?;
+                    // Of a file in another code the bytes stand beside the text, whose letters may take twice as many.
+                    let num_bytes_taken = 3 * num_bytes;
+                    memory.take("a table of points", num_bytes_taken).map_err(|e| fail(&e))?;
+                    let text = crate::file::read_table_limited(path, num_bytes).map_err(|e| fail(&e))?;
                     steps.push(
                         read_points(&text, path, self.request.surface, options.unit_mm, &memory)
                             .map_err(|e| fail(&e))?,
                     );
-                    memory.give_back(num_bytes);
+                    memory.give_back(num_bytes_taken);
                 }
                 let voxel = options.voxel_mm_by_index;
                 recording_from_points(&steps, specimen, voxel, self.request.surface, &options, &memory)

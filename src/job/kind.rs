@@ -220,7 +220,8 @@ impl Job {
                     if let Some(surface) = read.recording.grid.surface.filter(|_| !self.run.takes_surfaces()) {
                         let found = format!("displacements of the face {}", surface.face.name());
                         let error = FieldError::new(&wanted.pointer, found, "a recording of the volume");
-                        let remedy = "what cameras see of a face can be calibrated, and nothing else be made of it";
+                        let remedy =
+                            "what cameras see of a face can be calibrated and exported, and nothing else be made of it";
                         return Err(error.remedy(remedy).into());
                     }
                     let digest = read.digest.clone();

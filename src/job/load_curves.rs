@@ -1,10 +1,10 @@
 //! Load curves: what an elastic material leaves out of load curves of homogeneous tests, without a recording.
 
-use super::curve_files::{CurveColumns, TestCurve, add_material, needs_stress_and_stretch, unfit};
+use super::curve_files::{CurveColumns, TestCurve, add_material, needs_stress_and_stretch, unfit, unfit_curve};
 use super::{Context, JobError, Outcome, Request, ResultSchema, Run, summary};
 use crate::field::FieldError;
 use crate::provenance::VERSION;
-use crate::rate::{LoadCurve, LoadCurveOptions, LoadCurveVerdict, analyse_load_curve};
+use crate::rate::{LoadCurve, LoadCurveError, LoadCurveOptions, LoadCurveVerdict, analyse_load_curve};
 use crate::report::load_curve_pictures;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -41,8 +41,13 @@ struct CheckedLoadCurves {
 impl LoadCurvesRequest {
     fn curve(&self, index: usize, entry: &TestCurve) -> Result<LoadCurve, FieldError> {
         let pointer = format!("/curves/{index}/csv");
-        let csv = self.columns.read(&entry.csv, entry.test, &pointer)?;
-        needs_stress_and_stretch(&csv, &pointer)?;
+        let Some(test) = entry.test.with_one_drive() else {
+            let allowed = "a test with one drive: uniaxial, equibiaxial, pure_shear or simple_shear";
+            let error = FieldError::new(format!("/curves/{index}/test"), entry.test.name(), allowed);
+            return Err(error.remedy("fits to curves take biaxial tests; histories of them are not diagnosed"));
+        };
+        let csv = self.columns.read(&entry.csv, test, &pointer)?;
+        needs_stress_and_stretch(csv.is_displacement, csv.is_force, &pointer)?;
         let mut order: Vec<usize> = (0..csv.drive.len()).collect();
         if !csv.time_s.is_empty() {
             // Some sources have rows out of order.
@@ -50,8 +55,12 @@ impl LoadCurvesRequest {
         }
         let pick = |v: &[f64]| order.iter().filter_map(|&i| v.get(i).copied()).collect::<Vec<_>>();
         let name = entry.name.clone().unwrap_or_else(|| entry.test.name().into());
-        let curve = LoadCurve::new(&name, entry.test, &pick(&csv.time_s), &pick(&csv.drive), &pick(&csv.stress))
-            .map_err(|e| unfit(&pointer, &e))?;
+        let curve = LoadCurve::new(&name, test, &pick(&csv.time_s), &pick(&csv.drive), &pick(&csv.stress)).map_err(
+            |e| match &e {
+                LoadCurveError::Curve(of_curve) => unfit_curve(&pointer, of_curve),
+                _ => unfit(&pointer, &e),
+            },
+        )?;
         let curve = LoadCurve { shape_factor: self.shape_factor, ..curve };
         Ok(if entry.is_kept_back { curve.kept_back() } else { curve })
     }

@@ -2,7 +2,7 @@
 //! first invariant.
 
 use super::curve_files::{
-    CurveColumns, CurveFitSettings, CurveReport, add_material, fit_failed, reports_in_words, unfit,
+    CurveColumns, CurveFitSettings, CurveReport, add_material, fit_failed, reports_in_words, unfit, unfit_curve,
 };
 use super::{Context, JobError, Outcome, Progress, Request, ResultSchema, Run, defaults, summary};
 use crate::field::FieldError;
@@ -134,7 +134,7 @@ impl CheckedUniaxial {
 
     fn of_strip(&self) -> Result<Fits, JobError> {
         let curve = Curve::new("uniaxial", HomogeneousTest::Uniaxial, &self.csv.drive, &self.csv.stress)
-            .map_err(|e| unfit("/csv", &e))?;
+            .map_err(|e| unfit_curve("/csv", &e))?;
         let family = |&neo_hookean: &bool| {
             let options = self.request.fit.options(neo_hookean);
             fit_curves(std::slice::from_ref(&curve), &options).map_err(|e| fit_failed(&e))
@@ -161,7 +161,7 @@ impl CheckedUniaxial {
         }
         let found = first.ok_or_else(|| JobError::Internal("no fit was made".into()))?;
         let curve = Curve::new("uniaxial", HomogeneousTest::Uniaxial, &found.stretch, &found.nominal_stress_kpa)
-            .map_err(|e| unfit("/csv", &e))?;
+            .map_err(|e| unfit_curve("/csv", &e))?;
         Ok(Fits { families, curve, conversion: Some(found) })
     }
 }

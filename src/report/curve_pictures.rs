@@ -1,7 +1,7 @@
 //! Pictures of curve fits and of verdicts on load curves.
 
 use super::bars::{BarGroup, GroupedBars};
-use super::curves::{CurveSeries, CurvesPlot};
+use super::curves::{CurveSeries, CurvesPlot, Mark};
 use crate::homogeneous::{Curve, CurveFit, Deformation, LawComparison, LawEvidence};
 use crate::rate::{CurveTrace, LoadCurveVerdict};
 
@@ -14,17 +14,42 @@ fn abscissa(state: &Deformation) -> f64 {
     }
 }
 
-/// Curves with a fit (full line) and other fits (dashed); `is_kept_back` marks curves that were predicted.
+/// A stress whose own stretch goes less than this part of the way of the one across is drawn over that one.
+const LEAST_WAY: f64 = 0.1;
+
+/// What the states of a curve are drawn at, and what the legend adds to its name.
+fn abscissas(curve: &Curve) -> (Vec<f64>, String) {
+    let own: Vec<f64> = curve.states.iter().map(abscissa).collect();
+    let across = |state: &Deformation| match *state {
+        Deformation::Biaxial { stretches } => Some(stretches[1]),
+        _ => None,
+    };
+    let way = |values: &[f64]| {
+        let [low, high] = values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(*v), h.max(*v)]);
+        high - low
+    };
+    let across: Vec<f64> = curve.states.iter().filter_map(across).collect();
+    match curve.biaxial {
+        Some(stress) if way(&own) < LEAST_WAY * way(&across) => (across, format!(" over λ{}", 2 - stress.axis)),
+        _ => (own, String::new()),
+    }
+}
+
+/// Curves with a fit (full line) and other fits (dashed); `is_kept_back` marks curves that were predicted. Each stress
+/// of a biaxial test is drawn over its own stretch, that of the second axis with squares; where a width is held, over
+/// the stretch across it.
 pub fn fit_picture(title: &str, curves: &[(&Curve, bool)], fits: &[&CurveFit]) -> String {
-    let series = curves
-        .iter()
-        .map(|(curve, is_kept_back)| CurveSeries {
-            name: curve.name.clone(),
-            points: curve.states.iter().zip(&curve.nominal_stress_kpa).map(|(s, p)| [abscissa(s), *p]).collect(),
+    let of_curve = |(curve, is_kept_back): &(&Curve, bool)| {
+        let (drawn_at, over) = abscissas(curve);
+        CurveSeries {
+            name: format!("{}{over}", curve.name),
+            points: drawn_at.iter().zip(&curve.nominal_stress_kpa).map(|(x, p)| [*x, *p]).collect(),
             models: fits.iter().filter_map(|f| f.stress(&curve.states)).collect(),
             is_predicted: *is_kept_back,
-        })
-        .collect();
+            mark: if curve.biaxial.is_some_and(|stress| stress.axis == 1) { Mark::Square } else { Mark::Circle },
+        }
+    };
+    let series = curves.iter().map(of_curve).collect();
     CurvesPlot {
         title: title.into(),
         x_label: "stretch (or amount of shear)".into(),
@@ -62,6 +87,7 @@ fn trace_plot(title: &str, traces: &[CurveTrace], over_time: bool) -> String {
                 points: x.iter().zip(&t.measured_kpa).map(|(x, y)| [*x, *y]).collect(),
                 models: vec![t.after_kpa.clone(), t.before_kpa.clone()],
                 is_predicted: t.num_fitted == 0,
+                mark: Mark::Circle,
             }
         })
         .collect();

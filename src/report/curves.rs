@@ -6,6 +6,28 @@ use super::frame::Frame;
 use super::svg::{SMALL, Svg, TITLE, TextStyle};
 use super::text::shortened;
 
+/// What a measured point is drawn as.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mark {
+    /// A circle.
+    #[default]
+    Circle,
+    /// A square.
+    Square,
+}
+
+impl Mark {
+    /// Draws it around `at`; `radius` is half of its width.
+    fn draw(self, svg: &mut Svg, at: [f64; 2], radius: f64, fill: &str, color: &str, width: f64) {
+        match self {
+            Mark::Circle => svg.circle(at, radius, fill, color, width),
+            Mark::Square => {
+                svg.stroked_rect([at[0] - radius, at[1] - radius, 2.0 * radius, 2.0 * radius], fill, color, width);
+            }
+        }
+    }
+}
+
 /// One measured curve and the models drawn with it.
 #[derive(Clone, Debug, Default)]
 pub struct CurveSeries {
@@ -17,6 +39,8 @@ pub struct CurveSeries {
     pub models: Vec<Vec<f64>>,
     /// Whether the curve was predicted, not fitted: hollow marks.
     pub is_predicted: bool,
+    /// What its points are drawn as.
+    pub mark: Mark,
 }
 
 /// Measured curves with their fits above, data − model below.
@@ -65,7 +89,7 @@ impl CurvesPlot {
             let fill = if series.is_predicted { "#ffffff" } else { color };
             let stride = series.points.len().div_ceil(MAX_MARKS).max(1);
             for p in series.points.iter().step_by(stride) {
-                svg.circle(frame.at(*p), 2.4, fill, color, 1.0);
+                series.mark.draw(&mut svg, frame.at(*p), 2.4, fill, color, 1.0);
             }
             for (m, model) in series.models.iter().enumerate().rev() {
                 let line: Vec<[f64; 2]> = series.points.iter().zip(model).map(|(p, v)| frame.at([p[0], *v])).collect();
@@ -83,7 +107,7 @@ impl CurvesPlot {
             }
             let y = AREA[1] + 12.0 + 18.0 * i as f64;
             let x = AREA[0] + AREA[2] + 14.0;
-            svg.circle([x, y - 4.0], 3.0, fill, color, 1.2);
+            series.mark.draw(&mut svg, [x, y - 4.0], 3.0, fill, color, 1.2);
             let suffix = if series.is_predicted { " (predicted)" } else { "" };
             let name = shortened(&format!("{}{suffix}", series.name), SMALL, 150.0);
             svg.text([x + 9.0, y], &name, &TextStyle::new(SMALL));
@@ -117,6 +141,7 @@ mod tests {
                 points: vec![[1.0, 0.0], [1.5, bad], [2.0, 3.0]],
                 models: vec![vec![0.1, 1.0, bad], vec![0.0; 3]],
                 is_predicted: true,
+                mark: Mark::Square,
             };
             let plot = CurvesPlot { title: "t".into(), series: vec![series.clone(), series], ..CurvesPlot::default() };
             let svg = plot.to_svg();

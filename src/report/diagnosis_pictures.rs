@@ -71,7 +71,7 @@ fn load_curve(load: &LoadHistoryFit) -> String {
             name: "measured".into(),
             points,
             models: vec![load.force_n[1].clone(), load.force_n[0].clone()],
-            is_predicted: false,
+            ..CurveSeries::default()
         }],
     }
     .to_svg()

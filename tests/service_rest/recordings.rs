@@ -171,3 +171,28 @@ fn files_of_another_program_become_a_recording() {
         assert!(!text.contains("/tmp") && !text.contains("lambdak-"), "{text}");
     }
 }
+
+/// A table of points as cameras' programs in Europe write it, with `µ` in one byte or in UTF-16, becomes a recording
+/// from the page as from the command.
+#[test]
+fn tables_in_other_codes_become_a_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(folder.path(), &[]);
+    let mut table = String::from("x [µm];y [µm];z [µm];ux [µm];uy [µm];uz [µm]\n");
+    for n in 0..10 * 8 * 4 {
+        let [i, j, k] = [n % 10, n / 10 % 8, n / 80].map(f64::from);
+        let (x, y, z) = (-11.43 + 2.54 * i, -2.8 + 0.8 * j, -7.1625 + 4.775 * k);
+        table += &format!("{};{};{};{};0;0\n", 1e3 * x, 1e3 * y, 1e3 * z, 700.0 * y).replace('.', ",");
+    }
+    let latin: Vec<u8> = table.chars().map(|c| u8::try_from(c).unwrap()).collect();
+    let utf16 = format!("\u{feff}{table}").encode_utf16().flat_map(u16::to_le_bytes).collect();
+    for bytes in [latin, utf16, table.into_bytes()] {
+        let request = json!({
+            "files": ["points.csv"], "form": "points", "specimen": shipped("solid-shear.json"), "drive_mm": [5.0],
+        });
+        let body = tar_of(&[("import.json", request.to_string().as_bytes()), ("points.csv", &bytes)]);
+        let reply = service.call("POST", "/v1/recordings", &[("content-type", "application/x-tar")], &body);
+        assert_eq!(reply.status, 201, "{}", String::from_utf8_lossy(&reply.body));
+        assert_eq!(reply.json()["summary"]["num_voxels"], 320);
+    }
+}

@@ -40,6 +40,8 @@ Mesh = Union[str, float]
 """`search`, `standard`, `fine`, or a factor on the standard element size."""
 Recorded = Union[Recording, PathLike]
 Curve = Union[PathLike, Mapping[str, npt.ArrayLike]]
+# By name, or by number from 1.
+Column = Union[str, int]
 """A CSV file as test machines write it, or columns by name, such as `stretch` and `nominal_stress_kpa`."""
 Fields = Mapping[str, Any]
 Vector = Union[Sequence[float], npt.NDArray[Any]]
@@ -512,11 +514,12 @@ def uniaxial(
     bulk_kpa: Optional[float] = None,
     min_alpha_gap: Optional[float] = None,
     has_all_branches: Optional[bool] = None,
-    drive_column: Optional[str] = None,
-    stress_column: Optional[str] = None,
+    drive_column: Optional[Column] = None,
+    stress_column: Optional[Column] = None,
     stress_unit: Optional[str] = None,
     length_mm: Optional[float] = None,
     area_mm2: Optional[float] = None,
+    turned: Optional[str] = None,
     name: Optional[str] = None,
     folder: Optional[PathLike] = None,
     threads: Optional[int] = None,
@@ -529,14 +532,14 @@ def uniaxial(
         mesh=mesh,
         name=name,
         fit=_fit(law, max_terms, bulk_kpa, min_alpha_gap, has_all_branches),
-        columns=_columns(drive_column, stress_column, stress_unit, length_mm, area_mm2),
+        columns=_columns(drive_column, stress_column, stress_unit, length_mm, area_mm2, turned),
     )
     done = _run("uniaxial", request, folder, threads, on_progress)
     return CurveFit.of(done.result, done.folder)
 
 
 def curves(
-    tests: Mapping[str, Curve],
+    tests: Mapping[str, Union[Curve, Sequence[Curve]]],
     *,
     kept_back: Sequence[str] = (),
     has_neo_hookean_term: Optional[bool] = None,
@@ -546,30 +549,44 @@ def curves(
     bulk_kpa: Optional[float] = None,
     min_alpha_gap: Optional[float] = None,
     has_all_branches: Optional[bool] = None,
-    drive_column: Optional[str] = None,
-    stress_column: Optional[str] = None,
+    drive_column: Optional[Column] = None,
+    stress_column: Optional[Column] = None,
+    second_drive_column: Optional[Column] = None,
+    second_stress_column: Optional[Column] = None,
     stress_unit: Optional[str] = None,
     length_mm: Optional[float] = None,
     area_mm2: Optional[float] = None,
+    second_length_mm: Optional[float] = None,
+    second_area_mm2: Optional[float] = None,
+    turned: Optional[str] = None,
     folder: Optional[PathLike] = None,
     threads: Optional[int] = None,
     on_progress: Optional[OnProgress] = None,
 ) -> CurveFit:
     """Fits of Ogden terms, or of a `law`, to curves of several tests: `{"uniaxial": …, "pure_shear": …}`.
 
-    Tests are `uniaxial`, `equibiaxial`, `pure_shear` and `simple_shear`; those named in `kept_back` are predicted.
+    Tests are `uniaxial`, `equibiaxial`, `pure_shear`, `simple_shear` and `biaxial`, with one curve or a list of several;
+    those named in `kept_back` are predicted. A biaxial test has columns of two stretches and of both stresses or of one.
     """
     missing = [test for test in kept_back if test not in tests]
     if missing:
         raise InputError((f"kept_back names {', '.join(missing)}; it names tests that are given: {', '.join(tests)}",))
     request = given(
         curves=[
-            {"test": test, "csv": _csv(curve), "is_kept_back": test in kept_back} for test, curve in tests.items()
+            {"test": test, "csv": _csv(curve), "is_kept_back": test in kept_back}
+            for test, one_or_several in tests.items()
+            for curve in (one_or_several if isinstance(one_or_several, (list, tuple)) else [one_or_several])
         ],
         has_neo_hookean_term=has_neo_hookean_term,
         is_exact=is_exact,
         fit=_fit(law, max_terms, bulk_kpa, min_alpha_gap, has_all_branches),
-        columns=_columns(drive_column, stress_column, stress_unit, length_mm, area_mm2),
+        columns=_columns(drive_column, stress_column, stress_unit, length_mm, area_mm2, turned),
+        second_axis=given(
+            drive_column=_column(second_drive_column),
+            stress_column=_column(second_stress_column),
+            length_mm=second_length_mm,
+            area_mm2=second_area_mm2,
+        ),
     )
     done = _run("curves", request, folder, threads, on_progress)
     return CurveFit.of(done.result, done.folder)
@@ -592,19 +609,25 @@ def _fit(
 
 
 def _columns(
-    drive_column: Optional[str],
-    stress_column: Optional[str],
+    drive_column: Optional[Column],
+    stress_column: Optional[Column],
     stress_unit: Optional[str],
     length_mm: Optional[float],
     area_mm2: Optional[float],
+    turned: Optional[str],
 ) -> Dict[str, Any]:
     return given(
-        drive_column=drive_column,
-        stress_column=stress_column,
+        drive_column=_column(drive_column),
+        stress_column=_column(stress_column),
         stress_unit=stress_unit,
         length_mm=length_mm,
         area_mm2=area_mm2,
+        turned=turned,
     )
+
+
+def _column(column: Optional[Column]) -> Optional[str]:
+    return None if column is None else str(column)
 
 
 def _csv(curve: Curve) -> str:
@@ -621,12 +644,14 @@ def _csv(curve: Curve) -> str:
 
 def _text(file: PathLike) -> str:
     try:
-        return Path(file).read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        # Test machines in Europe write their units (°, µ) in this code.
-        return Path(file).read_text(encoding="cp1252")
+        content = Path(file).read_bytes()
     except OSError as error:
         raise InputError((f"cannot read {os.fspath(file)}: {error.strerror}",)) from None
+    try:
+        return content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+    except UnicodeDecodeError:
+        # Test machines in Europe write their units (°, µ) in this code.
+        return content.decode("latin-1")
 
 
 def export_material(

@@ -147,10 +147,11 @@ fn fit_table(fit: &CurveFit) -> String {
         Some(_) => "  kappa is held\n",
         None => "  kappa     not identifiable (the incompressible limit is fitted)\n",
     };
-    text += "  curve                points        R²    rms error kPa   relative\n";
+    let width = fit.curves.iter().map(|m| m.name.chars().count()).fold(20, usize::max);
+    text += &format!("  {:<width$} points        R²    rms error kPa   relative\n", "curve");
     for m in &fit.curves {
         text += &format!(
-            "  {:<20} {:>6} {:>9} {:>16} {:>9} %\n",
+            "  {:<width$} {:>6} {:>9} {:>16} {:>9} %\n",
             m.name,
             m.num_points,
             num(m.r_squared, 6),
