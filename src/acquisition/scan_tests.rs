@@ -221,8 +221,8 @@ fn scans_are_reconstructed_to_their_noise() {
     }
 }
 
-/// What a planned scan takes encoding to cost is what the synthetic scanner and the unwrapping make of it: as many voxels
-/// are lost and the others have as much noise, with an encoding that loses few and one that loses the edges.
+/// What a planned scan takes encoding to cost is what the synthetic scanner and the unwrapping make of it: as many
+/// voxels are lost and the others have as much noise, with an encoding that loses few and one that loses the edges.
 #[test]
 fn encodings_cost_what_is_planned() {
     let specimen = two_hole();

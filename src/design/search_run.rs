@@ -84,8 +84,8 @@ impl SearchRun<'_> {
     }
 
     /// The objective of `design` in `scan` over that of `base` in the study's if the grid lay anywhere, in place of on
-    /// the middle of each: `None` where the study takes it to do so, where its objective does not look at voxels or asks for a
-    /// diagnosis, or where it was cancelled.
+    /// the middle of each: `None` where the study takes it to do so, where its objective does not look at voxels or
+    /// asks for a diagnosis, or where it was cancelled.
     pub fn gain_anywhere(&self, base: &Specimen, design: &Specimen, scan: &ScanSettings) -> Option<f64> {
         let looks_at_voxels = !matches!(self.study.objective.kind, ObjectiveKind::TellApart | ObjectiveKind::Detect);
         if self.study.scan.grid != GridPlace::Centred || !looks_at_voxels {

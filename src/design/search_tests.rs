@@ -234,8 +234,8 @@ fn an_earlier_scan_is_searched() {
     assert!(result.base.evaluation.scan_share.is_empty());
 }
 
-/// Voxels and encoding that are better for the best design are found, rounded, in the ranges, and the same at any number
-/// of threads; all designs are then confirmed in that scan, and the base is not.
+/// Voxels and encoding that are better for the best design are found, rounded, in the ranges, and the same at any
+/// number of threads; all designs are then confirmed in that scan, and the base is not.
 #[test]
 fn a_scan_is_chosen() {
     let mut study = short_study();

@@ -35,9 +35,9 @@ impl Encoding {
         Some(Encoding { voxel_mm: scan.voxel_mm, mm_per_radian, phase_sd })
     }
 
-    /// The part of its signal that each voxel of a mask keeps by direction, from the voxels' mean displacements (mm) and
-    /// deformation gradients: its noise is as many times larger as this is smaller than 1. Zeros where one of its three
-    /// phases cannot be unwrapped or drowns in noise, so that the voxel has no displacement.
+    /// The part of its signal that each voxel of a mask keeps by direction, from the voxels' mean displacements (mm)
+    /// and deformation gradients: its noise is as many times larger as this is smaller than 1. Zeros where one of its
+    /// three phases cannot be unwrapped or drowns in noise, so that the voxel has no displacement.
     pub(crate) fn signal_left(
         &self,
         mask: &VoxelMask,
@@ -207,7 +207,7 @@ mod tests {
         assert_eq!(unwrapped(&neighbours[..3], &[0.0, 2.8, 0.9, 1.9], &[0.2; 4]), [true, false, true, false]);
     }
 
-    /// Neighbours of a mask share a face: in a block of nx × ny × nz there are 3 nx ny nz − nx ny − ny nz − nz nx pairs.
+    /// Neighbours share a face: in a block of nx × ny × nz there are 3 nx ny nz − nx ny − ny nz − nz nx pairs.
     #[test]
     fn neighbours_share_faces() {
         let specimen = super::super::continuum::tests::block("neighbours");

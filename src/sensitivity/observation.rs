@@ -370,8 +370,8 @@ mod tests {
         let integrated = &alone.integrated_sensitivity[0];
         assert!((integrated.volume_integral / (432.0 * s_mu) - 1.0).abs() < 1e-10);
         assert!((integrated.sum / (2304.0 * s_mu) - 1.0).abs() < 1e-10);
-        // Encoded, the phase of x changes by 0.6 × 0.25 / 0.1 rad over a voxel: its noise is larger by one over the sinc
-        // of half of that, and nothing else changes.
+        // Encoded, the phase of x changes by 0.6 × 0.25 / 0.1 rad over a voxel: its noise is larger by one over the
+        // sinc of half of that, and nothing else changes.
         let encoded = ScanSettings { mm_per_radian: Some([0.1; 3]), ..scan };
         let left = 0.75f64.sin() / 0.75;
         let noisier = ScanSettings { noise_sd_mm: [0.05 / left, 0.05, 0.05], ..scan };

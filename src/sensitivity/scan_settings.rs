@@ -97,9 +97,9 @@ pub struct ScanSettings {
     #[serde(default, skip_serializing_if = "GridPlace::is_default")]
     pub grid: GridPlace,
     /// Displacement per phase of each direction, mm/rad, where the scan is one of phases: `noise_sd_mm` is then that of
-    /// a voxel that is displaced evenly. Where the displacement changes within a voxel there is less signal and so much
-    /// more noise, and a voxel whose phase cannot be told from its neighbours' does not count. Left out, all voxels have
-    /// `noise_sd_mm`.
+    /// a voxel that is displaced evenly. Where the displacement changes within a voxel there is less signal and so
+    /// much more noise, and a voxel whose phase cannot be told from its neighbours' does not count. Left out, all
+    /// voxels have `noise_sd_mm`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schema(value_type = PositiveTriple, nullable = false))]
     pub mm_per_radian: Option<[f64; 3]>,
