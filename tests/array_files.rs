@@ -207,7 +207,8 @@ fn recordings_and_calibrations_are_the_same_in_all_files() {
     let settings = ["--drive", "2.5,5", "--mesh", "2.5", "--voxel", "1.5,0.4,1.5", "--mm-per-radian", "0.1"];
     lambdak(&[&["scan", specimen, "--json", "--out", &scan][..], &settings].concat());
     let result = lambdak(&["export", "recording", &scan, "--json", "--out", &exported]);
-    assert_eq!(result["files"], serde_json::json!(["recording.mat", "recording.h5"]));
+    let files = ["recording.mat", "recording.h5", "recording-1.csv", "recording-2.csv"];
+    assert_eq!(result["files"], serde_json::json!(files));
     let recording = Recording::read(Path::new(&scan), &ReadLimits::default()).unwrap();
     let file = File::open(place("exported/recording.h5")).unwrap();
     compare(&file, &variables(&place("exported/recording.mat")));
