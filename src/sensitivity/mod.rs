@@ -29,6 +29,7 @@ pub use covariance::{Covariance, Criterion, IDENTIFIABILITY_LIMIT, PromisedSd};
 pub use detectable_size::{DetectableSize, DetectionLimit};
 pub use discretisation::bound_discretisation;
 pub use drives::DriveSelection;
+#[cfg(feature = "calibration")]
 pub(crate) use encoding::{Encoding, MAX_PHASE_SD, MIN_MARGIN};
 pub use error::EvaluationError;
 pub use evaluation::{EvaluationMaps, SampleMaps, evaluate, evaluate_fixture, unknowns_of};
