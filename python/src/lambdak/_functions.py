@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -575,7 +575,7 @@ def curves(
         curves=[
             {"test": test, "csv": _csv(curve), "is_kept_back": test in kept_back}
             for test, one_or_several in tests.items()
-            for curve in (one_or_several if isinstance(one_or_several, (list, tuple)) else [one_or_several])
+            for curve in _several(one_or_several)
         ],
         has_neo_hookean_term=has_neo_hookean_term,
         is_exact=is_exact,
@@ -628,6 +628,11 @@ def _columns(
 
 def _column(column: Optional[Column]) -> Optional[str]:
     return None if column is None else str(column)
+
+
+def _several(curves: Union[Curve, Sequence[Curve]]) -> List[Curve]:
+    """The curves of a test, one or several. A text or a table is one, though it is a sequence, too."""
+    return list(curves) if isinstance(curves, (list, tuple)) else [cast(Curve, curves)]
 
 
 def _csv(curve: Curve) -> str:
