@@ -124,6 +124,10 @@ fn check(name: &str, text: &str) {
             }
         }
         println!(
+            "| {name} | {drive} | {ours:.4} ± {own:.4} | {value:.4} ± {error:.4} | {:+.2} % |",
+            100.0 * (ours / value - 1.0)
+        );
+        println!(
             "{name} {drive} mm: force {ours:.5} (finer {finer:.5}) N, reference {value:.5} ± {error:.5}: {:+.2} ({:+.2}) \
              errors, {:+.3} ({:+.3}) %; worst displacement {:.1} errors, {:.1e} mm at {}",
             (ours - value) / error,

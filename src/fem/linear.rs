@@ -120,6 +120,22 @@ impl LinearSystem {
         Arc::make_mut(&mut self.blocks).as_mut_slice()
     }
 
+    /// Adds `factor` times the values of a system of the same mesh. A factor is that of the values before.
+    pub(super) fn add(&mut self, factor: f64, other: &LinearSystem) {
+        for (own, of_other) in Arc::make_mut(&mut self.blocks).iter_mut().zip(&*other.blocks) {
+            for (x, y) in own.iter_mut().zip(of_other) {
+                *x += factor * y;
+            }
+        }
+    }
+
+    /// K x.
+    pub(super) fn times(&self, x: &[f64]) -> Vec<f64> {
+        let mut y = vec![0.0; x.len()];
+        multiply(&self.topology, &self.blocks, x, &mut y, &Crew::alone());
+        y
+    }
+
     /// Unknowns, those pinned by mirrors included.
     pub(super) fn num_unknowns(&self) -> usize {
         self.topology.num_unknowns()

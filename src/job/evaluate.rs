@@ -2,13 +2,14 @@
 
 use super::array_files::{add_arrays, array_formats};
 use super::detectable::{check_detectable, detectable_sizes, detection_seconds};
+use super::path_end::no_equilibrium;
 use super::subject::{add_drawings, check_meshes, driven, model_of, name_of_sample};
 use super::{Context, JobError, Outcome, RecordingOutline, Request, ResultSchema, Run, cost, defaults, summary};
 use crate::export::{FieldFormat, FieldSeries, evaluation_arrays, vtkhdf_file};
 use crate::fem::Equilibrium;
 use crate::field::FieldError;
 use crate::material::Material;
-use crate::mesh::MeshSize;
+use crate::mesh::{MeshOptions, MeshSize};
 use crate::report::{
     bar_pictures, detectable_picture, histogram_picture, map_pictures, solution_fields, surface_json, vtu_of,
 };
@@ -225,18 +226,18 @@ impl Run for CheckedEvaluation {
         let EvaluationRequest { specimen, material, scan, protocol, .. } = &self.request;
         context.step("solve", 0, 2);
         let options = self.options();
-        let models = specimen
-            .samples()
-            .iter()
-            .map(|sample| model_of(sample, &options.mesh.carried(specimen, sample), context))
-            .collect::<Result<Vec<_>, _>>()?;
+        let samples: Vec<(Specimen, MeshOptions)> =
+            specimen.samples().into_iter().map(|s| (s.clone(), options.mesh.carried(specimen, &s))).collect();
+        let models =
+            samples.iter().map(|(sample, mesh)| model_of(sample, mesh, context)).collect::<Result<Vec<_>, _>>()?;
         let cancelled = || context.is_cancelled();
         let evaluated = Fixture::of_models(specimen, models, scan, &options).and_then(|mut fixture| {
             let found = evaluate_fixture(&mut fixture, material, &self.drives, &[], &options, &cancelled)?;
             Ok((fixture, found))
         });
         let (fixture, (mut evaluation, maps)) = evaluated.map_err(|e| match e {
-            EvaluationError::Solve(_) | EvaluationError::MedianStretchNotReached { .. } => context.failed(&e),
+            EvaluationError::Solve(e) => no_equilibrium(&e, &samples, material, context),
+            EvaluationError::MedianStretchNotReached { .. } => context.failed(&e),
             other => FieldError::new("", "an evaluation that cannot be made", "one that can")
                 .remedy(other.to_string())
                 .into(),

@@ -38,6 +38,7 @@ mod next;
 mod outcome;
 mod paper_tables;
 mod part;
+mod path_end;
 mod proof;
 mod quick_response;
 mod reference;

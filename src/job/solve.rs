@@ -1,6 +1,7 @@
 //! Solve: forces and fields of a specimen at its drives.
 
 use super::array_files::{add_arrays, array_formats};
+use super::path_end::no_equilibrium;
 use super::subject::{check_meshes, driven, model_of, name_of_sample};
 use super::{Context, JobError, Outcome, RecordingOutline, Request, ResultSchema, Run, cost, defaults, summary};
 use crate::export::{FieldFormat, FieldSeries, solution_arrays, vtkhdf_file};
@@ -211,7 +212,7 @@ impl CheckedSolve {
             context.step(&format!("{of}solving drive {drive} mm"), index, num_drives);
             let found = model
                 .solve(material, drive, last.as_ref(), &SolveOptions::default(), &|| context.is_cancelled())
-                .map_err(|e| context.failed(&e))?;
+                .map_err(|e| no_equilibrium(&e, &[(sample.clone(), self.mesh_options(sample))], material, context))?;
             let fields = model.quadrature_fields(material, &found);
             result.push(&found, extremes(&fields), model.contact(sample, &found), model.statistics());
             if self.request.fields == FieldDrives::Every || index + 1 == num_drives {

@@ -27,7 +27,7 @@ pub use point::{energy_density, first_piola_kirchhoff_stress, material_tangent, 
 pub use shear_modulus::initial_shear_modulus_kpa;
 pub use shear_term::{ShearTerm, power_difference};
 pub use stability::{
-    least_relative_stiffness, smallest_principal_stiffness_kpa, smallest_relative_stiffness,
+    least_relative_stiffness, relative_stiffness, smallest_principal_stiffness_kpa, smallest_relative_stiffness,
     smallest_relative_stiffness_of_law,
 };
 

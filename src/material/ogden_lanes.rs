@@ -60,6 +60,11 @@ struct LawState {
 const LAW_EXPONENT: f64 = 2.0;
 
 impl SpectralState {
+    /// The isochoric principal logarithmic stretches x_a − x̄.
+    pub(super) fn centred_logs(&self) -> [Lanes; 3] {
+        self.centred_log
+    }
+
     /// Decomposes F (det F > 0).
     #[inline(always)]
     pub fn new(material: &Material, deformation_gradient: &Tensor) -> SpectralState {

@@ -22,7 +22,7 @@
 
 use super::invariant_law::InvariantLaw;
 use super::point::first_invariant_less_3;
-use super::{Material, OgdenTerm, ShearTerm, initial_shear_modulus_kpa, power_difference};
+use super::{Lanes, Material, OgdenTerm, ShearTerm, SpectralState, initial_shear_modulus_kpa, power_difference};
 
 /// Up to this many terms every product μα must be positive; with more the visited states decide.
 const MAX_TERMS_OF_POSITIVE_PRODUCTS: usize = 2;
@@ -90,6 +90,17 @@ pub fn smallest_relative_stiffness_of_law(law: &InvariantLaw, log_stretches: [f6
     let modulus_kpa = 4.0 * law.slopes_at(first_invariant_less_3(log_stretches))[0];
     let turning = turning_stiffness_kpa(&[ShearTerm { modulus_kpa, alpha: 2.0 }], log_stretches);
     keeping.min(turning) / law.initial_shear_modulus_kpa()
+}
+
+/// The smallest stiffness in Hill's sense over the initial shear modulus, for given F: 2 at rest, negative where the
+/// material is unstable. Increments that turn the principal axes count, too.
+pub fn relative_stiffness(material: &Material, deformation_gradient: &[[f64; 3]; 3]) -> f64 {
+    let lanes = deformation_gradient.map(|row| row.map(Lanes::splat));
+    let log_stretches = SpectralState::new(material, &lanes).centred_logs().map(|x| x.0[0]);
+    match &material.law {
+        None => smallest_relative_stiffness(&material.shear_terms(), log_stretches),
+        Some(law) => smallest_relative_stiffness_of_law(law, log_stretches),
+    }
 }
 
 /// The smallest stiffness over states with these isochoric principal stretches and on the way to them, as a fraction of

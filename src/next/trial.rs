@@ -127,7 +127,7 @@ impl Bench {
             by_parameter,
             by_unknown,
             weights: self.scanner.weights().to_vec(),
-            signal: self.scanner.signal_left(&state.displacement, &gradients)?,
+            signal: self.scanner.signal_left(&operator.average(&state.displacement)?, &gradients),
             beyond,
             // Equal blocks scanned together are as many scans of one.
             noise_mm2: scan.noise_sd_mm.map(|sd| sd * sd / f64::from(study.protocol.blocks_scanned)),

@@ -172,20 +172,10 @@ impl Scanner {
         &self.weights
     }
 
-    /// The part of its signal that each voxel keeps by direction at some nodal displacements, mm; zeros where a voxel
-    /// tells nothing, `None` where the scan does not say how it encodes. The voxels' mean deformation gradients are
-    /// those of the same displacements.
-    ///
-    /// # Errors
-    /// [`VoxelError::LengthMismatch`].
-    pub fn signal_left(
-        &self,
-        displacement: &[[f64; 3]],
-        deformation_gradients: &[Tensor],
-    ) -> Result<Option<Vec<[f64; 3]>>, VoxelError> {
-        let Some(encoding) = self.encoding else { return Ok(None) };
-        let averages = self.operator.average(displacement)?;
-        Ok(Some(encoding.signal_left(&self.mask, &averages, deformation_gradients)))
+    /// The part of its signal that each voxel keeps by direction where its mean displacement (mm) and deformation
+    /// gradient are these; zeros where a voxel tells nothing, `None` where the scan does not say how it encodes.
+    pub fn signal_left(&self, displacement: &[[f64; 3]], deformation_gradients: &[Tensor]) -> Option<Vec<[f64; 3]>> {
+        self.encoding.map(|encoding| encoding.signal_left(&self.mask, displacement, deformation_gradients))
     }
 
     /// λ of every voxel for nodal displacements in mm.
@@ -205,7 +195,8 @@ impl Scanner {
     pub fn observe(&self, material: &Material, state: &DrivenState) -> Result<Observation, EvaluationError> {
         let gradients = self.operator.deformation_gradients(state.displacement)?;
         let states: Vec<Decomposition> = gradients.iter().map(decompose).collect();
-        let signal = self.signal_left(state.displacement, &gradients)?;
+        let displacement = self.operator.average(state.displacement)?;
+        let signal = self.signal_left(&displacement, &gradients);
         // A voxel whose noise is larger by some factor tells as much as one that changes less by it.
         let changes = |field: &[[f64; 3]]| -> Result<Vec<[f64; 3]>, VoxelError> {
             let mut changes = self.operator.average(field)?;
@@ -214,7 +205,6 @@ impl Scanner {
             }
             Ok(changes)
         };
-        let displacement = self.operator.average(state.displacement)?;
         let fields = state.sensitivities.iter().map(|s| changes(&s.displacement)).collect::<Result<Vec<_>, _>>()?;
         // The force is that of all samples together: it is not a voxel's.
         let no_forces = vec![0.0; fields.len()];

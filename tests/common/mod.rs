@@ -8,6 +8,8 @@ use lambdak::mesh::{ElementKind, Mesh, MeshOptions, Mirror, mesh_specimen};
 use lambdak::specimen::{Block, Hole, HoleAxis, HoleKind, HoleShape, Outline, Specimen, Taper, TestKind};
 use std::collections::HashMap;
 
+pub mod fine_quadrature;
+
 pub type Vector = [f64; 3];
 pub type Matrix = [[f64; 3]; 3];
 
@@ -100,8 +102,32 @@ pub fn solve(model: &mut ForwardModel, material: &Material, drive_mm: f64) -> Re
 }
 
 /// The unit cube in n × n × n cells (hexahedra, or twice as many prisms), its nodes moved by `map`. Every boundary node
-/// is in `fixed_nodes`. The middle node of a prism's triangle is where the quadratic map of the other six takes it.
+/// is in `fixed_nodes`.
 pub fn cube(kind: ElementKind, n: usize, map: impl Fn(Vector) -> Vector) -> Mesh {
+    let (mut mesh, before) = bricks(kind, [n; 3], false, map);
+    mesh.fixed_nodes = nodes_where(&before, |p| p.iter().any(|&v| is_zero(v) || is_zero(v - 1.0)));
+    mesh
+}
+
+/// Whether a coordinate of the unit cube is zero but for rounding.
+pub fn is_zero(v: f64) -> bool {
+    v.abs() < 1e-9
+}
+
+/// The nodes whose place in the unit cube satisfies `is_wanted`.
+pub fn nodes_where(places: &[Vector], is_wanted: impl Fn(&Vector) -> bool) -> Vec<u32> {
+    (0..places.len() as u32).filter(|&n| is_wanted(&places[n as usize])).collect()
+}
+
+/// The unit cube in `counts` cells along x, y and z (hexahedra, or twice as many prisms), its nodes moved by `map`; in a
+/// ring the faces y = 0 and y = 1 are one. The places of the nodes in the cube come with the mesh, whose sets of nodes
+/// are empty. The middle node of a prism's triangle is where the quadratic map of the other six takes it.
+pub fn bricks(
+    kind: ElementKind,
+    counts: [usize; 3],
+    is_ring: bool,
+    map: impl Fn(Vector) -> Vector,
+) -> (Mesh, Vec<Vector>) {
     let local = kind.node_coordinates();
     let mut mesh = Mesh {
         element_kind: kind,
@@ -114,33 +140,33 @@ pub fn cube(kind: ElementKind, n: usize, map: impl Fn(Vector) -> Vector) -> Mesh
         mirror_y_nodes: Vec::new(),
         mirror_z_nodes: Vec::new(),
     };
+    let mut places: Vec<Vector> = Vec::new();
     let mut known: HashMap<[i64; 3], u32> = HashMap::new();
-    let h = 1.0 / n as f64;
+    let h = counts.map(|n| 1.0 / n as f64);
     let halves = if kind == ElementKind::Prism21 { 2 } else { 1 };
-    for cell in 0..n * n * n * halves {
+    for cell in 0..counts.iter().product::<usize>() * halves {
         let (half, c) = (cell % halves, cell / halves);
-        let corner = [c % n, c / n % n, c / (n * n)].map(|i| i as f64 * h);
-        let mut element = Vec::new();
+        let of_cell = [c % counts[0], c / counts[0] % counts[1], c / (counts[0] * counts[1])];
         for x in &local {
             let place = match (kind, half) {
                 (ElementKind::Hex27, _) => x.map(|v| 0.5 * (v + 1.0)),
                 (ElementKind::Prism21, 0) => [x[0], x[1], 0.5 * (x[2] + 1.0)],
                 (ElementKind::Prism21, _) => [1.0 - x[0], 1.0 - x[1], 0.5 * (x[2] + 1.0)],
             };
-            let p = [0, 1, 2].map(|i| corner[i] + h * place[i]);
+            let mut p = [0, 1, 2].map(|i| h[i] * (of_cell[i] as f64 + place[i]));
+            if is_ring && is_zero(p[1] - 1.0) {
+                p[1] = 0.0;
+            }
             // Nodes sit at multiples of h/6, so rounding to 1e-6 tells them apart.
             let key = p.map(|v| (v * 1e6).round() as i64);
             let next = mesh.nodes.len() as u32;
             let node = *known.entry(key).or_insert(next);
             if node == next {
                 mesh.nodes.push(map(p));
-                if p.iter().any(|&v| !(1e-9..=1.0 - 1e-9).contains(&v)) {
-                    mesh.fixed_nodes.push(node);
-                }
+                places.push(p);
             }
-            element.push(node);
+            mesh.connectivity.push(node);
         }
-        mesh.connectivity.extend(element);
     }
     if kind == ElementKind::Prism21 {
         for e in 0..mesh.num_elements() {
@@ -153,7 +179,7 @@ pub fn cube(kind: ElementKind, n: usize, map: impl Fn(Vector) -> Vector) -> Mesh
             }
         }
     }
-    mesh
+    (mesh, places)
 }
 
 /// A specimen to hand to [`ForwardModel::new`] with a mesh of [`cube`]; only its extents are read.
