@@ -2,6 +2,7 @@
 
 mod error;
 mod file;
+mod invariant_energy;
 mod invariant_law;
 mod lanes;
 mod limits;
@@ -13,9 +14,10 @@ mod shear_term;
 mod stability;
 
 pub use error::MaterialError;
+pub use invariant_energy::{ArrudaBoyce, FirstInvariantEnergy, Gent, LawParameter, MooneyRivlin, NeoHookean, Yeoh};
 #[cfg(test)]
 pub(crate) use invariant_law::laws;
-pub use invariant_law::{ArrudaBoyce, FirstInvariantEnergy, Gent, InvariantLaw, LawKind, LawParameter, Yeoh};
+pub use invariant_law::{InvariantLaw, LawKind};
 pub use lanes::{LANES, Lanes};
 pub use limits::{
     ARRUDA_BOYCE_SCHEMA, GENT_SCHEMA, MAX_ALPHA, MAX_CHAIN_LIMIT, MAX_LOCKING_STRETCH, MAX_MODULUS_KPA, MIN_ALPHA,

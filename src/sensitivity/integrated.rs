@@ -72,8 +72,12 @@ pub fn parameter_sensitivity(
         Parameter::Alpha(i) => {
             alpha_sensitivity(stretch_amplitude, k, material.terms[i].mu_kpa, material.terms[i].alpha)
         }
-        Parameter::Law(own) => law_sensitivity(stretch_amplitude, k, &|x| {
-            material.law.map_or(0.0, |law| law.slope_derivative(own, Lanes::splat(x)).0[0])
+        Parameter::Law(own) => material.law.map_or_else(PointwiseSensitivity::default, |law| {
+            let first = law_sensitivity(stretch_amplitude, k, &|x| law.slope_derivative(own, Lanes::splat(x)).0[0]);
+            let second = law.second_term().map_or(0.0, |term| {
+                law.second_modulus_derivative(own) * mu_sensitivity(stretch_amplitude, k, term.alpha).value
+            });
+            PointwiseSensitivity { value: first.value + second, ..first }
         }),
     }
 }
