@@ -51,7 +51,7 @@ pub(in crate::job) fn uniaxial(
 fn sequence_table(sequence: &CurveFitSequence) -> String {
     let s = &sequence.selection;
     let mut text = String::from(
-        "  model               parameters  misfit      decrement        F      p(F)       BIC   shear modulus kPa (95 %)\n",
+        "  model               parameters  misfit        decrement        F      p(F)       BIC   shear modulus kPa (95 %)\n",
     );
     for (model, fit) in s.models.iter().zip(&sequence.fits) {
         let g = fit.initial_shear_modulus_kpa;
@@ -60,11 +60,11 @@ fn sequence_table(sequence: &CurveFitSequence) -> String {
         };
         let probability = model.f_probability.map_or_else(|| format!("{:>9}", "-"), |p| format!("{:>9}", num(p, 2)));
         text += &format!(
-            "  {:<20}{:>9}  {:<10}{} {} {} {:>9}   {} ({} to {})\n",
+            "  {:<20}{:>9}  {:<11}{} {} {} {:>9}   {} ({} to {})\n",
             model.name,
             model.num_parameters,
             num(model.sum_of_squares, 5),
-            optional(model.decrement, 10, 3),
+            optional(model.decrement, 11, 3),
             optional(model.f_value, 8, 1),
             probability,
             num(model.bic, 7),
