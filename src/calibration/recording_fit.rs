@@ -67,8 +67,8 @@ impl RecordingFit {
         Some(self.covariance.covariance(index_of(one)?, index_of(other)?)? * self.misfit_factor)
     }
 
-    /// Standard deviation of what changes with the parameters ([`Material::parameters`]) by `gradient`, as [`Self::sd`];
-    /// none where it depends on one that is undetermined.
+    /// Standard deviation of what changes with the parameters (in the order of [`Material::parameters`]) by `gradient`,
+    /// as [`Self::sd`]; none where it depends on one that is undetermined.
     pub fn sd_along(&self, gradient: &[f64]) -> Option<f64> {
         Some(self.covariance.sd_along(gradient)? * self.misfit_factor.sqrt())
     }

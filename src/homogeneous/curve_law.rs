@@ -8,8 +8,8 @@ use super::compressible::respond;
 use super::deformation::{Deformation, incompressible_derivative, incompressible_stress};
 use super::fit_options::CurveFitOptions;
 use crate::material::{
-    InvariantLaw, Lanes, LawParameter, Material, OgdenTerm, Parameter, ShearTerm, first_invariant_less_3,
-    initial_shear_modulus_kpa, smallest_relative_stiffness, smallest_relative_stiffness_of_law,
+    InvariantLaw, Lanes, LawParameter, Material, OgdenTerm, Parameter, SECOND_EXPONENT, ShearTerm,
+    first_invariant_less_3, initial_shear_modulus_kpa, smallest_relative_stiffness, smallest_relative_stiffness_of_law,
 };
 use crate::optimise::LinearLimit;
 use nalgebra::DMatrix;
@@ -265,8 +265,8 @@ impl CurveLaw for InvariantLaw {
 
     fn incompressible_stress(&self, state: &Deformation) -> f64 {
         let first = 4.0 * self.slopes_at(first_invariant_less_3(state.log_stretches()))[0];
-        let of_second = |t: OgdenTerm| t.mu_kpa * t.alpha * stress_of_unit_term(t.alpha, state);
-        first * stress_of_unit_term(2.0, state) + self.second_term().map_or(0.0, of_second)
+        let of_second = |mu_kpa: f64| SECOND_EXPONENT * mu_kpa * stress_of_unit_term(SECOND_EXPONENT, state);
+        first * stress_of_unit_term(2.0, state) + self.second_mu_kpa().map_or(0.0, of_second)
     }
 
     fn initial_shear_modulus_kpa(&self) -> f64 {
@@ -341,10 +341,10 @@ impl CurveLaw for InvariantLaw {
         } else {
             let x = first_invariant_less_3(state.log_stretches());
             let unit = stress_of_unit_term(2.0, state);
-            let second_unit = self.second_term().map_or(0.0, |t| t.alpha * stress_of_unit_term(t.alpha, state));
+            let second_unit = SECOND_EXPONENT * stress_of_unit_term(SECOND_EXPONENT, state);
             for (index, p) in parameters.iter().enumerate() {
                 let first = 4.0 * self.slope_derivative(*p, Lanes::splat(x)).0[0] * unit;
-                row[index] = weight * (first + self.second_modulus_derivative(*p) * second_unit) * rate(*p);
+                row[index] = weight * (first + self.second_mu_derivative(*p) * second_unit) * rate(*p);
             }
             self.incompressible_stress(state)
         };

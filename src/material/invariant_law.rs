@@ -1,6 +1,5 @@
 //! The laws in the first invariant by their names, and the one that a material has.
 
-use super::OgdenTerm;
 use super::invariant_energy::{ArrudaBoyce, FirstInvariantEnergy, Gent, LawParameter, MooneyRivlin, NeoHookean, Yeoh};
 use super::lanes::Lanes;
 
@@ -155,14 +154,14 @@ impl InvariantLaw {
         self.energy().energy_density(x)
     }
 
-    /// The Ogden term that c (Ī₂ − 3) is, of exponent −2.
-    pub fn second_term(&self) -> Option<OgdenTerm> {
-        self.energy().second_kpa().map(|c| OgdenTerm { mu_kpa: -2.0 * c, alpha: SECOND_EXPONENT })
+    /// μ (kPa) of the Ogden term that c (Ī₂ − 3) is, with [`SECOND_EXPONENT`]; `None` where the law never holds it.
+    pub fn second_mu_kpa(&self) -> Option<f64> {
+        self.energy().second_kpa().map(|c| SECOND_EXPONENT * c)
     }
 
-    /// The derivative of that term's modulus μ by a parameter.
-    pub fn second_modulus_derivative(&self, parameter: LawParameter) -> f64 {
-        self.index_of(parameter).map_or(0.0, |index| -2.0 * self.energy().second_derivative(index))
+    /// The derivative of that by a parameter.
+    pub fn second_mu_derivative(&self, parameter: LawParameter) -> f64 {
+        self.index_of(parameter).map_or(0.0, |index| SECOND_EXPONENT * self.energy().second_derivative(index))
     }
 
     /// The x that no state reaches.
@@ -202,7 +201,7 @@ impl InvariantLaw {
 
     /// The initial shear modulus 2 W′(0), kPa, and ½ μα of the second term.
     pub fn initial_shear_modulus_kpa(&self) -> f64 {
-        2.0 * self.slopes_at(0.0)[0] + self.second_term().map_or(0.0, |t| 0.5 * t.mu_kpa * t.alpha)
+        2.0 * self.slopes_at(0.0)[0] + 0.5 * SECOND_EXPONENT * self.second_mu_kpa().unwrap_or(0.0)
     }
 }
 

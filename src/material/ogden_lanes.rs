@@ -123,14 +123,14 @@ impl SpectralState {
             for (tau, d) in state.tau.iter_mut().zip(deviator) {
                 *tau += d * slope * 2.0;
             }
-            let of_second = law.second_term().map(|term| {
+            let of_second = law.second_mu_kpa().map(|mu_kpa| {
                 let inverse = squared.map(|s| Lanes::splat(1.0) / s);
                 let mean = (inverse[0] + inverse[1] + inverse[2]) * (1.0 / 3.0);
                 let deviator = inverse.map(|s| s - mean);
                 for (tau, d) in state.tau.iter_mut().zip(deviator) {
-                    *tau += d * term.mu_kpa;
+                    *tau += d * mu_kpa;
                 }
-                SecondState { deviator, power: inverse.map(|s| s * term.mu_kpa), mean_power: mean * term.mu_kpa }
+                SecondState { deviator, power: inverse.map(|s| s * mu_kpa), mean_power: mean * mu_kpa }
             });
             state.law = Some(LawState {
                 x,
@@ -203,7 +203,7 @@ impl SpectralState {
                     let rate = law.slope_derivative(parameter, state.x) * 2.0;
                     d = state.deviator.map(|x| x * rate);
                     if let Some(second) = &state.second {
-                        let rate = law.second_modulus_derivative(parameter);
+                        let rate = law.second_mu_derivative(parameter);
                         for (d, x) in d.iter_mut().zip(second.deviator) {
                             *d += x * rate;
                         }

@@ -31,8 +31,7 @@ impl Material {
             Parameter::Mu(i) => 0.5 * self.terms[i].alpha,
             Parameter::Alpha(i) => 0.5 * self.terms[i].mu_kpa,
             Parameter::Law(p) => self.law.map_or(0.0, |law| {
-                2.0 * law.slope_derivative(p, Lanes::ZERO).0[0]
-                    + 0.5 * SECOND_EXPONENT * law.second_modulus_derivative(p)
+                2.0 * law.slope_derivative(p, Lanes::ZERO).0[0] + 0.5 * SECOND_EXPONENT * law.second_mu_derivative(p)
             }),
         };
         self.parameters().iter().map(derivative).collect()

@@ -20,7 +20,7 @@
 //! Fits to curves look at both parts ([`smallest_relative_stiffness`]), calibrations at the first alone
 //! ([`least_relative_stiffness`]). The first check is the stricter one; each keeps what it has accepted so far.
 
-use super::invariant_law::InvariantLaw;
+use super::invariant_law::{InvariantLaw, SECOND_EXPONENT};
 use super::point::first_invariant_less_3;
 use super::{Material, OgdenTerm, ShearTerm, initial_shear_modulus_kpa, power_difference};
 
@@ -90,7 +90,7 @@ pub fn smallest_relative_stiffness_of_law(law: &InvariantLaw, log_stretches: [f6
     }
     let modulus_kpa = 4.0 * law.slopes_at(first_invariant_less_3(log_stretches))[0];
     let mut terms = vec![ShearTerm { modulus_kpa, alpha: 2.0 }];
-    terms.extend(law.second_term().map(|t| ShearTerm { modulus_kpa: t.mu_kpa * t.alpha, alpha: t.alpha }));
+    terms.extend(second_term(law));
     let turning = turning_stiffness_kpa(&terms, log_stretches);
     keeping.min(turning) / law.initial_shear_modulus_kpa()
 }
@@ -113,6 +113,11 @@ pub fn least_relative_stiffness(material: &Material, visited: &[[f64; 3]]) -> f6
         .fold(1.0, f64::min)
 }
 
+/// The term that a law has of the second invariant.
+fn second_term(law: &InvariantLaw) -> Option<ShearTerm> {
+    law.second_mu_kpa().map(|mu_kpa| ShearTerm { modulus_kpa: SECOND_EXPONENT * mu_kpa, alpha: SECOND_EXPONENT })
+}
+
 /// The same as [`smallest_principal_stiffness_kpa`] of a law in the first invariant: with y = λ̄² the stress power is
 /// Σⱼ 4 W′ yⱼ (dēⱼ)² + 4 W″ (Σⱼ yⱼ dēⱼ)², and Σⱼ c/yⱼ (dēⱼ)² more of a second term with c = μα. Minus infinity beyond
 /// the states that the law allows.
@@ -128,7 +133,7 @@ fn smallest_stiffness_of_law_kpa(law: &InvariantLaw, log_stretches: [f64; 3]) ->
     let along = basis.map(|b| (0..3).map(|j| b[j] * y[j]).sum::<f64>());
     let form = |m: usize, n: usize| {
         let weighed = |weights: [f64; 3]| (0..3).map(|j| basis[m][j] * basis[n][j] * weights[j]).sum::<f64>();
-        let of_second = law.second_term().map_or(0.0, |t| t.mu_kpa * t.alpha * weighed(y.map(|y| 1.0 / y)));
+        let of_second = second_term(law).map_or(0.0, |t| t.modulus_kpa * weighed(y.map(|y| 1.0 / y)));
         4.0 * (slope * weighed(y) + second * along[m] * along[n]) + of_second
     };
     let (a, b, c) = (form(0, 0), form(0, 1), form(1, 1));

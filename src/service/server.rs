@@ -197,7 +197,7 @@ pub fn serve(options: &ServeOptions, on_ready: &dyn Fn(SocketAddr)) -> Result<()
     });
     let limits = options.limits;
     let slots_signal = signal.clone();
-    // A connection to PostgreSQL cannot be closed by a thread of the runtime: the last hold on the storage is let go here.
+    // A thread of the runtime cannot close a connection to PostgreSQL: the last hold on the storage is let go here.
     let held_store = store.clone();
     let result = runtime.block_on(async move {
         let listener = tokio::net::TcpListener::from_std(listener).map_err(fail)?;

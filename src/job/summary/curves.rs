@@ -41,6 +41,15 @@ pub(in crate::job) fn uniaxial(
         }
         text += &fit_table(family.chosen());
     }
+    if let [free, held] = families {
+        let (free, held) = (free.chosen(), held.chosen());
+        text += &format!(
+            "\nuse the fit of free terms ({}), which material.json holds; the one with a neo-Hookean term is for models that \
+             must have it: its misfit is {} times as large\n",
+            free.name(),
+            num(held.sum_of_squares / free.sum_of_squares, 3)
+        );
+    }
     if let Some(family) = families.first() {
         text += &law_table(laws, family.chosen());
     }
