@@ -46,7 +46,7 @@ pub(super) fn on_two_lines(text: &str, size: f64, width: f64) -> Vec<String> {
         return vec![text.to_string()];
     }
     let fits = |end: &usize| text_width(&text[..*end], size) <= width;
-    let Some(end) = text.match_indices(' ').map(|(at, _)| at).filter(fits).next_back() else {
+    let Some(end) = text.match_indices(' ').map(|(at, _)| at).rfind(fits) else {
         return vec![shortened(text, size, width)];
     };
     vec![text[..end].to_string(), shortened(text[end..].trim_start(), size, width)]
