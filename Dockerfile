@@ -1,6 +1,7 @@
 # The service in a slim image: docs/service.md says how it is run.
 FROM rust:1.89-slim-bookworm AS build
-# METIS and SQLite are built from C sources.
+# METIS and SQLite are built from C sources. The compiler is the distribution's, whichever that is when the image is built.
+# hadolint ignore=DL3008
 RUN apt-get update && apt-get install -y --no-install-recommends gcc libc6-dev && rm -rf /var/lib/apt/lists/*
 WORKDIR /source
 COPY Cargo.toml Cargo.lock ./
@@ -12,11 +13,13 @@ COPY geometries geometries
 RUN cargo build --release --locked --bin lambdak
 
 FROM debian:bookworm-slim
-RUN useradd --system --uid 10001 --home-dir /data --shell /usr/sbin/nologin lambdak \
+RUN groupadd --system --gid 10001 lambdak \
+    && useradd --system --uid 10001 --gid lambdak --home-dir /data --shell /usr/sbin/nologin lambdak \
     && install -d -o lambdak -g lambdak -m 0750 /data
 COPY --from=build /source/target/release/lambdak /usr/local/bin/lambdak
-COPY LICENSE-APACHE LICENSE-MIT /usr/share/doc/lambdak/
-USER lambdak
+COPY LICENSE-APACHE LICENSE-MIT docs/licences.md /usr/share/doc/lambdak/
+# A number, so that whoever starts the container sees without asking it that this is not root.
+USER 10001:10001
 WORKDIR /data
 VOLUME /data
 EXPOSE 8080

@@ -24,7 +24,14 @@ FILES = [
     ("ogden/1", "OgdenSchema", "geometries/materials/ecoflex-0020-two-term.json",
      "A material, Ψ = Σ μᵢ/αᵢ (λ̄₁^αᵢ + λ̄₂^αᵢ + λ̄₃^αᵢ − 3) + κ/2 (ln J)² ([theory](theory.md#the-material)). Every fit leaves one as "
      "`material.json`."),
-    ("yeoh/1", "YeohSchema", None, "A material with Yeoh's law in the place of Ogden's terms ([theory](theory.md#the-material))."),
+    (
+        "neo_hookean/1",
+        "NeoHookeanSchema",
+        None,
+        "A material with the neo-Hookean law in the place of Ogden's terms ([theory](theory.md#the-material)).",
+    ),
+    ("mooney_rivlin/1", "MooneyRivlinSchema", None, "A material with Mooney and Rivlin's law."),
+    ("yeoh/1", "YeohSchema", None, "A material with Yeoh's law."),
     ("gent/1", "GentSchema", None, "A material with Gent's law."),
     ("arruda_boyce/1", "ArrudaBoyceSchema", None, "A material with Arruda and Boyce's law."),
     ("study/1", "StudySchema", None,

@@ -30,7 +30,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         x_label: "diameter of the hole, mm".into(),
         y_label: "promised standard deviation, %".into(),
         is_log: false,
-        lines: vec![Line { name: String::new(), points, has_marks: true }],
+        lines: vec![Line { name: String::new(), points, has_marks: true, ..Line::default() }],
     };
     std::fs::write("diameter.svg", plot.to_svg())?;
     Ok(())

@@ -192,7 +192,7 @@ fn bad_input_ends_with_code_two_and_says_why() {
         (vec!["uniaxial", "binary.csv"], "not text"),
         (
             vec!["export", "material", "soft.json"],
-            r#"it must be "ogden/1" or "yeoh/1" or "gent/1" or "arruda_boyce/1""#,
+            r#"it must be "ogden/1" or "neo_hookean/1" or "mooney_rivlin/1" or "yeoh/1" or "gent/1" or "arruda_boyce/1""#,
         ),
         (vec!["curves", "twist=bad.csv"], "twist"),
         (vec!["curves", "unit.csv"], "TEST=FILE"),

@@ -22,6 +22,8 @@ needs_tables = unittest.skipUnless(HAS_TABLES, "pandas and xarray are not instal
 class Parts(Scratch):
     def test_laws_in_the_first_invariant(self):
         for material in (
+            lk.Material.neo_hookean(16.0, bulk_kpa=2000),
+            lk.Material.mooney_rivlin(6.0, 2.0, bulk_kpa=2000),
             lk.Material.yeoh((8.0, -0.2, 0.04), bulk_kpa=2000),
             lk.Material.gent(16.0, 30.0, bulk_kpa=2000),
             lk.Material.arruda_boyce(15.0, 2.5, bulk_kpa=2000),

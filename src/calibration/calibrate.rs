@@ -183,6 +183,10 @@ pub fn calibrate(
         on_stage("contours");
         around = contours(&mut problem, &fit, contour_options, is_cancelled)?;
     }
+    let mut stretches: Vec<f64> =
+        problem.visited_stretches(&fit)?.iter().map(|s| s.iter().copied().fold(1.0, f64::max)).collect();
+    stretches.sort_by(f64::total_cmp);
+    let largest_stretch = stretches.get(stretches.len() * 99 / 100).copied().unwrap_or(1.0);
     run.remark(observed, &fit, has_force, meshes.as_ref());
     let (work, notes) = (run.work, run.notes);
     Ok(Calibration {
@@ -193,6 +197,7 @@ pub fn calibrate(
         meshes,
         profiles,
         contours: around,
+        largest_stretch,
         has_force,
         work,
         notes,

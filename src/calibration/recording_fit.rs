@@ -67,6 +67,12 @@ impl RecordingFit {
         Some(self.covariance.covariance(index_of(one)?, index_of(other)?)? * self.misfit_factor)
     }
 
+    /// Standard deviation of what changes with the parameters (in the order of [`Material::parameters`]) by `gradient`,
+    /// as [`Self::sd`]; none where it depends on one that is undetermined.
+    pub fn sd_along(&self, gradient: &[f64]) -> Option<f64> {
+        Some(self.covariance.sd_along(gradient)? * self.misfit_factor.sqrt())
+    }
+
     /// The largest shift of a parameter that a structured error as large as the structured misfit could make.
     pub fn possible_shift(&self, parameter: Parameter) -> Option<f64> {
         let index = self.information.index_of(parameter).ok()?;
@@ -88,8 +94,7 @@ impl RecordingFit {
         let value = self.material.initial_shear_modulus_kpa();
         let gradient = self.material.initial_shear_modulus_derivatives();
         let is_known = !self.held.contains(1);
-        let sd = self.covariance.sd_along(&gradient).filter(|_| is_known);
-        (value, sd.map(|sd| sd * self.misfit_factor.sqrt()))
+        (value, self.sd_along(&gradient).filter(|_| is_known))
     }
 
     /// Equilibria of the sample that one recording is of, one per drive.

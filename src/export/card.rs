@@ -73,6 +73,9 @@ fn comments(
     let (convention, program, unit) = (converted.convention, format.program(), unit.symbol());
     let meaning = match convention.shape {
         Shape::Terms { .. } => "l1, l2, l3: principal stretches times J^(-1/3)",
+        Shape::Law { .. } if convention.energy.contains("I2") => {
+            "I1, I2: sums of the squares of the principal stretches, times J^(-2/3), and of their inverses, times J^(2/3)"
+        }
         Shape::Law { .. } => "I1: sum of the squares of the principal stretches, times J^(-2/3)",
     };
     vec![

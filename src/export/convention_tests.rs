@@ -49,6 +49,8 @@ fn numbers(text: &str, separators: &[char]) -> Vec<f64> {
 /// Constants of a law in the first invariant, and coefficients of the volumetric energy, as the manuals list them.
 fn counts(law: LawKind) -> (usize, usize) {
     match law {
+        LawKind::NeoHookean => (1, 1),
+        LawKind::MooneyRivlin => (2, 1),
         LawKind::Yeoh => (3, 3),
         LawKind::Gent | LawKind::ArrudaBoyce => (2, 1),
     }
@@ -69,7 +71,7 @@ fn read(card: &str, format: MaterialFormat, law: Option<LawKind>) -> Read {
                     (2 * order, order)
                 }
                 Some(law) => {
-                    let name = ["YEOH", "", "ARRUDA-BOYCE"][law as usize];
+                    let name = ["NEO HOOKE", "MOONEY-RIVLIN", "YEOH", "", "ARRUDA-BOYCE"][law as usize];
                     assert_eq!(keyword, format!("*HYPERELASTIC, {name}"));
                     counts(law)
                 }
@@ -90,9 +92,14 @@ fn read(card: &str, format: MaterialFormat, law: Option<LawKind>) -> Read {
             let (option, num_shape, num_volumetric) = match law {
                 None => ("OGDEN", 2 * order.clone().unwrap(), order.unwrap()),
                 Some(law) => {
-                    assert_eq!(order.ok(), (law == LawKind::Yeoh).then_some(3), "{head}");
+                    let stated = match law {
+                        LawKind::MooneyRivlin => Some(2),
+                        LawKind::Yeoh => Some(3),
+                        _ => None,
+                    };
+                    assert_eq!(order.ok(), stated, "{head}");
                     let (num_shape, num_volumetric) = counts(law);
-                    (["YEOH", "GENT", "BOYCE"][law as usize], num_shape, num_volumetric)
+                    (["NEO", "MOONEY", "YEOH", "GENT", "BOYCE"][law as usize], num_shape, num_volumetric)
                 }
             };
             assert_eq!((fields[0], fields[1], fields[5]), ("TB", "HYPER", option));
@@ -119,6 +126,8 @@ fn read(card: &str, format: MaterialFormat, law: Option<LawKind>) -> Read {
             };
             let (kind, names): (&str, Vec<String>) = match law {
                 None => ("Ogden", (1..=6).flat_map(|i| [format!("c{i}"), format!("m{i}")]).collect()),
+                Some(LawKind::NeoHookean) => ("Mooney-Rivlin", vec!["c1".into()]),
+                Some(LawKind::MooneyRivlin) => ("Mooney-Rivlin", vec!["c1".into(), "c2".into()]),
                 Some(LawKind::Yeoh) => ("Yeoh", (1..=6).map(|i| format!("c{i}")).collect()),
                 Some(LawKind::Gent) => ("Gent", vec!["G".into(), "Jm".into()]),
                 Some(LawKind::ArrudaBoyce) => ("Arruda-Boyce", vec!["mu".into(), "N".into()]),
@@ -149,13 +158,18 @@ fn energy(read: &Read, format: MaterialFormat, law: Option<LawKind>, stretches: 
         (None, Abaqus | Calculix) => sum(&|mu, alpha| 2.0 * mu / alpha.powi(2)),
         (None, Ansys | Comsol) => sum(&|mu, alpha| mu / alpha),
         (None, Febio) => sum(&|c, m| c / m.powi(2)),
+        (Some(LawKind::NeoHookean), Ansys | Comsol) => 0.5 * c[0] * x,
+        (Some(LawKind::NeoHookean), Abaqus | Calculix | Febio) => c[0] * x,
+        (Some(LawKind::MooneyRivlin), _) => c[0] * x + c[1] * powers(-2.0),
         (Some(LawKind::Yeoh), _) => c[0] * x + c[1] * x.powi(2) + c[2] * x.powi(3),
         (Some(LawKind::Gent), _) => -0.5 * c[0] * c[1] * (1.0 - x / c[1]).ln(),
         (Some(LawKind::ArrudaBoyce), Abaqus | Ansys | Calculix) => chains(c[0], c[1].powi(2)),
         (Some(LawKind::ArrudaBoyce), Comsol | Febio) => chains(c[0], c[1]),
     };
     let of_volume = match (law, format) {
-        (None | Some(LawKind::Yeoh), Abaqus | Ansys | Calculix) => (j - 1.0).powi(2) / v,
+        (None | Some(LawKind::NeoHookean | LawKind::MooneyRivlin | LawKind::Yeoh), Abaqus | Ansys | Calculix) => {
+            (j - 1.0).powi(2) / v
+        }
         (Some(LawKind::Gent | LawKind::ArrudaBoyce), Abaqus | Ansys | Calculix) => (0.5 * (j * j - 1.0) - j.ln()) / v,
         (_, Comsol) => 0.5 * v * (j - 1.0).powi(2),
         (_, Febio) => 0.5 * v * j.ln().powi(2),

@@ -65,6 +65,16 @@ impl MaterialFormat {
             (None, Calculix) => &CALCULIX_OGDEN,
             (None, Comsol) => &COMSOL_OGDEN,
             (None, Febio) => &FEBIO_OGDEN,
+            (Some(LawKind::NeoHookean), Abaqus) => &ABAQUS_NEO_HOOKEAN,
+            (Some(LawKind::NeoHookean), Ansys) => &ANSYS_NEO_HOOKEAN,
+            (Some(LawKind::NeoHookean), Calculix) => &CALCULIX_NEO_HOOKEAN,
+            (Some(LawKind::NeoHookean), Comsol) => &COMSOL_NEO_HOOKEAN,
+            (Some(LawKind::NeoHookean), Febio) => &FEBIO_NEO_HOOKEAN,
+            (Some(LawKind::MooneyRivlin), Abaqus) => &ABAQUS_MOONEY_RIVLIN,
+            (Some(LawKind::MooneyRivlin), Ansys) => &ANSYS_MOONEY_RIVLIN,
+            (Some(LawKind::MooneyRivlin), Calculix) => &CALCULIX_MOONEY_RIVLIN,
+            (Some(LawKind::MooneyRivlin), Comsol) => &COMSOL_MOONEY_RIVLIN,
+            (Some(LawKind::MooneyRivlin), Febio) => &FEBIO_MOONEY_RIVLIN,
             (Some(LawKind::Yeoh), Abaqus) => &ABAQUS_YEOH,
             (Some(LawKind::Yeoh), Ansys) => &ANSYS_YEOH,
             (Some(LawKind::Yeoh), Calculix) => &CALCULIX_YEOH,
@@ -180,6 +190,105 @@ static FEBIO_OGDEN: Convention = Convention {
     manual: FEBIO_MANUAL,
     law: VolumetricLaw::Logarithmic,
     shape: Shape::Terms { most: 6, factor: ("c", product), exponent: "m" },
+    volumetric: ("k", Volumetric::Modulus),
+    further: NO_SUCH_TERM,
+};
+
+/// Half of the initial shear modulus is the coefficient of I1 − 3.
+fn halved(value: f64) -> f64 {
+    0.5 * value
+}
+
+static ABAQUS_NEO_HOOKEAN: Convention = Convention {
+    keyword: "NEO HOOKE",
+    energy: "U = C_10 (I1 - 3) + (J - 1)^2/D_1 (C_10 is half of the initial shear modulus)",
+    manual: ABAQUS_MANUAL,
+    law: VolumetricLaw::Quadratic,
+    shape: Shape::Law { constants: &[("C_10", LawParameter::Modulus, halved)], order: None, num_volumetric: 1 },
+    volumetric: COMPLIANCES,
+    further: NO_SUCH_TERM,
+};
+
+static ANSYS_NEO_HOOKEAN: Convention = Convention {
+    keyword: "NEO",
+    energy: "W = mu/2 (I1 - 3) + (J - 1)^2/d",
+    manual: "Ansys Mechanical APDL Material Reference, Neo-Hookean Hyperelasticity (TB,HYPER,,,,NEO)",
+    law: VolumetricLaw::Quadratic,
+    shape: Shape::Law { constants: &[("mu", LawParameter::Modulus, same)], order: None, num_volumetric: 1 },
+    volumetric: ("d", Volumetric::Compliance),
+    further: NO_SUCH_TERM,
+};
+
+static CALCULIX_NEO_HOOKEAN: Convention = Convention { manual: CALCULIX_MANUAL, ..ABAQUS_NEO_HOOKEAN };
+
+static COMSOL_NEO_HOOKEAN: Convention = Convention {
+    keyword: "Neo-Hookean",
+    energy: "W = mu/2 (I1 - 3) + kappa/2 (J - 1)^2",
+    manual: COMSOL_MANUAL,
+    law: VolumetricLaw::Quadratic,
+    shape: Shape::Law { constants: &[("mu", LawParameter::Modulus, same)], order: None, num_volumetric: 1 },
+    volumetric: ("kappa", Volumetric::Modulus),
+    further: NO_SUCH_TERM,
+};
+
+/// FEBio's own neo-Hookean solid is another law, whose shape and volume are not apart; its Mooney-Rivlin solid without
+/// c2 is ours.
+static FEBIO_NEO_HOOKEAN: Convention = Convention {
+    keyword: "Mooney-Rivlin",
+    energy: "W = c1 (I1 - 3) + k/2 (ln J)^2",
+    manual: FEBIO_MANUAL,
+    law: VolumetricLaw::Logarithmic,
+    shape: Shape::Law { constants: &[("c1", LawParameter::Modulus, halved)], order: None, num_volumetric: 1 },
+    volumetric: ("k", Volumetric::Modulus),
+    further: NO_SUCH_TERM,
+};
+
+/// The names of Mooney and Rivlin's coefficients in most programs.
+const MOONEY_RIVLIN: &[LawConstant] =
+    &[("C_10", LawParameter::Coefficient(0), same), ("C_01", LawParameter::Coefficient(1), same)];
+
+static ABAQUS_MOONEY_RIVLIN: Convention = Convention {
+    keyword: "MOONEY-RIVLIN",
+    energy: "U = C_10 (I1 - 3) + C_01 (I2 - 3) + (J - 1)^2/D_1",
+    manual: ABAQUS_MANUAL,
+    law: VolumetricLaw::Quadratic,
+    shape: Shape::Law { constants: MOONEY_RIVLIN, order: None, num_volumetric: 1 },
+    volumetric: COMPLIANCES,
+    further: NO_SUCH_TERM,
+};
+
+static ANSYS_MOONEY_RIVLIN: Convention = Convention {
+    keyword: "MOONEY",
+    energy: "W = C_10 (I1 - 3) + C_01 (I2 - 3) + (J - 1)^2/d",
+    manual: "Ansys Mechanical APDL Material Reference, Mooney-Rivlin Hyperelasticity (TB,HYPER,,,2,MOONEY)",
+    law: VolumetricLaw::Quadratic,
+    shape: Shape::Law { constants: MOONEY_RIVLIN, order: Some(2), num_volumetric: 1 },
+    volumetric: ("d", Volumetric::Compliance),
+    further: NO_SUCH_TERM,
+};
+
+static CALCULIX_MOONEY_RIVLIN: Convention = Convention { manual: CALCULIX_MANUAL, ..ABAQUS_MOONEY_RIVLIN };
+
+static COMSOL_MOONEY_RIVLIN: Convention = Convention {
+    keyword: "Mooney-Rivlin, Two Parameters",
+    energy: "W = C_10 (I1 - 3) + C_01 (I2 - 3) + kappa/2 (J - 1)^2",
+    manual: COMSOL_MANUAL,
+    law: VolumetricLaw::Quadratic,
+    shape: Shape::Law { constants: MOONEY_RIVLIN, order: None, num_volumetric: 1 },
+    volumetric: ("kappa", Volumetric::Modulus),
+    further: NO_SUCH_TERM,
+};
+
+static FEBIO_MOONEY_RIVLIN: Convention = Convention {
+    keyword: "Mooney-Rivlin",
+    energy: "W = c1 (I1 - 3) + c2 (I2 - 3) + k/2 (ln J)^2",
+    manual: FEBIO_MANUAL,
+    law: VolumetricLaw::Logarithmic,
+    shape: Shape::Law {
+        constants: &[("c1", LawParameter::Coefficient(0), same), ("c2", LawParameter::Coefficient(1), same)],
+        order: None,
+        num_volumetric: 1,
+    },
     volumetric: ("k", Volumetric::Modulus),
     further: NO_SUCH_TERM,
 };

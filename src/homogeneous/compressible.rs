@@ -56,7 +56,7 @@ fn kirchhoff(material: &Material, e: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
     let volume: f64 = e.iter().sum();
     let mut stress = [material.bulk_kpa * volume; 3];
     let mut tangent = [[material.bulk_kpa; 3]; 3];
-    for term in &material.terms {
+    for term in material.all_terms() {
         let power = e.map(|v| (term.alpha * (v - volume / 3.0)).exp());
         let mean = power.iter().sum::<f64>() / 3.0;
         for j in 0..3 {
@@ -102,7 +102,9 @@ fn parameter_derivative(material: &Material, parameter: Parameter, e: [f64; 3]) 
             let squared = bar.map(|v| (2.0 * v).exp());
             let x = squared.iter().sum::<f64>() - 3.0;
             let rate = material.law.map_or(0.0, |law| law.slope_derivative(own, Lanes::splat(x)).0[0]);
-            deviator(squared).map(|d| 2.0 * rate * d)
+            let of_second = material.law.map_or(0.0, |law| law.second_mu_derivative(own));
+            let (first, second) = (deviator(squared), deviator(squared.map(|s| 1.0 / s)));
+            [0, 1, 2].map(|j| 2.0 * rate * first[j] + of_second * second[j])
         }
     }
 }

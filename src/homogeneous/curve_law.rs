@@ -8,8 +8,8 @@ use super::compressible::respond;
 use super::deformation::{Deformation, incompressible_derivative, incompressible_stress};
 use super::fit_options::CurveFitOptions;
 use crate::material::{
-    InvariantLaw, Lanes, LawParameter, Material, OgdenTerm, Parameter, ShearTerm, first_invariant_less_3,
-    initial_shear_modulus_kpa, smallest_relative_stiffness, smallest_relative_stiffness_of_law,
+    InvariantLaw, Lanes, LawParameter, Material, OgdenTerm, Parameter, SECOND_EXPONENT, ShearTerm,
+    first_invariant_less_3, initial_shear_modulus_kpa, smallest_relative_stiffness, smallest_relative_stiffness_of_law,
 };
 use crate::optimise::LinearLimit;
 use nalgebra::DMatrix;
@@ -252,10 +252,10 @@ fn rate(parameter: LawParameter, value: f64) -> f64 {
     if parameter.has_any_sign() { 1.0 } else { value }
 }
 
-/// The incompressible stress of an Ogden term of exponent 2 with c = 1 kPa: a law in the first invariant has 4 W′ times
-/// that.
-fn stress_of_unit_term(state: &Deformation) -> f64 {
-    incompressible_derivative(&ShearTerm { modulus_kpa: 1.0, alpha: 2.0 }, state)[0]
+/// The incompressible stress of an Ogden term with c = 1 kPa: a law in the first invariant has 4 W′ times that of
+/// exponent 2.
+fn stress_of_unit_term(alpha: f64, state: &Deformation) -> f64 {
+    incompressible_derivative(&ShearTerm { modulus_kpa: 1.0, alpha }, state)[0]
 }
 
 impl CurveLaw for InvariantLaw {
@@ -264,7 +264,9 @@ impl CurveLaw for InvariantLaw {
     }
 
     fn incompressible_stress(&self, state: &Deformation) -> f64 {
-        4.0 * self.slopes_at(first_invariant_less_3(state.log_stretches()))[0] * stress_of_unit_term(state)
+        let first = 4.0 * self.slopes_at(first_invariant_less_3(state.log_stretches()))[0];
+        let of_second = |mu_kpa: f64| SECOND_EXPONENT * mu_kpa * stress_of_unit_term(SECOND_EXPONENT, state);
+        first * stress_of_unit_term(2.0, state) + self.second_mu_kpa().map_or(0.0, of_second)
     }
 
     fn initial_shear_modulus_kpa(&self) -> f64 {
@@ -338,9 +340,11 @@ impl CurveLaw for InvariantLaw {
             response.nominal_stress_kpa[0]
         } else {
             let x = first_invariant_less_3(state.log_stretches());
-            let unit = stress_of_unit_term(state);
+            let unit = stress_of_unit_term(2.0, state);
+            let second_unit = SECOND_EXPONENT * stress_of_unit_term(SECOND_EXPONENT, state);
             for (index, p) in parameters.iter().enumerate() {
-                row[index] = weight * 4.0 * self.slope_derivative(*p, Lanes::splat(x)).0[0] * unit * rate(*p);
+                let first = 4.0 * self.slope_derivative(*p, Lanes::splat(x)).0[0] * unit;
+                row[index] = weight * (first + self.second_mu_derivative(*p) * second_unit) * rate(*p);
             }
             self.incompressible_stress(state)
         };

@@ -4,7 +4,7 @@ use super::super::curve_law::{CurveLaw, OgdenTerms};
 use super::super::deformation::{Deformation, HomogeneousTest};
 use super::super::fit::{BULK_OVER_SHEAR, fit_law, model_stress};
 use super::*;
-use crate::material::{ArrudaBoyce, Gent, InvariantLaw, ShearTerm, Yeoh, laws};
+use crate::material::{ArrudaBoyce, Gent, InvariantLaw, MooneyRivlin, NeoHookean, ShearTerm, Yeoh, laws};
 use nalgebra::DVector;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -33,12 +33,14 @@ fn curves(law: &dyn CurveLaw, bulk_kpa: Option<f64>, noise: f64, seed: u64) -> V
     TESTS.map(curve).into()
 }
 
-/// Laws that stiffen within the curves, so much that none of them looks like another.
-fn truths() -> [InvariantLaw; 3] {
+/// Laws that stiffen within the curves, so much that none of them looks like another, and those that cannot.
+fn truths() -> [InvariantLaw; 5] {
     [
         InvariantLaw::Yeoh(Yeoh { coefficients_kpa: [8.0, -0.3, 0.05] }),
         InvariantLaw::Gent(Gent { mu_kpa: 16.0, limit: 6.0 }),
         InvariantLaw::ArrudaBoyce(ArrudaBoyce { mu_kpa: 15.0, locking_stretch: 1.4 }),
+        InvariantLaw::NeoHookean(NeoHookean { mu_kpa: 16.0 }),
+        InvariantLaw::MooneyRivlin(MooneyRivlin { coefficients_kpa: [6.0, 2.0] }),
     ]
 }
 
@@ -46,17 +48,26 @@ fn options_of(law: Option<LawKind>, bulk_kpa: Option<f64>) -> CurveFitOptions {
     CurveFitOptions { law, bulk_kpa, ..CurveFitOptions::default() }
 }
 
-/// Textbook formulas: nominal stress 2 W′ (λ − 1/λ²), 2 W′ (λ − 1/λ⁵), 2 W′ (λ − 1/λ³) and 2 W′ γ. Rounding only.
+/// Textbook formulas: nominal stress 2 (W′ + c/λ) (λ − 1/λ²), 2 (W′ + c λ²) (λ − 1/λ⁵), 2 (W′ + c) (λ − 1/λ³) and
+/// 2 (W′ + c) γ, where c (Ī₂ − 3) is a part of the law. Rounding only.
 #[test]
 fn stresses_are_the_closed_forms() {
     for law in laws() {
         for l in [0.7f64, 1.0, 1.3, 1.8] {
             let (shear, slope) = (l - 1.0, |x: f64| 2.0 * law.slopes_at(x)[0]);
+            let c = match law {
+                InvariantLaw::MooneyRivlin(law) => 2.0 * law.coefficients_kpa[1],
+                _ => 0.0,
+            };
             let expected = [
-                (HomogeneousTest::Uniaxial, l, slope(l * l + 2.0 / l - 3.0) * (l - l.powi(-2))),
-                (HomogeneousTest::Equibiaxial, l, slope(2.0 * l * l + l.powi(-4) - 3.0) * (l - l.powi(-5))),
-                (HomogeneousTest::PureShear, l, slope(l * l + l.powi(-2) - 2.0) * (l - l.powi(-3))),
-                (HomogeneousTest::SimpleShear, shear, slope(shear * shear) * shear),
+                (HomogeneousTest::Uniaxial, l, (slope(l * l + 2.0 / l - 3.0) + c / l) * (l - l.powi(-2))),
+                (
+                    HomogeneousTest::Equibiaxial,
+                    l,
+                    (slope(2.0 * l * l + l.powi(-4) - 3.0) + c * l * l) * (l - l.powi(-5)),
+                ),
+                (HomogeneousTest::PureShear, l, (slope(l * l + l.powi(-2) - 2.0) + c) * (l - l.powi(-3))),
+                (HomogeneousTest::SimpleShear, shear, (slope(shear * shear) + c) * shear),
             ];
             for (test, drive, expected) in expected {
                 let found = law.incompressible_stress(&test.at(drive));

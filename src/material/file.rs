@@ -3,8 +3,9 @@
 //! It is read through [`MaterialFields`], which holds the fields of all formats, so that errors keep their place in the
 //! text, and written through [`MaterialFile`], which has a form of its own for each.
 
-use super::invariant_law::{ArrudaBoyce, Gent, InvariantLaw, Yeoh};
-use super::limits::{ARRUDA_BOYCE_SCHEMA, GENT_SCHEMA, SCHEMA, YEOH_SCHEMA};
+use super::invariant_energy::{ArrudaBoyce, Gent, MooneyRivlin, NeoHookean, Yeoh};
+use super::invariant_law::InvariantLaw;
+use super::limits::{ARRUDA_BOYCE_SCHEMA, GENT_SCHEMA, MOONEY_RIVLIN_SCHEMA, NEO_HOOKEAN_SCHEMA, SCHEMA, YEOH_SCHEMA};
 #[cfg(feature = "schema")]
 use super::limits::{
     MAX_ALPHA, MAX_CHAIN_LIMIT, MAX_LOCKING_STRETCH, MAX_MODULUS_KPA, MIN_CHAIN_LIMIT, MIN_LOCKING_STRETCH,
@@ -16,6 +17,8 @@ use crate::field::schema::{list_of, number_above, number_within, schema_of_file,
 use serde::{Deserialize, Serialize};
 
 file_tag!(MaterialTag, SCHEMA);
+file_tag!(NeoHookeanTag, NEO_HOOKEAN_SCHEMA);
+file_tag!(MooneyRivlinTag, MOONEY_RIVLIN_SCHEMA);
 file_tag!(YeohTag, YEOH_SCHEMA);
 file_tag!(GentTag, GENT_SCHEMA);
 file_tag!(ArrudaBoyceTag, ARRUDA_BOYCE_SCHEMA);
@@ -53,6 +56,40 @@ pub(super) struct OgdenFile {
     /// Terms.
     #[cfg_attr(feature = "schema", schema(value_type = Terms))]
     terms: Vec<OgdenTerm>,
+}
+
+/// A neo-Hookean material (`neo_hookean/1`): W = ½ μ x, x = Ī₁ − 3.
+#[derive(Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = NeoHookeanSchema))]
+#[serde(deny_unknown_fields)]
+pub(super) struct NeoHookeanFile {
+    /// Always `neo_hookean/1`.
+    schema: NeoHookeanTag,
+    /// κ, kPa.
+    #[cfg_attr(feature = "schema", schema(value_type = BulkKpa))]
+    bulk_kpa: f64,
+    /// μ, the initial shear modulus, kPa.
+    #[cfg_attr(feature = "schema", schema(value_type = PositiveKpa))]
+    mu_kpa: f64,
+}
+
+/// Mooney and Rivlin's material (`mooney_rivlin/1`): c₁ (Ī₁ − 3) + c₂ (Ī₂ − 3), with the initial shear modulus
+/// 2 (c₁ + c₂).
+#[derive(Serialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = MooneyRivlinSchema))]
+#[serde(deny_unknown_fields)]
+pub(super) struct MooneyRivlinFile {
+    /// Always `mooney_rivlin/1`.
+    schema: MooneyRivlinTag,
+    /// κ, kPa.
+    #[cfg_attr(feature = "schema", schema(value_type = BulkKpa))]
+    bulk_kpa: f64,
+    /// c₁, kPa.
+    #[cfg_attr(feature = "schema", schema(value_type = PositiveKpa))]
+    c_1_kpa: f64,
+    /// c₂, kPa.
+    #[cfg_attr(feature = "schema", schema(value_type = CoefficientKpa))]
+    c_2_kpa: f64,
 }
 
 /// Yeoh's material (`yeoh/1`): W = c₁ x + c₂ x² + c₃ x³, x = Ī₁ − 3.
@@ -112,13 +149,17 @@ pub(super) struct ArrudaBoyceFile {
     lambda_m: f64,
 }
 
-/// A material: `ogden/1`, `yeoh/1`, `gent/1` or `arruda_boyce/1`.
+/// A material: `ogden/1`, `neo_hookean/1`, `mooney_rivlin/1`, `yeoh/1`, `gent/1` or `arruda_boyce/1`.
 #[derive(Serialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = MaterialSchema))]
 #[serde(untagged)]
 pub(super) enum MaterialFile {
     /// Ogden's.
     Ogden(OgdenFile),
+    /// The neo-Hookean one.
+    NeoHookean(NeoHookeanFile),
+    /// Mooney and Rivlin's.
+    MooneyRivlin(MooneyRivlinFile),
     /// Yeoh's.
     Yeoh(YeohFile),
     /// Gent's.
@@ -132,6 +173,13 @@ impl From<Material> for MaterialFile {
         let Material { bulk_kpa, terms, law } = material;
         match law {
             None => MaterialFile::Ogden(OgdenFile { schema: MaterialTag, bulk_kpa, terms }),
+            Some(InvariantLaw::NeoHookean(NeoHookean { mu_kpa })) => {
+                MaterialFile::NeoHookean(NeoHookeanFile { schema: NeoHookeanTag, bulk_kpa, mu_kpa })
+            }
+            Some(InvariantLaw::MooneyRivlin(MooneyRivlin { coefficients_kpa: [c_1_kpa, c_2_kpa] })) => {
+                let schema = MooneyRivlinTag;
+                MaterialFile::MooneyRivlin(MooneyRivlinFile { schema, bulk_kpa, c_1_kpa, c_2_kpa })
+            }
             Some(InvariantLaw::Yeoh(Yeoh { coefficients_kpa: [c_1_kpa, c_2_kpa, c_3_kpa] })) => {
                 MaterialFile::Yeoh(YeohFile { schema: YeohTag, bulk_kpa, c_1_kpa, c_2_kpa, c_3_kpa })
             }
@@ -151,6 +199,10 @@ impl From<Material> for MaterialFile {
 enum MaterialFormat {
     #[serde(rename = "ogden/1")]
     Ogden,
+    #[serde(rename = "neo_hookean/1")]
+    NeoHookean,
+    #[serde(rename = "mooney_rivlin/1")]
+    MooneyRivlin,
     #[serde(rename = "yeoh/1")]
     Yeoh,
     #[serde(rename = "gent/1")]
@@ -202,6 +254,11 @@ impl TryFrom<MaterialFields> for Material {
         };
         let law = match schema {
             MaterialFormat::Ogden => None,
+            MaterialFormat::NeoHookean => Some(InvariantLaw::NeoHookean(NeoHookean { mu_kpa: take("mu_kpa")? })),
+            MaterialFormat::MooneyRivlin => {
+                let coefficients_kpa = [take("c_1_kpa")?, take("c_2_kpa")?];
+                Some(InvariantLaw::MooneyRivlin(MooneyRivlin { coefficients_kpa }))
+            }
             MaterialFormat::Yeoh => {
                 let coefficients_kpa = [take("c_1_kpa")?, take("c_2_kpa")?, take("c_3_kpa")?];
                 Some(InvariantLaw::Yeoh(Yeoh { coefficients_kpa }))

@@ -1,246 +1,20 @@
-//! Strain energies in the first isochoric invariant alone: Yeoh's, Gent's, Arruda and Boyce's.
-//!
-//! With x = Ī₁ − 3 and W(x) such an energy, τ_a = 2 W′ (λ̄_a² − mean λ̄²) + κ ln J: the law acts like an Ogden term of
-//! exponent 2 whose modulus μ = 2 W′(x) follows the deformation. Everything else about a law, as its place in the
-//! tangent or in stability, follows from W′ and W″; a law of one's own needs [`FirstInvariantEnergy`] alone.
+//! The laws in the first invariant by their names, and the one that a material has.
 
-use super::Lanes;
-use super::limits::{MAX_CHAIN_LIMIT, MAX_LOCKING_STRETCH, MAX_MODULUS_KPA, MIN_CHAIN_LIMIT, MIN_LOCKING_STRETCH};
+use super::invariant_energy::{ArrudaBoyce, FirstInvariantEnergy, Gent, LawParameter, MooneyRivlin, NeoHookean, Yeoh};
+use super::lanes::Lanes;
 
-/// What the material model needs to know of an energy W(x), x = Ī₁ − 3.
-pub trait FirstInvariantEnergy {
-    /// Its parameters, in the order of their derivatives.
-    fn parameters(&self) -> &'static [LawParameter];
-    /// Value of the parameter with this index.
-    fn value(&self, index: usize) -> f64;
-    /// Sets it.
-    fn set(&mut self, index: usize, value: f64);
-    /// W, kPa, zero at x = 0; infinite beyond the largest x that the law allows.
-    fn energy_density(&self, x: f64) -> f64;
-    /// W′ and W″, kPa.
-    fn slopes(&self, x: Lanes) -> [Lanes; 2];
-    /// ∂W′/∂ξ of the parameter with this index, kPa per unit of ξ.
-    fn slope_derivative(&self, index: usize, x: Lanes) -> Lanes;
-    /// The x that no state reaches; infinite where there is none.
-    fn largest_x(&self) -> f64 {
-        f64::INFINITY
-    }
-}
-
-/// A parameter of an energy in the first invariant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum LawParameter {
-    /// Yeoh's coefficient of x^(n + 1), kPa, for n from 0.
-    Coefficient(usize),
-    /// The modulus, kPa.
-    Modulus,
-    /// Gent's limit J_m of x.
-    Limit,
-    /// Arruda and Boyce's locking stretch λ_m.
-    LockingStretch,
-}
-
-impl LawParameter {
-    /// `c_1`, `mu`, `j_m`, `lambda_m`.
-    pub fn name(self) -> String {
-        match self {
-            LawParameter::Coefficient(n) => format!("c_{}", n + 1),
-            LawParameter::Modulus => "mu".into(),
-            LawParameter::Limit => "j_m".into(),
-            LawParameter::LockingStretch => "lambda_m".into(),
-        }
-    }
-
-    /// Whether stresses are in proportion to it (with all others of its kind): its unit is then kPa.
-    pub fn is_modulus(self) -> bool {
-        matches!(self, LawParameter::Coefficient(_) | LawParameter::Modulus)
-    }
-
-    /// Whether it may have either sign, and be zero.
-    pub fn has_any_sign(self) -> bool {
-        matches!(self, LawParameter::Coefficient(n) if n > 0)
-    }
-
-    /// Its least and largest value; a modulus that may not have either sign is above zero.
-    pub fn range(self) -> [f64; 2] {
-        match self {
-            LawParameter::Coefficient(0) | LawParameter::Modulus => [0.0, MAX_MODULUS_KPA],
-            LawParameter::Coefficient(_) => [-MAX_MODULUS_KPA, MAX_MODULUS_KPA],
-            LawParameter::Limit => [MIN_CHAIN_LIMIT, MAX_CHAIN_LIMIT],
-            LawParameter::LockingStretch => [MIN_LOCKING_STRETCH, MAX_LOCKING_STRETCH],
-        }
-    }
-}
-
-/// Yeoh (1993), W = c₁ x + c₂ x² + c₃ x³. With c₂ = c₃ = 0 it is the neo-Hookean law.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Yeoh {
-    /// c₁, c₂, c₃, kPa.
-    pub coefficients_kpa: [f64; 3],
-}
-
-impl FirstInvariantEnergy for Yeoh {
-    fn parameters(&self) -> &'static [LawParameter] {
-        use LawParameter::Coefficient;
-        &[Coefficient(0), Coefficient(1), Coefficient(2)]
-    }
-
-    fn value(&self, index: usize) -> f64 {
-        self.coefficients_kpa[index]
-    }
-
-    fn set(&mut self, index: usize, value: f64) {
-        self.coefficients_kpa[index] = value;
-    }
-
-    fn energy_density(&self, x: f64) -> f64 {
-        let [c1, c2, c3] = self.coefficients_kpa;
-        x * (c1 + x * (c2 + x * c3))
-    }
-
-    #[inline(always)]
-    fn slopes(&self, x: Lanes) -> [Lanes; 2] {
-        let [c1, c2, c3] = self.coefficients_kpa;
-        [x * (x * (3.0 * c3) + 2.0 * c2) + c1, x * (6.0 * c3) + 2.0 * c2]
-    }
-
-    #[inline(always)]
-    fn slope_derivative(&self, index: usize, x: Lanes) -> Lanes {
-        match index {
-            0 => Lanes::splat(1.0),
-            1 => x * 2.0,
-            _ => x * x * 3.0,
-        }
-    }
-}
-
-/// Gent (1996), W = −½ μ J_m ln(1 − x/J_m): the chains are at their end where x reaches J_m.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gent {
-    /// μ, the initial shear modulus, kPa.
-    pub mu_kpa: f64,
-    /// J_m.
-    pub limit: f64,
-}
-
-impl Gent {
-    /// 1/(J_m − x); NaN where x is not below J_m, so that no state beyond is taken for an equilibrium.
-    #[inline(always)]
-    fn inverse_rest(&self, x: Lanes) -> Lanes {
-        let rest = Lanes::splat(self.limit) - x;
-        Lanes::select_below(rest, f64::MIN_POSITIVE, Lanes::splat(f64::NAN), Lanes::splat(1.0) / rest)
-    }
-}
-
-impl FirstInvariantEnergy for Gent {
-    fn parameters(&self) -> &'static [LawParameter] {
-        &[LawParameter::Modulus, LawParameter::Limit]
-    }
-
-    fn value(&self, index: usize) -> f64 {
-        [self.mu_kpa, self.limit][index]
-    }
-
-    fn set(&mut self, index: usize, value: f64) {
-        *[&mut self.mu_kpa, &mut self.limit][index] = value;
-    }
-
-    fn energy_density(&self, x: f64) -> f64 {
-        if x < self.limit { -0.5 * self.mu_kpa * self.limit * (-x / self.limit).ln_1p() } else { f64::INFINITY }
-    }
-
-    #[inline(always)]
-    fn slopes(&self, x: Lanes) -> [Lanes; 2] {
-        let inverse = self.inverse_rest(x);
-        let slope = inverse * (0.5 * self.mu_kpa * self.limit);
-        [slope, slope * inverse]
-    }
-
-    #[inline(always)]
-    fn slope_derivative(&self, index: usize, x: Lanes) -> Lanes {
-        let inverse = self.inverse_rest(x);
-        if index == 0 { inverse * (0.5 * self.limit) } else { x * inverse * inverse * (-0.5 * self.mu_kpa) }
-    }
-
-    fn largest_x(&self) -> f64 {
-        self.limit
-    }
-}
-
-/// Arruda and Boyce (1993), the eight-chain network in the five-term series of the inverse Langevin function,
-/// W = μ Σ Cᵢ λ_m^(2 − 2i) (Ī₁ⁱ − 3ⁱ), C = 1/2, 1/20, 11/1050, 19/7000, 519/673750.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ArrudaBoyce {
-    /// μ, kPa: the initial shear modulus of chains that never lock.
-    pub mu_kpa: f64,
-    /// λ_m.
-    pub locking_stretch: f64,
-}
-
-/// i Cᵢ of the series.
-const CHAIN_SERIES: [f64; 5] = [0.5, 0.1, 11.0 / 350.0, 19.0 / 1750.0, 519.0 / 134_750.0];
-
-impl ArrudaBoyce {
-    /// Σ i Cᵢ weight(i − 1) q^(i−1), q = Ī₁/λ_m².
-    #[inline(always)]
-    fn series(&self, x: Lanes, weight: impl Fn(f64) -> f64) -> Lanes {
-        let q = (x + 3.0) * self.locking_stretch.powi(-2);
-        let mut sum = Lanes::ZERO;
-        for (i, c) in CHAIN_SERIES.iter().enumerate().rev() {
-            sum = sum * q + c * weight(i as f64);
-        }
-        sum
-    }
-}
-
-impl FirstInvariantEnergy for ArrudaBoyce {
-    fn parameters(&self) -> &'static [LawParameter] {
-        &[LawParameter::Modulus, LawParameter::LockingStretch]
-    }
-
-    fn value(&self, index: usize) -> f64 {
-        [self.mu_kpa, self.locking_stretch][index]
-    }
-
-    fn set(&mut self, index: usize, value: f64) {
-        *[&mut self.mu_kpa, &mut self.locking_stretch][index] = value;
-    }
-
-    fn energy_density(&self, x: f64) -> f64 {
-        let part = self.locking_stretch.powi(-2);
-        let mut sum = 0.0;
-        for (i, c) in CHAIN_SERIES.iter().enumerate() {
-            let n = i as i32 + 1;
-            // (3 + x)ⁿ − 3ⁿ without loss of digits at small x.
-            let rise = 3f64.powi(n) * (f64::from(n) * (x / 3.0).ln_1p()).exp_m1();
-            sum += c / f64::from(n) * part.powi(n - 1) * rise;
-        }
-        self.mu_kpa * sum
-    }
-
-    #[inline(always)]
-    fn slopes(&self, x: Lanes) -> [Lanes; 2] {
-        // dq/dx = λ_m⁻², and Σ i Cᵢ (i − 1) q^(i−2) = (Σ i Cᵢ (i − 1) q^(i−1))/q.
-        let second = self.series(x, |i| i) / (x + 3.0);
-        [self.series(x, |_| 1.0) * self.mu_kpa, second * self.mu_kpa]
-    }
-
-    #[inline(always)]
-    fn slope_derivative(&self, index: usize, x: Lanes) -> Lanes {
-        if index == 0 {
-            self.series(x, |_| 1.0)
-        } else {
-            // dq/dλ_m = −2 q/λ_m.
-            self.series(x, |i| i) * (-2.0 * self.mu_kpa / self.locking_stretch)
-        }
-    }
-}
+/// The exponent of an Ogden term that is Ī₂ − 3.
+pub const SECOND_EXPONENT: f64 = -2.0;
 
 /// Which energy in the first invariant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum LawKind {
+    /// W = ½ μ x, x = Ī₁ − 3: an Ogden term whose exponent is 2.
+    NeoHookean,
+    /// c₁ (Ī₁ − 3) + c₂ (Ī₂ − 3): Ogden terms whose exponents are 2 and −2.
+    MooneyRivlin,
     /// W = c₁ x + c₂ x² + c₃ x³, x = Ī₁ − 3.
     Yeoh,
     /// W = −½ μ J_m ln(1 − x/J_m).
@@ -251,11 +25,14 @@ pub enum LawKind {
 
 impl LawKind {
     /// All of them.
-    pub const ALL: [LawKind; 3] = [LawKind::Yeoh, LawKind::Gent, LawKind::ArrudaBoyce];
+    pub const ALL: [LawKind; 5] =
+        [LawKind::NeoHookean, LawKind::MooneyRivlin, LawKind::Yeoh, LawKind::Gent, LawKind::ArrudaBoyce];
 
-    /// The name by which it goes: `Yeoh`, `Gent`, `Arruda-Boyce`.
+    /// The name by which it goes: `neo-Hookean`, `Mooney-Rivlin`, `Yeoh`, `Gent`, `Arruda-Boyce`.
     pub fn name(self) -> &'static str {
         match self {
+            LawKind::NeoHookean => "neo-Hookean",
+            LawKind::MooneyRivlin => "Mooney-Rivlin",
             LawKind::Yeoh => "Yeoh",
             LawKind::Gent => "Gent",
             LawKind::ArrudaBoyce => "Arruda-Boyce",
@@ -270,6 +47,8 @@ impl LawKind {
     /// The law with these values of its parameters, in their order; those that are missing are no numbers.
     pub fn law(self, values: &[f64]) -> InvariantLaw {
         let mut law = match self {
+            LawKind::NeoHookean => InvariantLaw::NeoHookean(NeoHookean { mu_kpa: f64::NAN }),
+            LawKind::MooneyRivlin => InvariantLaw::MooneyRivlin(MooneyRivlin { coefficients_kpa: [f64::NAN; 2] }),
             LawKind::Yeoh => InvariantLaw::Yeoh(Yeoh { coefficients_kpa: [f64::NAN; 3] }),
             LawKind::Gent => InvariantLaw::Gent(Gent { mu_kpa: f64::NAN, limit: f64::NAN }),
             LawKind::ArrudaBoyce => {
@@ -282,10 +61,14 @@ impl LawKind {
         law
     }
 
-    /// Laws with this initial shear modulus (kPa) to start fits from, from stiffening late to early. The stresses of
-    /// Yeoh's law are linear in its coefficients: one start is enough.
+    /// Laws with this initial shear modulus (kPa) to start fits from, from stiffening late to early. Where
+    /// stresses are linear in all parameters one start is enough.
     pub fn starts(self, shear_kpa: f64) -> Vec<InvariantLaw> {
         match self {
+            LawKind::NeoHookean => vec![InvariantLaw::NeoHookean(NeoHookean { mu_kpa: shear_kpa })],
+            LawKind::MooneyRivlin => {
+                vec![InvariantLaw::MooneyRivlin(MooneyRivlin { coefficients_kpa: [0.4 * shear_kpa, 0.1 * shear_kpa] })]
+            }
             LawKind::Yeoh => vec![InvariantLaw::Yeoh(Yeoh { coefficients_kpa: [0.5 * shear_kpa, 0.0, 0.0] })],
             LawKind::Gent => {
                 [200.0, 60.0, 20.0].map(|limit| InvariantLaw::Gent(Gent { mu_kpa: shear_kpa, limit })).into()
@@ -304,6 +87,10 @@ impl LawKind {
 /// An energy in the first invariant that a material may have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InvariantLaw {
+    /// The neo-Hookean one.
+    NeoHookean(NeoHookean),
+    /// Mooney and Rivlin's, which holds the second invariant, too.
+    MooneyRivlin(MooneyRivlin),
     /// Yeoh's.
     Yeoh(Yeoh),
     /// Gent's.
@@ -316,6 +103,8 @@ impl InvariantLaw {
     /// The law behind the trait.
     fn energy(&self) -> &dyn FirstInvariantEnergy {
         match self {
+            InvariantLaw::NeoHookean(law) => law,
+            InvariantLaw::MooneyRivlin(law) => law,
             InvariantLaw::Yeoh(law) => law,
             InvariantLaw::Gent(law) => law,
             InvariantLaw::ArrudaBoyce(law) => law,
@@ -325,6 +114,8 @@ impl InvariantLaw {
     /// Which one it is.
     pub fn kind(&self) -> LawKind {
         match self {
+            InvariantLaw::NeoHookean(_) => LawKind::NeoHookean,
+            InvariantLaw::MooneyRivlin(_) => LawKind::MooneyRivlin,
             InvariantLaw::Yeoh(_) => LawKind::Yeoh,
             InvariantLaw::Gent(_) => LawKind::Gent,
             InvariantLaw::ArrudaBoyce(_) => LawKind::ArrudaBoyce,
@@ -350,15 +141,27 @@ impl InvariantLaw {
     pub fn set(&mut self, parameter: LawParameter, value: f64) {
         let Some(index) = self.index_of(parameter) else { return };
         match self {
+            InvariantLaw::NeoHookean(law) => law.set(index, value),
+            InvariantLaw::MooneyRivlin(law) => law.set(index, value),
             InvariantLaw::Yeoh(law) => law.set(index, value),
             InvariantLaw::Gent(law) => law.set(index, value),
             InvariantLaw::ArrudaBoyce(law) => law.set(index, value),
         }
     }
 
-    /// W (kPa) at x = Ī₁ − 3.
+    /// W (kPa) at x = Ī₁ − 3, without what the second invariant adds.
     pub fn energy_density(&self, x: f64) -> f64 {
         self.energy().energy_density(x)
+    }
+
+    /// μ (kPa) of the Ogden term that c (Ī₂ − 3) is, with [`SECOND_EXPONENT`]; `None` where the law never holds it.
+    pub fn second_mu_kpa(&self) -> Option<f64> {
+        self.energy().second_kpa().map(|c| SECOND_EXPONENT * c)
+    }
+
+    /// The derivative of that by a parameter.
+    pub fn second_mu_derivative(&self, parameter: LawParameter) -> f64 {
+        self.index_of(parameter).map_or(0.0, |index| SECOND_EXPONENT * self.energy().second_derivative(index))
     }
 
     /// The x that no state reaches.
@@ -370,6 +173,8 @@ impl InvariantLaw {
     #[inline(always)]
     pub fn slopes(&self, x: Lanes) -> [Lanes; 2] {
         match self {
+            InvariantLaw::NeoHookean(law) => law.slopes(x),
+            InvariantLaw::MooneyRivlin(law) => law.slopes(x),
             InvariantLaw::Yeoh(law) => law.slopes(x),
             InvariantLaw::Gent(law) => law.slopes(x),
             InvariantLaw::ArrudaBoyce(law) => law.slopes(x),
@@ -386,15 +191,17 @@ impl InvariantLaw {
     pub fn slope_derivative(&self, parameter: LawParameter, x: Lanes) -> Lanes {
         let Some(index) = self.index_of(parameter) else { return Lanes::ZERO };
         match self {
+            InvariantLaw::NeoHookean(law) => law.slope_derivative(index, x),
+            InvariantLaw::MooneyRivlin(law) => law.slope_derivative(index, x),
             InvariantLaw::Yeoh(law) => law.slope_derivative(index, x),
             InvariantLaw::Gent(law) => law.slope_derivative(index, x),
             InvariantLaw::ArrudaBoyce(law) => law.slope_derivative(index, x),
         }
     }
 
-    /// The initial shear modulus 2 W′(0), kPa.
+    /// The initial shear modulus 2 W′(0), kPa, and ½ μα of the second term.
     pub fn initial_shear_modulus_kpa(&self) -> f64 {
-        2.0 * self.slopes_at(0.0)[0]
+        2.0 * self.slopes_at(0.0)[0] + 0.5 * SECOND_EXPONENT * self.second_mu_kpa().unwrap_or(0.0)
     }
 }
 

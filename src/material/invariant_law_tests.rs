@@ -1,12 +1,17 @@
 use super::*;
-use crate::material::{Material, OgdenTerm, energy_density, first_piola_kirchhoff_stress, least_relative_stiffness};
+use crate::material::{
+    Material, OgdenTerm, Parameter, energy_density, first_piola_kirchhoff_stress, least_relative_stiffness,
+    material_tangent, smallest_relative_stiffness, smallest_relative_stiffness_of_law, stress_parameter_derivative,
+};
 
-/// One of each law, stiffening within the states of the tests.
-pub(crate) fn laws() -> [InvariantLaw; 3] {
+/// One of each law. Those that can stiffen do so within the states of the tests.
+pub(crate) fn laws() -> [InvariantLaw; 5] {
     [
         InvariantLaw::Yeoh(Yeoh { coefficients_kpa: [8.0, -0.3, 0.05] }),
         InvariantLaw::Gent(Gent { mu_kpa: 16.0, limit: 9.0 }),
         InvariantLaw::ArrudaBoyce(ArrudaBoyce { mu_kpa: 15.0, locking_stretch: 1.8 }),
+        InvariantLaw::NeoHookean(NeoHookean { mu_kpa: 16.0 }),
+        InvariantLaw::MooneyRivlin(MooneyRivlin { coefficients_kpa: [6.0, 2.0] }),
     ]
 }
 
@@ -57,6 +62,8 @@ fn limits_are_neo_hookean() {
     let f = [[1.3, 0.4, 0.0], [0.0, 0.9, 0.1], [0.0, -0.2, 1.0]];
     let wanted = first_piola_kirchhoff_stress(&ogden, &f);
     let almost = [
+        (InvariantLaw::NeoHookean(NeoHookean { mu_kpa: 16.0 }), 1e-13),
+        (InvariantLaw::MooneyRivlin(MooneyRivlin { coefficients_kpa: [8.0, 0.0] }), 1e-13),
         (InvariantLaw::Yeoh(Yeoh { coefficients_kpa: [8.0, 0.0, 0.0] }), 1e-13),
         (InvariantLaw::Gent(Gent { mu_kpa: 16.0, limit: 1e6 }), 1e-6),
         (InvariantLaw::ArrudaBoyce(ArrudaBoyce { mu_kpa: 16.0, locking_stretch: 1e3 }), 1e-5),
@@ -67,6 +74,57 @@ fn limits_are_neo_hookean() {
         for (a, b) in found.iter().flatten().zip(wanted.iter().flatten()) {
             assert!((a - b).abs() < tolerance * 100.0, "{law:?}: {a} {b}");
         }
+    }
+}
+
+/// Mooney and Rivlin's law is two Ogden terms of exponents 2 and −2, in everything that follows from it: the same
+/// numbers but for rounding. So it is where c₂ is zero, whose derivative is not.
+#[test]
+fn mooney_rivlin_is_two_terms() {
+    let f = [[1.3, 0.4, 0.0], [0.0, 0.9, 0.1], [0.0, -0.2, 1.0]];
+    let traceless = [0.4, -0.1, -0.3];
+    for [c_1, c_2] in [[6.0, 2.0], [9.0, -1.5], [8.0, 0.0]] {
+        let law = InvariantLaw::MooneyRivlin(MooneyRivlin { coefficients_kpa: [c_1, c_2] });
+        let own = Material { bulk_kpa: 900.0, terms: vec![], law: Some(law) };
+        // A term of no modulus has derivatives, too.
+        let terms = [(2.0 * c_1, 2.0), (-2.0 * c_2, -2.0)].map(|(mu_kpa, alpha)| OgdenTerm { mu_kpa, alpha });
+        let ogden = Material { bulk_kpa: 900.0, terms: terms.to_vec(), law: None };
+        let near = |a: f64, b: f64, scale: f64| assert!((a - b).abs() < 1e-12 * scale, "{c_2}: {a} {b}");
+        near(energy_density(&own, [1.4, 0.8, 0.9]), energy_density(&ogden, [1.4, 0.8, 0.9]), 10.0);
+        near(own.initial_shear_modulus_kpa(), ogden.initial_shear_modulus_kpa(), 10.0);
+        let pairs = [(&own, &ogden)].map(|(a, b)| {
+            let stresses = [a, b].map(|m| first_piola_kirchhoff_stress(m, &f).as_flattened().to_vec());
+            let tangents = [a, b].map(|m| material_tangent(m, &f).as_flattened().to_vec());
+            [stresses, tangents]
+        });
+        for [a, b] in pairs.as_flattened() {
+            a.iter().zip(b).for_each(|(a, b)| near(*a, *b, 1e3));
+        }
+        for (parameter, term, rate) in [(0, 0, 2.0), (1, 1, -2.0)] {
+            if c_2 == 0.0 && term == 1 {
+                // Ogden's derivative by μ divides by μ.
+                continue;
+            }
+            let law_parameter = Parameter::Law(LawParameter::Coefficient(parameter));
+            let a = stress_parameter_derivative(&own, law_parameter, &f);
+            let b = stress_parameter_derivative(&ogden, Parameter::Mu(term), &f);
+            a.iter().flatten().zip(b.iter().flatten()).for_each(|(a, b)| near(*a, rate * b, 10.0));
+        }
+        let terms = ogden.shear_terms();
+        let stiffnesses =
+            [smallest_relative_stiffness_of_law(&law, traceless), smallest_relative_stiffness(&terms, traceless)];
+        near(stiffnesses[0], stiffnesses[1], 10.0);
+    }
+    // By the second coefficient where it is zero: a difference of first order in it is exact.
+    let at = |c_2: f64| Material {
+        bulk_kpa: 900.0,
+        terms: vec![],
+        law: Some(InvariantLaw::MooneyRivlin(MooneyRivlin { coefficients_kpa: [8.0, c_2] })),
+    };
+    let derivative = stress_parameter_derivative(&at(0.0), Parameter::Law(LawParameter::Coefficient(1)), &f);
+    let [low, high] = [at(0.0), at(1.0)].map(|m| first_piola_kirchhoff_stress(&m, &f));
+    for (d, (a, b)) in derivative.iter().flatten().zip(low.iter().flatten().zip(high.iter().flatten())) {
+        assert!((b - a - d).abs() < 1e-11, "{d} {}", b - a);
     }
 }
 

@@ -14,8 +14,13 @@ pub const YEOH_SCHEMA: &str = "yeoh/1";
 pub const GENT_SCHEMA: &str = "gent/1";
 /// The schema of Arruda and Boyce's material.
 pub const ARRUDA_BOYCE_SCHEMA: &str = "arruda_boyce/1";
+/// The schema of the neo-Hookean material.
+pub const NEO_HOOKEAN_SCHEMA: &str = "neo_hookean/1";
+/// The schema of Mooney and Rivlin's material.
+pub const MOONEY_RIVLIN_SCHEMA: &str = "mooney_rivlin/1";
 /// All schemas of materials.
-pub(super) const SCHEMAS: [&str; 4] = [SCHEMA, YEOH_SCHEMA, GENT_SCHEMA, ARRUDA_BOYCE_SCHEMA];
+pub(super) const SCHEMAS: [&str; 6] =
+    [SCHEMA, NEO_HOOKEAN_SCHEMA, MOONEY_RIVLIN_SCHEMA, YEOH_SCHEMA, GENT_SCHEMA, ARRUDA_BOYCE_SCHEMA];
 /// Smallest J_m of Gent's law: below it the chains are at their end at a stretch of 1.06.
 pub const MIN_CHAIN_LIMIT: f64 = 1e-2;
 /// Largest J_m. Beyond it the law cannot be told from the neo-Hookean one.

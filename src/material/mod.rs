@@ -2,6 +2,7 @@
 
 mod error;
 mod file;
+mod invariant_energy;
 mod invariant_law;
 mod lanes;
 mod limits;
@@ -13,9 +14,10 @@ mod shear_term;
 mod stability;
 
 pub use error::MaterialError;
+pub use invariant_energy::{ArrudaBoyce, FirstInvariantEnergy, Gent, LawParameter, MooneyRivlin, NeoHookean, Yeoh};
 #[cfg(test)]
 pub(crate) use invariant_law::laws;
-pub use invariant_law::{ArrudaBoyce, FirstInvariantEnergy, Gent, InvariantLaw, LawKind, LawParameter, Yeoh};
+pub use invariant_law::{InvariantLaw, LawKind, SECOND_EXPONENT};
 pub use lanes::{LANES, Lanes};
 pub use limits::{
     ARRUDA_BOYCE_SCHEMA, GENT_SCHEMA, MAX_ALPHA, MAX_CHAIN_LIMIT, MAX_LOCKING_STRETCH, MAX_MODULUS_KPA, MIN_ALPHA,
@@ -145,6 +147,13 @@ impl Material {
     /// Its law as it is called: `Ogden`, or the name of its law in the first invariant.
     pub fn law_name(&self) -> &'static str {
         self.law.map_or("Ogden", |law| law.kind().name())
+    }
+
+    /// The terms, and the one that a law has of the second invariant.
+    pub(crate) fn all_terms(&self) -> impl Iterator<Item = OgdenTerm> {
+        let of_law = self.law.and_then(|law| law.second_mu_kpa());
+        let of_law = of_law.map(|mu_kpa| OgdenTerm { mu_kpa, alpha: SECOND_EXPONENT });
+        self.terms.iter().copied().chain(of_law)
     }
 
     /// κ, μ₁, α₁, μ₂, α₂, …, then those of the law.

@@ -9,11 +9,12 @@
 //! * shear: Â_abab = s_b + λ_a² g, Â_abba = λ_a λ_b g, with s_a = τ_a/λ_a², g = (s_a − s_b)/(λ_a² − λ_b²).
 //!
 //! A law W(Ī₁ − 3) adds what a term of exponent 2 and modulus 2 W′ would, and 4 W″ d_a d_b to ∂τ_a/∂ln λ_b with
-//! d_a = λ̄_a² − mean λ̄².
+//! d_a = λ̄_a² − mean λ̄². What it has of the second invariant is a term of exponent −2.
 //!
 //! For nearly equal stretches g is written as λ_b⁻⁴ [Σ_p e_bp R(α_p/2 − 1, d) − m R(−1, d)] with d = x_a − x_b and
 //! R(c, d) = expm1(c d)/expm1(d) → c, expanded about d = 0: exact in the limit, no perturbation of eigenvalues.
 
+use super::invariant_law::SECOND_EXPONENT;
 use super::lanes::Lanes;
 use super::{Material, Parameter};
 
@@ -54,6 +55,17 @@ struct LawState {
     mean_power: Lanes,
     /// 4 W″.
     stiffening: Lanes,
+    /// Of the second invariant.
+    second: Option<SecondState>,
+}
+
+/// What a term of exponent −2 adds to the state of a law.
+struct SecondState {
+    /// λ̄_a⁻² less their mean.
+    deviator: [Lanes; 3],
+    /// e_a and their mean.
+    power: [Lanes; 3],
+    mean_power: Lanes,
 }
 
 /// The exponent of the term that a law in the first invariant acts like.
@@ -116,7 +128,23 @@ impl SpectralState {
             for (tau, d) in state.tau.iter_mut().zip(deviator) {
                 *tau += d * slope * 2.0;
             }
-            state.law = Some(LawState { x, deviator, power, mean_power: mean * slope * 2.0, stiffening: second * 4.0 });
+            let of_second = law.second_mu_kpa().map(|mu_kpa| {
+                let inverse = squared.map(|s| Lanes::splat(1.0) / s);
+                let mean = (inverse[0] + inverse[1] + inverse[2]) * (1.0 / 3.0);
+                let deviator = inverse.map(|s| s - mean);
+                for (tau, d) in state.tau.iter_mut().zip(deviator) {
+                    *tau += d * mu_kpa;
+                }
+                SecondState { deviator, power: inverse.map(|s| s * mu_kpa), mean_power: mean * mu_kpa }
+            });
+            state.law = Some(LawState {
+                x,
+                deviator,
+                power,
+                mean_power: mean * slope * 2.0,
+                stiffening: second * 4.0,
+                second: of_second,
+            });
         }
         state
     }
@@ -134,13 +162,19 @@ impl SpectralState {
         self
     }
 
-    /// α_p, e_ap and m_p of all terms, and of the term that a law acts like.
+    /// α_p, e_ap and m_p of all terms, and of the terms that a law acts like.
     #[inline(always)]
     fn powers<'a>(&'a self, material: &'a Material) -> impl Iterator<Item = (f64, &'a [Lanes; 3], Lanes)> {
         let of_terms = material.terms.iter().take(MAX_TERMS).enumerate();
         of_terms
             .map(|(p, term)| (term.alpha, &self.power[p], self.mean_power[p]))
             .chain(self.law.iter().map(|law| (LAW_EXPONENT, &law.power, law.mean_power)))
+            .chain(
+                self.law
+                    .iter()
+                    .filter_map(|law| law.second.as_ref())
+                    .map(|second| (SECOND_EXPONENT, &second.power, second.mean_power)),
+            )
     }
 
     /// P (kPa) with the pressure-like stress `pressure` (kPa).
@@ -173,6 +207,12 @@ impl SpectralState {
                 if let (Some(law), Some(state)) = (&material.law, &self.law) {
                     let rate = law.slope_derivative(parameter, state.x) * 2.0;
                     d = state.deviator.map(|x| x * rate);
+                    if let Some(second) = &state.second {
+                        let rate = law.second_mu_derivative(parameter);
+                        for (d, x) in d.iter_mut().zip(second.deviator) {
+                            *d += x * rate;
+                        }
+                    }
                 }
             }
         }

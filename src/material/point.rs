@@ -21,7 +21,7 @@ fn first(t: &Tensor) -> [[f64; 3]; 3] {
 pub fn energy_density(material: &Material, principal_stretches: [f64; 3]) -> f64 {
     let ln_j: f64 = principal_stretches.iter().map(|l| l.ln()).sum();
     let mut energy = 0.5 * material.bulk_kpa * ln_j * ln_j;
-    for term in &material.terms {
+    for term in material.all_terms() {
         for l in principal_stretches {
             // expm1 keeps the digits of small strains.
             energy += term.mu_kpa / term.alpha * (term.alpha * (l.ln() - ln_j / 3.0)).exp_m1();

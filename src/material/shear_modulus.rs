@@ -1,5 +1,6 @@
 //! The initial shear modulus ½ Σ μᵢαᵢ: the shear stiffness at rest, by which fits are compared.
 
+use super::invariant_law::SECOND_EXPONENT;
 use super::{Lanes, Material, Parameter, ShearTerm};
 
 /// ½ Σ cᵢ of terms with products cᵢ = μᵢαᵢ, kPa.
@@ -29,7 +30,9 @@ impl Material {
             Parameter::Kappa => 0.0,
             Parameter::Mu(i) => 0.5 * self.terms[i].alpha,
             Parameter::Alpha(i) => 0.5 * self.terms[i].mu_kpa,
-            Parameter::Law(p) => self.law.map_or(0.0, |law| 2.0 * law.slope_derivative(p, Lanes::ZERO).0[0]),
+            Parameter::Law(p) => self.law.map_or(0.0, |law| {
+                2.0 * law.slope_derivative(p, Lanes::ZERO).0[0] + 0.5 * SECOND_EXPONENT * law.second_mu_derivative(p)
+            }),
         };
         self.parameters().iter().map(derivative).collect()
     }

@@ -20,7 +20,7 @@
 //! Fits to curves look at both parts ([`smallest_relative_stiffness`]), calibrations at the first alone
 //! ([`least_relative_stiffness`]). The first check is the stricter one; each keeps what it has accepted so far.
 
-use super::invariant_law::InvariantLaw;
+use super::invariant_law::{InvariantLaw, SECOND_EXPONENT};
 use super::point::first_invariant_less_3;
 use super::{Lanes, Material, OgdenTerm, ShearTerm, SpectralState, initial_shear_modulus_kpa, power_difference};
 
@@ -81,14 +81,17 @@ pub fn smallest_relative_stiffness(terms: &[ShearTerm], log_stretches: [f64; 3])
 }
 
 /// The same as [`smallest_relative_stiffness`] of a law in the first invariant. It acts like an Ogden term of exponent
-/// 2 with c = 4 W′ where the principal axes turn. Minus infinity beyond the states that the law allows.
+/// 2 with c = 4 W′ where the principal axes turn, and its second invariant is one. Minus infinity beyond the states
+/// that the law allows.
 pub fn smallest_relative_stiffness_of_law(law: &InvariantLaw, log_stretches: [f64; 3]) -> f64 {
     let keeping = smallest_stiffness_of_law_kpa(law, log_stretches);
     if !keeping.is_finite() {
         return f64::NEG_INFINITY;
     }
     let modulus_kpa = 4.0 * law.slopes_at(first_invariant_less_3(log_stretches))[0];
-    let turning = turning_stiffness_kpa(&[ShearTerm { modulus_kpa, alpha: 2.0 }], log_stretches);
+    let mut terms = vec![ShearTerm { modulus_kpa, alpha: 2.0 }];
+    terms.extend(second_term(law));
+    let turning = turning_stiffness_kpa(&terms, log_stretches);
     keeping.min(turning) / law.initial_shear_modulus_kpa()
 }
 
@@ -121,8 +124,14 @@ pub fn least_relative_stiffness(material: &Material, visited: &[[f64; 3]]) -> f6
         .fold(1.0, f64::min)
 }
 
+/// The term that a law has of the second invariant.
+fn second_term(law: &InvariantLaw) -> Option<ShearTerm> {
+    law.second_mu_kpa().map(|mu_kpa| ShearTerm { modulus_kpa: SECOND_EXPONENT * mu_kpa, alpha: SECOND_EXPONENT })
+}
+
 /// The same as [`smallest_principal_stiffness_kpa`] of a law in the first invariant: with y = λ̄² the stress power is
-/// Σⱼ 4 W′ yⱼ (dēⱼ)² + 4 W″ (Σⱼ yⱼ dēⱼ)². Minus infinity beyond the states that the law allows.
+/// Σⱼ 4 W′ yⱼ (dēⱼ)² + 4 W″ (Σⱼ yⱼ dēⱼ)², and Σⱼ c/yⱼ (dēⱼ)² more of a second term with c = μα. Minus infinity beyond
+/// the states that the law allows.
 fn smallest_stiffness_of_law_kpa(law: &InvariantLaw, log_stretches: [f64; 3]) -> f64 {
     let x = first_invariant_less_3(log_stretches);
     if x >= law.largest_x() {
@@ -134,8 +143,9 @@ fn smallest_stiffness_of_law_kpa(law: &InvariantLaw, log_stretches: [f64; 3]) ->
     let basis = [[1.0, -1.0, 0.0].map(|b| b / 2f64.sqrt()), [1.0, 1.0, -2.0].map(|b| b / 6f64.sqrt())];
     let along = basis.map(|b| (0..3).map(|j| b[j] * y[j]).sum::<f64>());
     let form = |m: usize, n: usize| {
-        let own: f64 = (0..3).map(|j| basis[m][j] * basis[n][j] * y[j]).sum();
-        4.0 * (slope * own + second * along[m] * along[n])
+        let weighed = |weights: [f64; 3]| (0..3).map(|j| basis[m][j] * basis[n][j] * weights[j]).sum::<f64>();
+        let of_second = second_term(law).map_or(0.0, |t| t.modulus_kpa * weighed(y.map(|y| 1.0 / y)));
+        4.0 * (slope * weighed(y) + second * along[m] * along[n]) + of_second
     };
     let (a, b, c) = (form(0, 0), form(0, 1), form(1, 1));
     0.5 * (a + c) - (0.25 * (a - c).powi(2) + b * b).sqrt()

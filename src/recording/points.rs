@@ -35,7 +35,8 @@ pub struct DisplacementPoint {
 }
 
 /// Reads a table with a header, whose cells are parted by commas, or by semicolons or tabs, where numbers may have
-/// decimal commas. The order of columns is free. A name may carry a unit (`x_mm`, `U [um]`); other numbers have the
+/// decimal commas. Lines before the header are skipped, and so are columns of another name. The order of columns is
+/// free. A name may carry a unit (`x_mm`, `U [um]`); other numbers have the
 /// file's, `unit_mm`. The displacements may be called `u`, `v`, `w`. Of points on a `surface`, the position along its
 /// normal may be left out, and the displacement along it where it is not measured.
 ///
@@ -49,26 +50,19 @@ pub fn read_points(
     memory: &ReadingMemory,
 ) -> Result<Vec<DisplacementPoint>, ImportError> {
     let fail = |line: usize, message: String| ImportError::Table { path: path.into(), line, message };
-    let mut lines = text.lines().enumerate();
-    let header = lines.next().map_or("", |(_, l)| l.trim().trim_start_matches('\u{feff}'));
-    let separator = [';', '\t'].into_iter().find(|s| header.contains(*s)).unwrap_or(',');
-    if header.split(separator).nth(MAX_COLUMNS).is_some() {
-        return Err(fail(1, format!("more than {MAX_COLUMNS} columns; x,y,z,ux,uy,uz,w,sd are known")));
-    }
-    let (names, units_mm) = names_and_units(header.split(separator));
-    let column = |name: &str| names.iter().position(|n| n == name);
     let needed = needed_columns(surface);
-    let mut columns = [None; 6];
-    for ((slot, name), is_needed) in columns.iter_mut().zip(COLUMNS).zip(needed) {
-        *slot = column(name);
-        if slot.is_none() && is_needed {
-            let needed: Vec<&str> = COLUMNS.into_iter().zip(needed).filter(|(_, n)| *n).map(|(name, _)| name).collect();
-            return Err(fail(1, format!("there is no column {name}; {} are needed", needed.join(","))));
-        }
+    let Some(header) = header_of(text, needed) else {
+        let (line, missing) = missing_column(text, needed);
+        let all: Vec<&str> = COLUMNS.into_iter().zip(needed).filter(|(_, n)| *n).map(|(name, _)| name).collect();
+        return Err(fail(line, format!("there is no column {missing}; {} are needed", all.join(","))));
+    };
+    let Header { line, separator, names, units_mm } = header;
+    if names.len() > MAX_COLUMNS {
+        return Err(fail(line, format!("more than {MAX_COLUMNS} columns")));
     }
-    if let Some(unknown) = names.iter().find(|n| !["x", "y", "z", "ux", "uy", "uz", "w", "sd"].contains(&n.as_str())) {
-        return Err(fail(1, format!("column '{unknown}' is not one of x,y,z,ux,uy,uz,w,sd")));
-    }
+    let lines = text.lines().enumerate().skip(line);
+    let column = |name: &str| names.iter().position(|n| n == name);
+    let columns = COLUMNS.map(column);
     let (weight, sd) = (column("w"), column("sd"));
     let mut points = Vec::new();
     for (n, line) in lines {
@@ -107,6 +101,44 @@ pub fn read_points(
         return Err(fail(1, "there is no point".into()));
     }
     Ok(points)
+}
+
+/// The line of a table that names its columns.
+struct Header {
+    /// Its number, from 1.
+    line: usize,
+    separator: char,
+    names: Vec<String>,
+    units_mm: Vec<Option<f64>>,
+}
+
+/// Lines among which the header is looked for: those before it say how the table was made.
+const MOST_LINES_BEFORE: usize = 200;
+
+fn lines_with_names(text: &str) -> impl Iterator<Item = Header> {
+    text.lines().take(MOST_LINES_BEFORE).enumerate().map(|(n, line)| {
+        let cells = line.trim().trim_start_matches('\u{feff}');
+        let separator = [';', '\t'].into_iter().find(|s| cells.contains(*s)).unwrap_or(',');
+        let (names, units_mm) = names_and_units(cells.split(separator).take(MAX_COLUMNS + 1));
+        Header { line: n + 1, separator, names, units_mm }
+    })
+}
+
+/// The first line that names all columns that are needed.
+fn header_of(text: &str, needed: [bool; 6]) -> Option<Header> {
+    lines_with_names(text).find(|header| missing_in(header, needed).is_none())
+}
+
+fn missing_in(header: &Header, needed: [bool; 6]) -> Option<&'static str> {
+    let has = |name: &str| header.names.iter().any(|n| n == name);
+    COLUMNS.into_iter().zip(needed).find(|(name, is_needed)| *is_needed && !has(name)).map(|(name, _)| name)
+}
+
+/// The line that comes nearest to a header, and the first column that it lacks.
+fn missing_column(text: &str, needed: [bool; 6]) -> (usize, &'static str) {
+    let known = |header: &Header| header.names.iter().filter(|n| COLUMNS.contains(&n.as_str())).count();
+    let nearest = lines_with_names(text).reduce(|best, next| if known(&next) > known(&best) { next } else { best });
+    nearest.map_or((1, COLUMNS[0]), |header| (header.line, missing_in(&header, needed).unwrap_or(COLUMNS[0])))
 }
 
 /// Names of columns in lower case, and the units that they end in, mm.

@@ -4,7 +4,7 @@ use super::axis::Axis;
 use super::color::{AXIS, EMPTY, GRID, MUTED, of_series};
 use super::number::significant;
 use super::svg::{NORMAL, SMALL, Svg, TITLE, TextStyle};
-use super::text::{shortened, text_width};
+use super::text::{on_two_lines, shortened, text_width};
 
 /// The values of one parameter.
 #[derive(Clone, Debug, Default)]
@@ -37,6 +37,8 @@ pub struct GroupedBars {
 const PLOT: f64 = 440.0;
 const BAR: f64 = 15.0;
 const BETWEEN: f64 = 14.0;
+/// From one line of a label to the next.
+const LINE: f64 = 13.0;
 
 impl GroupedBars {
     /// The picture.
@@ -70,8 +72,11 @@ impl GroupedBars {
         for (g, group) in self.groups.iter().enumerate() {
             let y = top + g as f64 * group_height + 0.5 * BETWEEN;
             let middle = y + 0.5 * num_series as f64 * BAR;
-            let label = shortened(&group.label, NORMAL, left - 14.0);
-            svg.text([left - 12.0, middle + 0.35 * NORMAL], &label, &TextStyle::new(NORMAL).end());
+            let lines = on_two_lines(&group.label, NORMAL, left - 14.0);
+            for (n, line) in lines.iter().enumerate() {
+                let below = (n as f64 - 0.5 * (lines.len() - 1) as f64) * LINE;
+                svg.text([left - 12.0, middle + below + 0.35 * NORMAL], line, &TextStyle::new(NORMAL).end());
+            }
             for s in 0..num_series {
                 let value = group.values.get(s).copied().unwrap_or(f64::NAN);
                 self.draw_value(&mut svg, value, of_series(&self.series[s], s), [left, y + s as f64 * BAR], &at);

@@ -1,5 +1,6 @@
 //! The page of a calibration: what was found, how sure, and where model and data differ.
 
+use super::calibration_curves::{force_picture, stress_picture};
 use super::{
     CalloutKind, ColorMap, Column, ContourPanel, ContourPlot, CorrelationPlot, Line, LinePlot, Report, ReportHeader,
     Table, VoxelField, VoxelMaps, residual_histogram, significant, symbol_of_parameter,
@@ -48,6 +49,18 @@ pub fn calibration_report(
     for note in &result.notes {
         report.callout(CalloutKind::Caution, "Note", note);
     }
+    let stress = stress_picture(found);
+    let mut of_material = vec![(
+        stress.clone(),
+        "Nominal stress of the estimate in homogeneous tests, up to the stretch that 99 of 100 voxels stay below. Bands: what the \
+         noise leaves uncertain, 95 %.",
+    )];
+    pictures.push(("stress-stretch".to_string(), stress));
+    if let Some(force) = force_picture(found, observed, &result.recordings) {
+        of_material.push((force.clone(), "Forces of all samples together, and data − model."));
+        pictures.push(("force-drive".to_string(), force));
+    }
+    report.figures(&of_material);
     report.section("Number of terms");
     report.table(&terms(result));
     let s = &result.term_selection;
@@ -108,6 +121,7 @@ pub fn calibration_report(
                         .map(|(v, d)| [100.0 * (v / middle - 1.0), *d])
                         .collect(),
                     has_marks: true,
+                    ..Line::default()
                 }
             })
             .collect();
@@ -279,6 +293,7 @@ fn convergence(found: &Calibration) -> LinePlot {
             name: String::new(),
             points: found.fit.history.iter().enumerate().map(|(n, v)| [n as f64, v - last]).collect(),
             has_marks: true,
+            ..Line::default()
         }],
     }
 }

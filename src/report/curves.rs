@@ -4,7 +4,7 @@ use super::axis::Axis;
 use super::color::{AXIS, SERIES};
 use super::frame::Frame;
 use super::svg::{SMALL, Svg, TITLE, TextStyle};
-use super::text::shortened;
+use super::text::{shortened, text_width};
 
 /// What a measured point is drawn as.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -56,8 +56,10 @@ pub struct CurvesPlot {
     pub series: Vec<CurveSeries>,
 }
 
-const AREA: [f64; 4] = [68.0, 40.0, 520.0, 280.0];
-const BELOW: [f64; 4] = [68.0, 340.0, 520.0, 110.0];
+const AREA: [f64; 4] = [96.0, 40.0, 520.0, 280.0];
+const BELOW: [f64; 4] = [96.0, 340.0, 520.0, 110.0];
+/// Ticks of the residuals.
+const TICKS_BELOW: usize = 3;
 /// Most marks drawn per curve; longer recordings are thinned evenly.
 const MAX_MARKS: usize = 120;
 
@@ -78,7 +80,7 @@ impl CurvesPlot {
         svg.text([AREA[0], 18.0], &shortened(&self.title, TITLE, 600.0), &TextStyle::title());
         frame.draw_grid(&mut svg, 6, 6);
         if let Some(below) = &below {
-            below.draw_grid(&mut svg, 6, 3);
+            below.draw_grid(&mut svg, 6, TICKS_BELOW);
             let zero = below.at([horizontal.low, 0.0])[1];
             if zero > BELOW[1] && zero < BELOW[1] + BELOW[3] {
                 svg.line([BELOW[0], zero], [BELOW[0] + BELOW[2], zero], AXIS, 1.0, "");
@@ -112,11 +114,16 @@ impl CurvesPlot {
             let name = shortened(&format!("{}{suffix}", series.name), SMALL, 150.0);
             svg.text([x + 9.0, y], &name, &TextStyle::new(SMALL));
         }
-        let label_offset = 50.0;
+        // Beside the longest number at a tick.
+        let widest = |axis: &Axis, num_ticks: usize| {
+            axis.ticks(num_ticks).iter().map(|tick| text_width(&tick.label, SMALL)).fold(0.0, f64::max)
+        };
+        let of_below = below.as_ref().map_or(0.0, |below| widest(&below.vertical, TICKS_BELOW));
+        let label_offset = (widest(&vertical, 6).max(of_below) + 18.0).clamp(50.0, AREA[0] - 12.0);
         frame.draw_left(&mut svg, &self.y_label, 6, label_offset);
         frame.draw_bottom(&mut svg, if below.is_some() { "" } else { &self.x_label }, 6);
         if let Some(below) = &below {
-            below.draw_left(&mut svg, "data − model", 3, label_offset);
+            below.draw_left(&mut svg, "data − model", TICKS_BELOW, label_offset);
             below.draw_bottom(&mut svg, &self.x_label, 6);
         }
         svg.finish(&self.title)

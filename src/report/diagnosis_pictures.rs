@@ -10,7 +10,6 @@ use crate::homogeneous::HomogeneousTest;
 
 /// Most suspects in the picture of the evidence, and most letters of each label.
 const MAX_SUSPECTS: usize = 12;
-const MAX_LETTERS: usize = 34;
 
 /// The pictures of a diagnosis as SVG.
 pub(super) struct DiagnosisPictures {
@@ -89,7 +88,7 @@ fn law_plot(curves: &[LawCurve]) -> Option<String> {
         [("", 2), (", terms alone", 1)].map(|(which, column)| Line {
             name: format!("{test}{which}"),
             points: curve.points.iter().map(|p| [p[0], p[column]]).collect(),
-            has_marks: false,
+            ..Line::default()
         })
     };
     let plot = LinePlot {
@@ -139,10 +138,7 @@ fn evidence_bars(d: &Diagnosis) -> String {
         .iter()
         .filter(|r| r.round == 1)
         .take(MAX_SUSPECTS)
-        .map(|r| BarGroup {
-            label: r.description.chars().take(MAX_LETTERS).collect(),
-            values: vec![r.score, r.fitted.unwrap_or(f64::NAN)],
-        })
+        .map(|r| BarGroup { label: r.description.clone(), values: vec![r.score, r.fitted.unwrap_or(f64::NAN)] })
         .collect();
     GroupedBars {
         title: "Causes by what they would explain".into(),

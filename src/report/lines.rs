@@ -15,6 +15,8 @@ pub struct Line {
     pub points: Vec<[f64; 2]>,
     /// Mark the points.
     pub has_marks: bool,
+    /// Low and high end of what is uncertain at each point, drawn as a band; nothing where there are fewer than points.
+    pub band: Vec<[f64; 2]>,
 }
 
 /// Curves with shared axes.
@@ -41,7 +43,8 @@ impl LinePlot {
         let points = || self.lines.iter().flat_map(|l| &l.points).filter(usable);
         let horizontal = Axis::covering(points().map(|p| p[0]), false, 0.02);
         let zero = (!self.is_log && points().all(|p| p[1] >= 0.0)).then_some(0.0);
-        let vertical = Axis::covering(points().map(|p| p[1]).chain(zero), self.is_log, 0.04);
+        let bands = self.lines.iter().flat_map(|l| l.band.iter().flatten().copied());
+        let vertical = Axis::covering(points().map(|p| p[1]).chain(zero).chain(bands), self.is_log, 0.04);
         let (Some(horizontal), Some(vertical)) = (horizontal, vertical) else {
             return Svg::placeholder(&self.title, "no values to show");
         };
@@ -56,6 +59,15 @@ impl LinePlot {
         for (n, line) in self.lines.iter().enumerate() {
             let color = SERIES[(n + 1) % SERIES.len()];
             let at: Vec<[f64; 2]> = line.points.iter().filter(usable).map(|p| frame.at(*p)).collect();
+            if line.band.len() == line.points.len() && !self.is_log {
+                let edge = |end: usize| line.points.iter().zip(&line.band).map(move |(p, band)| [p[0], band[end]]);
+                let around: Vec<[f64; 2]> = edge(0).chain(edge(1).rev()).map(|p| frame.at(p)).collect();
+                if around.iter().flatten().all(|v| v.is_finite()) {
+                    svg.open_translucent(0.2);
+                    svg.polygon(&around, color, "none", 0.0);
+                    svg.close_group();
+                }
+            }
             svg.polyline(&at, color, 1.5);
             if line.has_marks {
                 at.iter().for_each(|p| svg.circle(*p, 3.0, color, "#ffffff", 0.8));
@@ -93,7 +105,7 @@ pub fn residual_histogram(title: &str, series: &[(String, Vec<f64>)]) -> LinePlo
                 let left = -END + b as f64 * width;
                 points.extend([[left, density], [left + width, density]]);
             }
-            Line { name: name.clone(), points, has_marks: false }
+            Line { name: name.clone(), points, ..Line::default() }
         })
         .collect();
     let normal = (0..=120)
@@ -102,7 +114,7 @@ pub fn residual_histogram(title: &str, series: &[(String, Vec<f64>)]) -> LinePlo
             [x, (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt()]
         })
         .collect();
-    lines.push(Line { name: "standard normal".into(), points: normal, has_marks: false });
+    lines.push(Line { name: "standard normal".into(), points: normal, ..Line::default() });
     LinePlot {
         title: title.into(),
         x_label: "(data − model) / noise".into(),

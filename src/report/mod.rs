@@ -28,6 +28,7 @@
 mod axis;
 mod bars;
 mod base64;
+mod calibration_curves;
 mod calibration_report;
 mod color;
 mod confusion;

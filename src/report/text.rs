@@ -9,7 +9,10 @@ const WIDTHS: [u16; 95] = [
     260, 334, 584,
 ];
 
-/// Estimated width of a text, px. The fallback fonts are up to a sixth wider than Helvetica; the estimate leaves room.
+/// The fonts that stand in for Helvetica are up to a sixth wider.
+const WIDEST_FONT: f64 = 7.0 / 6.0;
+
+/// Estimated width of a text, px, in the widest of the fonts that it may be shown in.
 pub(super) fn text_width(text: &str, size: f64) -> f64 {
     let units: f64 = text
         .chars()
@@ -18,7 +21,7 @@ pub(super) fn text_width(text: &str, size: f64) -> f64 {
             _ => 580.0,
         })
         .sum();
-    units / 1000.0 * size * 1.08
+    units / 1000.0 * size * WIDEST_FONT
 }
 
 /// `text` cut to a width, with an ellipsis where something is missing.
@@ -37,6 +40,18 @@ pub(super) fn shortened(text: &str, size: f64, width: f64) -> String {
     format!("{}…", out.trim_end())
 }
 
+/// `text` on one line, or on two of a width that are parted between words; the second is cut where it is too long.
+pub(super) fn on_two_lines(text: &str, size: f64, width: f64) -> Vec<String> {
+    if text_width(text, size) <= width {
+        return vec![text.to_string()];
+    }
+    let fits = |end: &usize| text_width(&text[..*end], size) <= width;
+    let Some(end) = text.match_indices(' ').map(|(at, _)| at).rfind(fits) else {
+        return vec![shortened(text, size, width)];
+    };
+    vec![text[..end].to_string(), shortened(text[end..].trim_start(), size, width)]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -46,5 +61,16 @@ mod tests {
         assert_eq!(shortened("short", 10.0, 100.0), "short");
         let cut = shortened("a rather long label for a bar", 10.0, 60.0);
         assert!(cut.ends_with('…') && text_width(&cut, 10.0) <= 62.0);
+    }
+
+    #[test]
+    fn longer_text_takes_two_lines() {
+        let text = "the encoding gradient is off by a factor along one axis";
+        assert_eq!(on_two_lines(text, 10.0, 1000.0), [text]);
+        let lines = on_two_lines(text, 10.0, 180.0);
+        assert_eq!(lines.join(" "), text);
+        assert!(lines.len() == 2 && lines.iter().all(|line| text_width(line, 10.0) <= 180.0));
+        assert!(on_two_lines(text, 10.0, 90.0)[1].ends_with('…'));
+        assert_eq!(on_two_lines("unbreakable-and-long", 10.0, 40.0).len(), 1);
     }
 }

@@ -146,7 +146,7 @@ fn materials(t: &TogetherResult, all: &[&DiagnosisResult], specimen: &Specimen) 
             })
             .collect()
     };
-    let line = |name: &str, material: &Material| Line { name: name.into(), points: curve(material), has_marks: false };
+    let line = |name: &str, material: &Material| Line { name: name.into(), points: curve(material), ..Line::default() };
     let mut lines: Vec<Line> = all.iter().map(|r| line(&r.recording, &r.material)).collect();
     lines.push(line("one for all", &t.material));
     LinePlot {

@@ -2,7 +2,7 @@
 
 use super::pointwise::{PointwiseSensitivity, alpha_sensitivity, law_sensitivity, mu_sensitivity};
 use crate::kinematics::Decomposition;
-use crate::material::{Lanes, Material, Parameter};
+use crate::material::{Lanes, Material, Parameter, SECOND_EXPONENT};
 use crate::voxel::VoxelMask;
 use serde::{Deserialize, Serialize};
 
@@ -72,8 +72,10 @@ pub fn parameter_sensitivity(
         Parameter::Alpha(i) => {
             alpha_sensitivity(stretch_amplitude, k, material.terms[i].mu_kpa, material.terms[i].alpha)
         }
-        Parameter::Law(own) => law_sensitivity(stretch_amplitude, k, &|x| {
-            material.law.map_or(0.0, |law| law.slope_derivative(own, Lanes::splat(x)).0[0])
+        Parameter::Law(own) => material.law.map_or_else(PointwiseSensitivity::default, |law| {
+            let first = law_sensitivity(stretch_amplitude, k, &|x| law.slope_derivative(own, Lanes::splat(x)).0[0]);
+            let second = law.second_mu_derivative(own) * mu_sensitivity(stretch_amplitude, k, SECOND_EXPONENT).value;
+            PointwiseSensitivity { value: first.value + second, ..first }
         }),
     }
 }

@@ -197,6 +197,8 @@ pub fn serve(options: &ServeOptions, on_ready: &dyn Fn(SocketAddr)) -> Result<()
     });
     let limits = options.limits;
     let slots_signal = signal.clone();
+    // A thread of the runtime cannot close a connection to PostgreSQL: the last hold on the storage is let go here.
+    let held_store = store.clone();
     let result = runtime.block_on(async move {
         let listener = tokio::net::TcpListener::from_std(listener).map_err(fail)?;
         if let Some(keep) = options.keep {
@@ -222,6 +224,7 @@ pub fn serve(options: &ServeOptions, on_ready: &dyn Fn(SocketAddr)) -> Result<()
     }
     drop(scratch);
     runtime.shutdown_timeout(Duration::from_secs(2));
+    drop(held_store);
     log::info("stopped", &serde_json::json!({}));
     result
 }

@@ -9,6 +9,7 @@ import os
 import shutil
 import signal
 import subprocess
+import sys
 import sysconfig
 import tempfile
 import threading
@@ -32,6 +33,7 @@ PathLike = Union[str, "os.PathLike[str]"]
 OnProgress = Callable[[str], None]
 
 VARIABLE = "LAMBDAK_PROGRAM"
+_FILE_NAME = "lambdak.exe" if sys.platform == "win32" else "lambdak"
 EXIT_STOPPED = 130
 _ERROR_OF_EXIT_CODE: Dict[int, Callable[[str], LambdakError]] = {
     3: NoSolutionError,
@@ -48,8 +50,8 @@ def program_path() -> Path:
         raise ProgramMissingError(f"{VARIABLE} is {named!r}, which is no program; set it to lambdak's path or unset it")
     places = _script_folders()
     for place in places:
-        if (place / "lambdak").is_file():
-            return place / "lambdak"
+        if (place / _FILE_NAME).is_file():
+            return place / _FILE_NAME
     on_path = shutil.which("lambdak")
     if on_path is not None:
         return Path(on_path)
@@ -200,6 +202,7 @@ def _run(arguments: Sequence[str], on_progress: Optional[OnProgress]) -> _Ended:
             encoding="utf-8",
             errors="replace",
             start_new_session=is_main,
+            creationflags=_new_group() if is_main else 0,
         )
     except OSError as error:
         raise ProgramMissingError(f"{arguments[0]} cannot be run: {error.strerror}") from None
@@ -226,15 +229,30 @@ def _run(arguments: Sequence[str], on_progress: Optional[OnProgress]) -> _Ended:
     return _Ended(process.returncode, "".join(output), lines, interrupt)
 
 
+def _new_group() -> int:
+    """What start_new_session is elsewhere; there it counts for nothing."""
+    if sys.platform == "win32":
+        return subprocess.CREATE_NEW_PROCESS_GROUP
+    return 0
+
+
+def _ask_to_stop(process: "subprocess.Popen[str]") -> None:
+    if sys.platform == "win32":
+        # A group of its own can be sent no other event.
+        process.send_signal(signal.CTRL_BREAK_EVENT)
+    else:
+        process.send_signal(signal.SIGINT)
+
+
 def _read_all(stream: IO[str], output: List[str]) -> None:
     output.append(stream.read())
 
 
 def _stop(process: "subprocess.Popen[str]", stderr: IO[str], lines: List[str]) -> None:
     """Asks the program to stop and waits. A second Ctrl-C makes it end at once, a third one kills it."""
-    for how in (signal.SIGINT, signal.SIGINT, signal.SIGKILL):
+    for send in (_ask_to_stop, _ask_to_stop, subprocess.Popen.kill):
         try:
-            process.send_signal(how)
+            send(process)
             lines += [line.strip() for line in stderr if line.strip()]
             process.wait()
             return

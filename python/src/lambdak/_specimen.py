@@ -297,6 +297,8 @@ class Term:
 
 
 _LAWS = {
+    "neo_hookean/1": ("mu_kpa",),
+    "mooney_rivlin/1": ("c_1_kpa", "c_2_kpa"),
     "yeoh/1": ("c_1_kpa", "c_2_kpa", "c_3_kpa"),
     "gent/1": ("mu_kpa", "j_m"),
     "arruda_boyce/1": ("mu_kpa", "lambda_m"),
@@ -305,7 +307,7 @@ _LAWS = {
 
 @dataclass(frozen=True)
 class Law:
-    """An energy in the first invariant alone: the schema of its file and its numbers by their names there."""
+    """An energy in the first invariant (and, of Mooney and Rivlin, in the second): the schema of its file and its numbers by their names there."""
 
     schema: str
     values: Dict[str, float]
@@ -316,7 +318,8 @@ class Material:
     """A hyperelastic material, Ψ = Σ μᵢ/αᵢ (Σλ̄^αᵢ − 3) + W(Ī₁ − 3) + κ/2 (ln J)², with κ (`bulk_kpa`) in kPa.
 
     `Material([(17.0, 1.91)], bulk_kpa=2173)` is Ogden's (`ogden/1`): terms are :class:`Term` or pairs of μ (kPa) and α.
-    `Material.yeoh`, `Material.gent` and `Material.arruda_boyce` have a :class:`Law` W in the place of terms.
+    `Material.neo_hookean`, `Material.mooney_rivlin`, `Material.yeoh`, `Material.gent` and `Material.arruda_boyce` have a
+    :class:`Law` W in the place of terms.
     """
 
     terms: Tuple[Term, ...]
@@ -334,6 +337,17 @@ class Material:
         object.__setattr__(self, "bulk_kpa", plain(bulk_kpa))
         object.__setattr__(self, "law", law)
         _check("material", self.to_dict())
+
+    @classmethod
+    def neo_hookean(cls, mu_kpa: float, *, bulk_kpa: float) -> "Material":
+        """W = ½ μ x, x = Ī₁ − 3 (`neo_hookean/1`)."""
+        return cls(bulk_kpa=bulk_kpa, law=Law("neo_hookean/1", {"mu_kpa": plain(mu_kpa)}))
+
+    @classmethod
+    def mooney_rivlin(cls, c_1_kpa: float, c_2_kpa: float, *, bulk_kpa: float) -> "Material":
+        """c₁ (Ī₁ − 3) + c₂ (Ī₂ − 3) (`mooney_rivlin/1`)."""
+        values = {"c_1_kpa": plain(c_1_kpa), "c_2_kpa": plain(c_2_kpa)}
+        return cls(bulk_kpa=bulk_kpa, law=Law("mooney_rivlin/1", values))
 
     @classmethod
     def yeoh(cls, c_kpa: Tuple[float, float, float], *, bulk_kpa: float) -> "Material":

@@ -41,6 +41,15 @@ pub(in crate::job) fn uniaxial(
         }
         text += &fit_table(family.chosen());
     }
+    if let [free, held] = families {
+        let (free, held) = (free.chosen(), held.chosen());
+        text += &format!(
+            "\nuse the fit of free terms ({}), which material.json holds; the one with a neo-Hookean term is for models that \
+             must have it: its misfit is {} times as large\n",
+            free.name(),
+            num(held.sum_of_squares / free.sum_of_squares, 3)
+        );
+    }
     if let Some(family) = families.first() {
         text += &law_table(laws, family.chosen());
     }
@@ -51,7 +60,7 @@ pub(in crate::job) fn uniaxial(
 fn sequence_table(sequence: &CurveFitSequence) -> String {
     let s = &sequence.selection;
     let mut text = String::from(
-        "  model               parameters  misfit      decrement        F      p(F)       BIC   shear modulus kPa (95 %)\n",
+        "  model               parameters  misfit        decrement        F      p(F)       BIC   shear modulus kPa (95 %)\n",
     );
     for (model, fit) in s.models.iter().zip(&sequence.fits) {
         let g = fit.initial_shear_modulus_kpa;
@@ -60,11 +69,11 @@ fn sequence_table(sequence: &CurveFitSequence) -> String {
         };
         let probability = model.f_probability.map_or_else(|| format!("{:>9}", "-"), |p| format!("{:>9}", num(p, 2)));
         text += &format!(
-            "  {:<20}{:>9}  {:<10}{} {} {} {:>9}   {} ({} to {})\n",
+            "  {:<20}{:>9}  {:<11}{} {} {} {:>9}   {} ({} to {})\n",
             model.name,
             model.num_parameters,
             num(model.sum_of_squares, 5),
-            optional(model.decrement, 10, 3),
+            optional(model.decrement, 11, 3),
             optional(model.f_value, 8, 1),
             probability,
             num(model.bic, 7),

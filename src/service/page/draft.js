@@ -87,6 +87,8 @@ export async function planOfLink(text) {
 const FORMATS = {
   "specimen/1": (specimen) => ({ specimen }),
   "ogden/1": (material) => ({ material }),
+  "neo_hookean/1": (material) => ({ material }),
+  "mooney_rivlin/1": (material) => ({ material }),
   "yeoh/1": (material) => ({ material }),
   "gent/1": (material) => ({ material }),
   "arruda_boyce/1": (material) => ({ material }),
