@@ -1,5 +1,5 @@
-//! Finite deformations with closed forms: a tube that is blown up, twisted and pulled at once, thin bonded layers pressed
-//! between plates, the energy that plates put into a sample.
+//! Finite deformations with closed forms: a tube that is blown up, twisted and pulled at once, thin bonded layers
+//! pressed between plates, the energy that plates put into a sample.
 //!
 //! `cargo test --test fem_closed_forms -- --nocapture` prints the tables of `docs/verification.md`.
 
@@ -23,8 +23,8 @@ const INNER: f64 = 1.0;
 const OUTER: f64 = 2.0;
 const HEIGHT: f64 = 1.0;
 
-/// A tube of an incompressible solid whose inner radius, length and twist are given: r² = a² + (R² − A²)/λ, θ = Θ + τ Z,
-/// z = λ Z (Ericksen's family 3; Rivlin, Phil. Trans. R. Soc. A 242, 1949). Its outer face is free.
+/// A tube of an incompressible solid whose inner radius, length and twist are given: r² = a² + (R² − A²)/λ,
+/// θ = Θ + τ Z, z = λ Z (Ericksen's family 3; Rivlin, Phil. Trans. R. Soc. A 242, 1949). Its outer face is free.
 struct Tube {
     /// a, mm.
     inner_mm: f64,
@@ -244,8 +244,8 @@ fn bonded_layers_tend_to_lubrication_theory() {
 }
 
 /// Energy that a solution stores (mJ, of the meshed part): ∫ Ψ_iso(F) + κ/2 (ln θ)² dV, θ the linear function of the
-/// place that is nearest to J in each element, which is what these elements store (Simo, Taylor & Pister, Comput. Methods
-/// Appl. Mech. Eng. 51, 1985).
+/// place that is nearest to J in each element, which is what these elements store (Simo, Taylor & Pister, Comput.
+/// Methods Appl. Mech. Eng. 51, 1985).
 fn stored_mj(points: &[QuadraturePoint], material: &Material) -> f64 {
     let isochoric = Material { bulk_kpa: 0.0, ..material.clone() };
     let of_element = |points: &[QuadraturePoint]| {

@@ -32,9 +32,9 @@ const SHIFTS: [f64; 3] = [0.02, 0.1, 0.5];
 /// Steps of the inverse iteration. Near an instability each brings the error down to a part of s.
 const ITERATIONS: usize = 12;
 
-/// ν below which a sample counts as unstable. On the last steps before a limit point ν falls as the square root of the
-/// way that is left, and √(1/1024) is 0.03.
-const UNSTABLE_BELOW: f64 = 0.05;
+/// ν below which a sample counts as unstable. Before a limit point it falls as the square root of the way that is left
+/// (times a number of the order of one), of which steps and [`WITHIN_REACH`] leave up to 0.002: √0.002 is 0.045.
+const UNSTABLE_BELOW: f64 = 0.1;
 
 /// Accuracy of the linear solutions: an eigenvalue has the square of its vector's error.
 const ACCURACY: f64 = 1e-5;
@@ -234,7 +234,7 @@ impl MeshModel {
         };
         let [first, others @ ..] = SHIFTS;
         let mut shifted = others.iter().fold(with_shift(first), |made, &shift| made.or_else(|_| with_shift(shift)))?;
-        // Any start that no symmetry excludes will do: the path's own direction and one that has none of its symmetries.
+        // Any start that no symmetry excludes will do: the path's direction and one that has none of its symmetries.
         let path = path_direction(assembler, material, state)?;
         let scatter = |k: usize| ((k as f64 * 0.618_033_988_75).fract() - 0.5) / mesh.nodes.len() as f64;
         let start: Vec<[f64; 3]> =
