@@ -119,9 +119,9 @@ pub fn nodes_where(places: &[Vector], is_wanted: impl Fn(&Vector) -> bool) -> Ve
     (0..places.len() as u32).filter(|&n| is_wanted(&places[n as usize])).collect()
 }
 
-/// The unit cube in `counts` cells along x, y and z (hexahedra, or twice as many prisms), its nodes moved by `map`; in
-/// a ring the faces y = 0 and y = 1 are one. The places of the nodes in the cube come with the mesh, whose sets of nodes
-/// are empty. The middle node of a prism's triangle is where the quadratic map of the other six takes it.
+/// The unit cube in `counts` cells along x, y and z (hexahedra, or twice as many prisms), its nodes moved by `map`. In
+/// a ring the faces y = 0 and y = 1 are one. The places of the nodes in the cube come with the mesh, whose sets of
+/// nodes are empty. The middle node of a prism's triangle is where the quadratic map of the other six takes it.
 pub fn bricks(
     kind: ElementKind,
     counts: [usize; 3],
