@@ -77,7 +77,7 @@ mod tests {
             let text = recording_points(&first, &first.steps[0]);
             let is_flat = matches!(surface, Some(Surface { components: MeasuredComponents::InPlane, .. }));
             assert_eq!(text.lines().next().unwrap().contains("uz_mm"), !is_flat, "{text}");
-            let second = made(read_points(&text, Path::new("again.csv"), surface, 1.0, &memory).unwrap());
+            let second = made(read_points(&text, Path::new("again.csv"), surface, 1.0, &memory).unwrap().points);
             assert_eq!((&first.mask, first.grid.shape), (&second.mask, second.grid.shape));
             for a in 0..3 {
                 // Spacings of planes are differences of the positions.

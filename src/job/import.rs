@@ -11,9 +11,9 @@ use crate::field::FieldError;
 use crate::file::ReadingMemory;
 use crate::provenance::VERSION;
 use crate::recording::{
-    Filter, GridOrigin, Image, ImportOptions, LoadCurve, NamedImage, RawRecording, Recording, SeriesMap, VectorFrame,
-    axes_of_affine, mat, raw_recording_from_series, read_points, recording_from_images, recording_from_mat,
-    recording_from_points, write_vectors,
+    Filter, GridOrigin, Image, ImportOptions, LoadCurve, NamedImage, PointTable, RawRecording, Recording, SeriesMap,
+    VectorFrame, axes_of_affine, mat, raw_recording_from_series, read_points, recording_from_images,
+    recording_from_mat, recording_from_points, unused_variables, write_vectors,
 };
 use crate::report::{displacement_picture, raw_picture};
 use crate::specimen::Specimen;
@@ -363,7 +363,8 @@ impl CheckedImport {
         files.iter().enumerate().map(read).collect()
     }
 
-    fn read_files(&self, context: &Context) -> Result<Recording, JobError> {
+    /// The recording that files of a laboratory hold, and the names in them that were not used.
+    fn read_files(&self, context: &Context) -> Result<(Recording, Vec<String>), JobError> {
         let files = &context.files;
         let missing = || JobError::Internal("a checked import has a specimen and a form".into());
         let specimen = self.request.specimen.as_ref().ok_or_else(missing)?;
@@ -380,7 +381,9 @@ impl CheckedImport {
                         mat::read_mat(path, &memory).map_err(|e| unfit(&format!("/files/{index}"), path, &e))?;
                     variables.extend(found);
                 }
-                recording_from_mat(&variables, specimen, &options, &memory).map_err(|e| unfit("/files", first, &e))
+                let unused = unused_variables(&variables).into_iter().map(str::to_owned).collect();
+                let made = recording_from_mat(&variables, specimen, &options, &memory);
+                made.map(|recording| (recording, unused)).map_err(|e| unfit("/files", first, &e))
             }
             FileForm::Nifti => {
                 let images = self.read_images(files, &memory)?;
@@ -390,11 +393,12 @@ impl CheckedImport {
                     _ => options.axes,
                 };
                 let options = ImportOptions { axes, ..options };
-                recording_from_images(&images, specimen, self.request.vectors, &options, &memory).map_err(|e| unfit(&e))
+                let made = recording_from_images(&images, specimen, self.request.vectors, &options, &memory);
+                made.map(|recording| (recording, Vec::new())).map_err(|e| unfit(&e))
             }
             FileForm::Dicom | FileForm::Paravision => Err(missing()),
             FileForm::Points => {
-                let mut steps = Vec::new();
+                let (mut steps, mut unused) = (Vec::new(), Vec::new());
                 for (index, path) in files.iter().enumerate() {
                     let fail = |e: &dyn std::fmt::Display| unfit(&format!("/files/{index}"), path, e);
                     let num_bytes = std::fs::metadata(path).map_err(|e| fail(&e))?.len();
@@ -402,15 +406,18 @@ impl CheckedImport {
                     let num_bytes_taken = 3 * num_bytes;
                     memory.take("a table of points", num_bytes_taken).map_err(|e| fail(&e))?;
                     let text = crate::file::read_table_limited(path, num_bytes).map_err(|e| fail(&e))?;
-                    steps.push(
-                        read_points(&text, path, self.request.surface, options.unit_mm, &memory)
-                            .map_err(|e| fail(&e))?,
-                    );
+                    let table = read_points(&text, path, self.request.surface, options.unit_mm, &memory);
+                    let PointTable { points, unused_columns } = table.map_err(|e| fail(&e))?;
+                    steps.push(points);
+                    // Tables of the same make have the same columns.
+                    unused.extend(unused_columns);
+                    unused.sort();
+                    unused.dedup();
                     memory.give_back(num_bytes_taken);
                 }
                 let voxel = options.voxel_mm_by_index;
-                recording_from_points(&steps, specimen, voxel, self.request.surface, &options, &memory)
-                    .map_err(|e| unfit("/files", first, &e))
+                let made = recording_from_points(&steps, specimen, voxel, self.request.surface, &options, &memory);
+                made.map(|recording| (recording, unused)).map_err(|e| unfit("/files", first, &e))
             }
         }
     }
@@ -434,6 +441,7 @@ impl CheckedImport {
             num_voxels: raw.num_voxels(),
             noise_sd_mm: raw.noise_sd_mm.map(|sd| sd.map(Some)),
             surface: None,
+            left_aside: Vec::new(),
             steps: steps.collect(),
         };
         let mut outcome = Outcome { summary: summary::import(&result), ..Outcome::default() };
@@ -474,12 +482,16 @@ impl Run for CheckedImport {
         if let Some(raw) = raw.as_ref().filter(|_| self.request.is_raw) {
             return self.raw_outcome(raw, context);
         }
-        let (mut recording, sd, reports) = match raw {
+        let (mut recording, sd, reports, left_aside) = match raw {
             Some(raw) => {
                 let pointer = if self.request.recording.is_some() { "/recording" } else { "/files" };
-                self.unwrapped(&raw, pointer, context)?
+                let (recording, sd, reports) = self.unwrapped(&raw, pointer, context)?;
+                (recording, sd, reports, Vec::new())
             }
-            None => (self.read_files(context)?, Vec::new(), Vec::new()),
+            None => {
+                let (recording, left_aside) = self.read_files(context)?;
+                (recording, Vec::new(), Vec::new(), left_aside)
+            }
         };
         if let Some(load) = &self.load {
             recording.load = Some(load.clone());
@@ -504,6 +516,7 @@ impl Run for CheckedImport {
             num_voxels: recording.num_voxels(),
             noise_sd_mm: recording.stated_noise_sd_mm(),
             surface: recording.grid.surface,
+            left_aside,
             steps: steps.collect(),
         };
         let mut outcome = Outcome { summary: summary::import(&result), ..Outcome::default() };

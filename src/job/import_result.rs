@@ -19,6 +19,9 @@ pub(super) struct ImportResult {
     /// The face that cameras saw; absent where the volume was scanned.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub surface: Option<Surface>,
+    /// Columns of tables of points and variables of MATLAB files that were not used; absent where all were.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub left_aside: Vec<String>,
     pub steps: Vec<ImportStep>,
 }
 

@@ -27,6 +27,19 @@ struct Array<'a> {
     values: &'a [f64],
 }
 
+/// The field among the variables of a file: the first of the names that it may have.
+fn field_of(variables: &[(String, MatValue)]) -> Option<(&'static str, &MatValue)> {
+    FIELD_NAMES.iter().find_map(|name| variables.iter().find(|(n, _)| n == name).map(|(_, value)| (*name, value)))
+}
+
+/// Names of the variables that [`recording_from_mat`] does not use.
+pub fn unused_variables(variables: &[(String, MatValue)]) -> Vec<&str> {
+    let field = field_of(variables).map(|(name, _)| name);
+    let is_used =
+        |n: &str| Some(n) == field || ["mask", "X"].contains(&n) || EDGE_NAMES.contains(&n) || DRIVE_NAMES.contains(&n);
+    variables.iter().map(|(n, _)| n.as_str()).filter(|n| !is_used(n)).collect()
+}
+
 /// A recording from the variables of a MATLAB file. Variables that were not used are named in its notes.
 ///
 /// # Errors
@@ -39,10 +52,8 @@ pub fn recording_from_mat(
 ) -> Result<Recording, ImportError> {
     let find = |name: &str| variables.iter().find(|(n, _)| n == name).map(|(_, v)| v);
     let names = || variables.iter().map(|(n, _)| n.clone()).collect::<Vec<_>>().join(", ");
-    let (field_name, field) = FIELD_NAMES
-        .iter()
-        .find_map(|n| find(n).map(|v| (*n, v)))
-        .ok_or_else(|| ImportError::Missing { what: "U_t", found: names() })?;
+    let (field_name, field) =
+        field_of(variables).ok_or_else(|| ImportError::Missing { what: "U_t", found: names() })?;
     let steps = steps_of(field)?;
     let dims = steps[0][0].dims;
     for array in steps.iter().flatten() {
@@ -112,11 +123,8 @@ pub fn recording_from_mat(
             }
         })
         .collect();
-    let is_used =
-        |n: &str| n == field_name || ["mask", "X"].contains(&n) || EDGE_NAMES.contains(&n) || DRIVE_NAMES.contains(&n);
-    let ignored: Vec<&str> = variables.iter().map(|(n, _)| n.as_str()).filter(|n| !is_used(n)).collect();
     let notes = serde_json::json!({
-        "imported": { "field": field_name, "ignored_variables": ignored, "voxel_mm_by_index": edges, "region": options.region,
+        "imported": { "field": field_name, "ignored_variables": unused_variables(variables), "voxel_mm_by_index": edges, "region": options.region,
             "origin": options.origin, "center_of_positions_mm": positions_mm, "axes": IndexAxis::words(options.axes),
             "components": IndexAxis::words(components) },
     });

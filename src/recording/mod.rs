@@ -25,12 +25,12 @@ pub use component_fault::ComponentFault;
 pub use error::RecordingError;
 pub use images::{NamedImage, VectorFrame, axes_of_affine, recording_from_images};
 pub use import::{GridOrigin, ImportError, ImportOptions, IndexAxis};
-pub use lab::recording_from_mat;
+pub use lab::{recording_from_mat, unused_variables};
 pub use limits::ReadLimits;
 pub use load_curve::LoadCurve;
 pub use nifti::{Image, NiftiError, Samples};
 pub use plate_fault::{MistakenUnit, PlateFault};
-pub use points::{DisplacementPoint, read_points, recording_from_points};
+pub use points::{DisplacementPoint, PointTable, read_points, recording_from_points};
 pub use raw::{RawRecording, RawStep};
 pub use read::ReadRecording;
 pub use scanner::{

@@ -34,10 +34,19 @@ pub struct DisplacementPoint {
     pub sd: Option<f64>,
 }
 
+/// A table of points.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointTable {
+    /// The points, in the order of the lines.
+    pub points: Vec<DisplacementPoint>,
+    /// Names of the columns that were not used, in lower case: what a program writes beside the displacements, and
+    /// what is misspelt.
+    pub unused_columns: Vec<String>,
+}
+
 /// Reads a table with a header, whose cells are parted by commas, or by semicolons or tabs, where numbers may have
-/// decimal commas. Lines before the header are skipped, and so are columns of another name. The order of columns is
-/// free. A name may carry a unit (`x_mm`, `U [um]`); other numbers have the
-/// file's, `unit_mm`. The displacements may be called `u`, `v`, `w`. Of points on a `surface`, the position along its
+/// decimal commas. Lines before the header are skipped; columns of another name are not used. The order of columns is
+/// free. A name may carry a unit (`x_mm`, `U [um]`); other numbers have the file's, `unit_mm`. The displacements may be called `u`, `v`, `w`. Of points on a `surface`, the position along its
 /// normal may be left out, and the displacement along it where it is not measured.
 ///
 /// # Errors
@@ -48,7 +57,7 @@ pub fn read_points(
     surface: Option<Surface>,
     unit_mm: f64,
     memory: &ReadingMemory,
-) -> Result<Vec<DisplacementPoint>, ImportError> {
+) -> Result<PointTable, ImportError> {
     let fail = |line: usize, message: String| ImportError::Table { path: path.into(), line, message };
     let needed = needed_columns(surface);
     let Some(header) = header_of(text, needed) else {
@@ -63,7 +72,7 @@ pub fn read_points(
     let lines = text.lines().enumerate().skip(line);
     let column = |name: &str| names.iter().position(|n| n == name);
     let columns = COLUMNS.map(column);
-    let (weight, sd) = (column("w"), column("sd"));
+    let (weight_column, sd_column) = (column("w"), column("sd"));
     let mut points = Vec::new();
     for (n, line) in lines {
         if line.trim().is_empty() {
@@ -90,17 +99,19 @@ pub fn read_points(
         if [x, y, z].iter().zip(columns).any(|(p, column)| column.is_some() && !p.is_finite()) {
             return Err(fail(n + 1, "a position is not finite".into()));
         }
-        let weight = weight.map_or(Ok(1.0), number)?;
+        let weight = weight_column.map_or(Ok(1.0), number)?;
         if !(weight >= 0.0 && weight.is_finite()) {
             return Err(fail(n + 1, format!("weight {weight} is not a finite number from zero up")));
         }
-        let sd = sd.map(number).transpose()?;
+        let sd = sd_column.map(number).transpose()?;
         points.push(DisplacementPoint { position: [x, y, z], displacement: [ux, uy, uz], weight, sd });
     }
     if points.is_empty() {
         return Err(fail(1, "there is no point".into()));
     }
-    Ok(points)
+    let used = || columns.into_iter().chain([weight_column, sd_column]).flatten();
+    let unused = names.iter().enumerate().filter(|(n, name)| !name.is_empty() && used().all(|column| column != *n));
+    Ok(PointTable { unused_columns: unused.map(|(_, name)| name.clone()).collect(), points })
 }
 
 /// The line of a table that names its columns.

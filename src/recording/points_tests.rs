@@ -32,7 +32,7 @@ fn points_on_a_grid_become_voxels() {
     }
     lines.rotate_left(117);
     let text = format!("x_mm,y_mm,z_mm,ux_mm,uy_mm,uz_mm,sd\n{}\n", lines.join("\n"));
-    let points = read_points(&text, path(), None, 1.0, &memory(1 << 20)).unwrap();
+    let points = read_points(&text, path(), None, 1.0, &memory(1 << 20)).unwrap().points;
     assert_eq!(points.len(), 319);
     let r =
         recording_from_points(&[points], &specimen(), None, None, &ImportOptions::default(), &memory(1 << 26)).unwrap();
@@ -54,7 +54,10 @@ fn preambles_and_other_columns_are_passed_over() {
     let read = |text: &str| read_points(text, path(), None, 1.0, &memory(1 << 20));
     let plain = read("x,y,z,ux,uy,uz\n1,2,3,0.1,0.2,0.3\n").unwrap();
     let text = "# correlated\nStep;7\n\nX [mm];Y [mm];Z [mm];exx;U [mm];V [mm];W [mm];sigma\n1;2;3;9;0,1;0,2;0,3;8\n";
-    assert_eq!(read(text).unwrap(), plain);
+    let seen = read(text).unwrap();
+    assert_eq!(seen.points, plain.points);
+    // A misspelt column is said, for nothing else would show that it had no part.
+    assert_eq!((plain.unused_columns.len(), seen.unused_columns), (0, vec!["exx".to_string(), "sigma".into()]));
     let said = read("# correlated\nx,y,z,ux,uy\n1,2,3,0.1,0.2\n").unwrap_err().to_string();
     assert!(said.contains("line 2: there is no column uz; x,y,z,ux,uy,uz are needed"), "{said}");
 }
@@ -69,7 +72,7 @@ fn scattered_points_are_averaged() {
         text +=
             &format!("{x},{y},{z},{},0,0,{}\n", if n % 2 == 0 { 1.0 } else { 4.0 }, if n % 2 == 0 { 2.0 } else { 1.0 });
     }
-    let points = read_points(&text, path(), None, 1.0, &memory(1 << 23)).unwrap();
+    let points = read_points(&text, path(), None, 1.0, &memory(1 << 23)).unwrap().points;
     let read = |voxel| {
         recording_from_points(
             std::slice::from_ref(&points),
@@ -105,7 +108,7 @@ fn points_of_a_face_are_its_subsets() {
     let of_one = seen(Face::PlusZ, MeasuredComponents::InPlane);
     let read = |text: &str, surface, unit_mm| {
         let options = ImportOptions { unit_mm, ..ImportOptions::default() };
-        let points = read_points(text, path(), surface, 1.0, &memory(1 << 20))?;
+        let points = read_points(text, path(), surface, 1.0, &memory(1 << 20))?.points;
         recording_from_points(&[points], &specimen(), None, surface, &options, &memory(1 << 26))
     };
     for text in [&plain, &with_place] {
@@ -118,7 +121,7 @@ fn points_of_a_face_are_its_subsets() {
         }
     }
     // Averaged in subsets of 5.08 × 1.6 mm: means of linear fields.
-    let points = read_points(&plain, path(), of_one, 1.0, &memory(1 << 20)).unwrap();
+    let points = read_points(&plain, path(), of_one, 1.0, &memory(1 << 20)).unwrap().points;
     let options = ImportOptions::default();
     let voxel = Some([5.08, 1.6, 1.0]);
     let r = recording_from_points(&[points], &specimen(), voxel, of_one, &options, &memory(1 << 26)).unwrap();
@@ -149,7 +152,7 @@ fn poor_tables_are_typed_errors() {
     }
     let many = "x,y,z,ux,uy,uz\n".to_string() + &"1,2,3,4,5,6\n".repeat(11);
     assert!(matches!(read_points(&many, path(), None, 1.0, &memory(1000)), Err(ImportError::Memory(_))));
-    let one = read_points("x,y,z,ux,uy,uz\n1,2,3,4,5,6\n", path(), None, 1.0, &memory(2000)).unwrap();
+    let one = read_points("x,y,z,ux,uy,uz\n1,2,3,4,5,6\n", path(), None, 1.0, &memory(2000)).unwrap().points;
     let read = |steps: &[Vec<DisplacementPoint>]| {
         recording_from_points(steps, &specimen(), None, None, &ImportOptions::default(), &memory(1 << 26)).unwrap_err()
     };
@@ -161,7 +164,7 @@ fn poor_tables_are_typed_errors() {
 #[test]
 fn tables_of_cameras_are_read() {
     let read = |text: &str, surface: &str, unit_mm: f64| {
-        read_points(text, path(), surface.parse().ok(), unit_mm, &memory(1 << 20)).unwrap()
+        read_points(text, path(), surface.parse().ok(), unit_mm, &memory(1 << 20)).unwrap().points
     };
     let expected = read("x,y,z,ux,uy,uz\n1,2,9.5,0.25,,0.125\n", "+z,all", 1.0);
     for text in [

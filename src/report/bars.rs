@@ -4,7 +4,7 @@ use super::axis::Axis;
 use super::color::{AXIS, EMPTY, GRID, MUTED, of_series};
 use super::number::significant;
 use super::svg::{NORMAL, SMALL, Svg, TITLE, TextStyle};
-use super::text::{on_two_lines, shortened, text_width};
+use super::text::{shortened, text_width, wrapped};
 
 /// The values of one parameter.
 #[derive(Clone, Debug, Default)]
@@ -57,8 +57,10 @@ impl GroupedBars {
         let labels = self.groups.iter().map(|g| text_width(&g.label, NORMAL)).fold(0.0, f64::max);
         let left = (labels + 22.0).clamp(60.0, 240.0);
         let top = 56.0;
-        let group_height = num_series as f64 * BAR + BETWEEN;
-        let height = self.groups.len() as f64 * group_height;
+        let labels: Vec<Vec<String>> = self.groups.iter().map(|g| wrapped(&g.label, NORMAL, left - 14.0)).collect();
+        // A label of many lines may be higher than its bars.
+        let group_height = |g: usize| (num_series as f64 * BAR).max(labels[g].len() as f64 * LINE) + BETWEEN;
+        let height: f64 = (0..self.groups.len()).map(group_height).sum();
         let mut svg = Svg::new(left + PLOT + 110.0, top + height + 46.0);
         svg.text([left, 18.0], &shortened(&self.title, TITLE, PLOT + 100.0), &TextStyle::title());
         self.draw_key(&mut svg, [left, 38.0]);
@@ -69,10 +71,11 @@ impl GroupedBars {
             svg.text([at(tick.value), top + height + 15.0], &tick.label, &TextStyle::note().middle());
         }
         svg.text([left + 0.5 * PLOT, top + height + 34.0], &self.axis_label, &TextStyle::new(NORMAL).middle());
-        for (g, group) in self.groups.iter().enumerate() {
-            let y = top + g as f64 * group_height + 0.5 * BETWEEN;
-            let middle = y + 0.5 * num_series as f64 * BAR;
-            let lines = on_two_lines(&group.label, NORMAL, left - 14.0);
+        let mut below_last = top;
+        for (g, (group, lines)) in self.groups.iter().zip(&labels).enumerate() {
+            let middle = below_last + 0.5 * group_height(g);
+            below_last += group_height(g);
+            let y = middle - 0.5 * num_series as f64 * BAR;
             for (n, line) in lines.iter().enumerate() {
                 let below = (n as f64 - 0.5 * (lines.len() - 1) as f64) * LINE;
                 svg.text([left - 12.0, middle + below + 0.35 * NORMAL], line, &TextStyle::new(NORMAL).end());

@@ -40,16 +40,16 @@ pub(super) fn shortened(text: &str, size: f64, width: f64) -> String {
     format!("{}…", out.trim_end())
 }
 
-/// `text` on one line, or on two of a width that are parted between words; the second is cut where it is too long.
-pub(super) fn on_two_lines(text: &str, size: f64, width: f64) -> Vec<String> {
-    if text_width(text, size) <= width {
-        return vec![text.to_string()];
+/// `text` on lines of a width, parted between words; a word that is wider is cut.
+pub(super) fn wrapped(text: &str, size: f64, width: f64) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split(' ') {
+        match lines.last_mut() {
+            Some(line) if text_width(&format!("{line} {word}"), size) <= width => *line = format!("{line} {word}"),
+            _ => lines.push(shortened(word, size, width)),
+        }
     }
-    let fits = |end: &usize| text_width(&text[..*end], size) <= width;
-    let Some(end) = text.match_indices(' ').map(|(at, _)| at).rfind(fits) else {
-        return vec![shortened(text, size, width)];
-    };
-    vec![text[..end].to_string(), shortened(text[end..].trim_start(), size, width)]
+    lines
 }
 
 #[cfg(test)]
@@ -64,13 +64,16 @@ mod tests {
     }
 
     #[test]
-    fn longer_text_takes_two_lines() {
+    fn longer_text_takes_more_lines() {
         let text = "the encoding gradient is off by a factor along one axis";
-        assert_eq!(on_two_lines(text, 10.0, 1000.0), [text]);
-        let lines = on_two_lines(text, 10.0, 180.0);
-        assert_eq!(lines.join(" "), text);
-        assert!(lines.len() == 2 && lines.iter().all(|line| text_width(line, 10.0) <= 180.0));
-        assert!(on_two_lines(text, 10.0, 90.0)[1].ends_with('…'));
-        assert_eq!(on_two_lines("unbreakable-and-long", 10.0, 40.0).len(), 1);
+        assert_eq!(wrapped(text, 10.0, 1000.0), [text]);
+        for (width, num_lines) in [(180.0, 2), (90.0, 4)] {
+            let lines = wrapped(text, 10.0, width);
+            assert_eq!(lines.join(" "), text);
+            assert_eq!(lines.len(), num_lines);
+            assert!(lines.iter().all(|line| text_width(line, 10.0) <= width));
+        }
+        let cut = wrapped("unbreakable-and-long", 10.0, 40.0);
+        assert!(cut.len() == 1 && cut[0].ends_with('…'));
     }
 }

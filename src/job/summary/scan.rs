@@ -68,6 +68,10 @@ pub(in crate::job) fn import(result: &ImportResult) -> String {
     if let Some(sd) = result.noise_sd_mm {
         text += &format!("noise (x, y, z): {} mm\n", per_component(sd));
     }
+    if !result.left_aside.is_empty() {
+        let listed = result.left_aside.join(", ");
+        text += &format!("left aside, for no name of the format is so: {listed}\n");
+    }
     for step in &result.steps {
         let what = match (result.is_raw, result.surface.map(|s| s.components)) {
             (true, _) => "raw phases",
