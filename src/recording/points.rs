@@ -46,8 +46,9 @@ pub struct PointTable {
 
 /// Reads a table with a header, whose cells are parted by commas, or by semicolons or tabs, where numbers may have
 /// decimal commas. Lines before the header are skipped; columns of another name are not used. The order of columns is
-/// free. A name may carry a unit (`x_mm`, `U [um]`); other numbers have the file's, `unit_mm`. The displacements may be called `u`, `v`, `w`. Of points on a `surface`, the position along its
-/// normal may be left out, and the displacement along it where it is not measured.
+/// free. A name may carry a unit (`x_mm`, `U [um]`); other numbers have the file's, `unit_mm`. The displacements may be
+/// called `u`, `v`, `w`. Of points on a `surface`, the position along its normal may be left out, and the displacement
+/// along it where it is not measured.
 ///
 /// # Errors
 /// [`ImportError::Table`].
