@@ -3,6 +3,7 @@
 
 use super::entry::DesignEntry;
 use super::findings::{Equals, symbol};
+use super::search::Found;
 use super::study::Study;
 use super::vary_scan::ChosenScan;
 use super::words::{listed, plates_in_words, sample_in_words, short_number};
@@ -32,8 +33,10 @@ impl Recommendation {
         study: &Study,
         base: &DesignEntry,
         ranked: &[DesignEntry],
-        (equals, scan): (Equals, Option<&ChosenScan>),
+        equals: Equals,
+        found: &Found,
     ) -> Recommendation {
+        let scan = found.scan.as_ref();
         let Some(chosen) = ranked.get(equals.simplest).or(ranked.first()) else { return Recommendation::default() };
         let advice = if chosen.is_design_of(base) {
             let found = match scan {
@@ -48,11 +51,12 @@ impl Recommendation {
                 format!(", number {} of the list", equals.simplest + 1)
             };
             format!(
-                "Make \"{}\"{number}: {}. {} {}",
+                "Make \"{}\"{number}: {}. {} {}{}",
                 chosen.specimen.name,
                 shape(chosen),
                 scan_like_this(study, chosen),
-                because(base, ranked, equals, chosen, scan)
+                because(base, ranked, equals, chosen, scan),
+                found.gain_anywhere.map_or(String::new(), |gain| if_the_grid_moves(chosen, gain.recommended))
             )
         };
         Recommendation {
@@ -141,6 +145,21 @@ fn because(
         ),
     };
     why + &of_scan
+}
+
+/// By how much less a factor may be on average over the places of the grid without a word, relative.
+const HARDLY_LESS: f64 = 0.02;
+
+/// What is left of the chosen design's factor where the scan's grid is not placed as assumed.
+fn if_the_grid_moves(chosen: &DesignEntry, anywhere: f64) -> String {
+    if anywhere > (1.0 - HARDLY_LESS) * chosen.objective {
+        return String::new();
+    }
+    let worth = if anywhere > 1.0 + HARDLY_LESS { "" } else { ", no better than the base specimen" };
+    format!(
+        " Place the scan's grid on the middle of the sample: on average over all places where it may lie the factor is \
+         {anywhere:.3}{worth}."
+    )
 }
 
 /// Relative standard deviations of every μᵢ and αᵢ of each material, those of the base beside them.

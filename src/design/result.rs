@@ -8,7 +8,6 @@ use super::recommendation::Recommendation;
 use super::search::Found;
 use super::study::Study;
 use super::study_hash::study_hash;
-use super::ties::{equal_to_best, simplest};
 use super::vary_scan::ChosenScan;
 use crate::calibration::ParameterSpread;
 use crate::provenance::VERSION;
@@ -38,6 +37,9 @@ pub struct DesignResult {
     /// specimen; absent where the study takes it to do so, or its objective does not hang on it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub objective_grid_anywhere: Option<f64>,
+    /// The same of the design that is recommended.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recommended_objective_grid_anywhere: Option<f64>,
     /// The scan that was found for the winner, in which all of `ranked` are confirmed; absent where it is the study's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scan: Option<ChosenScan>,
@@ -120,23 +122,22 @@ impl DesignResult {
     /// Puts a search's findings together; `None` if nothing was confirmed.
     pub fn new(study: &Study, found: &Found) -> Option<DesignResult> {
         let ranked: Vec<DesignEntry> = found.ranked.iter().filter_map(DesignEntry::of).collect();
-        let equal_to_best = equal_to_best(study, &found.base, &found.ranked);
-        let simplest = simplest(&found.ranked, &equal_to_best).unwrap_or(0);
         let base = DesignEntry::of(&found.base)?;
         let best = ranked.first()?.clone();
         let disagreement = disagreement(study, &base, &ranked);
-        let equals = Equals { equal_to_best: &equal_to_best, simplest };
+        let equals = Equals { equal_to_best: &found.equal_to_best, simplest: found.simplest };
         Some(DesignResult {
             schema: "design/1".into(),
             name: study.name.clone(),
             pareto: pareto(&ranked),
-            recommendation: Recommendation::new(study, &base, &ranked, (equals, found.scan.as_ref())),
+            recommendation: Recommendation::new(study, &base, &ranked, equals, found),
             protocol: study.protocol.clone(),
-            findings: findings(study, &base, &ranked, &disagreement, equals, found.gain_anywhere),
-            objective_grid_anywhere: found.gain_anywhere,
+            findings: findings(study, &base, &ranked, &disagreement, equals, found.gain_anywhere.map(|gain| gain.best)),
+            objective_grid_anywhere: found.gain_anywhere.map(|gain| gain.best),
+            recommended_objective_grid_anywhere: found.gain_anywhere.map(|gain| gain.recommended),
             scan: found.scan,
-            equal_to_best,
-            simplest,
+            equal_to_best: found.equal_to_best.clone(),
+            simplest: found.simplest,
             disagreement,
             base,
             best,

@@ -19,6 +19,7 @@ use super::space::{Subspace, Variable, subspaces};
 use super::state::{MOST_FINE_FAILURES, State};
 use super::structure_problem::StructureProblem;
 use super::study::Study;
+use super::ties::{equal_to_best, simplest};
 use super::unfinished::Unfinished;
 use super::vary_scan::ChosenScan;
 use crate::specimen::Specimen;
@@ -41,9 +42,13 @@ pub struct Found {
     pub base: Confirmed,
     /// Confirmed designs, best objective first, those within every limit before others.
     pub ranked: Vec<Confirmed>,
-    /// The objective of the best over the base's if the scan's grid lay anywhere; `None` where the study takes it to do
-    /// so, or its objective does not hang on it.
-    pub gain_anywhere: Option<f64>,
+    /// Places in `ranked` of the designs that are equal to the best within what meshes leave open, the best included.
+    pub equal_to_best: Vec<usize>,
+    /// Place of the one of them that is simplest to make, which is recommended.
+    pub simplest: usize,
+    /// What is left of the gains if the scan's grid lies anywhere; `None` where the study takes it to do so, or its
+    /// objective does not hang on it.
+    pub gain_anywhere: Option<GainAnywhere>,
     /// The scan that was found for the best, in which all of `ranked` are confirmed; `None` where it is the study's.
     pub scan: Option<ChosenScan>,
     /// Every design evaluated, in order.
@@ -54,6 +59,15 @@ pub struct Found {
     pub failures: Vec<String>,
     /// Forward solutions at search fidelity, about: evaluations × material samples.
     pub num_evaluations: usize,
+}
+
+/// Objectives over the base's if the scan's grid lies anywhere, in place of on the middle of each specimen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GainAnywhere {
+    /// Of the best design.
+    pub best: f64,
+    /// Of the one that is recommended.
+    pub recommended: f64,
 }
 
 impl Found {
@@ -125,9 +139,18 @@ impl SearchRun<'_> {
         }
         let ranked = self.confirm_all(&base, &spaces, &mut state)?;
         let (ranked, scan) = self.with_best_scan(&base, ranked, &mut state)?;
-        let anywhere = |best: &Confirmed| self.gain_anywhere(&base.specimen, &best.specimen, best.scan()?);
+        let equal_to_best = equal_to_best(study, &base, &ranked);
+        let simplest = simplest(&ranked, &equal_to_best).unwrap_or(0);
+        let anywhere = |place: usize| {
+            let design: &Confirmed = ranked.get(place)?;
+            self.gain_anywhere(&base.specimen, &design.specimen, design.scan()?)
+        };
+        let best = anywhere(0);
+        let recommended = if simplest == 0 { best } else { anywhere(simplest) };
         Ok(Found {
-            gain_anywhere: ranked.first().and_then(anywhere),
+            gain_anywhere: best.zip(recommended).map(|(best, recommended)| GainAnywhere { best, recommended }),
+            equal_to_best,
+            simplest,
             scan,
             base,
             ranked,
