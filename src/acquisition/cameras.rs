@@ -84,7 +84,7 @@ pub fn film(
     let driven = DrivenSample::new(specimen, options.sample, material, mesh, solve, &options.grid, is_cancelled)?;
     let (mask, truth) = (driven.mask, driven.truth);
     let has_force = options.sample == 0;
-    let (load, windows) = loading_history(&specimen.drive_mm, &driven.forces_n, &options.load, options.seed)?;
+    let (load, windows) = loading_history(&specimen.drive_mm, &driven.force, &options.load, options.seed)?;
     let steps = truth.iter().zip(&specimen.drive_mm).zip(&windows).enumerate();
     let steps = steps.map(|(n, ((seen, &drive_mm), &window))| RecordedStep {
         drive_mm,

@@ -1,6 +1,7 @@
 //! Why a scan was not made or not reconstructed.
 
 use crate::fem::{PrepareError, SolveError};
+use crate::homogeneous::TableError;
 use crate::voxel::VoxelError;
 
 /// Why a scan was not made or not reconstructed.
@@ -36,6 +37,9 @@ pub enum AcquisitionError {
         /// The length needed.
         expected: usize,
     },
+    /// The force over the drive is not known.
+    #[error("the force over the drive: {0}")]
+    Force(#[from] TableError),
     /// Nothing of a direction could be unwrapped with certainty.
     #[error(
         "step {step}, direction {axis}: no voxel could be unwrapped with certainty; the signal is too low or the phase changes by more than π from voxel to voxel"

@@ -1,6 +1,7 @@
 //! The loading history that goes with a scan: ramps, holds, a load cell that drifts and scatters.
 
 use super::AcquisitionError;
+use crate::homogeneous::ForceTable;
 use crate::recording::LoadCurve;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -70,32 +71,24 @@ impl LoadProgram {
     }
 }
 
-/// The readings of a program that holds at `drives_mm` with true forces `forces_n`, and the window of each hold. On the
-/// ramps the force follows a monotone curve through rest and the holds. Times and readings are rounded as a file stores
-/// them.
+/// The readings of a program that holds at `drives_mm`, of a sample with the true force `force` (N over the distance
+/// from rest in mm), and the window of each hold. Times and readings are rounded as a file stores them.
 ///
 /// # Errors
-/// [`AcquisitionError::Value`], [`AcquisitionError::Length`].
+/// [`AcquisitionError::Value`]; [`AcquisitionError::Force`] where the table does not reach to all drives.
 pub fn loading_history(
     drives_mm: &[f64],
-    forces_n: &[f64],
+    force: &ForceTable,
     program: &LoadProgram,
     seed: u64,
 ) -> Result<(LoadCurve, Vec<[f64; 2]>), AcquisitionError> {
     program.check()?;
-    if drives_mm.len() != forces_n.len() {
-        let (found, expected) = (forces_n.len(), drives_mm.len());
-        return Err(AcquisitionError::Length { what: "list of forces", found, expected });
-    }
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(STREAM);
     let mut normal = |sd: f64| {
         let x: f64 = StandardNormal.sample(&mut rng);
         sd * x
     };
-    // All drives lie on one side of rest: their magnitudes are in the order of the curve.
-    let distances_mm: Vec<f64> = drives_mm.iter().map(|d| d.abs()).collect();
-    let curve = Monotone::new(&distances_mm, forces_n);
     let mut windows = Vec::with_capacity(drives_mm.len());
     // Corners of the drive over time, with the cell's drift.
     let mut corners = vec![[0.0, 0.0, 0.0], [program.rest_s, 0.0, 0.0]];
@@ -120,55 +113,12 @@ pub fn loading_history(
         let ([t0, d0, c0], [t1, d1, c1]) = (corners[piece], corners[piece + 1]);
         let part = if t1 > t0 { ((time - t0) / (t1 - t0)).clamp(0.0, 1.0) } else { 1.0 };
         let (drive, drift) = (d0 + part * (d1 - d0), c0 + part * (c1 - c0));
-        let force = curve.at(drive.abs()) + drift + normal(program.reading_sd_n);
+        let force = force.at(drive.abs())?.0 + drift + normal(program.reading_sd_n);
         load.time_s.push(time);
         load.drive_mm.push((1e4 * drive).round() / 1e4);
         load.force_n.push((1e4 * force).round() / 1e4);
     }
     Ok((load, windows))
-}
-
-/// Monotone cubic through the origin and the given points (Fritsch & Carlson 1980).
-struct Monotone {
-    x: Vec<f64>,
-    y: Vec<f64>,
-    slope: Vec<f64>,
-}
-
-impl Monotone {
-    fn new(x: &[f64], y: &[f64]) -> Self {
-        let mut points: Vec<[f64; 2]> = x.iter().zip(y).map(|(x, y)| [*x, *y]).collect();
-        points.push([0.0, 0.0]);
-        points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        points.dedup_by(|a, b| (a[0] - b[0]).abs() < 1e-12);
-        let n = points.len();
-        let secant: Vec<f64> = points.windows(2).map(|p| (p[1][1] - p[0][1]) / (p[1][0] - p[0][0])).collect();
-        let slope = (0..n)
-            .map(|i| match (i.checked_sub(1).map(|j| secant[j]), secant.get(i)) {
-                (Some(a), Some(&b)) if a * b > 0.0 => {
-                    let (h0, h1) = (points[i][0] - points[i - 1][0], points[i + 1][0] - points[i][0]);
-                    3.0 * (h0 + h1) / ((2.0 * h1 + h0) / a + (h1 + 2.0 * h0) / b)
-                }
-                (Some(_), Some(_)) | (None, None) => 0.0,
-                (Some(a), None) => a,
-                (None, Some(&b)) => b,
-            })
-            .collect();
-        let (x, y) = (points.iter().map(|p| p[0]).collect(), points.iter().map(|p| p[1]).collect());
-        Monotone { x, y, slope }
-    }
-
-    fn at(&self, x: f64) -> f64 {
-        if self.x.len() < 2 {
-            return self.y[0];
-        }
-        let i = self.x.partition_point(|a| *a <= x).clamp(1, self.x.len() - 1) - 1;
-        let h = self.x[i + 1] - self.x[i];
-        let t = (x - self.x[i]) / h;
-        let (a, b) = (1.0 - t, t);
-        (1.0 + 2.0 * t) * a * a * self.y[i] + t * a * a * h * self.slope[i] + b * b * (3.0 - 2.0 * t) * self.y[i + 1]
-            - b * b * a * h * self.slope[i + 1]
-    }
 }
 
 #[cfg(test)]
@@ -178,7 +128,8 @@ mod tests {
     #[test]
     fn windows_lie_in_their_holds() {
         let program = LoadProgram { drift_sd_n: 0.0, reading_sd_n: 0.0, ..LoadProgram::default() };
-        let (load, windows) = loading_history(&[2.5, 5.0], &[5.0, 11.0], &program, 7).unwrap();
+        let table = |sign: f64| ForceTable::new(&[0.0, 2.5, 5.0], &[0.0, sign * 5.0, sign * 11.0]).unwrap();
+        let (load, windows) = loading_history(&[2.5, 5.0], &table(1.0), &program, 7).unwrap();
         for ((window, drive), force) in windows.iter().zip([2.5, 5.0]).zip([5.0, 11.0]) {
             let held = load.time_s.iter().zip(&load.drive_mm).filter(|(t, _)| (window[0]..=window[1]).contains(*t));
             assert!(held.clone().count() > 50);
@@ -190,8 +141,8 @@ mod tests {
         assert!(load.drive_mm.windows(2).all(|d| d[1] >= d[0]));
         // The other way all is negative, but for noise and drift: none here.
         let quiet = LoadProgram { drift_sd_n: 0.0, reading_sd_n: 0.0, ..LoadProgram::default() };
-        let [there, back] = [1.0, -1.0]
-            .map(|sign| loading_history(&[sign * 2.5, sign * 5.0], &[sign * 5.0, sign * 11.0], &quiet, 3).unwrap().0);
+        let [there, back] =
+            [1.0, -1.0].map(|sign| loading_history(&[sign * 2.5, sign * 5.0], &table(sign), &quiet, 3).unwrap().0);
         let is_negative = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a + b).abs() < 1e-12);
         assert!(is_negative(&there.force_n, &back.force_n) && is_negative(&there.drive_mm, &back.drive_mm));
         // The force rises with the drive: the curve between the holds is monotone (rounding 10⁻⁴).
@@ -202,9 +153,10 @@ mod tests {
     #[test]
     fn drift_dominates_the_mean() {
         let program = LoadProgram { drift_sd_n: 0.1, reading_sd_n: 0.01, ..LoadProgram::default() };
+        let table = ForceTable::new(&[0.0, 5.0], &[0.0, 10.0]).unwrap();
         let deviations: Vec<f64> = (0..400)
             .map(|seed| {
-                let (load, windows) = loading_history(&[5.0], &[10.0], &program, seed).unwrap();
+                let (load, windows) = loading_history(&[5.0], &table, &program, seed).unwrap();
                 load.mean_force_n(windows[0]).unwrap() - 10.0
             })
             .collect();
@@ -215,11 +167,10 @@ mod tests {
 
     #[test]
     fn bad_programs_are_refused() {
+        let table = ForceTable::new(&[0.0, 1.0], &[0.0, 1.0]).unwrap();
         let program = LoadProgram { settle_s: 40.0, ..LoadProgram::default() };
-        assert!(matches!(loading_history(&[1.0], &[1.0], &program, 0), Err(AcquisitionError::Value { .. })));
-        assert!(matches!(
-            loading_history(&[1.0], &[], &LoadProgram::default(), 0),
-            Err(AcquisitionError::Length { .. })
-        ));
+        assert!(matches!(loading_history(&[1.0], &table, &program, 0), Err(AcquisitionError::Value { .. })));
+        let beyond = loading_history(&[2.0], &table, &LoadProgram::default(), 0);
+        assert!(matches!(beyond, Err(AcquisitionError::Force(_))));
     }
 }

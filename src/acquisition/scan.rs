@@ -106,11 +106,11 @@ pub fn scan(
 ) -> Result<Scan, AcquisitionError> {
     options.check()?;
     let driven = DrivenSample::new(specimen, options.sample, material, mesh, solve, &options.grid, is_cancelled)?;
-    let DrivenSample { sample, recorded, model, path, mask, truth, forces_n } = driven;
+    let DrivenSample { sample, recorded, model, path, mask, truth, forces_n, force } = driven;
     let states: Vec<&[[f64; 3]]> = path.iter().map(|state| &state.displacement[..]).collect();
     let images = signal_images(&sample, model.mesh(), &states, &options.grid, options.mm_per_radian, is_cancelled)?;
     let has_force = options.sample == 0;
-    let (load, windows) = loading_history(&specimen.drive_mm, &forces_n, &options.load, options.seed)?;
+    let (load, windows) = loading_history(&specimen.drive_mm, &force, &options.load, options.seed)?;
     let mut steps = Vec::with_capacity(images.len());
     for (n, signal) in images.into_iter().enumerate() {
         let (phase, magnitude) = noisy_images(signal, options, n as u64);

@@ -71,7 +71,7 @@ pub use range::{AngleRange, CountRange, EdgeRange, OffsetRange, Range};
 pub use recommendation::Recommendation;
 pub use response::{Response, TEARING_FRACTION, tearing_stretch};
 pub use result::{DesignResult, MaterialVerification, Verification};
-pub use search::{Found, base_at_drive, search};
+pub use search::{Found, GainAnywhere, base_at_drive, search};
 pub use search_error::SearchError;
 pub use search_run::{Progress, ProgressSink};
 pub use space::{Subspace, Variable, subspaces};
