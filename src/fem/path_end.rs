@@ -20,7 +20,7 @@ use crate::material::{Material, relative_stiffness};
 use std::fmt;
 
 /// Smallest step on the last part of the way, as a fraction of the drive: what stands still in such steps has ended.
-const SMALLEST_STEP: f64 = 1.0 / 4096.0;
+const SMALLEST_STEP: f64 = 1.0 / 2048.0;
 
 /// What of a drive that was reached is reached again in other steps.
 const WITHIN_REACH: f64 = 0.999;
@@ -183,7 +183,7 @@ impl ForwardModel {
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<PathEnd, SolveError> {
         let small = SolveOptions { min_step: SMALLEST_STEP, ..SolveOptions::default() };
-        let mut last = self.as_far_as(material, reached_mm, None, &small, is_cancelled)?;
+        let mut last = self.as_far_as(material, reached_mm, None, &SolveOptions::default(), is_cancelled)?;
         let failure = match self.solve(material, asked_mm, Some(&last), &small, is_cancelled) {
             Ok(_) => None,
             Err(SolveError::Diverged { reached_mm, cause, .. }) => {
