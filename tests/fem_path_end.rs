@@ -1,9 +1,10 @@
-//! Why a path of equilibria ends, where that is known: a column that buckles, a material that is unstable.
+//! Why a path of equilibria ends, where that is known: columns that buckle under a drive or before it, a material that
+//! is unstable.
 
 mod common;
 
 use common::{bar, never, ogden, one_term, specimen};
-use lambdak::fem::{EndCause, ForwardModel, PathEnd, SolveError, SolveOptions};
+use lambdak::fem::{EndCause, ForwardModel, PathEnd, SolveError, SolveOptions, Way};
 use lambdak::material::Material;
 use lambdak::mesh::{MeshOptions, mesh_specimen};
 use lambdak::specimen::{HoleAxis, Specimen, TestKind};
@@ -32,10 +33,33 @@ fn a_column_buckles_where_euler_says() {
     let EndCause::Sample { least_stiffness, place_mm, is_limit_point, .. } = found.cause else {
         panic!("{:?}", found.cause)
     };
-    println!("buckles at {:.4} mm, Euler {expected_mm:.4} mm", found.drive_mm);
+    println!("buckles at {:.4} mm, Euler {expected_mm:.4} mm", found.reached_mm);
     // The grips hold the ends' faces together, which stiffens them by about a thickness in twenty.
-    assert!((found.drive_mm / expected_mm - 1.0).abs() < 0.08, "{} {expected_mm}", found.drive_mm);
+    assert!((found.reached_mm / expected_mm - 1.0).abs() < 0.08, "{} {expected_mm}", found.reached_mm);
     assert!(least_stiffness.abs() < 0.05 && !is_limit_point && place_mm[0].abs() < 0.1 * length, "{place_mm:?}");
+}
+
+/// A slender block between plates that are pressed together before any drive buckles where such a column does.
+#[test]
+fn a_block_buckles_while_its_plates_are_pressed_together() {
+    let [length, thickness, width] = [2.0, 24.0, 6.0];
+    let block = specimen(TestKind::DoubleLapShear, [length, thickness, width], HoleAxis::Thickness, &[]);
+    let expected_mm = thickness * (PI * length / thickness).powi(2) / 3.0;
+    let pressed = Specimen { precompression_mm: 3.0 * expected_mm, ..block };
+    let options = MeshOptions { levels: 24, ..MeshOptions::scaled(&pressed, 2.0) };
+    let mut model = ForwardModel::new(mesh_specimen(&pressed, &options).unwrap(), &pressed).unwrap();
+    let failed = model.solve(&one_term(), 1.0, None, &SolveOptions::default(), &never);
+    let Err(SolveError::NotPrecompressed { reached_mm, asked_mm, .. }) = failed else { panic!("{failed:?}") };
+    let end = model.precompression_end(&one_term(), reached_mm, asked_mm, &never).unwrap();
+    println!("{end}; solved to {reached_mm:.4} mm, Euler {expected_mm:.4} mm");
+    let EndCause::Sample { least_stiffness, place_mm, is_limit_point, .. } = end.cause else {
+        panic!("{:?}", end.cause)
+    };
+    assert!(end.way == Way::Precompression && end.to_string().contains("precompression_mm"));
+    // The bonded ends stiffen it by about a thickness in twelve, the shear that Euler leaves out softens it by as much.
+    assert!((end.reached_mm / expected_mm - 1.0).abs() < 0.08, "{} {expected_mm}", end.reached_mm);
+    assert!(least_stiffness.abs() < 0.05 && !is_limit_point, "{least_stiffness}");
+    assert!(place_mm[1].abs() < 0.1 * thickness, "{place_mm:?}");
 }
 
 /// A material whose third product is negative is unstable beyond some stretch, at a point before the bar as a whole.

@@ -125,6 +125,24 @@ impl Assembler {
         Ok(assembler)
     }
 
+    /// The same sample while its plates are brought to where they are before any drive; what drives them here is the
+    /// precompression.
+    pub(super) fn pressing(&self) -> Assembler {
+        let old = &self.discretisation;
+        let pressing = Assembler {
+            discretisation: Arc::new(Discretisation {
+                mesh: old.mesh.clone(),
+                tables: old.tables.clone(),
+                topology: old.topology.clone(),
+                plates: Arc::new(old.plates.pressing()),
+                multiplicity: old.multiplicity,
+                points: OnceLock::new(),
+            }),
+            ..self.clone()
+        };
+        pressing.departed(&self.departures().before_drive())
+    }
+
     /// The same with the kernels that use no special instructions.
     pub(super) fn portable(&self) -> Assembler {
         Assembler { kernels: Kernels::portable(), ..self.clone() }

@@ -103,6 +103,11 @@ impl PlateMotion {
         }
     }
 
+    /// What of the motion is there without any drive.
+    fn before_drive(&self) -> PlateMotion {
+        PlateMotion { translation_per_mm: [0.0; 3], rotation_rad_per_mm: [0.0; 3], ..*self }
+    }
+
     /// The motion times a factor.
     pub fn scaled(&self, factor: f64) -> PlateMotion {
         let times = |v: [f64; 3]| v.map(|x| factor * x);
@@ -157,6 +162,16 @@ impl Departures {
             fixed_plate: self.fixed_plate.scaled(factor),
             moved_plate: self.moved_plate.scaled(factor),
             faces_per_mm: self.faces_per_mm.clone().map(|face| face.map(|f| f.scaled(factor))),
+            ..self.clone()
+        }
+    }
+
+    /// The same without what grows with the drive.
+    pub(super) fn before_drive(&self) -> Departures {
+        Departures {
+            fixed_plate: self.fixed_plate.before_drive(),
+            moved_plate: self.moved_plate.before_drive(),
+            faces_per_mm: [None, None],
             ..self.clone()
         }
     }

@@ -115,6 +115,11 @@ impl ForwardModel {
         Ok(ForwardModel { fine: self.fine.moved(nodes)?, guide: None, statistics: Statistics::default() })
     }
 
+    /// The model while its plates are brought to where they are before any drive: what drives it is the precompression.
+    pub(super) fn pressing(&self) -> ForwardModel {
+        ForwardModel { fine: self.fine.pressing(), guide: None, statistics: Statistics::default() }
+    }
+
     /// What the model departs from the nominal experiment in.
     pub fn departures(&self) -> &Departures {
         self.fine.assembler.departures()

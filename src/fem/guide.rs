@@ -80,7 +80,7 @@ impl Guide {
                 let from_coarse = self.transfer(fine, &at_start);
                 first_guess.add_difference(drive_mm / start.drive_mm, start, &from_coarse);
             }
-            fine.step(&first_guess, None, drive_mm).ok()
+            fine.step(&first_guess, &[], drive_mm).ok()
         });
         match &found {
             Some(_) => fine.statistics.load_steps += 1,

@@ -70,6 +70,14 @@ impl MeshModel {
         }
     }
 
+    /// The same sample while its plates are brought to where they are before any drive, with nothing assembled.
+    pub(super) fn pressing(&self) -> MeshModel {
+        MeshModel {
+            assembler: self.assembler.pressing(),
+            linearisation: Linearisation::new(self.linearisation.system.empty_like()),
+        }
+    }
+
     /// The same elements with the nodes elsewhere and no departures; the symbolic work is shared.
     ///
     /// # Errors

@@ -80,7 +80,7 @@ pub use forward_model::ForwardModel;
 pub use law_correction::LawCorrection;
 pub use nesting::Nesting;
 pub use options::{SolveOptions, Statistics};
-pub use path_end::{EndCause, PathEnd};
+pub use path_end::{EndCause, PathEnd, Way};
 pub use result::{SolveResult, SolveStep};
 pub use rotation::turned_by;
 pub use tangent::Tangent;

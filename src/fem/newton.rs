@@ -31,10 +31,6 @@ const KEPT_TANGENT_GAINS: f64 = 0.1;
 /// this part of the tolerance, so that equilibria are as good as by Newton's steps.
 const KEPT_TANGENT_TOLERANCE: f64 = 0.1;
 
-/// The first part of the way that the plates are pressed together, in first steps of a drive: a bonded block is stiffer
-/// across its plates than along them.
-const FIRST_PART_BEFORE_DRIVE: f64 = 0.1;
-
 /// A run of Newton's method on one mesh with one material.
 pub(super) struct Newton<'a> {
     /// The mesh and its departures.
@@ -61,7 +57,8 @@ impl Newton<'_> {
             Some(e) => e.clone(),
             None => self.before_drive()?,
         };
-        let mut previous: Option<Equilibrium> = None;
+        // The equilibria before the present one, the latest first, and of how many the next is guessed.
+        let (mut before, mut num_before) = (Vec::new(), 1);
         let mut step = self.assembler.plates().first_step_mm.min((drive_mm - current.drive_mm).abs());
         let smallest = self.options.min_step * drive_mm.abs().max(1e-9);
         loop {
@@ -71,23 +68,26 @@ impl Newton<'_> {
             let left = drive_mm - current.drive_mm;
             let is_last = left.abs() <= step * (1.0 + 1e-9);
             let target = if is_last { drive_mm } else { current.drive_mm + step * left.signum() };
-            let before = self.statistics.newton_iterations;
-            match self.step(&current, previous.as_ref(), target) {
+            let iterations = self.statistics.newton_iterations;
+            match self.step(&current, &before, target) {
                 Ok(next) => {
                     self.statistics.load_steps += 1;
                     if is_last {
                         return Ok(next);
                     }
-                    if self.statistics.newton_iterations - before <= 6 {
+                    if self.statistics.newton_iterations - iterations <= 6 {
                         step *= 1.5;
                     }
-                    previous = Some(std::mem::replace(&mut current, next));
+                    before.insert(0, std::mem::replace(&mut current, next));
+                    before.truncate(num_before);
                 }
                 Err(cause) => {
                     if (self.is_cancelled)() {
                         return Err(SolveError::Cancelled { reached_mm: current.drive_mm });
                     }
                     self.statistics.failed_steps += 1;
+                    // The path bends.
+                    num_before = 2;
                     step = 0.5 * (target - current.drive_mm).abs();
                     if step < smallest {
                         return Err(SolveError::Diverged { reached_mm: current.drive_mm, asked_mm: drive_mm, cause });
@@ -103,39 +103,20 @@ impl Newton<'_> {
     /// # Errors
     /// [`SolveError::NotPrecompressed`], [`SolveError::Cancelled`].
     fn before_drive(&mut self) -> Result<Equilibrium, SolveError> {
-        let (mesh, plates) = (self.assembler.mesh(), self.assembler.plates());
-        let mut current = Equilibrium::at_rest(mesh.nodes.len(), mesh.num_elements());
-        let whole = plates.before_drive_mm;
-        let length_mm = norm(&whole);
-        if !(length_mm > 0.0) {
-            return Ok(current);
+        let mesh = self.assembler.mesh();
+        let asked_mm = self.assembler.plates().precompression_mm();
+        if !(asked_mm.abs() > 0.0) {
+            return Ok(Equilibrium::at_rest(mesh.nodes.len(), mesh.num_elements()));
         }
-        let (mut done, mut part) = (0.0_f64, (plates.first_step_mm * FIRST_PART_BEFORE_DRIVE / length_mm).min(1.0));
-        while done < 1.0 {
-            let target = if done + part > 1.0 - 1e-9 { 1.0 } else { done + part };
-            let mut departures = self.assembler.departures().clone();
-            for (t, component) in departures.moved_plate.translation_mm.iter_mut().zip(whole) {
-                *t -= (1.0 - target) * component;
+        let pressing = self.assembler.pressing();
+        match self.elsewhere(&pressing, |newton| newton.solve(asked_mm, None)) {
+            Ok(pressed) => Ok(Equilibrium { drive_mm: 0.0, ..pressed }),
+            Err(SolveError::Diverged { reached_mm, asked_mm, cause }) => {
+                Err(SolveError::NotPrecompressed { reached_mm, asked_mm, cause })
             }
-            let assembler = self.assembler.departed(&departures);
-            let stepped = self.elsewhere(&assembler, |newton| newton.step(&current, None, 0.0));
-            match stepped {
-                Ok(next) => {
-                    self.statistics.load_steps += 1;
-                    (done, current) = (target, next);
-                }
-                Err(_) if (self.is_cancelled)() => return Err(SolveError::Cancelled { reached_mm: 0.0 }),
-                Err(cause) => {
-                    self.statistics.failed_steps += 1;
-                    part *= 0.5;
-                    if part < self.options.min_step {
-                        let asked_mm = -whole[1];
-                        return Err(SolveError::NotPrecompressed { reached_mm: done * asked_mm, asked_mm, cause });
-                    }
-                }
-            }
+            Err(SolveError::Cancelled { .. }) => Err(SolveError::Cancelled { reached_mm: 0.0 }),
+            Err(other) => Err(other),
         }
-        Ok(current)
     }
 
     /// What `run` gives with another assembler of the same mesh; what it takes counts here.
@@ -153,17 +134,17 @@ impl Newton<'_> {
         out
     }
 
-    /// One load step from `from` to a drive (mm); `previous` is the equilibrium before `from`, if any.
+    /// One load step from `from` to a drive (mm); `before` are equilibria before `from`, the latest first.
     ///
     /// # Errors
     /// [`StepFailure`].
     pub(super) fn step(
         &mut self,
         from: &Equilibrium,
-        previous: Option<&Equilibrium>,
+        before: &[Equilibrium],
         drive_mm: f64,
     ) -> Result<Equilibrium, StepFailure> {
-        let mut trial = self.first_guess(from, previous, drive_mm);
+        let mut trial = self.first_guess(from, before, drive_mm);
         let mut update: Option<Update> = None;
         let mut worst = f64::INFINITY;
         let mut last = f64::INFINITY;
@@ -217,13 +198,21 @@ impl Newton<'_> {
         }
     }
 
-    /// The state at a drive that is linear along the path, where there is one, with what the plates still lack carried
-    /// into the sample.
-    fn first_guess(&self, from: &Equilibrium, previous: Option<&Equilibrium>, drive_mm: f64) -> Equilibrium {
+    /// The state at a drive to which the line through `from` and the equilibrium `before` it leads, or the parabola
+    /// through the two before it, with what the plates still lack carried into the sample.
+    fn first_guess(&self, from: &Equilibrium, before: &[Equilibrium], drive_mm: f64) -> Equilibrium {
         let mut trial = from.clone();
         trial.drive_mm = drive_mm;
-        if let Some(p) = previous.filter(|p| (from.drive_mm - p.drive_mm).abs() > 0.0) {
-            trial.add_difference((drive_mm - from.drive_mm) / (from.drive_mm - p.drive_mm), from, p);
+        match before {
+            [] => {}
+            [p] => trial.add_difference((drive_mm - from.drive_mm) / (from.drive_mm - p.drive_mm), from, p),
+            [p, q, ..] => {
+                // u₀ + (t − t₀) u[t₀, t₁] + (t − t₀)(t − t₁) u[t₀, t₁, t₂] with Newton's divided differences.
+                let [t, t0, t1, t2] = [drive_mm, from.drive_mm, p.drive_mm, q.drive_mm];
+                let bend = (t - t0) * (t - t1) / (t0 - t2);
+                trial.add_difference((t - t0 + bend) / (t0 - t1), from, p);
+                trial.add_difference(-bend / (t1 - t2), p, q);
+            }
         }
         let imposed = |v: usize| self.assembler.imposed(v, drive_mm);
         self.assembler.plates().carry(&self.assembler.mesh().nodes, &imposed, &mut trial.displacement);

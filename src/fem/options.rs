@@ -9,13 +9,13 @@ pub struct SolveOptions {
     pub tolerance: f64,
     /// Newton iterations per load step.
     pub max_iterations: usize,
-    /// Smallest load step as a fraction of the drive asked for.
+    /// Smallest load step as a fraction of the drive asked for. Steps shrink only where they fail.
     pub min_step: f64,
 }
 
 impl Default for SolveOptions {
     fn default() -> Self {
-        SolveOptions { tolerance: 1e-6, max_iterations: 14, min_step: 1.0 / 64.0 }
+        SolveOptions { tolerance: 1e-6, max_iterations: 14, min_step: 1.0 / 1024.0 }
     }
 }
 

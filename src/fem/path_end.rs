@@ -20,7 +20,7 @@ use crate::material::{Material, relative_stiffness};
 use std::fmt;
 
 /// Smallest step on the last part of the way, as a fraction of the drive: what stands still in such steps has ended.
-const SMALLEST_STEP: f64 = 1.0 / 1024.0;
+const SMALLEST_STEP: f64 = 1.0 / 2048.0;
 
 /// What of a drive that was reached is reached again in other steps.
 const WITHIN_REACH: f64 = 0.999;
@@ -80,24 +80,50 @@ pub enum EndCause {
     },
 }
 
+/// What moves the plate along a path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Way {
+    /// The drive.
+    Drive,
+    /// The precompression, before any drive.
+    Precompression,
+}
+
+impl fmt::Display for Way {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Way::Drive => "drive",
+            Way::Precompression => "precompression",
+        })
+    }
+}
+
 /// Where a path ended and why.
 #[derive(Clone, Debug)]
 pub struct PathEnd {
-    /// Last drive with an equilibrium in small steps, mm.
-    pub drive_mm: f64,
+    /// What moved the plate.
+    pub way: Way,
+    /// How far at the last equilibrium in small steps, mm.
+    pub reached_mm: f64,
     /// Why there is none beyond.
     pub cause: EndCause,
 }
 
 impl fmt::Display for PathEnd {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let drive = self.drive_mm;
+        let reached = self.reached_mm;
+        let (there, reduce) = match self.way {
+            Way::Drive => (format!("at {reached:.2} mm"), "reduce the drive"),
+            Way::Precompression => {
+                (format!("at a precompression of {reached:.2} mm"), "change precompression_mm towards 0")
+            }
+        };
         let at = |[x, y, z]: [f64; 3]| format!("({x:.1}, {y:.1}, {z:.1}) mm");
         match &self.cause {
             EndCause::Material { place_mm, .. } => {
                 write!(
                     f,
-                    "at {drive:.2} mm the material is unstable at {}; reduce the drive or use a material that is stable there",
+                    "{there} the material is unstable at {}; {reduce} or use a material that is stable there",
                     at(*place_mm)
                 )
             }
@@ -109,31 +135,41 @@ impl fmt::Display for PathEnd {
                 };
                 write!(
                     f,
-                    "at {drive:.2} mm the sample itself becomes unstable at {} (its least stiffness is {least_stiffness:.3} \
-                     of that at rest): {how}; reduce the drive or make it stouter there",
+                    "{there} the sample itself becomes unstable at {} (its least stiffness is {least_stiffness:.3} \
+                     of that at rest): {how}; {reduce} or make it stouter there",
                     at(*place_mm)
                 )
             }
             EndCause::Mesh { element, .. } => {
-                write!(
-                    f,
-                    "at {drive:.2} mm element {element} folds although the sample is stable; reduce the drive or refine the mesh"
-                )
+                write!(f, "{there} element {element} folds although the sample is stable; {reduce} or refine the mesh")
             }
             EndCause::Method { failure: None, .. } => {
-                write!(f, "smaller load steps than those tried go on; reduce the drive or try another mesh")
+                write!(f, "smaller load steps than those tried go on; {reduce} or try another mesh")
             }
             EndCause::Method { failure: Some(failure), .. } => {
-                write!(
-                    f,
-                    "at {drive:.2} mm neither sample nor mesh gives way ({failure}); reduce the drive or try another mesh"
-                )
+                write!(f, "{there} neither sample nor mesh gives way ({failure}); {reduce} or try another mesh")
             }
         }
     }
 }
 
 impl ForwardModel {
+    /// Why plates came to a precompression of `reached_mm` and no further on the way to `asked_mm`
+    /// ([`SolveError::NotPrecompressed`]): [`ForwardModel::path_end`] with the precompression in place of the drive.
+    ///
+    /// # Errors
+    /// As [`ForwardModel::path_end`].
+    pub fn precompression_end(
+        &self,
+        material: &Material,
+        reached_mm: f64,
+        asked_mm: f64,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<PathEnd, SolveError> {
+        let end = self.pressing().path_end(material, reached_mm, asked_mm, is_cancelled)?;
+        Ok(PathEnd { way: Way::Precompression, ..end })
+    }
+
     /// Why a path that stopped at `reached_mm` on the way to `asked_mm` ([`SolveError::Diverged`]) did so. It is
     /// followed in ever smaller steps first, which takes about as long as a dozen solutions.
     ///
@@ -147,7 +183,7 @@ impl ForwardModel {
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<PathEnd, SolveError> {
         let small = SolveOptions { min_step: SMALLEST_STEP, ..SolveOptions::default() };
-        let mut last = self.as_far_as(material, reached_mm, None, &small, is_cancelled)?;
+        let mut last = self.as_far_as(material, reached_mm, None, &SolveOptions::default(), is_cancelled)?;
         let failure = match self.solve(material, asked_mm, Some(&last), &small, is_cancelled) {
             Ok(_) => None,
             Err(SolveError::Diverged { reached_mm, cause, .. }) => {
@@ -170,7 +206,7 @@ impl ForwardModel {
             Some(StepFailure::InvertedElement { element, .. }) => EndCause::Mesh { element, least_stiffness },
             failure => EndCause::Method { least_stiffness, failure },
         };
-        Ok(PathEnd { drive_mm: last.drive_mm, cause })
+        Ok(PathEnd { way: Way::Drive, reached_mm: last.drive_mm, cause })
     }
 
     /// The equilibrium at a drive, or the last one on the way there that is found again.

@@ -3,10 +3,15 @@
 use super::departures::Departures;
 use super::lifting::AffineMap;
 use crate::mesh::Mesh;
-use crate::specimen::{Specimen, TestKind};
+use crate::specimen::{PRECOMPRESSION_DIRECTION, Specimen, TestKind};
+
+/// The first part of the way that the plates are pressed together, in first steps of a drive: a bonded block is stiffer
+/// across its plates than along them.
+const FIRST_STEP_OF_PRESSING: f64 = 0.1;
 
 /// The plates or grips of a test, on a mesh. The moved one is displaced by the drive in its direction; the fixed one
 /// not at all.
+#[derive(Clone)]
 pub(super) struct Plates {
     /// Whether each node is on the moved face.
     pub(super) is_moved: Vec<bool>,
@@ -83,6 +88,22 @@ impl Plates {
             }),
             axis,
         }
+    }
+
+    /// The same plates where they are brought to where they are before any drive: what drives them (mm) is the
+    /// precompression.
+    pub(super) fn pressing(&self) -> Plates {
+        Plates {
+            direction: PRECOMPRESSION_DIRECTION,
+            before_drive_mm: [0.0; 3],
+            first_step_mm: FIRST_STEP_OF_PRESSING * self.first_step_mm,
+            ..self.clone()
+        }
+    }
+
+    /// The precompression that stays on while the plates are driven, mm.
+    pub(super) fn precompression_mm(&self) -> f64 {
+        (0..3).map(|i| PRECOMPRESSION_DIRECTION[i] * self.before_drive_mm[i]).sum()
     }
 
     /// The part of a force or a displacement in the direction of the drive.
