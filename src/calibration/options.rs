@@ -67,7 +67,7 @@ impl Default for FitOptions {
             min_alpha_gap: 1.0,
             bulk: Bulk::Free,
             held: Held::default(),
-            solve: SolveOptions::default(),
+            solve: SolveOptions::trial(),
         }
     }
 }

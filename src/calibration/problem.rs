@@ -210,7 +210,7 @@ impl<'a> CalibrationProblem<'a> {
         material: &Material,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Vec<Vec<f64>>, CalibrationError> {
-        let found = self.predict(material, None, &SolveOptions::default(), is_cancelled)?;
+        let found = self.predict(material, None, &SolveOptions::trial(), is_cancelled)?;
         Ok(found.into_iter().map(|p| p.forces_n).collect())
     }
 

@@ -70,7 +70,7 @@ pub fn stand_ins(
     on_stage: &dyn Fn(&str),
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<(Vec<StandIn>, Vec<Contour>), CalibrationError> {
-    let solve = SolveOptions::default();
+    let solve = SolveOptions::trial();
     let truth_mesh = MeshOptions { grading: 0.4, ..MeshOptions::scaled(specimen, options.truth_factor) };
     let mut all = Vec::new();
     let mut small = None;

@@ -15,7 +15,7 @@ use super::objective::{Judged, Reference};
 use super::response::{Response, criteria_as_relative_sd, log_or_undetermined, normalised, tearing_stretch};
 use super::study::Study;
 use super::tell_apart::{Imitation, log_separation, state_of};
-use crate::fem::Equilibrium;
+use crate::fem::{Equilibrium, SolveOptions};
 use crate::kinematics::principal_stretches;
 use crate::mesh::MeshOptions;
 use crate::sensitivity::{
@@ -130,7 +130,7 @@ pub fn confirm(
     let variants = Variants::of(study, specimen, is_cancelled)?;
     for factor in MESHES {
         let mesh = MeshOptions::graded(specimen, factor);
-        let options = EvaluationOptions { mesh, ..EvaluationOptions::standard(specimen) };
+        let options = EvaluationOptions { mesh, solve: SolveOptions::trial(), ..EvaluationOptions::standard(specimen) };
         evaluated = by_material(study, specimen, options, factor, is_cancelled)?;
         responses_by_mesh.push(variants.responses(study, &evaluated));
     }
@@ -186,7 +186,8 @@ pub fn estimate(
     specimen.validate().map_err(|e| EvaluationFailure::Geometry { reason: e.to_string() })?;
     let mesh = fidelity.mesh_options(specimen);
     let sampling = Sampling::on_elements_of(mesh.section_size_mm, study.scan.voxel_mm);
-    let options = EvaluationOptions { mesh, sampling, ..EvaluationOptions::standard(specimen) };
+    let options =
+        EvaluationOptions { mesh, sampling, solve: SolveOptions::trial(), ..EvaluationOptions::standard(specimen) };
     let by_material = by_material(study, specimen, options, fidelity.factor(), is_cancelled)?;
     let responses = if study.budget.variants_in_search {
         Variants::of(study, specimen, is_cancelled)?.responses(study, &by_material)

@@ -74,17 +74,12 @@ impl<'a> Evaluator<'a> {
         }
         let central: Vec<MaterialPrior> =
             study.materials.iter().map(|prior| MaterialPrior { relative_sd: 0.0, ..prior.clone() }).collect();
-        Evaluator { study, samples: sample_materials(&central), coarseness: 1.0, solve: SolveOptions::default() }
+        Evaluator { study, samples: sample_materials(&central), coarseness: 1.0, solve: SolveOptions::trial() }
     }
 
     /// For `study`, always at the variants too.
     pub fn with_variants(study: &'a Study) -> Evaluator<'a> {
-        Evaluator {
-            study,
-            samples: sample_materials(&study.materials),
-            coarseness: 1.0,
-            solve: SolveOptions::default(),
-        }
+        Evaluator { study, samples: sample_materials(&study.materials), coarseness: 1.0, solve: SolveOptions::trial() }
     }
 
     /// The same with elements larger by `factor`: for tests.

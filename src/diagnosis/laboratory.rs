@@ -70,7 +70,7 @@ impl<'a> Laboratory<'a> {
             observed,
             stations: Stations::new(observed, nominal, options),
             own_error: None,
-            solve: SolveOptions::default(),
+            solve: SolveOptions::trial(),
             face_axis: match observed.specimen.test {
                 TestKind::DoubleLapShear => 1,
                 TestKind::Uniaxial => 0,

@@ -19,6 +19,14 @@ impl Default for SolveOptions {
     }
 }
 
+impl SolveOptions {
+    /// For what searches and fits try out: a path that needs load steps below 1/64 of the drive counts as ended. A
+    /// design whose sample comes so near to giving way is none to make, and a fit finds another way round.
+    pub fn trial() -> SolveOptions {
+        SolveOptions { min_step: 1.0 / 64.0, ..SolveOptions::default() }
+    }
+}
+
 /// What the last solve took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]

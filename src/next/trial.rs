@@ -75,7 +75,7 @@ impl Bench {
         drives.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()).then(b.1.cmp(&a.1)));
         let (mut trial, mut last) = (Trial::default(), None);
         for (drive_mm, is_scanned) in drives {
-            let found = self.model.solve(material, drive_mm, last.as_ref(), &SolveOptions::default(), is_cancelled);
+            let found = self.model.solve(material, drive_mm, last.as_ref(), &SolveOptions::trial(), is_cancelled);
             let state = match found {
                 Ok(state) => state,
                 Err(error) if is_cancelled() => return Err(error.into()),

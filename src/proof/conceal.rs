@@ -345,7 +345,7 @@ fn path(
     experiment: &Experiment,
     drives: &[f64],
 ) -> Result<Vec<Equilibrium>, ConcealError> {
-    let options = SolveOptions::default();
+    let options = SolveOptions::trial();
     let never = || false;
     let material = &experiment.material;
     let is_out_of_place = experiment.hidden.iter().any(|h| matches!(h.cause, HiddenCause::Mount | HiddenCause::Travel));
