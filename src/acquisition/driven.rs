@@ -61,16 +61,21 @@ impl DrivenSample {
         let truth = path.iter().map(|state| operator.average(&state.displacement)).collect::<Result<Vec<_>, _>>()?;
         let mut forces_n: Vec<f64> = path.iter().map(|state| state.force_n).collect();
         let ramps_mm = on_the_ramps(&specimen.drive_mm);
-        let ramps = |sample: &Specimen, path: &[Equilibrium]| -> Result<Vec<f64>, AcquisitionError> {
+        let ramps = |sample: &Specimen, model: &mut ForwardModel, path: &[Equilibrium]| {
             let coarser = mesh.carried(specimen, sample).refined_by(COARSER, sample, 0.0);
-            let mut model = ForwardModel::of_specimen(sample, &coarser)?;
-            Ok(forces_on_ramps(&mut model, material, path, &ramps_mm, solve, is_cancelled)?)
+            let found = ForwardModel::of_specimen(sample, &coarser)
+                .map(|mut coarse| forces_on_ramps(&mut coarse, material, path, &ramps_mm, solve, is_cancelled));
+            match found {
+                Ok(Ok(forces)) => Ok(forces),
+                // There is no such mesh, or no equilibrium on it.
+                _ => forces_on_ramps(model, material, path, &ramps_mm, solve, is_cancelled),
+            }
         };
-        let mut on_ramps_n = ramps(sample, &path)?;
+        let mut on_ramps_n = ramps(sample, &mut model, &path)?;
         for (_, other) in samples.iter().enumerate().filter(|(n, _)| *n != index) {
             let mut model = ForwardModel::of_specimen(other, &mesh.carried(specimen, other))?;
             let path = model.solve_path(material, &other.drive_mm, solve, &|| is_cancelled())?;
-            on_ramps_n.iter_mut().zip(ramps(other, &path)?).for_each(|(sum, force)| *sum += force);
+            on_ramps_n.iter_mut().zip(ramps(other, &mut model, &path)?).for_each(|(sum, force)| *sum += force);
             forces_n.iter_mut().zip(path).for_each(|(sum, state)| *sum += state.force_n);
         }
         let steps = specimen.drive_mm.iter().copied().zip(forces_n.iter().copied());
@@ -95,8 +100,8 @@ fn on_the_ramps(steps_mm: &[f64]) -> Vec<f64> {
     between
 }
 
-/// Forces at drives between the steps of `path`, N: those of a coarser `model`, by the factor by which it errs at the
-/// steps.
+/// Forces at drives between the steps of `path`, N: those of `model`, which may be coarser, by the factor by which it
+/// errs at the steps.
 fn forces_on_ramps(
     model: &mut ForwardModel,
     material: &Material,
