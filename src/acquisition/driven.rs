@@ -8,8 +8,6 @@ use crate::mesh::MeshOptions;
 use crate::specimen::Specimen;
 use crate::voxel::{Sampling, VoxelGrid, VoxelMask, VoxelOperator};
 
-/// Element size of the mesh that forces on the ramps are solved on, over that of the steps.
-const COARSER: f64 = 2.0;
 /// On the ramps the force is solved for at drives that lie no farther apart than this part of the largest. Between
 /// them the cubic of [`ForceTable`] errs by at most 0.14 % of the largest force for a material near the end of its
 /// chains (Gent's in simple shear of 1.09, with a J_m of 2.5), and by 0.013 % where J_m is 6 or an exponent is 5.
@@ -61,21 +59,12 @@ impl DrivenSample {
         let truth = path.iter().map(|state| operator.average(&state.displacement)).collect::<Result<Vec<_>, _>>()?;
         let mut forces_n: Vec<f64> = path.iter().map(|state| state.force_n).collect();
         let ramps_mm = on_the_ramps(&specimen.drive_mm);
-        let ramps = |sample: &Specimen, model: &mut ForwardModel, path: &[Equilibrium]| {
-            let coarser = mesh.carried(specimen, sample).refined_by(COARSER, sample, 0.0);
-            let found = ForwardModel::of_specimen(sample, &coarser)
-                .map(|mut coarse| forces_on_ramps(&mut coarse, material, path, &ramps_mm, solve, is_cancelled));
-            match found {
-                Ok(Ok(forces)) => Ok(forces),
-                // There is no such mesh, or no equilibrium on it.
-                _ => forces_on_ramps(model, material, path, &ramps_mm, solve, is_cancelled),
-            }
-        };
-        let mut on_ramps_n = ramps(sample, &mut model, &path)?;
+        let mut on_ramps_n = forces_on_ramps(&mut model, material, &path, &ramps_mm, solve, is_cancelled)?;
         for (_, other) in samples.iter().enumerate().filter(|(n, _)| *n != index) {
             let mut model = ForwardModel::of_specimen(other, &mesh.carried(specimen, other))?;
             let path = model.solve_path(material, &other.drive_mm, solve, &|| is_cancelled())?;
-            on_ramps_n.iter_mut().zip(ramps(other, &mut model, &path)?).for_each(|(sum, force)| *sum += force);
+            let of_other = forces_on_ramps(&mut model, material, &path, &ramps_mm, solve, is_cancelled)?;
+            on_ramps_n.iter_mut().zip(of_other).for_each(|(sum, force)| *sum += force);
             forces_n.iter_mut().zip(path).for_each(|(sum, state)| *sum += state.force_n);
         }
         let steps = specimen.drive_mm.iter().copied().zip(forces_n.iter().copied());
@@ -100,8 +89,7 @@ fn on_the_ramps(steps_mm: &[f64]) -> Vec<f64> {
     between
 }
 
-/// Forces at drives between the steps of `path`, N: those of `model`, which may be coarser, by the factor by which it
-/// errs at the steps.
+/// Forces at drives between the steps of `path`, N, each from the equilibrium before it.
 fn forces_on_ramps(
     model: &mut ForwardModel,
     material: &Material,
@@ -110,32 +98,16 @@ fn forces_on_ramps(
     solve: &SolveOptions,
     is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<f64>, SolveError> {
-    // Where, and what it is on the mesh of the steps.
-    let steps = path.iter().map(|state| (state.drive_mm, Some(state.force_n)));
-    let mut all: Vec<(f64, Option<f64>)> = steps.chain(ramps_mm.iter().map(|drive| (*drive, None))).collect();
-    all.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
-    let drives: Vec<f64> = all.iter().map(|(drive, _)| *drive).collect();
-    let coarse = model.solve_path(material, &drives, solve, &|| is_cancelled())?;
-    let points = all.iter().zip(&coarse).map(|((_, known), state)| (state, *known));
-    let factors: Vec<(f64, f64)> = points
-        .filter(|(state, _)| state.force_n != 0.0)
-        .filter_map(|(state, known)| Some((state.drive_mm.abs(), known? / state.force_n)))
-        .collect();
-    let force_at = |drive: f64| {
-        let state = coarse.iter().find(|state| state.drive_mm == drive)?;
-        Some(between(&factors, drive.abs()) * state.force_n)
-    };
-    Ok(ramps_mm.iter().filter_map(|drive| force_at(*drive)).collect())
-}
-
-/// The value at `x` on the lines through `points` of rising x; beyond them that of the nearest.
-fn between(points: &[(f64, f64)], x: f64) -> f64 {
-    let after = points.partition_point(|p| p.0 <= x);
-    match (after.checked_sub(1).map(|before| points[before]), points.get(after)) {
-        (Some((x0, y0)), Some((x1, y1))) => y0 + (y1 - y0) * (x - x0) / (x1 - x0),
-        (Some((_, y)), None) | (None, Some(&(_, y))) => y,
-        (None, None) => 1.0,
+    let mut last: Option<Equilibrium> = None;
+    let mut forces = Vec::with_capacity(ramps_mm.len());
+    for &drive in ramps_mm {
+        let known = path.iter().chain(&last).filter(|state| state.drive_mm.abs() < drive.abs());
+        let start = known.max_by(|a, b| a.drive_mm.abs().total_cmp(&b.drive_mm.abs())).cloned();
+        let state = model.solve(material, drive, start.as_ref(), solve, &|| is_cancelled())?;
+        forces.push(state.force_n);
+        last = Some(state);
     }
+    Ok(forces)
 }
 
 /// The table through rest and points of drive and force, in any order.
