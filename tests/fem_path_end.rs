@@ -1,5 +1,5 @@
-//! Why a path of equilibria ends, where that is known: columns that buckle under a drive or before it, a material that
-//! is unstable.
+//! Why a path of equilibria ends, where that is known: columns that buckle under a drive or before it, a bar that necks,
+//! a material that is unstable.
 
 mod common;
 
@@ -60,6 +60,37 @@ fn a_block_buckles_while_its_plates_are_pressed_together() {
     assert!((end.reached_mm / expected_mm - 1.0).abs() < 0.08, "{} {expected_mm}", end.reached_mm);
     assert!(least_stiffness.abs() < 0.05 && !is_limit_point, "{least_stiffness}");
     assert!(place_mm[1].abs() < 0.1 * thickness, "{place_mm:?}");
+}
+
+/// A bar of a material that carries no more force beyond some stretch (Considère) necks, and snaps where what the neck
+/// gains the rest of the bar, which is unloaded, can no longer give: at a limit point. Displacements then go with the
+/// square root of the way that is left. From 0.04 to 0.01 of it they change twice as much as from 0.01 to 0.0025, four
+/// times as much on a path that runs on; the middle between both decides.
+#[test]
+fn a_bar_that_necks_turns_back() {
+    let s = specimen(TestKind::Uniaxial, [35.0, 3.0, 19.0], HoleAxis::Thickness, &[]);
+    let material = ogden(320.0, &[(-41.0, -1.33)]);
+    let options = MeshOptions::scaled(&s, 3.0);
+    let found = end(&s, &options, &material, 70.0);
+    let EndCause::Sample { is_limit_point, goes_on, .. } = found.cause else { panic!("{:?}", found.cause) };
+    assert!(is_limit_point && !goes_on, "{:?}", found.cause);
+    let mut model = ForwardModel::new(mesh_specimen(&s, &options).unwrap(), &s).unwrap();
+    let drives = [0.04, 0.01, 0.0025].map(|left| found.reached_mm * (1.0 - left));
+    let states = model.solve_path(&material, &drives, &SolveOptions::default(), &never).unwrap();
+    // The plate's own motion, which goes with the drive, is taken off.
+    let stretched = |n: usize| -> Vec<[f64; 3]> {
+        let nodes = &model.mesh().nodes;
+        let rigid = |x: &[f64; 3]| drives[n] * (x[0] / 35.0 + 0.5);
+        states[n].displacement.iter().zip(nodes).map(|(u, x)| [u[0] - rigid(x), u[1], u[2]]).collect()
+    };
+    let change = |a: usize, b: usize| -> f64 {
+        let pairs = stretched(a).into_iter().zip(stretched(b));
+        pairs.map(|(a, b)| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>()).sum::<f64>().sqrt()
+    };
+    let ratio = change(0, 1) / change(1, 2);
+    println!("forces {:?}, change {ratio:.2}", states.iter().map(|s| s.force_n).collect::<Vec<_>>());
+    assert!(states[0].force_n > states[2].force_n, "beyond the largest force");
+    assert!(ratio < 8f64.sqrt(), "{ratio}");
 }
 
 /// A material whose third product is negative is unstable beyond some stretch, at a point before the bar as a whole.

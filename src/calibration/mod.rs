@@ -27,6 +27,7 @@ mod prediction;
 mod problem;
 mod profile;
 mod recording_fit;
+mod repeats;
 mod result;
 mod run;
 mod stand_ins;
@@ -65,6 +66,7 @@ pub use prediction::SolverWork;
 pub use problem::CalibrationProblem;
 pub use profile::{Profile, bulk_lower_bound_kpa, profile};
 pub use recording_fit::RecordingFit;
+pub(crate) use repeats::mean_scans;
 pub use result::{
     CalibrationResult, DiscretisationResult, ObjectiveResult, ParameterResult, RatioResult, StepResult,
     ValueWithInterval, rms_misfit_mm,

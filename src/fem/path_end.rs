@@ -2,9 +2,11 @@
 //!
 //! An equilibrium is stable while its tangent K is positive definite. How far it is from losing that is told by the
 //! least eigenvalue ν of K φ = ν K₀ φ, with K₀ the tangent at rest: it is 1 at rest, whatever the units, the specimen
-//! and the mesh, and falls to zero where the sample gives way along φ without more force. Where the drive itself
-//! excites φ the path turns back there (a limit point: no equilibrium lies beyond); where it does not, another path
-//! branches off (a bifurcation: buckling, or wrinkles of a free face; Biot 1963).
+//! and the mesh, and falls to zero where the sample gives way along φ without more force. At a limit point the path
+//! turns back and no equilibrium lies beyond; at a bifurcation another path branches off (buckling, or wrinkles of a
+//! free face; Biot 1963). How ν falls tells them apart: before the drive d at which a path turns back its states are
+//! smooth functions of √(d − drive), and so is ν; through a bifurcation the path runs on smoothly in the drive, and ν
+//! with it (Wriggers & Simo, Int. J. Numer. Meth. Engng 30 (1990) 155).
 //!
 //! ν and φ are found by inverse iteration with K + s K₀, which is positive definite also where K has just ceased to be.
 
@@ -39,8 +41,9 @@ const UNSTABLE_BELOW: f64 = 0.1;
 /// Accuracy of the linear solutions: an eigenvalue has the square of its vector's error.
 const ACCURACY: f64 = 1e-5;
 
-/// Part of the path's direction that lies along φ from which on the drive excites it.
-const EXCITED_ABOVE: f64 = 0.5;
+/// Parts of the way at which ν is looked at beside the end: near enough for its law to be that of the end, and far
+/// enough apart for a square root to be told from a line.
+const BEFORE_END: [f64; 2] = [0.94, 0.98];
 
 /// Why a path ended.
 #[derive(Clone, Debug)]
@@ -183,7 +186,12 @@ impl ForwardModel {
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<PathEnd, SolveError> {
         let small = SolveOptions { min_step: SMALLEST_STEP, ..SolveOptions::default() };
-        let mut last = self.as_far_as(material, reached_mm, None, &SolveOptions::default(), is_cancelled)?;
+        let usual = SolveOptions::default();
+        let mut before: Vec<Equilibrium> = Vec::new();
+        for part in BEFORE_END {
+            before.push(self.as_far_as(material, part * reached_mm, before.last(), &usual, is_cancelled)?);
+        }
+        let mut last = self.as_far_as(material, reached_mm, before.last(), &usual, is_cancelled)?;
         let failure = match self.solve(material, asked_mm, Some(&last), &small, is_cancelled) {
             Ok(_) => None,
             Err(SolveError::Diverged { reached_mm, cause, .. }) => {
@@ -197,12 +205,18 @@ impl ForwardModel {
         let least_stiffness = mode.stiffness;
         let cause = match failure {
             _ if relative_stiffness < 0.0 => EndCause::Material { relative_stiffness, place_mm },
-            failure if least_stiffness < UNSTABLE_BELOW => EndCause::Sample {
-                least_stiffness,
-                place_mm: mode.place_mm,
-                is_limit_point: mode.part_of_path > EXCITED_ABOVE,
-                goes_on: failure.is_none(),
-            },
+            failure if least_stiffness < UNSTABLE_BELOW => {
+                let mut seen: Vec<(f64, f64)> = Vec::new();
+                for state in &before {
+                    seen.push((state.drive_mm, self.fine.softest(material, state)?.stiffness));
+                }
+                EndCause::Sample {
+                    least_stiffness,
+                    place_mm: mode.place_mm,
+                    is_limit_point: falls_as_square_root(seen[0], seen[1], (last.drive_mm, least_stiffness)),
+                    goes_on: failure.is_none(),
+                }
+            }
             Some(StepFailure::InvertedElement { element, .. }) => EndCause::Mesh { element, least_stiffness },
             failure => EndCause::Method { least_stiffness, failure },
         };
@@ -238,14 +252,22 @@ impl ForwardModel {
     }
 }
 
+/// Whether ν, seen at three drives of which the last is the end of a path, falls there as the square root of the way
+/// that is left (ν² then lies on a line) rather than on a line itself.
+fn falls_as_square_root(first: (f64, f64), second: (f64, f64), end: (f64, f64)) -> bool {
+    let on_line = |a: f64, b: f64| a + (b - a) * (end.0 - first.0) / (second.0 - first.0);
+    let line = on_line(first.1, second.1);
+    let root = on_line(first.1.powi(2), second.1.powi(2)).max(0.0).sqrt();
+    // Beyond a point where it turns back a path has no states, so that none has a negative ν.
+    end.1 > 0.0 && (end.1 - root).abs() < (end.1 - line).abs()
+}
+
 /// How a sample gives way most easily.
 struct Softest {
     /// ν.
     stiffness: f64,
     /// Where at rest φ is largest, mm.
     place_mm: [f64; 3],
-    /// The part of the path's direction that lies along φ, in the stiffness at rest.
-    part_of_path: f64,
 }
 
 impl MeshModel {
@@ -284,15 +306,10 @@ impl MeshModel {
             mode.iter_mut().for_each(|x| *x /= scale);
             stiffness = dot(&mode, &tangent.times(&mode));
         }
-        // The direction of the path, K u′ = b, along φ: (φ·b)/(ν + s) of what (K + s K₀)⁻¹ b is in all.
-        let right = assembler.collect(&path, 1.0);
-        let direction = shifted.solve(std::slice::from_ref(&right), ACCURACY)?.swap_remove(0);
-        let along = dot(&mode, &at_rest.times(&direction));
-        let part_of_path = along * along / dot(&direction, &at_rest.times(&direction)).max(f64::MIN_POSITIVE);
         let nodal = assembler.spread(&mode);
         let size = |u: &[f64; 3]| u.iter().map(|x| x * x).sum::<f64>();
         let most = (0..nodal.len()).max_by(|&a, &b| size(&nodal[a]).total_cmp(&size(&nodal[b]))).unwrap_or(0);
-        Ok(Softest { stiffness, place_mm: mesh.nodes[most], part_of_path })
+        Ok(Softest { stiffness, place_mm: mesh.nodes[most] })
     }
 }
 
@@ -313,4 +330,22 @@ fn path_direction(assembler: &Assembler, material: &Material, at: &Equilibrium) 
         .assemble_directional(&configuration, Some(&imposed), None, None, &mut rate)
         .map_err(|cause| SolveError::diverged_at(at.drive_mm, cause))?;
     Ok(rate)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::falls_as_square_root;
+
+    /// ν = c (d − x)^p with an end a little before d, and with a smooth change of c on the way.
+    #[test]
+    fn a_turning_path_is_told_from_a_branching_one() {
+        let seen = |power: f64, drift: f64, x: f64| (x, (1.0 + drift * x) * (1.0 - x).powf(power));
+        for (drift, end) in [(0.0, 0.999), (0.5, 0.999), (-0.3, 0.9995), (0.0, 0.995)] {
+            let is_root = |power: f64| {
+                falls_as_square_root(seen(power, drift, 0.94), seen(power, drift, 0.98), seen(power, drift, end))
+            };
+            assert!(is_root(0.5) && !is_root(1.0), "{drift}, {end}");
+        }
+        assert!(!falls_as_square_root((0.94, 0.06), (0.98, 0.02), (1.01, -0.01)));
+    }
 }

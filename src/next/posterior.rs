@@ -7,7 +7,7 @@ use super::options::{NextOptions, Plan};
 use super::scanned::{ForceRead, ScannedStep};
 use super::visited::Visited;
 use crate::calibration::{
-    CalibrateOptions, CalibrationProblem, Objective, Observed, RecordingFit, TermCount, calibrate,
+    CalibrateOptions, CalibrationProblem, Objective, Observed, RecordingFit, TermCount, calibrate, mean_scans,
 };
 use crate::kinematics::{Decomposition, IDENTITY, decompose};
 use crate::material::Material;
@@ -74,29 +74,29 @@ impl Posterior {
             num_starts,
             ..CalibrateOptions::default()
         };
-        let corrected = if options.has_mesh_correction {
+        let (mut corrected, num_scans): (Vec<Observed>, Vec<usize>) =
+            mean_scans(observed).into_iter().map(|m| (m.mean, m.num_scans)).unzip();
+        if options.has_mesh_correction {
             on_stage("error of the mesh");
-            let first = calibrate(observed, &mesh, &settings(TermCount::Fixed(1), 1), on_stage, is_cancelled)?;
-            without_mesh_error(observed, &first.fit, options.mesh_factor, is_cancelled)?
-        } else {
-            observed.to_vec()
-        };
+            let first = calibrate(&corrected, &mesh, &settings(TermCount::Fixed(1), 1), on_stage, is_cancelled)?;
+            corrected = without_mesh_error(&corrected, &first.fit, options.mesh_factor, is_cancelled)?;
+        }
         on_stage("what is known so far");
         let terms = options.num_terms.map_or(TermCount::Auto { max: MAX_TERMS }, TermCount::Fixed);
         let found = calibrate(&corrected, &mesh, &settings(terms, NUM_STARTS), on_stage, is_cancelled)?;
         let mut problem = CalibrationProblem::new(&corrected, &|s| mesh(s, options.mesh_factor), Objective::Weighted)?;
         let discrepancy = Discrepancy::of(&corrected, &found.fit);
-        let seen = Seen::of(&mut problem, &found.fit, plan)?;
+        let seen = Seen::of(&mut problem, &found.fit, plan, &num_scans)?;
         let visited = Visited::of(seen.states.iter().flatten().flatten());
         let mut information = JointInformation::none(&found.fit.material, seen.unknown_sd.len());
         for (r, steps) in seen.steps.iter().enumerate() {
             for (s, step) in steps.iter().enumerate() {
                 let here = &corrected[r];
-                let num = num_done(&corrected, &here.specimen, here.steps[s].drive_mm) as f64;
+                let num = num_done(observed, &here.specimen, here.steps[s].drive_mm) as f64;
                 let (material, num_unknowns) = (&found.fit.material, seen.unknown_sd.len());
                 // Scans of one drive share their discrepancy: each has its part of what their mean tells.
                 let of_all = step.information(material, num_unknowns, num, &discrepancy)?;
-                information.add_times(1.0 / num, &of_all)?;
+                information.add_times(num_scans[r] as f64 / num, &of_all)?;
             }
         }
         Ok(Posterior {
@@ -195,12 +195,18 @@ struct Seen {
 }
 
 impl Seen {
-    fn of(problem: &mut CalibrationProblem, fit: &RecordingFit, plan: &Plan) -> Result<Seen, NextError> {
+    /// `num_scans`: of how many scans each recording is the mean.
+    fn of(
+        problem: &mut CalibrationProblem,
+        fit: &RecordingFit,
+        plan: &Plan,
+        num_scans: &[usize],
+    ) -> Result<Seen, NextError> {
         problem.refuse_unlike_samples("what to scan next")?;
         let observed = problem.observed();
         let mut seen = Seen { steps: Vec::new(), states: Vec::new(), unknown_sd: Vec::new() };
         for (r, (model, view)) in problem.models_and_views().enumerate() {
-            let recording = &observed[r];
+            let (recording, num) = (&observed[r], num_scans[r] as f64);
             let (mut steps, mut states) = (Vec::new(), Vec::new());
             for (s, equilibrium) in fit.states(r).iter().enumerate() {
                 let measured = &recording.steps[s];
@@ -234,13 +240,14 @@ impl Seen {
                     beyond: vec![0.0; weights.len()],
                     weights,
                     signal: None,
-                    noise_mm2: recording.noise_sd_mm.map(|sd| sd * sd * recording.noise_correlation()),
+                    // Of one scan.
+                    noise_mm2: recording.noise_sd_mm.map(|sd| num * sd * sd * recording.noise_correlation()),
                     voxel_mm3: recording.mask.grid.voxel_volume_mm3(),
                     force: measured.force.map(|force| ForceRead {
                         force_n: equilibrium.force_n,
                         by_parameter: forces.to_vec(),
                         by_unknown: unknowns.iter().map(|u| u.force_n).collect(),
-                        sd_n: force.sd_n,
+                        sd_n: num.sqrt() * force.sd_n,
                         beyond: 0.0,
                     }),
                 });
