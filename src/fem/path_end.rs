@@ -27,6 +27,9 @@ const SMALLEST_STEP: f64 = 1.0 / 2048.0;
 /// What of a drive that was reached is reached again in other steps.
 const WITHIN_REACH: f64 = 0.999;
 
+/// How often a drive a little before the last one reached is tried.
+const TRIES: usize = 3;
+
 /// s: small beside 1, and large beside what a factor in single precision gets wrong. Where K + s K₀ is not positive
 /// definite either, larger ones are tried.
 const SHIFTS: [f64; 3] = [0.02, 0.1, 0.5];
@@ -235,13 +238,17 @@ impl ForwardModel {
         options: &SolveOptions,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Equilibrium, SolveError> {
-        match self.solve(material, drive_mm, start, options, is_cancelled) {
-            // Other steps than those that led there may end a little earlier.
-            Err(SolveError::Diverged { reached_mm, .. }) => {
-                self.solve(material, reached_mm * WITHIN_REACH, start, options, is_cancelled)
+        let mut found = self.solve(material, drive_mm, start, options, is_cancelled);
+        for _ in 0..TRIES {
+            match found {
+                // Other steps than those that led there may end a little earlier.
+                Err(SolveError::Diverged { reached_mm, .. }) => {
+                    found = self.solve(material, reached_mm * WITHIN_REACH, start, options, is_cancelled);
+                }
+                _ => break,
             }
-            found => found,
         }
+        found
     }
 
     /// The smallest stiffness of the material over its initial shear modulus, and where at rest.

@@ -10,6 +10,7 @@ pub const SECOND_EXPONENT: f64 = -2.0;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum LawKind {
     /// W = ½ μ x, x = Ī₁ − 3: an Ogden term whose exponent is 2.
     NeoHookean,
@@ -86,6 +87,7 @@ impl LawKind {
 
 /// An energy in the first invariant that a material may have.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum InvariantLaw {
     /// The neo-Hookean one.
     NeoHookean(NeoHookean),
