@@ -1,5 +1,5 @@
-//! Why a path of equilibria ends, where that is known: columns that buckle under a drive or before it, a bar that necks,
-//! a material that is unstable.
+//! Why a path of equilibria ends, where that is known: columns that buckle under a drive or before it, a bar that
+//! necks, a material that is unstable.
 
 mod common;
 
