@@ -158,7 +158,8 @@ impl Observed {
     }
 
     /// How far the noise differs over the image, per component: the multiples of the typical noise that a tenth and
-    /// nine tenths of all values stay below. `None` where it is alike everywhere, at every step.
+    /// nine tenths of all values stay below. `None` where the two differ by less than a hundredth: a mean of scans of
+    /// which one lacks a voxel is as good as even.
     pub fn noise_range(&self) -> Option<[[f64; 2]; 3]> {
         let varying: Vec<&[f64; 3]> = self.steps.iter().filter_map(|s| s.relative_noise.as_ref()).flatten().collect();
         let of_component = |c: usize| {
@@ -166,7 +167,8 @@ impl Observed {
             all.sort_by(f64::total_cmp);
             [0.1, 0.9].map(|part| all[((all.len() - 1) as f64 * part).round() as usize])
         };
-        (!varying.is_empty()).then(|| [0, 1, 2].map(of_component))
+        let range = (!varying.is_empty()).then(|| [0, 1, 2].map(of_component));
+        range.filter(|all| all.iter().any(|[least, most]| *most > 1.01 * least))
     }
 
     /// Whether the volume was scanned, as `what` needs.
