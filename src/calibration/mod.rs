@@ -66,7 +66,7 @@ pub use prediction::SolverWork;
 pub use problem::CalibrationProblem;
 pub use profile::{Profile, bulk_lower_bound_kpa, profile};
 pub use recording_fit::RecordingFit;
-pub(crate) use repeats::mean_scans;
+pub use repeats::{MeanScan, mean_scans};
 pub use result::{
     CalibrationResult, DiscretisationResult, ObjectiveResult, ParameterResult, RatioResult, StepResult,
     ValueWithInterval, rms_misfit_mm,

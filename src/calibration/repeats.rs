@@ -11,15 +11,15 @@ const ALIKE: f64 = 1.25;
 
 /// The mean of scans of one sample at the same drives, and how many scans it is of.
 #[derive(Clone, Debug)]
-pub(crate) struct MeanScan {
+pub struct MeanScan {
     /// The mean, with its own noise.
-    pub(crate) mean: Observed,
+    pub mean: Observed,
     /// Number of scans.
-    pub(crate) num_scans: usize,
+    pub num_scans: usize,
 }
 
 /// Every scan that differs from those before it, and the mean of it and its repeats.
-pub(crate) fn mean_scans(observed: &[Observed]) -> Vec<MeanScan> {
+pub fn mean_scans(observed: &[Observed]) -> Vec<MeanScan> {
     let mut groups: Vec<Vec<&Observed>> = Vec::new();
     for scan in observed {
         match groups.iter_mut().find(|group| is_repeat(group[0], scan)) {
