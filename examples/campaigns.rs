@@ -187,10 +187,8 @@ impl Sample<'_> {
             let is_precise = self.over_precision(&known) <= 1.0;
             if is_precise || observed.len() == MOST_SCANS {
                 let truth: Vec<f64> = self.truth.parameters()[1..].iter().map(|p| self.truth.value(*p)).collect();
-                let holds = |(p, t): (&lambdak::next::NextParameter, &f64)| {
-                    let [low, high] = p.interval_95;
-                    low.is_none_or(|low| low <= *t) && high.is_none_or(|high| *t <= high)
-                };
+                let holds =
+                    |(p, t): (&lambdak::next::NextParameter, &f64)| (p.interval_95[0]..=p.interval_95[1]).contains(t);
                 let covered = known.parameters.iter().zip(&truth).filter(|pair| holds(*pair)).count();
                 return Ok(Campaign { num_scans: observed.len(), is_precise, covered: [covered, truth.len()] });
             }

@@ -195,7 +195,6 @@ pub fn calibrate(
         initial_shear_modulus,
         selection,
         meshes,
-        has_profile_intervals: of_noise.are_of_profiles,
         profiles,
         contours: around,
         largest_stretch,

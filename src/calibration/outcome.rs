@@ -54,8 +54,6 @@ pub struct Calibration {
     pub selection: TermSelection,
     /// The two meshes; none where only one was used.
     pub meshes: Option<MeshComparison>,
-    /// Whether terms are hardly told apart, so that the intervals of moduli and exponents are of profile likelihoods.
-    pub has_profile_intervals: bool,
     /// On request.
     pub profiles: Vec<Profile>,
     /// On request.

@@ -7,7 +7,7 @@ use super::posterior::{Point, Posterior};
 use super::result::{CandidateResult, LeftOut, MisfitResult, NextParameter, NextResult, Stop, StopVerdict};
 use super::trial::{Bench, Trial};
 use super::worth::{Knowledge, MOST_SCANS, Worth};
-use crate::calibration::Observed;
+use crate::calibration::{Observed, TWO_SIDED_95};
 use crate::material::Parameter;
 use crate::specimen::{Specimen, farthest_from_zero, leads_on};
 use rayon::prelude::*;
@@ -67,15 +67,16 @@ pub fn advise(
         parameters: values
             .zip(&parameters)
             .zip(&so_far.relative_sd)
-            .enumerate()
-            .map(|(index, ((parameter, name), &relative_sd))| {
+            .map(|((parameter, name), &relative_sd)| {
                 let value = posterior.material.value(parameter);
+                let half = TWO_SIDED_95 * relative_sd * value.abs();
+                let precision = Some(options.precision.of(name)).filter(|p| p.is_finite());
                 NextParameter {
                     name: name.clone(),
                     value,
                     relative_sd,
-                    interval_95: posterior.interval_95(index, value, relative_sd * value.abs()),
-                    precision: Some(options.precision.of(name)).filter(|p| p.is_finite()),
+                    interval_95: [value - half, value + half],
+                    precision,
                 }
             })
             .collect(),

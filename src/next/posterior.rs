@@ -7,11 +7,10 @@ use super::options::{NextOptions, Plan};
 use super::scanned::{ForceRead, ScannedStep};
 use super::visited::Visited;
 use crate::calibration::{
-    CalibrateOptions, CalibrationProblem, Objective, Observed, RecordingFit, TWO_SIDED_95, TermCount, calibrate,
-    mean_scans,
+    CalibrateOptions, CalibrationProblem, Objective, Observed, RecordingFit, TermCount, calibrate, mean_scans,
 };
 use crate::kinematics::{Decomposition, IDENTITY, decompose};
-use crate::material::{Material, Parameter};
+use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::sensitivity::{Covariance, FisherInformation, JointInformation, median, unknowns_of};
 use crate::specimen::Specimen;
@@ -37,23 +36,6 @@ pub(super) struct Point {
     pub(super) material: Material,
 }
 
-/// What a fit alone leaves of a parameter whose likelihood is not that of a linear model.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct ProfileInterval {
-    /// Standard deviation of the linear model, where there is one.
-    sd: Option<f64>,
-    /// Ends of the 95 % interval; none where they are open.
-    ends: [Option<f64>; 2],
-}
-
-impl ProfileInterval {
-    /// The interval where `sd` is known to no better than this: as much longer as that is more than the fit's own.
-    pub(super) fn lengthened(&self, value: f64, sd: f64) -> [Option<f64>; 2] {
-        let factor = self.sd.map_or(1.0, |own| (sd / own).max(1.0));
-        self.ends.map(|end| end.map(|end| value + factor * (end - value)))
-    }
-}
-
 /// What is known so far.
 pub(super) struct Posterior {
     /// The estimate.
@@ -62,8 +44,6 @@ pub(super) struct Posterior {
     pub(super) information: JointInformation,
     /// To what the unknowns are known beforehand.
     pub(super) unknown_sd: Vec<f64>,
-    /// Of all μ and α where terms are hardly told apart; none where the linear model holds.
-    pub(super) profiles: Option<Vec<ProfileInterval>>,
     /// The misfit beyond noise.
     pub(super) discrepancy: Discrepancy,
     /// The states visited.
@@ -119,12 +99,7 @@ impl Posterior {
                 information.add_times(num_scans[r] as f64 / num, &of_all)?;
             }
         }
-        let of_shear = found.estimates.iter().filter(|e| e.parameter != Parameter::Kappa);
-        let profiles = found
-            .has_profile_intervals
-            .then(|| of_shear.map(|e| ProfileInterval { sd: e.sd, ends: e.interval_95 }).collect());
         Ok(Posterior {
-            profiles,
             material: found.fit.material.clone(),
             information,
             unknown_sd: seen.unknown_sd,
@@ -133,14 +108,6 @@ impl Posterior {
             chi2_per_datum: found.fit.chi2_per_datum,
             notes: found.notes,
         })
-    }
-
-    /// The 95 % interval of the parameter of place `index` among μ and α, known to a standard deviation of `sd`.
-    pub(super) fn interval_95(&self, index: usize, value: f64, sd: f64) -> [Option<f64>; 2] {
-        match &self.profiles {
-            Some(profiles) => profiles[index].lengthened(value, sd),
-            None => [-1.0, 1.0].map(|side| Some(value + side * TWO_SIDED_95 * sd)),
-        }
     }
 
     /// Information about the material, with `more` about material and unknowns, the unknowns estimated too.

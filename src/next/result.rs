@@ -48,9 +48,8 @@ pub struct NextParameter {
     pub value: f64,
     /// Standard deviation over the estimate; 1 where the recordings do not determine it, or no better.
     pub relative_sd: f64,
-    /// 95 % interval; null for a side that the recordings leave open. Where terms are hardly told apart it follows the
-    /// valley that they leave, as a calibration's does.
-    pub interval_95: [Option<f64>; 2],
+    /// 95 % interval.
+    pub interval_95: [f64; 2],
     /// The precision that is asked; null for none.
     pub precision: Option<f64>,
 }

@@ -101,7 +101,7 @@ fn candidates(result: &NextResult) -> Table {
 
 fn known(result: &NextResult) -> Table {
     let row = |p: &crate::next::NextParameter| {
-        let [low, high] = p.interval_95.map(|end| end.map_or("open".into(), |end| significant(end, 4)));
+        let [low, high] = p.interval_95.map(|end| significant(end, 4));
         vec![
             symbol_of_parameter(&p.name),
             significant(p.value, 5),
