@@ -28,9 +28,9 @@ type Failure = Box<dyn Error + Send + Sync>;
 
 /// A campaign that needs more has failed, and counts as this many.
 const MOST_SCANS: usize = 8;
-/// Element sizes relative to standard: of the truth, fine enough that its own error is no part of what is found, and of
-/// the fits, as in the command `next`.
-const TRUTH_MESH: f64 = 0.8;
+/// Element sizes relative to standard: of the truth, fine enough that its own error (0.1 % of the force) is less than what
+/// noise leaves, and of the fits, as in the command `next`.
+const TRUTH_MESH: f64 = 0.5;
 const FIT_MESH: f64 = 2.5;
 /// Drives that may be scanned, mm.
 const DRIVES_MM: [f64; 5] = [2.0, 3.0, 4.0, 5.0, 6.0];

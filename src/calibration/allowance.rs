@@ -11,10 +11,15 @@
 
 use super::recording_fit::RecordingFit;
 use super::target::Target;
+use crate::mesh::error_over_difference;
 
-/// Error left on the finer mesh over the difference of the two, at the order 1.4 that singular edges leave:
-/// 0.7^1.4 / (1 − 0.7^1.4).
-pub(super) const ERROR_OVER_SHIFT: f64 = 1.54;
+/// Element size of the coarser mesh relative to the finer one.
+pub(super) const MESH_RATIO: f64 = 1.0 / 0.7;
+
+/// Error of the finer mesh over the difference of the two, 1.54.
+pub(super) fn error_over_shift() -> f64 {
+    error_over_difference(MESH_RATIO).abs()
+}
 
 /// The allowance of one calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,8 +63,8 @@ impl Allowance {
         }
         Allowance {
             factor,
-            own_error_mm: ERROR_OVER_SHIFT * (squares / count.max(1) as f64).sqrt(),
-            objective: (factor * ERROR_OVER_SHIFT).powi(2) * objective,
+            own_error_mm: error_over_shift() * (squares / count.max(1) as f64).sqrt(),
+            objective: (factor * error_over_shift()).powi(2) * objective,
         }
     }
 

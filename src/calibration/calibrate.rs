@@ -5,7 +5,7 @@
 //! error (see [`super::allowance`]), and a term that the finer mesh does not ask for was the coarse mesh's and is
 //! dropped.
 
-use super::allowance::{Allowance, ERROR_OVER_SHIFT};
+use super::allowance::{Allowance, MESH_RATIO, error_over_shift};
 use super::calibrate_options::{CalibrateOptions, TermCount};
 use super::contours::contours;
 use super::error::CalibrationError;
@@ -25,8 +25,6 @@ use crate::mesh::MeshOptions;
 use crate::sensitivity::IDENTIFIABILITY_LIMIT;
 use crate::specimen::Specimen;
 
-/// Element size of the coarser mesh relative to the finer one.
-pub const MESH_RATIO: f64 = 1.0 / 0.7;
 /// Calibrates on `observed`. `mesh` gives the settings for an element size relative to standard; `on_stage` is told
 /// what comes next.
 ///
@@ -89,7 +87,7 @@ pub fn calibrate(
             // What a discretisation error within the allowance could make a term of is no evidence for one.
             let start = run.fit(&mut problem, &fewer.material, Some(fewer))?;
             let candidates = Candidates::new(&mut problem, &start, &run.fit_options, is_cancelled)?;
-            let of_mesh = (options.discretisation_factor * ERROR_OVER_SHIFT).powi(2)
+            let of_mesh = (options.discretisation_factor * error_over_shift()).powi(2)
                 * candidates.promise_of_mesh(&problem.targets()?, &smaller);
             pair[0].chi2 = (pair[0].chi2 - of_mesh).max(pair[1].chi2);
             compare(&mut pair, fit.num_data);
@@ -127,7 +125,7 @@ pub fn calibrate(
         return Err(CalibrationError::NotConverged { iterations, distance, limit });
     }
     let mesh_error = |value: &dyn Fn(&Material) -> f64| match &meshes {
-        Some(m) => ERROR_OVER_SHIFT * (value(&fit.material) - value(&m.coarse)).abs(),
+        Some(m) => error_over_shift() * (value(&fit.material) - value(&m.coarse)).abs(),
         None => 0.0,
     };
     if is_weak(&fit) {

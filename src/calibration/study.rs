@@ -11,8 +11,7 @@
 //! whose equilibria and derivatives all draws share. The first draws are also fitted from blind starts, which must end
 //! in the same optimum.
 
-use super::allowance::ERROR_OVER_SHIFT;
-use super::calibrate::MESH_RATIO;
+use super::allowance::{MESH_RATIO, error_over_shift};
 use super::calibrate_options::CalibrateOptions;
 use super::error::CalibrationError;
 use super::interval::widened;
@@ -318,7 +317,7 @@ fn summarise(draws: &[Draw], truth: &Material, noiseless: &RecordingFit, coarse:
             let at = noiseless.material.value(parameter);
             let values: Vec<f64> = fitted.iter().map(|d| d.values[i]).collect();
             let stated = || fitted.iter().filter_map(|d| d.ends[i].map(|ends| (d.values[i], ends)));
-            let discretisation_sd = factor * ERROR_OVER_SHIFT * (at - coarse.material.value(parameter)).abs();
+            let discretisation_sd = factor * error_over_shift() * (at - coarse.material.value(parameter)).abs();
             let true_value = truth.value(parameter);
             let covers = |v: f64, center: f64, ends: Ends, discretisation_sd: f64| {
                 let [low, high] = widened(parameter, v, ends, discretisation_sd, 0.0);

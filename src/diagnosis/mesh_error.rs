@@ -19,7 +19,7 @@ use super::other_mesh::OtherMesh;
 use super::prior::FitSettings;
 use super::scene::Scene;
 use super::trace::Trace;
-use crate::mesh::MeshOptions;
+use crate::mesh::{MeshOptions, error_over_difference};
 use nalgebra::DVector;
 use rayon::prelude::*;
 
@@ -40,8 +40,6 @@ const HARDLY_FINER: f64 = 0.9;
 /// single mesh may shift a parameter by little because it happens to err as ours does; therefore the mean square over
 /// all meshes counts.
 const COARSER: [(f64, bool); 3] = [(1.25, false), (1.6, false), (1.6, true)];
-/// The order of convergence that singular edges leave.
-const ORDER: f64 = 1.4;
 /// Standard deviation of a parameter as a part of its shift when the edge is made twice as wide. The true edge may have
 /// any width from sharp to twice ours, each as likely as another: the standard deviation of an even distribution is
 /// 1/√12 of its range, which is two such shifts wide.
@@ -202,12 +200,12 @@ pub fn widen<'a>(
     let ours = laboratory.model_of(&fitted.scene())?;
     let by_mesh = |(coarser, mesh): &mut (f64, OtherMesh)| {
         let beyond = mesh.beyond(ours, fitted, is_cancelled)?;
-        Ok(shift_by(&beyond) / (1.0 - coarser.powf(ORDER)))
+        Ok(shift_by(&beyond) * error_over_difference(*coarser))
     };
     let mut shifts = meshes.par_iter_mut().map(by_mesh).collect::<Result<Vec<_>, DiagnosisError>>()?;
     // The part of that error which the correction by the finer mesh leaves.
-    let left = defect.map_or(1.0, |d| d.ratio.powf(ORDER));
-    shifts.extend(defect.map(|d| shift_by(&d.trace) / (1.0 - left)));
+    let left = defect.map_or(1.0, |d| 1.0 - 1.0 / error_over_difference(d.ratio));
+    shifts.extend(defect.map(|d| shift_by(&d.trace) * error_over_difference(d.ratio)));
     let mut square = DVector::<f64>::zeros(weighed.len());
     for shift in &shifts {
         square += shift.component_mul(shift) / shifts.len() as f64;

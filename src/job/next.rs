@@ -62,7 +62,7 @@ pub struct NextRequest {
     #[serde(default = "mesh_factor")]
     #[schema(minimum = 0.2, maximum = 5.0, default = mesh_factor)]
     pub mesh_factor: f64,
-    /// Whether the error of that mesh is predicted by one of half the size and taken off the recordings.
+    /// Whether the error of that mesh is extrapolated from a finer one and taken off the recordings.
     #[serde(default = "defaults::yes")]
     #[schema(default = defaults::yes)]
     pub has_mesh_correction: bool,

@@ -41,7 +41,7 @@ pub struct NextOptions {
     pub num_terms: Option<usize>,
     /// Element size relative to standard.
     pub mesh_factor: f64,
-    /// Whether the error of that mesh is predicted by one of half the size and taken off the recordings.
+    /// Whether the error of that mesh is extrapolated from a finer one and taken off the recordings.
     pub has_mesh_correction: bool,
     /// Candidates' drives, mm, in the direction of each specimen's own; where left out `num_drives` from
     /// the study's smallest to its largest.

@@ -7,7 +7,8 @@ use super::options::{NextOptions, Plan};
 use super::scanned::{ForceRead, ScannedStep};
 use super::visited::Visited;
 use crate::calibration::{
-    CalibrateOptions, CalibrationProblem, Objective, Observed, RecordingFit, TermCount, calibrate, mean_scans,
+    CalibrateOptions, Calibration, CalibrationProblem, Objective, Observed, RecordingFit, TermCount, calibrate,
+    mean_scans,
 };
 use crate::kinematics::{Decomposition, IDENTITY, decompose};
 use crate::material::Material;
@@ -18,8 +19,12 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 /// Most terms where BIC chooses.
 const MAX_TERMS: usize = 3;
-/// Starts of every number of terms.
+/// Starts of every number of terms, and where the fit is repeated with the error of the mesh known better.
 const NUM_STARTS: usize = 2;
+const NUM_STARTS_AGAIN: usize = 1;
+/// A further term is fitted where the linear model promises this part of what BIC asks of it: the fit itself may gain
+/// more, but of such a term takes most of the time that an answer has.
+const LEAST_OF_BIC: f64 = 0.5;
 /// A parameter that the recordings do not determine counts as known to this relative standard deviation.
 pub(super) const UNKNOWN_RELATIVE_SD: f64 = 1.0;
 /// Materials that candidates are averaged over differ from the estimate by at most this part of each parameter.
@@ -66,25 +71,11 @@ impl Posterior {
         on_stage: &dyn Fn(&str),
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Posterior, NextError> {
-        let mesh = |s: &Specimen, factor: f64| MeshOptions::scaled(s, factor);
-        let settings = |terms: TermCount, num_starts: usize| CalibrateOptions {
-            terms,
-            mesh_factor: options.mesh_factor,
-            has_mesh_allowance: false,
-            num_starts,
-            ..CalibrateOptions::default()
-        };
-        let (mut corrected, num_scans): (Vec<Observed>, Vec<usize>) =
+        let (means, num_scans): (Vec<Observed>, Vec<usize>) =
             mean_scans(observed).into_iter().map(|m| (m.mean, m.num_scans)).unzip();
-        if options.has_mesh_correction {
-            on_stage("error of the mesh");
-            let first = calibrate(&corrected, &mesh, &settings(TermCount::Fixed(1), 1), on_stage, is_cancelled)?;
-            corrected = without_mesh_error(&corrected, &first.fit, options.mesh_factor, is_cancelled)?;
-        }
-        on_stage("what is known so far");
-        let terms = options.num_terms.map_or(TermCount::Auto { max: MAX_TERMS }, TermCount::Fixed);
-        let found = calibrate(&corrected, &mesh, &settings(terms, NUM_STARTS), on_stage, is_cancelled)?;
-        let mut problem = CalibrationProblem::new(&corrected, &|s| mesh(s, options.mesh_factor), Objective::Weighted)?;
+        let (corrected, found) = fit_together(means, options, on_stage, is_cancelled)?;
+        let mut problem =
+            CalibrationProblem::new(&corrected, &|s| MeshOptions::scaled(s, options.mesh_factor), Objective::Weighted)?;
         let discrepancy = Discrepancy::of(&corrected, &found.fit);
         let seen = Seen::of(&mut problem, &found.fit, plan, &num_scans)?;
         let visited = Visited::of(seen.states.iter().flatten().flatten());
@@ -149,6 +140,51 @@ impl Posterior {
         let sides: Vec<Point> = [-1.0, 1.0].into_iter().filter_map(moved).collect();
         let center = Point { weight: 2.0 / 3.0, material: self.material.clone() };
         Ok(std::iter::once(center).chain(sides).collect())
+    }
+}
+
+/// The law of `means`, and these with the error of the fit's mesh, which a first fit tells.
+fn fit_together(
+    means: Vec<Observed>,
+    options: &NextOptions,
+    on_stage: &dyn Fn(&str),
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<(Vec<Observed>, Calibration), NextError> {
+    let num_data: usize = means.iter().map(|o| 3 * o.mask.num_voxels() * o.steps.len()).sum();
+    let fit = |observed: &[Observed], terms: TermCount, num_starts: usize| {
+        let settings = CalibrateOptions {
+            terms,
+            mesh_factor: options.mesh_factor,
+            has_mesh_allowance: false,
+            num_starts,
+            least_promise: match terms {
+                // Two parameters at ln n each.
+                TermCount::Auto { .. } => LEAST_OF_BIC * 2.0 * (num_data as f64).ln(),
+                TermCount::Fixed(_) => 0.0,
+            },
+            ..CalibrateOptions::default()
+        };
+        calibrate(observed, &MeshOptions::scaled, &settings, on_stage, is_cancelled)
+    };
+    let terms = options.num_terms.map_or(TermCount::Auto { max: MAX_TERMS }, TermCount::Fixed);
+    if !options.has_mesh_correction {
+        on_stage("what is known so far");
+        let found = fit(&means, terms, NUM_STARTS)?;
+        return Ok((means, found));
+    }
+    on_stage("error of the mesh");
+    let mut first = fit(&means, TermCount::Fixed(options.num_terms.unwrap_or(1)), 1)?;
+    let mut num_starts = NUM_STARTS;
+    loop {
+        let corrected = without_mesh_error(&means, &first.fit, options.mesh_factor, is_cancelled)?;
+        on_stage("what is known so far");
+        let found = fit(&corrected, terms, num_starts)?;
+        // A law of more terms tells the error better: large strains and small ones no longer share an exponent.
+        if found.fit.material.terms.len() <= first.fit.material.terms.len() {
+            return Ok((corrected, found));
+        }
+        on_stage("error of the mesh");
+        (first, num_starts) = (found, NUM_STARTS_AGAIN);
     }
 }
 

@@ -103,3 +103,22 @@ fn bombs_are_refused() {
     // Numbers of several variables add up.
     assert!(matches!(read_mat(&file("v73.mat"), 4000), Err(MatError::Memory(_))));
 }
+
+/// An array whose sizes ask for more bytes than a number of 64 bits can count is damaged.
+#[test]
+fn sizes_beyond_counting_are_errors() {
+    let element = |kind: u32, content: &[u8]| {
+        let head = [kind.to_le_bytes(), (content.len() as u32).to_le_bytes()].concat();
+        [&head[..], content, &vec![0; content.len().next_multiple_of(8) - content.len()]].concat()
+    };
+    let (double, sizes) =
+        ([6u32, 0].map(u32::to_le_bytes).concat(), [1u32 << 31, 1 << 30].map(u32::to_le_bytes).concat());
+    let parts = [element(6, &double), element(6, &sizes), element(1, b"u"), element(9, &1.0f64.to_le_bytes())];
+    let mut bytes = vec![b' '; 124];
+    bytes.extend_from_slice(&[0, 1, b'I', b'M']);
+    bytes.extend(element(14, &parts.concat()));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("huge.mat");
+    std::fs::write(&path, bytes).unwrap();
+    assert!(matches!(read_mat(&path, 10_000), Err(MatError::Damaged { .. })));
+}

@@ -198,7 +198,7 @@ impl Reader<'_> {
             }
             6..=15 => {
                 let (kind, real, rest) = self.element(rest)?;
-                if real.len() as u64 > 8 * wanted {
+                if real.len() as u64 > wanted.saturating_mul(8) {
                     return Err(damaged(format!(
                         "'{name}' has {} bytes, its sizes ask for {count} numbers",
                         real.len()
