@@ -11,9 +11,9 @@
 //! ends when the posterior says that every μ and α has its precision, or after [`MOST_SCANS`]. The truth is solved on
 //! a mesh of its own. The 95 % intervals at the end are compared with the truth.
 
-use lambdak::calibration::{Observed, SyntheticScan};
+use lambdak::calibration::{CalibrationError, Observed, SyntheticScan};
 use lambdak::design::Study;
-use lambdak::fem::SolveOptions;
+use lambdak::fem::{SolveError, SolveOptions};
 use lambdak::material::Material;
 use lambdak::mesh::MeshOptions;
 use lambdak::next::{NextOptions, NextResult, Plan, Precision, advise};
@@ -75,8 +75,8 @@ struct Sample<'a> {
     truth: &'a Material,
     precision: f64,
     study: &'a Study,
-    /// Noiseless scans by drive.
-    scans: Vec<SyntheticScan>,
+    /// Noiseless scans by drive; none where the sample gives way before.
+    scans: Vec<Option<SyntheticScan>>,
 }
 
 fn main() -> Result<(), Failure> {
@@ -131,11 +131,15 @@ fn driven(study: &Study, drive: usize) -> Specimen {
 
 impl Sample<'_> {
     fn new<'a>(truth: &'a Material, kind: &Kind, study: &'a Study) -> Result<Sample<'a>, Failure> {
-        let scan = |drive: usize| -> Result<SyntheticScan, Failure> {
+        let scan = |drive: usize| -> Result<Option<SyntheticScan>, Failure> {
             let body = driven(study, drive);
             let mesh = MeshOptions { grading: 0.4, ..MeshOptions::scaled(&body, TRUTH_MESH) };
             let solve = SolveOptions::default();
-            Ok(SyntheticScan::new(&body, truth, &study.scan, &study.protocol, &mesh, &solve, &|| false)?)
+            match SyntheticScan::new(&body, truth, &study.scan, &study.protocol, &mesh, &solve, &|| false) {
+                Ok(scan) => Ok(Some(scan)),
+                Err(CalibrationError::Solve(SolveError::Diverged { .. })) => Ok(None),
+                Err(error) => Err(error.into()),
+            }
         };
         let scans = (0..DRIVES_MM.len()).map(scan).collect::<Result<_, _>>()?;
         Ok(Sample { truth, precision: kind.precision, study, scans })
@@ -143,7 +147,7 @@ impl Sample<'_> {
 
     /// A noisy recording; every `draw` has noise of its own.
     fn record(&self, drive: usize, seed: u64, draw: u64) -> Result<Observed, Failure> {
-        let scan = &self.scans[drive];
+        let scan = self.scans[drive].as_ref().ok_or("a drive at which the sample gives way")?;
         let recording = scan.recording("scan", &driven(self.study, drive), &scan.draw(seed, draw), Filter::None)?;
         Ok(Observed::new(&recording, self.study.scan.force_sd_n)?)
     }
@@ -171,9 +175,11 @@ impl Sample<'_> {
         let mut observed: Vec<Observed> = Vec::new();
         let mut next = 0;
         // A fixed protocol takes no advice: a single candidate saves time.
-        let candidates_mm = match way {
-            Way::Adaptive(_) => &DRIVES_MM[..],
-            Way::Fixed(_) => &DRIVES_MM[..1],
+        let candidates_mm: Vec<f64> = match way {
+            Way::Adaptive(_) => {
+                (0..DRIVES_MM.len()).filter(|d| self.scans[*d].is_some()).map(|d| DRIVES_MM[d]).collect()
+            }
+            Way::Fixed(_) => vec![DRIVES_MM[0]],
         };
         loop {
             let drive = match way {
@@ -183,7 +189,7 @@ impl Sample<'_> {
             };
             let own = draw * MOST_SCANS as u64 + observed.len() as u64;
             observed.push(self.record(drive, seed, own)?);
-            let known = self.ask(&observed, candidates_mm)?;
+            let known = self.ask(&observed, &candidates_mm)?;
             let is_precise = self.over_precision(&known) <= 1.0;
             if is_precise || observed.len() == MOST_SCANS {
                 let truth: Vec<f64> = self.truth.parameters()[1..].iter().map(|p| self.truth.value(*p)).collect();
@@ -211,8 +217,8 @@ impl Kind {
         let samples: Vec<Sample> =
             self.truths.par_iter().map(|truth| Sample::new(truth, self, &study)).collect::<Result<_, _>>()?;
         let holds = |drive: &usize| {
-            let force_n = |sample: &Sample| sample.scans[*drive].noiseless().forces_n[0];
-            samples.iter().all(|sample| force_n(sample) <= MOST_FORCE_N)
+            let is_borne = |scan: &SyntheticScan| scan.noiseless().forces_n[0] <= MOST_FORCE_N;
+            samples.iter().all(|sample| sample.scans[*drive].as_ref().is_some_and(is_borne))
         };
         let allowed: Vec<usize> = (0..DRIVES_MM.len()).filter(holds).collect();
         let largest = *allowed.last().ok_or("no drive holds the limit of the load cell with every material")?;
