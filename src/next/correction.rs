@@ -16,8 +16,9 @@ use crate::specimen::Specimen;
 /// finer meshes take longer than an answer may.
 const FINER: f64 = 0.4;
 const FINEST: f64 = 0.6;
-/// A finer mesh whose element size is closer to ours than this factor says nothing about our error.
-const HARDLY_FINER: f64 = 0.9;
+/// Of a finer mesh whose element size is closer to ours than this factor the difference would be multiplied by more
+/// than 2.5: nothing is taken off.
+const HARDLY_FINER: f64 = 0.7;
 
 /// `observed` plus the error that the fit's mesh, of `mesh_factor`, has with the law of `fit`, as a finer mesh tells
 /// it.
