@@ -28,6 +28,8 @@ type Failure = Box<dyn Error + Send + Sync>;
 
 /// A campaign that needs more has failed, and counts as this many.
 const MOST_SCANS: usize = 8;
+/// Of one material and way to choose the scans.
+const MOST_CAMPAIGNS: u64 = 1000;
 /// Element sizes relative to standard: of the truth, fine enough that its own error (0.1 % of the force) is less than what
 /// noise leaves, and of the fits, as in the command `next`.
 const TRUTH_MESH: f64 = 0.5;
@@ -72,6 +74,8 @@ struct Tally {
 
 /// A material to be measured.
 struct Sample<'a> {
+    /// Its place among the materials of its kind.
+    place: u64,
     truth: &'a Material,
     precision: f64,
     study: &'a Study,
@@ -81,7 +85,7 @@ struct Sample<'a> {
 
 fn main() -> Result<(), Failure> {
     let numbers: Vec<u64> = std::env::args().skip(1).map(|n| n.parse()).collect::<Result<_, _>>()?;
-    let draws = numbers.first().copied().unwrap_or(20);
+    let draws = numbers.first().copied().unwrap_or(20).min(MOST_CAMPAIGNS);
     let seed = numbers.get(1).copied().unwrap_or(1);
     let of = |terms: &[(f64, f64)]| Material::new(400.0, terms.iter().copied());
     let kinds = [
@@ -130,7 +134,8 @@ fn driven(study: &Study, drive: usize) -> Specimen {
 }
 
 impl Sample<'_> {
-    fn new<'a>(truth: &'a Material, kind: &Kind, study: &'a Study) -> Result<Sample<'a>, Failure> {
+    fn new<'a>(place: usize, kind: &'a Kind, study: &'a Study) -> Result<Sample<'a>, Failure> {
+        let truth = &kind.truths[place];
         let scan = |drive: usize| -> Result<Option<SyntheticScan>, Failure> {
             let body = driven(study, drive);
             let mesh = MeshOptions { grading: 0.4, ..MeshOptions::scaled(&body, TRUTH_MESH) };
@@ -142,13 +147,15 @@ impl Sample<'_> {
             }
         };
         let scans = (0..DRIVES_MM.len()).map(scan).collect::<Result<_, _>>()?;
-        Ok(Sample { truth, precision: kind.precision, study, scans })
+        Ok(Sample { place: place as u64, truth, precision: kind.precision, study, scans })
     }
 
-    /// A noisy recording; every `draw` has noise of its own.
-    fn record(&self, drive: usize, seed: u64, draw: u64) -> Result<Observed, Failure> {
+    /// The noisy recording of one scan of a campaign. Every material, campaign and scan has noise of its own; ways to
+    /// choose the scans share it.
+    fn record(&self, drive: usize, seed: u64, campaign: u64, num_before: usize) -> Result<Observed, Failure> {
         let scan = self.scans[drive].as_ref().ok_or("a drive at which the sample gives way")?;
-        let recording = scan.recording("scan", &driven(self.study, drive), &scan.draw(seed, draw), Filter::None)?;
+        let own = (self.place * MOST_CAMPAIGNS + campaign) * MOST_SCANS as u64 + num_before as u64;
+        let recording = scan.recording("scan", &driven(self.study, drive), &scan.draw(seed, own), Filter::None)?;
         Ok(Observed::new(&recording, self.study.scan.force_sd_n)?)
     }
 
@@ -171,7 +178,7 @@ impl Sample<'_> {
         known.parameters.iter().map(|p| p.relative_sd / self.precision).fold(0.0, f64::max)
     }
 
-    fn campaign(&self, way: &Way, seed: u64, draw: u64) -> Result<Campaign, Failure> {
+    fn campaign(&self, way: &Way, seed: u64, campaign: u64) -> Result<Campaign, Failure> {
         let mut observed: Vec<Observed> = Vec::new();
         let mut next = 0;
         // A fixed protocol takes no advice: a single candidate saves time.
@@ -187,8 +194,7 @@ impl Sample<'_> {
                 Way::Adaptive(_) => next,
                 Way::Fixed(drives) => drives[observed.len() % drives.len()],
             };
-            let own = draw * MOST_SCANS as u64 + observed.len() as u64;
-            observed.push(self.record(drive, seed, own)?);
+            observed.push(self.record(drive, seed, campaign, observed.len())?);
             let known = self.ask(&observed, &candidates_mm)?;
             let is_precise = self.over_precision(&known) <= 1.0;
             if is_precise || observed.len() == MOST_SCANS {
@@ -205,7 +211,7 @@ impl Sample<'_> {
 
     /// Whether as many scans as may be of a fixed protocol have the precision.
     fn reaches(&self, drives: &[usize], seed: u64) -> Result<bool, Failure> {
-        let record = |n: usize| self.record(drives[n % drives.len()], seed, n as u64);
+        let record = |n: usize| self.record(drives[n % drives.len()], seed, 0, n);
         let observed = (0..MOST_SCANS).map(record).collect::<Result<Vec<_>, _>>()?;
         Ok(self.over_precision(&self.ask(&observed, &DRIVES_MM[..1])?) <= 1.0)
     }
@@ -214,8 +220,10 @@ impl Sample<'_> {
 impl Kind {
     fn compare(&self, draws: u64, seed: u64) -> Result<(), Failure> {
         let study = study(self)?;
-        let samples: Vec<Sample> =
-            self.truths.par_iter().map(|truth| Sample::new(truth, self, &study)).collect::<Result<_, _>>()?;
+        let samples: Vec<Sample> = (0..self.truths.len())
+            .into_par_iter()
+            .map(|place| Sample::new(place, self, &study))
+            .collect::<Result<_, _>>()?;
         let holds = |drive: &usize| {
             let is_borne = |scan: &SyntheticScan| scan.noiseless().forces_n[0] <= MOST_FORCE_N;
             samples.iter().all(|sample| sample.scans[*drive].as_ref().is_some_and(is_borne))
@@ -265,8 +273,10 @@ fn row(name: &str, samples: &[Sample], way: &Way, draws: u64, seed: u64) -> Resu
     let mut total = Tally::default();
     let mut means = Vec::new();
     for sample in samples {
-        let all: Vec<Campaign> =
-            (0..draws).into_par_iter().map(|draw| sample.campaign(way, seed, draw)).collect::<Result<_, _>>()?;
+        let all: Vec<Campaign> = (0..draws)
+            .into_par_iter()
+            .map(|campaign| sample.campaign(way, seed, campaign))
+            .collect::<Result<_, _>>()?;
         let num_scans: usize = all.iter().map(|c| c.num_scans).sum();
         means.push(format!("{:.2}", num_scans as f64 / draws as f64));
         total.num_campaigns += all.len();

@@ -6,7 +6,7 @@
 //! dropped.
 
 use super::allowance::{Allowance, MESH_RATIO, error_over_shift};
-use super::calibrate_options::{CalibrateOptions, TermCount};
+use super::calibrate_options::CalibrateOptions;
 use super::contours::contours;
 use super::error::CalibrationError;
 use super::interval::{TWO_SIDED_95, widened};
@@ -18,7 +18,7 @@ use super::recording_fit::RecordingFit;
 use super::run::{Run, with_falling_exponents};
 use super::starts::Candidates;
 use super::target::Objective;
-use super::terms::{Rule, SETTLED, TermSelection, choose, compare, is_kept};
+use super::terms::{DecidedBy, compare, is_kept};
 use super::weak_intervals::{Ends, ends_by_noise, is_weak};
 use crate::material::{Material, Parameter};
 use crate::mesh::MeshOptions;
@@ -41,46 +41,15 @@ pub fn calibrate(
     let mut problem = CalibrationProblem::new(observed, &|s| mesh(s, coarse_factor), options.objective)?;
     let has_force = problem.has_force();
     let mut run = Run::new(options, has_force, on_stage, is_cancelled);
-    let (rows, fits) = run.select(&mut problem)?;
-    let rule = |rule| choose(&rows, rule, options.decrement_threshold);
-    let mut selection = TermSelection {
-        by_bic: rule(Rule::Bic),
-        by_f_test: rule(Rule::FTest),
-        by_decrement: rule(Rule::Decrement),
-        decided_by: match options.terms {
-            _ if options.law.is_some() => "fixed".into(),
-            TermCount::Fixed(_) => "fixed".into(),
-            TermCount::Auto { .. } => match options.rule {
-                Rule::Bic => "bic".into(),
-                Rule::FTest => "f_test".into(),
-                Rule::Decrement => "decrement".into(),
-            },
-        },
-        chosen: match options.terms {
-            _ if options.law.is_some() => rows.len(),
-            TermCount::Fixed(n) => n.min(rows.len()),
-            TermCount::Auto { .. } => rule(options.rule),
-        },
-        needed_chi2_decrease: fits
-            .first()
-            .filter(|_| options.rule == Rule::Bic)
-            .map(|f| 2.0 * (f.num_data as f64).ln()),
-        rows,
-    };
-    let Some(mut coarse) = fits.get(selection.chosen.saturating_sub(1)).cloned() else {
-        return Err(CalibrationError::NotConverged {
-            iterations: options.fit.max_iterations,
-            distance: f64::INFINITY,
-            limit: options.fit.tolerance,
-        });
-    };
+    let (mut selection, fits) = run.select_terms(&mut problem)?;
+    let mut coarse = fits[selection.chosen - 1].clone();
     let mut meshes = None;
     let mut fit = coarse.clone();
     if options.has_mesh_allowance {
         on_stage("finer mesh");
         let mut finer = CalibrationProblem::new(observed, &|s| mesh(s, options.mesh_factor), options.objective)?;
         fit = run.fit(&mut finer, &with_falling_exponents(&coarse.material), None)?;
-        while selection.chosen > 1 && selection.decided_by != "fixed" {
+        while selection.chosen > 1 && selection.decided_by != DecidedBy::Fixed {
             let fewer = &fits[selection.chosen - 2];
             let smaller = run.fit(&mut finer, &with_falling_exponents(&fewer.material), None)?;
             let mut pair = vec![run.row(&finer, &smaller, 1, 1)?, run.row(&finer, &fit, 1, 1)?];
@@ -112,18 +81,9 @@ pub fn calibrate(
         meshes = Some(MeshComparison { num_unknowns, coarse: coarse.material.clone(), allowance });
         problem = finer;
     } else {
-        fit = run.fit(&mut problem, &with_falling_exponents(&fit.material), None)?;
+        fit = run.in_order(&mut problem, fit)?;
     }
-    if !fit.is_converged && fit.distance < SETTLED {
-        run.notes.push(format!(
-            "the fit was not at the optimum after {} iterations, {:.2} standard deviations away by the linear model: the data \
-             hardly tell its terms apart",
-            fit.iterations, fit.distance
-        ));
-    } else if !fit.is_converged {
-        let (iterations, distance, limit) = (fit.iterations, fit.distance, options.fit.tolerance);
-        return Err(CalibrationError::NotConverged { iterations, distance, limit });
-    }
+    run.settle(&fit)?;
     let mesh_error = |value: &dyn Fn(&Material) -> f64| match &meshes {
         Some(m) => error_over_shift() * (value(&fit.material) - value(&m.coarse)).abs(),
         None => 0.0,
@@ -234,6 +194,7 @@ fn estimate(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibration::TermCount;
     use crate::calibration::test_problem::{block, same_mesh, truth};
     use crate::recording::Filter;
 

@@ -8,7 +8,7 @@ use super::prediction::{Prediction, SolverWork, Unseen};
 use super::recording_fit::RecordingFit;
 use super::step::Constraints;
 use super::stress_path::StressPath;
-use super::system::NormalSystem;
+use super::system::{NormalSystem, raw_sums};
 use super::target::{Objective, Target};
 use crate::fem::{Departures, ForwardModel, SolveOptions};
 use crate::kinematics::IDENTITY;
@@ -212,6 +212,20 @@ impl<'a> CalibrationProblem<'a> {
     ) -> Result<Vec<Vec<f64>>, CalibrationError> {
         let found = self.predict(material, None, &SolveOptions::trial(), is_cancelled)?;
         Ok(found.into_iter().map(|p| p.forces_n).collect())
+    }
+
+    /// By how much `fit`, a fit of this problem, would shift to first order were the data `other`, of the same specimens
+    /// and voxels: per parameter, in its unit; zero where the data do not determine it.
+    ///
+    /// # Errors
+    /// [`CalibrationError`]: nothing to compare.
+    pub fn shift_to(&self, fit: &RecordingFit, other: &[Observed]) -> Result<Vec<f64>, CalibrationError> {
+        let gradient = |targets: &[Target]| raw_sums(&fit.predictions, targets).1;
+        let moved = Target::of_recordings(other, &self.views, self.objective)?;
+        let change = gradient(&moved) - gradient(&self.targets()?);
+        let covariance = fit.information.covariance();
+        let part = |i: usize, j: usize| covariance.covariance(i, j).map_or(0.0, |c| c * change[j]);
+        Ok((0..change.len()).map(|i| (0..change.len()).map(|j| part(i, j)).sum()).collect())
     }
 
     /// The isochoric principal stretches that a fit's voxels visit, all recordings and drives together.

@@ -10,7 +10,7 @@ use super::problem::CalibrationProblem;
 use super::recording_fit::RecordingFit;
 use super::starts::{first_starts, further_starts, law_starts};
 use super::target::{Objective, PAPER_BETA};
-use super::terms::{TermRow, compare, degeneracies, is_kept};
+use super::terms::{DecidedBy, Rule, SETTLED, TermRow, TermSelection, choose, compare, degeneracies, is_kept};
 use crate::material::{MAX_TERMS, Material, least_relative_stiffness};
 
 /// The same material with its exponents falling.
@@ -37,6 +37,8 @@ pub(super) struct Run<'a> {
     options: &'a CalibrateOptions,
     /// Those of `options` with what is held because no force was recorded.
     pub(super) fit_options: FitOptions,
+    /// Earlier fits on this mesh, from which those of their numbers of terms start.
+    earlier: &'a [RecordingFit],
     on_stage: &'a dyn Fn(&str),
     is_cancelled: &'a dyn Fn() -> bool,
     /// What all fits have taken so far.
@@ -56,7 +58,70 @@ impl<'a> Run<'a> {
         // Without a force all moduli share a factor: μ₁ stays where it is.
         let held = if has_force { options.fit.held } else { options.fit.held.with(1) };
         let fit_options = FitOptions { held, ..options.fit };
-        Run { options, fit_options, on_stage, is_cancelled, work: SolverWork::default(), notes: Vec::new() }
+        let work = SolverWork::default();
+        Run { options, fit_options, earlier: &[], on_stage, is_cancelled, work, notes: Vec::new() }
+    }
+
+    /// The fits of the numbers of terms that `earlier` has start where those ended.
+    pub(super) fn with_earlier(self, earlier: &'a [RecordingFit]) -> Self {
+        Run { earlier, ..self }
+    }
+
+    /// The best fit of each number of terms, and which number each rule takes.
+    ///
+    /// # Errors
+    /// [`CalibrationError::NotConverged`] where no fit is left; any other error of the fits.
+    pub(super) fn select_terms(
+        &mut self,
+        problem: &mut CalibrationProblem,
+    ) -> Result<(TermSelection, Vec<RecordingFit>), CalibrationError> {
+        let options = self.options;
+        let (rows, fits) = self.select(problem)?;
+        let Some(first) = fits.first() else {
+            return Err(CalibrationError::NotConverged {
+                iterations: options.fit.max_iterations,
+                distance: f64::INFINITY,
+                limit: options.fit.tolerance,
+            });
+        };
+        let rule = |rule| choose(&rows, rule, options.decrement_threshold);
+        let (decided_by, chosen) = match options.terms {
+            _ if options.law.is_some() => (DecidedBy::Fixed, rows.len()),
+            TermCount::Fixed(n) => (DecidedBy::Fixed, n.clamp(1, rows.len())),
+            TermCount::Auto { .. } => (options.rule.into(), rule(options.rule)),
+        };
+        let needed_chi2_decrease = (options.rule == Rule::Bic).then(|| 2.0 * (first.num_data as f64).ln());
+        let (by_bic, by_f_test, by_decrement) = (rule(Rule::Bic), rule(Rule::FTest), rule(Rule::Decrement));
+        Ok((TermSelection { by_bic, by_f_test, by_decrement, decided_by, chosen, needed_chi2_decrease, rows }, fits))
+    }
+
+    /// `fit` with its terms in the order of falling exponents.
+    pub(super) fn in_order(
+        &mut self,
+        problem: &mut CalibrationProblem,
+        fit: RecordingFit,
+    ) -> Result<RecordingFit, CalibrationError> {
+        let sorted = with_falling_exponents(&fit.material);
+        if sorted == fit.material { Ok(fit) } else { self.fit(problem, &sorted, Some(&fit)) }
+    }
+
+    /// Notes a fit that is near its optimum only.
+    ///
+    /// # Errors
+    /// [`CalibrationError::NotConverged`] where it is far from it.
+    pub(super) fn settle(&mut self, fit: &RecordingFit) -> Result<(), CalibrationError> {
+        let (iterations, distance, limit) = (fit.iterations, fit.distance, self.options.fit.tolerance);
+        if fit.is_converged {
+            return Ok(());
+        }
+        if distance >= SETTLED {
+            return Err(CalibrationError::NotConverged { iterations, distance, limit });
+        }
+        self.notes.push(format!(
+            "the fit was not at the optimum after {iterations} iterations, {distance:.2} standard deviations away by the \
+             linear model: the data hardly tell its terms apart"
+        ));
+        Ok(())
     }
 
     /// The best fit of each number of terms, up to the first that the deciding rule does not keep.
@@ -76,17 +141,14 @@ impl<'a> Run<'a> {
         };
         while rows.len() < most.clamp(1, MAX_TERMS - 1) {
             (self.on_stage)(&format!("{} term{}", rows.len() + 1, if rows.is_empty() { "" } else { "s" }));
-            let starts = match fits.last() {
-                None => first_starts(problem.observed()),
-                Some(last) => {
-                    further_starts(problem, last, &self.fit_options, self.options.num_starts, self.is_cancelled)?
-                        .into_iter()
-                        .filter(|(promise, _)| *promise >= self.options.least_promise)
-                        .map(|(_, start)| start)
-                        .collect()
+            let found = match self.again(problem, rows.len() + 1)? {
+                Some(found) => Some(found),
+                None => {
+                    let starts = self.blind_starts(problem, fits.last())?;
+                    self.best_of(problem, &starts)?
                 }
             };
-            let Some((row, fit)) = self.best_of(problem, &starts)? else { break };
+            let Some((row, fit)) = found else { break };
             rows.push(row);
             fits.push(fit);
             compare(&mut rows, fits[0].num_data);
@@ -98,6 +160,42 @@ impl<'a> Run<'a> {
         Ok((rows, fits))
     }
 
+    /// The fit of this number of terms from where the earlier one ended; none where there is none, or where that is no
+    /// start any more.
+    fn again(
+        &mut self,
+        problem: &mut CalibrationProblem,
+        num_terms: usize,
+    ) -> Result<Option<(TermRow, RecordingFit)>, CalibrationError> {
+        let Some(earlier) = self.earlier.iter().find(|f| f.material.terms.len() == num_terms) else { return Ok(None) };
+        match problem.fit_from(earlier, &self.fit_options, self.is_cancelled) {
+            Ok(fit) => {
+                self.count(&earlier.material, &fit);
+                Ok(Some((self.row(problem, &fit, 1, 1)?, fit)))
+            }
+            Err(e) if e.is_of_the_data() => Ok(None),
+            Err(e) => Err(e),
+        }
+    }
+
+    /// Starts of a first term, or of one more than the `last` fit has.
+    fn blind_starts(
+        &self,
+        problem: &mut CalibrationProblem,
+        last: Option<&RecordingFit>,
+    ) -> Result<Vec<Material>, CalibrationError> {
+        let Some(last) = last else { return Ok(first_starts(problem.observed())) };
+        let further = further_starts(problem, last, &self.fit_options, self.options.num_starts, self.is_cancelled)?;
+        let is_promising = |(promise, _): &(f64, Material)| *promise >= self.options.least_promise;
+        Ok(further.into_iter().filter(is_promising).map(|(_, start)| start).collect())
+    }
+
+    /// Counts and tells a fit.
+    fn count(&mut self, start: &Material, fit: &RecordingFit) {
+        self.work.add(fit.work);
+        (self.on_stage)(&format!("  {}: χ² {:.1} in {} iterations", start_in_words(start), fit.chi2, fit.iterations));
+    }
+
     /// One fit, counted and told.
     pub(super) fn fit(
         &mut self,
@@ -106,8 +204,7 @@ impl<'a> Run<'a> {
         near: Option<&RecordingFit>,
     ) -> Result<RecordingFit, CalibrationError> {
         let fit = problem.fit(start, near, &self.fit_options, self.is_cancelled)?;
-        self.work.add(fit.work);
-        (self.on_stage)(&format!("  {}: χ² {:.1} in {} iterations", start_in_words(start), fit.chi2, fit.iterations));
+        self.count(start, &fit);
         Ok(fit)
     }
 

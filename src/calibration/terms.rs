@@ -10,6 +10,7 @@
 use super::recording_fit::RecordingFit;
 use crate::material::{Material, OgdenTerm};
 use serde::{Deserialize, Serialize};
+use std::fmt;
 use utoipa::ToSchema;
 
 /// Which rule decides.
@@ -24,6 +25,41 @@ pub enum Rule {
     FTest,
     /// The paper's decrement of ℓ.
     Decrement,
+}
+
+/// What decided the number of terms.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum DecidedBy {
+    /// It was given.
+    Fixed,
+    /// The Bayesian information criterion.
+    Bic,
+    /// The F-test.
+    FTest,
+    /// The paper's decrement.
+    Decrement,
+}
+
+impl From<Rule> for DecidedBy {
+    fn from(rule: Rule) -> DecidedBy {
+        match rule {
+            Rule::Bic => DecidedBy::Bic,
+            Rule::FTest => DecidedBy::FTest,
+            Rule::Decrement => DecidedBy::Decrement,
+        }
+    }
+}
+
+impl fmt::Display for DecidedBy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            DecidedBy::Fixed => "the number was given",
+            DecidedBy::Bic => "BIC",
+            DecidedBy::FTest => "the F-test",
+            DecidedBy::Decrement => "the decrement",
+        })
+    }
 }
 
 /// Level of the F-test.
@@ -90,8 +126,8 @@ pub struct TermSelection {
     pub by_f_test: usize,
     /// By the paper's decrement.
     pub by_decrement: usize,
-    /// Which rule decided, `fixed` where the number was given.
-    pub decided_by: String,
+    /// Which rule decided, or that the number was given.
+    pub decided_by: DecidedBy,
     /// The number taken.
     pub chosen: usize,
     /// χ² decrease (over the misfit per datum) that the deciding rule asks of a term.

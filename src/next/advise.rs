@@ -56,7 +56,8 @@ pub fn advise(
     }
     judged.sort_by(Judged::compare);
     let stop = view.stop(&judged[0]);
-    let values = posterior.material.parameters().into_iter().filter(|p| *p != Parameter::Kappa);
+    let values = posterior.material.parameters().into_iter().zip(&posterior.mesh_sd);
+    let values = values.filter(|(p, _)| *p != Parameter::Kappa);
     let (worst, _) = so_far.worst(&parameters, &options.precision);
     let sentence = sentence(&parameters[worst], so_far.relative_sd[worst], worst, &judged[0].result, stop.as_ref());
     Ok(NextResult {
@@ -67,14 +68,15 @@ pub fn advise(
         parameters: values
             .zip(&parameters)
             .zip(&so_far.relative_sd)
-            .map(|((parameter, name), &relative_sd)| {
+            .map(|(((parameter, mesh_sd), name), &relative_sd)| {
                 let value = posterior.material.value(parameter);
-                let half = TWO_SIDED_95 * relative_sd * value.abs();
+                let half = TWO_SIDED_95 * mesh_sd.hypot(relative_sd * value);
                 let precision = Some(options.precision.of(name)).filter(|p| p.is_finite());
                 NextParameter {
                     name: name.clone(),
                     value,
                     relative_sd,
+                    discretisation_relative_sd: mesh_sd / value.abs(),
                     interval_95: [value - half, value + half],
                     precision,
                 }

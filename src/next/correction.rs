@@ -9,6 +9,7 @@
 use super::error::NextError;
 use crate::calibration::{Observed, RecordingFit};
 use crate::fem::{Equilibrium, ForwardModel, Nesting, SolveOptions};
+use crate::material::Material;
 use crate::mesh::{MeshOptions, error_over_difference};
 use crate::specimen::Specimen;
 
@@ -20,42 +21,72 @@ const FINEST: f64 = 0.6;
 /// than 2.5: nothing is taken off.
 const HARDLY_FINER: f64 = 0.7;
 
-/// `observed` plus the error that the fit's mesh, of `mesh_factor`, has with the law of `fit`, as a finer mesh tells
-/// it.
-///
-/// # Errors
-/// [`NextError`] where a specimen cannot be meshed or has no equilibrium there.
-pub(super) fn without_mesh_error(
-    observed: &[Observed],
-    fit: &RecordingFit,
-    mesh_factor: f64,
-    is_cancelled: &dyn Fn() -> bool,
-) -> Result<Vec<Observed>, NextError> {
-    let ratio = FINER.max(FINEST / mesh_factor);
-    let mut corrected = observed.to_vec();
-    if ratio > HARDLY_FINER {
-        return Ok(corrected);
+/// Recordings with a finer mesh of each.
+pub(super) struct FinerMeshes<'a> {
+    observed: &'a [Observed],
+    /// Element size of the finer meshes as a factor on that of the fit's.
+    ratio: f64,
+    /// Of each recording; none where these would say nothing.
+    meshes: Vec<Finer>,
+}
+
+impl<'a> FinerMeshes<'a> {
+    /// Of `observed`, fitted on meshes of `mesh_factor`.
+    ///
+    /// # Errors
+    /// [`NextError`] where a specimen cannot be meshed so.
+    pub(super) fn new(observed: &'a [Observed], mesh_factor: f64) -> Result<FinerMeshes<'a>, NextError> {
+        let ratio = FINER.max(FINEST / mesh_factor);
+        let finer = |o: &Observed| Finer::new(&o.specimen, [mesh_factor, ratio * mesh_factor]);
+        let meshes =
+            if ratio > HARDLY_FINER { Vec::new() } else { observed.iter().map(finer).collect::<Result<_, _>>()? };
+        Ok(FinerMeshes { observed, ratio, meshes })
     }
-    let whole = error_over_difference(ratio);
-    for (r, recording) in corrected.iter_mut().enumerate() {
-        let specimen = recording.specimen.clone();
-        let mut finer = Finer::new(&specimen, [mesh_factor, ratio * mesh_factor])?;
-        let view = recording.view(&specimen, finer.fine.mesh())?;
-        let mut last = None;
-        for (s, step) in recording.steps.iter_mut().enumerate() {
-            let state = finer.solve(fit, &fit.states(r)[s], last.as_ref(), is_cancelled)?;
-            let fine = view.average(&state.displacement)?;
-            for ((u, fine), coarse) in step.displacement.iter_mut().zip(&fine).zip(fit.predicted(r, s)) {
-                *u = [0, 1, 2].map(|c| u[c] + whole * (coarse[c] - fine[c]));
+
+    /// The recordings plus the error that the fit's mesh has with the law of `fit`, as the finer meshes tell it.
+    ///
+    /// # Errors
+    /// [`NextError`] where a specimen has no equilibrium there.
+    pub(super) fn without_mesh_error(
+        &mut self,
+        fit: &RecordingFit,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Vec<Observed>, NextError> {
+        let whole = error_over_difference(self.ratio);
+        let mut corrected = self.observed.to_vec();
+        for (r, (recording, finer)) in corrected.iter_mut().zip(&mut self.meshes).enumerate() {
+            let view = recording.view(&recording.specimen, finer.fine.mesh())?;
+            let states = finer.states(&fit.material, fit.states(r), is_cancelled)?;
+            for (s, (step, state)) in recording.steps.iter_mut().zip(&states).enumerate() {
+                let fine = view.average(&state.displacement)?;
+                for ((u, fine), coarse) in step.displacement.iter_mut().zip(&fine).zip(fit.predicted(r, s)) {
+                    *u = [0, 1, 2].map(|c| u[c] + whole * (coarse[c] - fine[c]));
+                }
+                let error_n = whole * (fit.force_n(r, s) - state.force_n);
+                if let Some(force) = &mut step.force {
+                    force.value_n += error_n;
+                }
             }
-            let error_n = whole * (fit.force_n(r, s) - state.force_n);
-            if let Some(force) = &mut step.force {
-                force.value_n += error_n;
-            }
-            last = Some(state);
         }
+        Ok(corrected)
     }
-    Ok(corrected)
+
+    /// The recordings with no more of the error taken off than the finer meshes themselves tell, where `corrected` are
+    /// those with all of it.
+    pub(super) fn without_extrapolation(&self, corrected: &[Observed]) -> Vec<Observed> {
+        let told = 1.0 / error_over_difference(self.ratio);
+        let between = |measured: f64, corrected: f64| measured + told * (corrected - measured);
+        let mut all = self.observed.to_vec();
+        for (step, corrected) in all.iter_mut().zip(corrected).flat_map(|(a, b)| a.steps.iter_mut().zip(&b.steps)) {
+            for (u, corrected) in step.displacement.iter_mut().zip(&corrected.displacement) {
+                *u = [0, 1, 2].map(|c| between(u[c], corrected[c]));
+            }
+            if let (Some(force), Some(corrected)) = (&mut step.force, &corrected.force) {
+                force.value_n = between(force.value_n, corrected.value_n);
+            }
+        }
+        all
+    }
 }
 
 /// A finer mesh of a specimen beside that of the fit.
@@ -64,6 +95,8 @@ struct Finer {
     fine: ForwardModel,
     /// How the fine mesh lies in the coarse one; `None` where it does not.
     nesting: Option<Nesting>,
+    /// Equilibria of the drives, last found on the two meshes.
+    known: Vec<[Equilibrium; 2]>,
 }
 
 impl Finer {
@@ -72,26 +105,32 @@ impl Finer {
         let model = |factor: f64| ForwardModel::of_specimen(specimen, &MeshOptions::scaled(specimen, factor));
         let (coarse, fine) = (model(mesh_factors[0])?, model(mesh_factors[1])?);
         let nesting = Nesting::located(coarse.mesh(), fine.mesh());
-        Ok(Finer { coarse, fine, nesting })
+        Ok(Finer { coarse, fine, nesting, known: Vec::new() })
     }
 
-    /// The equilibrium on the finer mesh where the fit's has `state`: from there, or, where that leads to none, from
-    /// the `last` one found here.
-    fn solve(
+    /// The equilibria on the finer mesh where the fit's mesh has `coarse`: from there, with what that mesh got wrong
+    /// the last time taken off; where that leads to none, from the last drive's.
+    fn states(
         &mut self,
-        fit: &RecordingFit,
-        state: &Equilibrium,
-        last: Option<&Equilibrium>,
+        material: &Material,
+        coarse: &[Equilibrium],
         is_cancelled: &dyn Fn() -> bool,
-    ) -> Result<Equilibrium, NextError> {
-        let (material, options) = (&fit.material, SolveOptions::trial());
-        if let Some(nesting) = &self.nesting {
-            let start = self.fine.start_from(&self.coarse, nesting, material, state, None);
-            if let Ok(found) = self.fine.solve(material, state.drive_mm, Some(&start), &options, is_cancelled) {
-                return Ok(found);
-            }
+    ) -> Result<Vec<Equilibrium>, NextError> {
+        let options = SolveOptions::trial();
+        let mut found: Vec<Equilibrium> = Vec::new();
+        for (s, state) in coarse.iter().enumerate() {
+            let near = self.nesting.as_ref().and_then(|nesting| {
+                let known = self.known.get(s).map(|[coarse, fine]| [coarse, fine]);
+                let start = self.fine.start_from(&self.coarse, nesting, material, state, known);
+                self.fine.solve(material, state.drive_mm, Some(&start), &options, is_cancelled).ok()
+            });
+            found.push(match near {
+                Some(near) => near,
+                None => self.fine.solve(material, state.drive_mm, found.last(), &options, is_cancelled)?,
+            });
         }
-        Ok(self.fine.solve(material, state.drive_mm, last, &options, is_cancelled)?)
+        self.known = coarse.iter().cloned().zip(found.iter().cloned()).map(|(c, f)| [c, f]).collect();
+        Ok(found)
     }
 }
 
@@ -99,7 +138,7 @@ impl Finer {
 mod tests {
     use super::*;
     use crate::calibration::{CalibrationProblem, FitOptions, Objective, SyntheticScan};
-    use crate::material::{Material, Parameter};
+    use crate::material::Parameter;
     use crate::recording::Filter;
     use crate::sensitivity::{Protocol, ScanSettings};
 
@@ -133,7 +172,8 @@ mod tests {
             fit.material.parameters().iter().skip(1).map(sds).fold(0.0, f64::max)
         };
         let coarse = fit(&observed);
-        let corrected = fit(&without_mesh_error(&observed, &coarse, COARSE, &|| false).unwrap());
+        let corrected =
+            fit(&FinerMeshes::new(&observed, COARSE).unwrap().without_mesh_error(&coarse, &|| false).unwrap());
         let [before, after] = [&coarse, &corrected].map(missed_by);
         assert!(before > 1.0 && after < before / 3.0, "{before} {after}");
     }

@@ -1,14 +1,13 @@
 //! What is known so far: the law fitted to all recordings, its information, its misfit and the states it has visited.
 
-use super::correction::without_mesh_error;
+use super::correction::FinerMeshes;
 use super::discrepancy::Discrepancy;
 use super::error::NextError;
 use super::options::{NextOptions, Plan};
 use super::scanned::{ForceRead, ScannedStep};
 use super::visited::Visited;
 use crate::calibration::{
-    CalibrateOptions, Calibration, CalibrationProblem, Objective, Observed, RecordingFit, TermCount, calibrate,
-    mean_scans,
+    CalibrateOptions, CalibrationProblem, Law, Objective, Observed, RecordingFit, TermCount, fit_law, mean_scans,
 };
 use crate::kinematics::{Decomposition, IDENTITY, decompose};
 use crate::material::Material;
@@ -19,12 +18,16 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 /// Most terms where BIC chooses.
 const MAX_TERMS: usize = 3;
-/// Starts of every number of terms, and where the fit is repeated with the error of the mesh known better.
+/// Blind starts of every number of terms.
 const NUM_STARTS: usize = 2;
-const NUM_STARTS_AGAIN: usize = 1;
 /// A further term is fitted where the linear model promises this part of what BIC asks of it: the fit itself may gain
 /// more, but of such a term takes most of the time that an answer has.
 const LEAST_OF_BIC: f64 = 0.5;
+/// Standard deviation of a parameter as a part of its shift by what was extrapolated of the mesh's error. Around holes and
+/// notches the order is not known: what lies beyond the finer mesh may be anything from nothing to twice as much, each
+/// as likely as another. The standard deviation of an even distribution is 1/√12 of its range, which is two such
+/// shifts wide.
+const SD_OVER_EXTRAPOLATED: f64 = 0.58;
 /// A parameter that the recordings do not determine counts as known to this relative standard deviation.
 pub(super) const UNKNOWN_RELATIVE_SD: f64 = 1.0;
 /// Materials that candidates are averaged over differ from the estimate by at most this part of each parameter.
@@ -55,6 +58,9 @@ pub(super) struct Posterior {
     pub(super) visited: Visited,
     /// χ² over its expectation.
     pub(super) chi2_per_datum: f64,
+    /// Per parameter of the material, in its unit: standard deviation of what the mesh's error may still make of the
+    /// estimate. Scans do not lower it.
+    pub(super) mesh_sd: Vec<f64>,
     /// Remarks of the fit.
     pub(super) notes: Vec<String>,
 }
@@ -73,9 +79,9 @@ impl Posterior {
     ) -> Result<Posterior, NextError> {
         let (means, num_scans): (Vec<Observed>, Vec<usize>) =
             mean_scans(observed).into_iter().map(|m| (m.mean, m.num_scans)).unzip();
-        let (corrected, found) = fit_together(means, options, on_stage, is_cancelled)?;
-        let mut problem =
-            CalibrationProblem::new(&corrected, &|s| MeshOptions::scaled(s, options.mesh_factor), Objective::Weighted)?;
+        let Fitted { corrected, law: found, mesh_shift, models } =
+            fit_together(&means, options, on_stage, is_cancelled)?;
+        let mut problem = models.with_data(&corrected)?;
         let discrepancy = Discrepancy::of(&corrected, &found.fit);
         let seen = Seen::of(&mut problem, &found.fit, plan, &num_scans)?;
         let visited = Visited::of(seen.states.iter().flatten().flatten());
@@ -97,6 +103,7 @@ impl Posterior {
             discrepancy,
             visited,
             chi2_per_datum: found.fit.chi2_per_datum,
+            mesh_sd: mesh_shift.iter().map(|shift| SD_OVER_EXTRAPOLATED * shift.abs()).collect(),
             notes: found.notes,
         })
     }
@@ -143,20 +150,30 @@ impl Posterior {
     }
 }
 
-/// The law of `means`, and these with the error of the fit's mesh, which a first fit tells.
-fn fit_together(
-    means: Vec<Observed>,
+/// What is fitted to the means of scans.
+struct Fitted<'a> {
+    /// The means with the error of the fit's mesh taken off.
+    corrected: Vec<Observed>,
+    /// The law of these.
+    law: Law,
+    /// Shift of every parameter by the part of the error that was extrapolated.
+    mesh_shift: Vec<f64>,
+    /// Models of the means' specimens.
+    models: CalibrationProblem<'a>,
+}
+
+/// Fits `means`, with the error of the fit's mesh taken off, which a first fit tells.
+fn fit_together<'a>(
+    means: &'a [Observed],
     options: &NextOptions,
     on_stage: &dyn Fn(&str),
     is_cancelled: &dyn Fn() -> bool,
-) -> Result<(Vec<Observed>, Calibration), NextError> {
+) -> Result<Fitted<'a>, NextError> {
     let num_data: usize = means.iter().map(|o| 3 * o.mask.num_voxels() * o.steps.len()).sum();
-    let fit = |observed: &[Observed], terms: TermCount, num_starts: usize| {
+    let fit = |problem: &mut CalibrationProblem, terms: TermCount, earlier: &[RecordingFit]| {
         let settings = CalibrateOptions {
             terms,
-            mesh_factor: options.mesh_factor,
-            has_mesh_allowance: false,
-            num_starts,
+            num_starts: NUM_STARTS,
             least_promise: match terms {
                 // Two parameters at ln n each.
                 TermCount::Auto { .. } => LEAST_OF_BIC * 2.0 * (num_data as f64).ln(),
@@ -164,27 +181,33 @@ fn fit_together(
             },
             ..CalibrateOptions::default()
         };
-        calibrate(observed, &MeshOptions::scaled, &settings, on_stage, is_cancelled)
+        fit_law(problem, earlier, &settings, on_stage, is_cancelled)
     };
+    let mesh = |s: &Specimen| MeshOptions::scaled(s, options.mesh_factor);
+    let mut problem = CalibrationProblem::new(means, &mesh, Objective::Weighted)?;
     let terms = options.num_terms.map_or(TermCount::Auto { max: MAX_TERMS }, TermCount::Fixed);
     if !options.has_mesh_correction {
         on_stage("what is known so far");
-        let found = fit(&means, terms, NUM_STARTS)?;
-        return Ok((means, found));
+        let law = fit(&mut problem, terms, &[])?;
+        let mesh_shift = vec![0.0; law.fit.material.parameters().len()];
+        return Ok(Fitted { corrected: means.to_vec(), law, mesh_shift, models: problem });
     }
     on_stage("error of the mesh");
-    let mut first = fit(&means, TermCount::Fixed(options.num_terms.unwrap_or(1)), 1)?;
-    let mut num_starts = NUM_STARTS;
+    let mut first = fit(&mut problem, TermCount::Fixed(options.num_terms.unwrap_or(1)), &[])?;
+    let mut finer = FinerMeshes::new(means, options.mesh_factor)?;
     loop {
-        let corrected = without_mesh_error(&means, &first.fit, options.mesh_factor, is_cancelled)?;
+        let corrected = finer.without_mesh_error(&first.fit, is_cancelled)?;
         on_stage("what is known so far");
-        let found = fit(&corrected, terms, num_starts)?;
+        let mut present = problem.with_data(&corrected)?;
+        let law = fit(&mut present, terms, &first.by_num_terms)?;
         // A law of more terms tells the error better: large strains and small ones no longer share an exponent.
-        if found.fit.material.terms.len() <= first.fit.material.terms.len() {
-            return Ok((corrected, found));
+        if law.fit.material.terms.len() <= first.fit.material.terms.len() {
+            let mesh_shift = present.shift_to(&law.fit, &finer.without_extrapolation(&corrected))?;
+            return Ok(Fitted { models: present.with_data(means)?, corrected, law, mesh_shift });
         }
+        problem = present.with_data(means)?;
         on_stage("error of the mesh");
-        (first, num_starts) = (found, NUM_STARTS_AGAIN);
+        first = law;
     }
 }
 

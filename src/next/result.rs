@@ -48,7 +48,11 @@ pub struct NextParameter {
     pub value: f64,
     /// Standard deviation over the estimate; 1 where the recordings do not determine it, or no better.
     pub relative_sd: f64,
-    /// 95 % interval.
+    /// Standard deviation over the estimate of what the mesh's error may still make of it. Scans do not lower it, and
+    /// no precision that is asked counts it.
+    #[serde(default)]
+    pub discretisation_relative_sd: f64,
+    /// 95 % interval, of noise, misfit and mesh.
     pub interval_95: [f64; 2],
     /// The precision that is asked; null for none.
     pub precision: Option<f64>,

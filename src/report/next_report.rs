@@ -106,6 +106,7 @@ fn known(result: &NextResult) -> Table {
             symbol_of_parameter(&p.name),
             significant(p.value, 5),
             significant(100.0 * p.relative_sd, 3),
+            significant(100.0 * p.discretisation_relative_sd, 3),
             format!("{low} to {high}"),
             p.precision.map_or("–".into(), |precision| significant(100.0 * precision, 3)),
         ]
@@ -116,6 +117,7 @@ fn known(result: &NextResult) -> Table {
             Column::words("parameter"),
             Column::numbers("value", "kPa, 1"),
             Column::numbers("sd", "%"),
+            Column::numbers("sd by the mesh", "%"),
             Column::numbers("95 % interval", ""),
             Column::numbers("asked", "%"),
         ],

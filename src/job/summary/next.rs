@@ -8,8 +8,12 @@ pub(in crate::job) fn next(result: &NextResult) -> String {
     let mut text = format!("{}\n\nknown so far from {}\n", result.sentence, result.recordings.join(", "));
     for p in &result.parameters {
         let [low, high] = p.interval_95.map(|end| num(end, 4));
-        let sd = num(100.0 * p.relative_sd, 3);
-        text += &format!("  {:<10} {:>10}, sd {sd} %, 95 % interval {low} to {high}\n", p.name, num(p.value, 5));
+        let [sd, mesh] = [p.relative_sd, p.discretisation_relative_sd].map(|sd| num(100.0 * sd, 3));
+        text += &format!(
+            "  {:<10} {:>10}, sd {sd} %, by the mesh {mesh} %, 95 % interval {low} to {high}\n",
+            p.name,
+            num(p.value, 5)
+        );
     }
     text += "\nsd after the scan, %";
     for p in &result.parameters {

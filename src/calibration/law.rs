@@ -1,0 +1,82 @@
+//! The law that recordings ask for, on one mesh: what a plan rests on where there is no time for a whole calibration.
+
+use super::calibrate_options::CalibrateOptions;
+use super::error::CalibrationError;
+use super::problem::CalibrationProblem;
+use super::recording_fit::RecordingFit;
+use super::run::Run;
+
+/// A law that was fitted.
+#[derive(Debug)]
+pub struct Law {
+    /// The fit of the number of terms that was taken, in the order of falling exponents.
+    pub fit: RecordingFit,
+    /// The best fit of every number of terms that was tried, from one upwards.
+    pub by_num_terms: Vec<RecordingFit>,
+    /// Remarks for the reader.
+    pub notes: Vec<String>,
+}
+
+/// Fits `problem` with as many terms as `options` say. The fits of the numbers of terms that `earlier` has, fits of
+/// the same models to nearly the same data, start where those ended. The options' allowance for the mesh, profiles and
+/// contours are those of [`super::calibrate()`] and do nothing here.
+///
+/// # Errors
+/// [`CalibrationError`]: nothing to compare, no equilibrium, no converged fit.
+pub fn fit_law(
+    problem: &mut CalibrationProblem,
+    earlier: &[RecordingFit],
+    options: &CalibrateOptions,
+    on_stage: &dyn Fn(&str),
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Law, CalibrationError> {
+    let has_force = problem.has_force();
+    let mut run = Run::new(options, has_force, on_stage, is_cancelled).with_earlier(earlier);
+    let (selection, by_num_terms) = run.select_terms(problem)?;
+    let fit = run.in_order(problem, by_num_terms[selection.chosen - 1].clone())?;
+    run.settle(&fit)?;
+    run.remark(problem.observed(), &fit, has_force, None);
+    Ok(Law { fit, by_num_terms, notes: run.notes })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibration::test_problem::{block, coarse, same_mesh, tight, truth};
+    use crate::calibration::{Objective, Observed, TermCount};
+    use crate::material::Parameter;
+    use crate::recording::Filter;
+
+    /// Fits that start where those to other noise ended come to the same law as blind ones, in fewer iterations.
+    #[test]
+    fn earlier_fits_save_iterations_alone() {
+        let (_, scan) = same_mesh(&truth());
+        let observe = |draw: u64| {
+            let recording = scan.recording("draw", &block(), &scan.draw(5, draw), Filter::None).unwrap();
+            [Observed::new(&recording, 0.01).unwrap()]
+        };
+        let [one, other] = [0, 1].map(observe);
+        let options = CalibrateOptions {
+            terms: TermCount::Auto { max: 2 },
+            fit: tight(),
+            num_starts: 2,
+            ..CalibrateOptions::default()
+        };
+        let law = |problem: &mut CalibrationProblem, earlier: &[RecordingFit]| {
+            fit_law(problem, earlier, &options, &|_| (), &|| false).expect("a law")
+        };
+        let mut problem = CalibrationProblem::new(&one, &coarse, Objective::Weighted).unwrap();
+        let earlier = law(&mut problem, &[]);
+        let mut problem = problem.with_data(&other).unwrap();
+        let [blind, near] = [&[], &earlier.by_num_terms[..]].map(|earlier| law(&mut problem, earlier));
+        assert_eq!(blind.fit.material.terms.len(), 1);
+        assert_eq!(near.by_num_terms.len(), earlier.by_num_terms.len());
+        let iterations = |law: &Law| law.by_num_terms[0].iterations;
+        assert!(iterations(&near) < iterations(&blind), "{} {}", iterations(&near), iterations(&blind));
+        // Both stopped closer to the optimum than the tolerance, in standard deviations.
+        for parameter in [Parameter::Mu(0), Parameter::Alpha(0)] {
+            let apart = blind.fit.material.value(parameter) - near.fit.material.value(parameter);
+            assert!(apart.abs() < 2.0 * tight().tolerance * blind.fit.sd(parameter).unwrap(), "{apart}");
+        }
+    }
+}
