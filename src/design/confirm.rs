@@ -364,7 +364,7 @@ impl MaterialEvaluation {
     fn response(&self, study: &Study) -> Response {
         let normalisation = study.objective.normalisation;
         let sensitivities = self.evaluation.steps.last().map_or(&[][..], |step| &step.integrated_sensitivity);
-        let promised = self.evaluation.promised_sd.iter().filter(|p| p.parameter != "kappa");
+        let promised = self.evaluation.promised_sd.iter().filter(|p| p.is_of_shear());
         let c = &self.relative_sd_by_criterion;
         let log_detectable = match (study.objective.kind, counted(study)) {
             (ObjectiveKind::Detect, Ok(counted)) => log_sizes(&counted, &self.evaluation.detectable),
@@ -401,8 +401,8 @@ impl Confirmed {
             self.limits.iter().all(|m| m.is_satisfied) && judged.margins.iter().all(|m| *m >= -1e-9);
         self.gains.clear();
         for (index, (own, of_base)) in self.by_material.iter().zip(&base.by_material).enumerate() {
-            let parameters = study.materials[index].material.parameters().into_iter().map(|p| p.name());
-            for (entry, parameter) in parameters.filter(|n| n != "kappa").enumerate() {
+            let parameters = study.materials[index].material.shear_parameters().map(|p| p.name());
+            for (entry, parameter) in parameters.enumerate() {
                 // A prior's central values come first among its samples.
                 let central = samples.iter().position(|s| s.prior == index);
                 let mean = |of: fn(&Response) -> &Vec<f64>| {

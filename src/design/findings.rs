@@ -6,6 +6,7 @@ use super::entry::DesignEntry;
 use super::found_sizes::sizes_in_words;
 use super::study::Study;
 use super::words::{holes_in_words, listed};
+use crate::material::symbol_of_parameter;
 use crate::sensitivity::{GridPlace, IDENTIFIABILITY_LIMIT, ScanSettings};
 use crate::specimen::{Specimen, way_across_plates};
 use crate::voxel::VoxelGrid;
@@ -22,19 +23,6 @@ fn more_or_less(ratio: f64) -> String {
         format!("{percent:.0} % more")
     } else {
         format!("{:.0} % less", -percent)
-    }
-}
-
-/// "mu_1" as it is written in reports: μ₁.
-pub(super) fn symbol(parameter: &str) -> String {
-    let subscript = |digits: &str| -> String {
-        digits.chars().filter_map(|c| c.to_digit(10)).filter_map(|d| char::from_u32('₀' as u32 + d)).collect()
-    };
-    match parameter.split_once('_') {
-        Some(("mu", index)) => format!("μ{}", subscript(index)),
-        Some(("alpha", index)) => format!("α{}", subscript(index)),
-        _ if parameter == "kappa" => "κ".into(),
-        _ => parameter.into(),
     }
 }
 
@@ -278,7 +266,11 @@ fn gains_of_material(best: &DesignEntry, material: &str) -> Option<String> {
         .filter_map(|g| Some((g, g.promised_sd?)))
         .filter(|(_, ratio)| *ratio < 0.9995)
         .map(|(g, ratio)| {
-            format!("{} is promised {:.1} % less precisely", symbol(&g.parameter), 100.0 * (1.0 / ratio - 1.0))
+            format!(
+                "{} is promised {:.1} % less precisely",
+                symbol_of_parameter(&g.parameter),
+                100.0 * (1.0 / ratio - 1.0)
+            )
         })
         .collect();
     if !lost.is_empty() {
@@ -290,7 +282,7 @@ fn gains_of_material(best: &DesignEntry, material: &str) -> Option<String> {
     {
         text += &format!(
             " If the material is stiffer or softer than assumed, the least factor is ×{ratio:.3} ({}).",
-            symbol(&gain.parameter)
+            symbol_of_parameter(&gain.parameter)
         );
     }
     Some(text)
@@ -379,12 +371,12 @@ fn where_measures_disagree(d: &Disagreement, material: &str) -> Option<String> {
 fn what_is_seen(base: &DesignEntry, best: &DesignEntry, index: usize, material: &str) -> Vec<String> {
     let Some(of_best) = best.by_material.get(index) else { return Vec::new() };
     let mut said = Vec::new();
-    for parameter in of_best.evaluation.promised_sd.iter().map(|p| &p.parameter).filter(|n| *n != "kappa") {
+    for parameter in of_best.evaluation.promised_sd.iter().filter(|p| p.is_of_shear()).map(|p| &p.parameter) {
         let relative = |e: &DesignEntry| {
             let list = &e.by_material.get(index)?.evaluation.promised_sd;
             list.iter().find(|p| p.parameter == *parameter)?.relative_sd
         };
-        let name = symbol(parameter);
+        let name = symbol_of_parameter(parameter);
         let percent = |sd: Option<f64>| sd.map_or("undetermined".into(), |sd| format!("{:.0} %", 100.0 * sd));
         let is_seen = |sd: Option<f64>| sd.is_some_and(|sd| sd <= IDENTIFIABILITY_LIMIT);
         let (of_base, of_best) = (relative(base), relative(best));
@@ -438,9 +430,6 @@ mod tests {
 
     #[test]
     fn words() {
-        assert_eq!(symbol("mu_1"), "μ₁");
-        assert_eq!(symbol("alpha_12"), "α₁₂");
-        assert_eq!(symbol("kappa"), "κ");
         assert_eq!(factors(&[1.1, 0.9]).as_deref(), Some("×0.900 to ×1.100"));
         assert_eq!(factors(&[1.1]).as_deref(), Some("×1.100"));
         assert_eq!(factors(&[]), None);

@@ -79,9 +79,8 @@ impl<'a> Reference<'a> {
         if objective.combine != Combine::Weighted {
             return vec![1.0 / count as f64; count];
         }
-        let parameters = self.study.materials[prior].material.parameters().into_iter().map(|p| p.name());
-        let of_parameters: Vec<f64> =
-            parameters.filter(|n| n != "kappa").map(|name| objective.weight_of(&name)).collect();
+        let parameters = self.study.materials[prior].material.shear_parameters();
+        let of_parameters: Vec<f64> = parameters.map(|p| objective.weight_of(&p.name())).collect();
         let of_gains: Vec<f64> = of_parameters.iter().copied().cycle().take(count).collect();
         let total: f64 = of_gains.iter().sum();
         of_gains.into_iter().map(|w| w / total).collect()
@@ -164,10 +163,9 @@ impl<'a> Reference<'a> {
     /// Name of a limit of [`Judged::worst_margins`].
     pub fn limit_name(&self, prior: usize, limit: usize) -> String {
         let name = &self.study.materials[prior].name;
-        let parameters = self.study.materials[prior].material.parameters().into_iter().map(|p| p.name());
         let mut names: Vec<String> = Vec::new();
         if self.study.objective.guard_promised_sd.covers(prior) {
-            let guards = parameters.filter(|n| n != "kappa");
+            let guards = self.study.materials[prior].material.shear_parameters().map(|p| p.name());
             names.extend(guards.map(|p| format!("the guard on the standard deviation of {p}, material \"{name}\"")));
         }
         names.extend(self.study.limits.max_force_n.map(|_| "the largest force".into()));

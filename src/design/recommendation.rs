@@ -2,11 +2,12 @@
 //! figures assume.
 
 use super::entry::DesignEntry;
-use super::findings::{Equals, symbol};
+use super::findings::Equals;
 use super::search::Found;
 use super::study::Study;
 use super::vary_scan::ChosenScan;
 use super::words::{listed, plates_in_words, sample_in_words, short_number};
+use crate::material::symbol_of_parameter;
 use crate::sensitivity::{GridPlace, Protocol, ScanSettings};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -166,11 +167,11 @@ fn if_the_grid_moves(chosen: &DesignEntry, anywhere: f64) -> String {
 fn precision(base: &DesignEntry, chosen: &DesignEntry) -> String {
     let percent = |sd: Option<f64>| sd.map_or("not at all".to_string(), |sd| format!("{} %", short_number(100.0 * sd)));
     let of_materials = chosen.by_material.iter().zip(&base.by_material).map(|(own, of_base)| {
-        let shear = own.evaluation.promised_sd.iter().filter(|p| p.parameter != "kappa");
+        let shear = own.evaluation.promised_sd.iter().filter(|p| p.is_of_shear());
         let each = shear.map(|p| {
             let there = of_base.evaluation.promised_sd.iter().find(|b| b.parameter == p.parameter);
             let there = there.and_then(|b| b.relative_sd);
-            format!("{} to {} (base: {})", symbol(&p.parameter), percent(p.relative_sd), percent(there))
+            format!("{} to {} (base: {})", symbol_of_parameter(&p.parameter), percent(p.relative_sd), percent(there))
         });
         format!("of material \"{}\" {}", own.material, listed(&each.collect::<Vec<_>>()))
     });

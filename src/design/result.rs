@@ -3,13 +3,14 @@
 use super::aim::Objective;
 use super::disagreement::{Disagreement, disagreement};
 use super::entry::DesignEntry;
-use super::findings::{Equals, findings, symbol};
+use super::findings::{Equals, findings};
 use super::recommendation::Recommendation;
 use super::search::Found;
 use super::study::Study;
 use super::study_hash::study_hash;
 use super::vary_scan::ChosenScan;
 use crate::calibration::ParameterSpread;
+use crate::material::symbol_of_parameter;
 use crate::provenance::VERSION;
 use crate::sensitivity::Protocol;
 use serde::{Deserialize, Serialize};
@@ -164,7 +165,7 @@ impl DesignResult {
                         said.push(format!(
                             "Material \"{}\", {label} specimen: do not trust what is promised of {}: {}.",
                             v.material,
-                            symbol(&p.parameter),
+                            symbol_of_parameter(&p.parameter),
                             p.doubts.join("; ")
                         ));
                     }

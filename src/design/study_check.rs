@@ -55,10 +55,8 @@ impl Study {
         if self.objective.kind == ObjectiveKind::TellApart && self.materials.len() < 2 {
             problems.push(StudyError::NothingToTellApart { count: self.materials.len() });
         }
-        let parameters = |prior: &MaterialPrior| {
-            let names = prior.material.parameters().into_iter().map(|p| p.name());
-            names.filter(|n| n != "kappa").collect::<Vec<_>>()
-        };
+        let parameters =
+            |prior: &MaterialPrior| prior.material.shear_parameters().map(|p| p.name()).collect::<Vec<_>>();
         self.objective.check(&self.materials.iter().map(parameters).collect::<Vec<_>>(), &mut problems);
         for (part, name, count, least) in [
             ("budget", "explore", self.budget.explore, 1),

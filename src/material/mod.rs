@@ -7,6 +7,7 @@ mod invariant_law;
 mod lanes;
 mod limits;
 mod ogden_lanes;
+mod parameter;
 mod point;
 mod read;
 mod shear_modulus;
@@ -24,6 +25,7 @@ pub use limits::{
     MIN_CHAIN_LIMIT, MIN_LOCKING_STRETCH, SCHEMA, YEOH_SCHEMA,
 };
 pub use ogden_lanes::{MAX_TERMS, SpectralState, Tensor};
+pub use parameter::{Parameter, symbol_of_parameter};
 pub(crate) use point::first_invariant_less_3;
 pub use point::{energy_density, first_piola_kirchhoff_stress, material_tangent, stress_parameter_derivative};
 pub use shear_modulus::initial_shear_modulus_kpa;
@@ -63,53 +65,12 @@ pub struct Material {
     pub law: Option<InvariantLaw>,
 }
 
-/// A material parameter. Order everywhere: κ, μ₁, α₁, μ₂, α₂, …, or κ and those of the law.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Parameter {
-    /// κ, kPa.
-    Kappa,
-    /// μ of the term with this index (from 0), kPa.
-    Mu(usize),
-    /// α of the term with this index (from 0).
-    Alpha(usize),
-    /// A parameter of the law in the first invariant.
-    Law(LawParameter),
-}
-
-impl Parameter {
-    /// `kappa`, `mu_1`, `alpha_1`, …; of a law as [`LawParameter::name`] says.
-    pub fn name(self) -> String {
-        match self {
-            Parameter::Kappa => "kappa".into(),
-            Parameter::Mu(i) => format!("mu_{}", i + 1),
-            Parameter::Alpha(i) => format!("alpha_{}", i + 1),
-            Parameter::Law(parameter) => parameter.name(),
-        }
-    }
-
-    /// Whether a parameter of this name is a modulus, in kPa: [`Parameter::is_modulus`] for results, which hold names.
-    pub fn is_modulus_of_name(name: &str) -> bool {
-        let kind = name.split('_').next().unwrap_or(name);
-        let moduli = [Parameter::Kappa, Parameter::Mu(0), Parameter::Law(LawParameter::Coefficient(0))];
-        moduli.iter().any(|modulus| modulus.name().split('_').next() == Some(kind))
-    }
-
-    /// Whether it is a modulus, in kPa; the others have no unit.
-    pub fn is_modulus(self) -> bool {
-        match self {
-            Parameter::Kappa | Parameter::Mu(_) => true,
-            Parameter::Alpha(_) => false,
-            Parameter::Law(parameter) => parameter.is_modulus(),
-        }
-    }
-
-    /// Whether it may have either sign and be zero; the others keep the sign that they have.
-    pub fn has_any_sign(self) -> bool {
-        matches!(self, Parameter::Law(parameter) if parameter.has_any_sign())
-    }
-}
-
 impl Material {
+    /// All its parameters but κ.
+    pub fn shear_parameters(&self) -> impl Iterator<Item = Parameter> {
+        self.parameters().into_iter().filter(|p| *p != Parameter::Kappa)
+    }
+
     /// A valid material of a bulk modulus (kPa) and terms (μ in kPa, α).
     ///
     /// ```

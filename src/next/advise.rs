@@ -127,8 +127,7 @@ fn trials(
 
 /// Names of all μ and α.
 fn named(posterior: &Posterior, options: &NextOptions) -> Result<Vec<String>, NextError> {
-    let parameters = posterior.material.parameters().into_iter().filter(|p| *p != Parameter::Kappa);
-    let names: Vec<String> = parameters.map(|p| p.name()).collect();
+    let names: Vec<String> = posterior.material.shear_parameters().map(|p| p.name()).collect();
     match options.precision.by_parameter.keys().find(|name| !names.contains(name)) {
         Some(name) => Err(NextError::UnknownParameter { name: name.clone(), known: names.join(", ") }),
         None => Ok(names),

@@ -306,7 +306,7 @@ fn contour_plot(found: &Calibration, contours: &[Contour]) -> ContourPlot {
 /// ℓ_u, ℓ_F and ℓ of every pair of parameters; `estimate_of` names the values to mark.
 pub fn contour_panels(contours: &[Contour], estimate_of: &dyn Fn(&str) -> Option<f64>) -> Vec<ContourPanel> {
     let label = |name: &str| {
-        let unit = if Parameter::is_modulus_of_name(name) { ", kPa" } else { "" };
+        let unit = if Parameter::named(name).is_some_and(Parameter::is_modulus) { ", kPa" } else { "" };
         format!("{}{unit}", symbol_of_parameter(name))
     };
     contours
@@ -319,7 +319,7 @@ pub fn contour_panels(contours: &[Contour], estimate_of: &dyn Fn(&str) -> Option
                 x: c.values[0].clone(),
                 y: c.values[1].clone(),
                 values: values.iter().map(|v| v.filter(|v| *v > 0.0).unwrap_or(f64::NAN)).collect(),
-                is_log_x: c.parameters[0] == "kappa",
+                is_log_x: Parameter::named(&c.parameters[0]) == Some(Parameter::Kappa),
                 mark: estimate_of(&c.parameters[0]).zip(estimate_of(&c.parameters[1])).map(|(a, b)| [a, b]),
             })
         })

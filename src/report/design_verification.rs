@@ -62,7 +62,11 @@ pub(super) fn verification(page: &mut Report, result: &DesignResult) {
                 rows.push(SpreadRow {
                     specimen: label.into(),
                     parameter: symbol_of_parameter(&p.parameter),
-                    unit: if Parameter::is_modulus_of_name(&p.parameter) { "kPa".into() } else { String::new() },
+                    unit: if Parameter::named(&p.parameter).is_some_and(Parameter::is_modulus) {
+                        "kPa".into()
+                    } else {
+                        String::new()
+                    },
                     truth: p.truth,
                     found: p.estimates.clone(),
                     promised_sd: p.promised_sd.unwrap_or(f64::NAN),

@@ -82,6 +82,7 @@ mod gallery_tests;
 #[cfg(test)]
 mod test_xml;
 
+pub use crate::material::symbol_of_parameter;
 pub use bars::{BarGroup, GroupedBars};
 pub use calibration_report::{calibration_report, contour_panels};
 pub use color::ColorMap;
@@ -106,7 +107,7 @@ pub use lines::{Line, LinePlot, residual_histogram};
 pub use main_effects::{MainEffect, MainEffectsPlot};
 pub use maps::{VoxelField, VoxelMaps};
 pub use next_report::next_report;
-pub use number::{plain_number, significant, symbol_of_parameter};
+pub use number::{plain_number, significant};
 pub use parallel::{ParallelAxis, ParallelPlot};
 pub use pareto::{ParetoPlot, ParetoPoint, PointKind};
 pub use pvd::pvd;

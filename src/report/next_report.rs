@@ -3,7 +3,8 @@
 use super::bars::{BarGroup, GroupedBars};
 use super::html::{Report, ReportHeader};
 use super::html_parts::{CalloutKind, Column, Table};
-use super::number::{significant, symbol_of_parameter};
+use super::number::significant;
+use super::symbol_of_parameter;
 use crate::next::NextResult;
 
 /// Pictures by name without ending, and the page; `study` is the study's name.

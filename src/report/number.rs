@@ -120,22 +120,6 @@ fn group_thousands(text: &str) -> String {
     out
 }
 
-/// The symbol of a parameter: `kappa` is κ, `mu_1` is μ₁, `alpha_2` is α₂; other names stay.
-pub fn symbol_of_parameter(name: &str) -> String {
-    let (stem, index) = name.split_once('_').map_or((name, ""), |(s, i)| (s, i));
-    let symbol = match stem {
-        "kappa" => "κ",
-        "mu" => "μ",
-        "alpha" => "α",
-        _ => return name.to_string(),
-    };
-    if !index.chars().all(|c| c.is_ascii_digit()) {
-        return name.to_string();
-    }
-    let below = ['₀', '₁', '₂', '₃', '₄', '₅', '₆', '₇', '₈', '₉'];
-    symbol.chars().chain(index.chars().map(|c| shifted(c, &below, '₋'))).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -170,14 +154,5 @@ mod tests {
         assert_eq!(fixed(-0.001, 2), "0.00");
         assert_eq!(signed_percent(0.0312), "+3.1 %");
         assert_eq!(signed_percent(-0.5), "−50 %");
-    }
-
-    #[test]
-    fn parameters_have_symbols() {
-        assert_eq!(symbol_of_parameter("kappa"), "κ");
-        assert_eq!(symbol_of_parameter("mu_1"), "μ₁");
-        assert_eq!(symbol_of_parameter("alpha_12"), "α₁₂");
-        assert_eq!(symbol_of_parameter("mu_x"), "mu_x");
-        assert_eq!(symbol_of_parameter("delta_2"), "delta_2");
     }
 }

@@ -50,8 +50,7 @@ pub fn sweep_report(result: &SweepResult, table: &SweepTable) -> String {
             .filter(|&r| materials.get(r).is_some_and(|m| m.as_deref() == Some(material.name.as_str())))
             .filter(|&r| r + 1 == table.num_rows || tasks[r + 1] > tasks[r])
             .collect();
-        let of_material = material.material.parameters();
-        let names: Vec<String> = of_material.iter().map(|p| p.name()).filter(|n| n != "kappa").collect();
+        let names: Vec<String> = material.material.shear_parameters().map(|p| p.name()).collect();
         section(&mut page, result, &material.name, &names, &Selection { table, rows });
     }
     failures(&mut page, &texts("failure_kind"), &texts("failure_reason"), &tasks);
@@ -99,7 +98,7 @@ fn section(page: &mut Report, result: &SweepResult, material: &str, names: &[Str
     );
     let mut responses = vec![(worst_label.to_string(), worst.clone()), ("force / N".into(), force.clone())];
     for name in names {
-        let unit = if Parameter::is_modulus_of_name(name) { "" } else { "_kpa" };
+        let unit = if Parameter::named(name).is_some_and(Parameter::is_modulus) { "" } else { "_kpa" };
         let column = format!("sensitivity_sum_{name}{unit}");
         responses.push((label(&column), selection.numbers(&column)));
     }

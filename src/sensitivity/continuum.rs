@@ -5,7 +5,7 @@
 //! voxels at a fixed number of voxels per volume. Mirrored parts count as often as they are reflected.
 
 use super::information::{FisherInformation, InformationError, MeasurementNoise};
-use super::integrated::{IntegratedSensitivity, parameter_sensitivity, shear_parameters};
+use super::integrated::{IntegratedSensitivity, parameter_sensitivity};
 use super::joint_information::JointInformation;
 use super::protocol::{Nuisance, Protocol};
 use crate::fem::{ParameterSensitivity, QuadraturePoint};
@@ -30,7 +30,8 @@ pub fn integrate_over_quadrature(
     let states: Vec<_> = points.iter().map(|p| (decompose(&p.deformation_gradient), p.volume_mm3)).collect();
     let copies = num_copies(mirror);
     let volume = copies * points.iter().map(|p| p.volume_mm3).sum::<f64>();
-    shear_parameters(material)
+    material
+        .shear_parameters()
         .map(|parameter| {
             let half: f64 = states
                 .iter()

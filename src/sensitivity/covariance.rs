@@ -34,6 +34,13 @@ pub struct PromisedSd {
     pub discretisation_relative: Option<f64>,
 }
 
+impl PromisedSd {
+    /// Whether it is that of any parameter but κ.
+    pub fn is_of_shear(&self) -> bool {
+        Parameter::named(&self.parameter) != Some(Parameter::Kappa)
+    }
+}
+
 /// A figure of merit of the relative covariance C of chosen parameters, all others being estimated as well (nuisance).
 /// All are to be **minimised**.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]

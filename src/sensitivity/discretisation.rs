@@ -100,7 +100,7 @@ mod tests {
         let (own, better) = (&coarse.steps[0], &fine.steps[0]);
         let bound = own.force_discretisation_n.expect("bounded");
         assert!((own.force_n - better.force_n).abs() < bound && bound < 0.1 * own.force_n, "{bound}");
-        let pairs = coarse.promised_sd.iter().zip(&fine.promised_sd).filter(|(p, _)| p.parameter != "kappa");
+        let pairs = coarse.promised_sd.iter().zip(&fine.promised_sd).filter(|(p, _)| p.is_of_shear());
         for (own, better) in pairs {
             let bound = own.discretisation_relative.expect("bounded");
             let (own, better) = (own.value.expect("determined"), better.value.expect("determined"));

@@ -88,11 +88,6 @@ pub fn sensitivity_map(material: &Material, parameter: Parameter, states: &[Deco
         .collect()
 }
 
-/// μᵢ and αᵢ: the parameters that a volume-preserving deformation can tell of.
-pub(super) fn shear_parameters(material: &Material) -> impl Iterator<Item = Parameter> {
-    material.parameters().into_iter().filter(|p| *p != Parameter::Kappa)
-}
-
 /// 𝒮 of every μᵢ and αᵢ over the voxels of `mask`, whose states stand in the mask's order; each of them stands for
 /// `voxels_each` voxels of the scan.
 pub fn integrate_over_voxels(
@@ -102,7 +97,8 @@ pub fn integrate_over_voxels(
     voxels_each: f64,
 ) -> Vec<IntegratedSensitivity> {
     let (voxel_volume, subset_area) = (mask.grid.voxel_volume_mm3(), mask.grid.subset_area_mm2());
-    shear_parameters(material)
+    material
+        .shear_parameters()
         .map(|parameter| {
             let (mut sum, mut integral) = (0.0, 0.0);
             for (value, fraction) in sensitivity_map(material, parameter, states).iter().zip(&mask.material_fraction) {
@@ -173,7 +169,7 @@ mod tests {
             HistogramAxis { low: 0.0, high: 1.0, num_bins: 101 },
         )
         .unwrap();
-        for parameter in shear_parameters(&material()) {
+        for parameter in material().shear_parameters() {
             let sum: f64 = sensitivity_map(&material(), parameter, &states).iter().sum();
             let bins = histogram.sum_over_bins(|l, k| parameter_sensitivity(&material(), parameter, l, Some(k)).value);
             // Bin width 0.0025 in λ: at most half of it times the logarithmic slope (below 20), mostly cancelling.

@@ -4,7 +4,7 @@ use super::covariance::PromisedSd;
 use super::encoding::Encoding;
 use super::error::EvaluationError;
 use super::information::{FisherInformation, MeasurementNoise};
-use super::integrated::{IntegratedSensitivity, integrate_over_voxels, sensitivity_map, shear_parameters};
+use super::integrated::{IntegratedSensitivity, integrate_over_voxels, sensitivity_map};
 use super::joint_information::{JointInformation, NuisanceColumn};
 use super::scan_settings::{ScanSettings, ScannedVoxels};
 use crate::fem::ParameterSensitivity;
@@ -226,7 +226,7 @@ impl Scanner {
             HistogramAxis { low: 0.0, high: 1.0, num_bins: MODE_BINS },
         )?;
         let integrated_sensitivity = integrate_over_voxels(material, &states, &self.mask, self.voxels_each);
-        let sensitivities = shear_parameters(material).map(|p| (p, sensitivity_map(material, p, &states))).collect();
+        let sensitivities = material.shear_parameters().map(|p| (p, sensitivity_map(material, p, &states))).collect();
         let maps = DriveMaps { drive_mm: state.drive_mm, displacement, states, signal, sensitivities, histogram };
         Ok(Observation { maps, voxels_each: self.voxels_each, integrated_sensitivity, joint })
     }
