@@ -103,3 +103,17 @@ fn an_unstable_material_is_told() {
     // Next to the hole, where the bar is stretched most.
     assert!(relative_stiffness < 0.0 && place_mm[0].abs() < 4.0, "{relative_stiffness} {place_mm:?}");
 }
+
+/// A neo-Hookean bar is stable at every stretch. On six elements the meshed bar gives way at a stretch of five, before
+/// any element folds; on finer ones it is followed further.
+#[test]
+fn a_coarse_mesh_gives_way_before_it_folds() {
+    let s = specimen(TestKind::Uniaxial, [20.0, 8.0, 8.0], HoleAxis::Thickness, &[]);
+    let material = ogden(2000.0, &[(10.0, 2.0)]);
+    let asked_mm = 120.0;
+    let found = end(&s, &MeshOptions::scaled(&s, 5.0), &material, asked_mm);
+    let EndCause::Sample { least_stiffness, .. } = found.cause else { panic!("{:?}", found.cause) };
+    assert!(least_stiffness < 0.05 && (70.0..100.0).contains(&found.reached_mm), "{found}");
+    let mut finer = ForwardModel::new(mesh_specimen(&s, &MeshOptions::scaled(&s, 1.5)).unwrap(), &s).unwrap();
+    finer.solve(&material, asked_mm, None, &SolveOptions::default(), &never).expect("a finer mesh goes on");
+}

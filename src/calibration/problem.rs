@@ -214,8 +214,8 @@ impl<'a> CalibrationProblem<'a> {
         Ok(found.into_iter().map(|p| p.forces_n).collect())
     }
 
-    /// By how much `fit`, a fit of this problem, would shift to first order were the data `other`, of the same specimens
-    /// and voxels: per parameter, in its unit; zero where the data do not determine it.
+    /// By how much `fit`, a fit of this problem, would shift to first order were the data `other`, of the same
+    /// specimens and voxels: per parameter, in its unit; zero where the data do not determine it.
     ///
     /// # Errors
     /// [`CalibrationError`]: nothing to compare.

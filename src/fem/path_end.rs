@@ -59,7 +59,8 @@ pub enum EndCause {
         /// Where it was at rest, mm.
         place_mm: [f64; 3],
     },
-    /// The sample gives way as a structure, though no point of its material does.
+    /// The meshed sample gives way as a structure, though no point of its material does. Large elements do so at
+    /// stretches that the sample itself bears: a finer mesh tells.
     Sample {
         /// ν, the least stiffness over that at rest; 1 at rest.
         least_stiffness: f64,
@@ -70,7 +71,8 @@ pub enum EndCause {
         /// Whether smaller steps follow the sample to the drive asked for once it has given way.
         goes_on: bool,
     },
-    /// An element folds although the sample is stable: the mesh is too coarse for the deformation there.
+    /// An element folds although the sample is stable: the mesh is too coarse for the deformation there. On no path
+    /// that was tried: elements give way first, and the meshed sample with them ([`EndCause::Sample`]).
     Mesh {
         /// Element index.
         element: usize,
@@ -142,7 +144,8 @@ impl fmt::Display for PathEnd {
                 write!(
                     f,
                     "{there} the sample itself becomes unstable at {} (its least stiffness is {least_stiffness:.3} \
-                     of that at rest): {how}; {reduce} or make it stouter there",
+                     of that at rest): {how}; {reduce}, make it stouter there, or refine the mesh, of which a coarse one \
+                     gives way before the sample does",
                     at(*place_mm)
                 )
             }

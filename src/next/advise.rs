@@ -264,7 +264,7 @@ fn percent(part: f64) -> String {
 fn sentence(name: &str, before: f64, index: usize, best: &CandidateResult, stop: Option<&Stop>) -> String {
     let after = best.promised_relative_sd[index];
     let advice = format!(
-        "Scan {} next: it takes the sd of {name} from {} to {} for {} minutes.",
+        "Scan next: {}. It takes the sd of {name} from {} to {} for {} minutes.",
         best.name,
         percent(before),
         percent(after),

@@ -23,9 +23,9 @@ const NUM_STARTS: usize = 2;
 /// A further term is fitted where the linear model promises this part of what BIC asks of it: the fit itself may gain
 /// more, but of such a term takes most of the time that an answer has.
 const LEAST_OF_BIC: f64 = 0.5;
-/// Standard deviation of a parameter as a part of its shift by what was extrapolated of the mesh's error. Around holes and
-/// notches the order is not known: what lies beyond the finer mesh may be anything from nothing to twice as much, each
-/// as likely as another. The standard deviation of an even distribution is 1/√12 of its range, which is two such
+/// Standard deviation of a parameter as a part of its shift by what was extrapolated of the mesh's error. Around holes
+/// and notches the order is not known: what lies beyond the finer mesh may be anything from nothing to twice as much,
+/// each as likely as another. The standard deviation of an even distribution is 1/√12 of its range, which is two such
 /// shifts wide.
 const SD_OVER_EXTRAPOLATED: f64 = 0.58;
 /// A parameter that the recordings do not determine counts as known to this relative standard deviation.
