@@ -9,7 +9,28 @@ use std::path::Path;
 
 pub(super) fn read(path: &Path, memory: &ReadingMemory) -> Result<Vec<(String, MatValue)>, MatError> {
     let file = File::open_streaming(path).map_err(failed)?;
-    fields(&file.root(), memory, 0)
+    fields(&file.root(), Reading { memory, file_bytes: file.file_size() }, 0)
+}
+
+/// What all of a file is read with.
+#[derive(Clone, Copy)]
+struct Reading<'a> {
+    memory: &'a ReadingMemory,
+    /// Length of the file.
+    file_bytes: u64,
+}
+
+/// An error where a chunk of a dataset is said to be stored in more bytes than the file has: memory for them would be
+/// taken before they are read.
+fn check_chunks(dataset: &Dataset, file_bytes: u64) -> Result<(), MatError> {
+    // An index that cannot be listed cannot be read either, which says why.
+    let Ok(chunks) = dataset.chunks() else { return Ok(()) };
+    match chunks.iter().map(|chunk| chunk.storage_size).max() {
+        Some(most) if most > file_bytes => {
+            Err(failed(format!("a chunk of {most} bytes in a file of {file_bytes} bytes")))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// What the numbers of a dataset take while they are read: its bytes as stored, one chunk of them unpacked, and the
@@ -28,7 +49,7 @@ fn failed(error: impl std::fmt::Display) -> MatError {
     MatError::Damaged { what: error.to_string() }
 }
 
-fn fields(group: &Group, memory: &ReadingMemory, depth: usize) -> Result<Vec<(String, MatValue)>, MatError> {
+fn fields(group: &Group, reading: Reading, depth: usize) -> Result<Vec<(String, MatValue)>, MatError> {
     if depth > MAX_DEPTH {
         let (found, limit) = (depth as u64, MAX_DEPTH as u64);
         return Err(MatError::TooLarge { what: "groups within groups", found, limit });
@@ -36,15 +57,15 @@ fn fields(group: &Group, memory: &ReadingMemory, depth: usize) -> Result<Vec<(St
     let mut found = Vec::new();
     for name in group.datasets().map_err(failed)? {
         if !name.starts_with('#') {
-            take_members::<(String, MatValue)>(memory, 1)?;
+            take_members::<(String, MatValue)>(reading.memory, 1)?;
             let dataset = group.dataset(&name).map_err(failed)?;
-            found.push((name, value(&dataset, memory, depth)?));
+            found.push((name, value(&dataset, reading, depth)?));
         }
     }
     for name in group.groups().map_err(failed)? {
         if !name.starts_with('#') {
             let inner = group.group(&name).map_err(failed)?;
-            found.push((name, MatValue::Struct(fields(&inner, memory, depth + 1)?)));
+            found.push((name, MatValue::Struct(fields(&inner, reading, depth + 1)?)));
         }
     }
     found.sort_by(|a, b| a.0.cmp(&b.0));
@@ -61,14 +82,14 @@ fn text_attribute(attributes: &HashMap<String, AttrValue>, name: &str) -> Option
     }
 }
 
-fn value(dataset: &Dataset, memory: &ReadingMemory, depth: usize) -> Result<MatValue, MatError> {
+fn value(dataset: &Dataset, reading: Reading, depth: usize) -> Result<MatValue, MatError> {
     if depth > MAX_DEPTH {
         let (found, limit) = (depth as u64, MAX_DEPTH as u64);
         return Err(MatError::TooLarge { what: "cells within cells", found, limit });
     }
     let shape = dataset.shape().map_err(failed)?;
     let count = shape.iter().try_fold(1u64, |p, &d| p.checked_mul(d)).ok_or_else(|| failed("sizes overflow"))?;
-    memory.check()?;
+    reading.memory.check()?;
     let attributes = dataset.attrs().map_err(failed)?;
     let dims: Vec<usize> = shape.iter().rev().map(|&d| d as usize).collect();
     // An empty array is stored as its sizes.
@@ -83,9 +104,10 @@ fn value(dataset: &Dataset, memory: &ReadingMemory, depth: usize) -> Result<MatV
         return Ok(MatValue::Other("a type that is not read"));
     }
     let transient = reading_bytes(dataset, count)?;
-    memory.take("a variable of the file", transient)?;
-    let found = stored(dataset, dtype, (dims, count), &attributes, memory, depth);
-    memory.give_back(transient);
+    check_chunks(dataset, reading.file_bytes)?;
+    reading.memory.take("a variable of the file", transient)?;
+    let found = stored(dataset, dtype, (dims, count), &attributes, reading, depth);
+    reading.memory.give_back(transient);
     found
 }
 
@@ -95,26 +117,26 @@ fn stored(
     dtype: DType,
     (dims, count): (Vec<usize>, u64),
     attributes: &HashMap<String, AttrValue>,
-    memory: &ReadingMemory,
+    reading: Reading,
     depth: usize,
 ) -> Result<MatValue, MatError> {
     match dtype {
         DType::ObjectReference => {
             let mut members = Vec::new();
             // A reference takes eight bytes in the file, and what it leads to is opened with all its attributes.
-            memory.take("references", count.saturating_mul(REFERENCE_BYTES))?;
+            reading.memory.take("references", count.saturating_mul(REFERENCE_BYTES))?;
             for object in dataset.dereference().map_err(failed)? {
-                take_members::<MatValue>(memory, 1)?;
+                take_members::<MatValue>(reading.memory, 1)?;
                 members.push(match object {
-                    Object::Dataset(inner) => value(&inner, memory, depth + 1)?,
-                    Object::Group(inner) => MatValue::Struct(fields(&inner, memory, depth + 1)?),
+                    Object::Dataset(inner) => value(&inner, reading, depth + 1)?,
+                    Object::Group(inner) => MatValue::Struct(fields(&inner, reading, depth + 1)?),
                     _ => MatValue::Other("object"),
                 });
             }
             Ok(MatValue::Cell { dims, members })
         }
         DType::Compound(parts) if parts.len() == 2 => {
-            memory.take_values::<[f64; 4]>("complex numbers", count)?;
+            reading.memory.take_values::<[f64; 4]>("complex numbers", count)?;
             let raw = dataset.read_raw().map_err(failed)?;
             // MATLAB runs on little-endian machines alone; a complex number is two of its reals without a gap.
             let numbers: Vec<f64> = match (&parts[0].1, &parts[1].1) {
@@ -144,7 +166,7 @@ fn stored(
         | DType::U16
         | DType::U32
         | DType::U64 => {
-            memory.take_values::<f64>("numbers of a variable", count)?;
+            reading.memory.take_values::<f64>("numbers of a variable", count)?;
             let values = dataset.read_f64().map_err(failed)?;
             if values.len() as u64 != count {
                 return Err(failed(format!("{} numbers, the sizes ask for {count}", values.len())));
@@ -155,5 +177,34 @@ fn stored(
             Ok(MatValue::Numeric { dims, values, imaginary: None })
         }
         _ => Ok(MatValue::Other("a type that is not read")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::file::MemoryLimit;
+
+    /// A chunk that says to be stored in more bytes than the file has, found by fuzzing: 40 kB took 2.5 GB.
+    #[test]
+    fn chunks_larger_than_the_file_are_refused() {
+        const STORED: u32 = 0x9000_0000;
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/import/v73.mat");
+        let mut bytes = std::fs::read(&path).unwrap();
+        let file = File::open_streaming(&path).unwrap();
+        let root = file.root();
+        let datasets = root.datasets().unwrap();
+        let chunk = datasets.iter().find_map(|name| root.dataset(name).ok()?.chunks().ok()?.into_iter().next());
+        let size = chunk.expect("a chunked variable").storage_size as u32;
+        // A key of the index: size, filters left out, place in the array.
+        let key = [&size.to_le_bytes()[..], &[0; 12]].concat();
+        let at = bytes.windows(key.len()).position(|w| w == key).expect("its key in the index");
+        bytes[at..at + 4].copy_from_slice(&STORED.to_le_bytes());
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("chunk.mat");
+        std::fs::write(&path, bytes).unwrap();
+        let found = read(&path, &MemoryLimit::body(1_000_000).begin());
+        let Err(MatError::Damaged { what }) = found else { panic!("{found:?}") };
+        assert!(what.contains(&STORED.to_string()), "{what}");
     }
 }
