@@ -5,6 +5,10 @@ use crate::material::Parameter;
 /// 97.5 % point of the standard normal distribution: half the width of an interval of 95 %, in standard deviations.
 pub const TWO_SIDED_95: f64 = 1.959_963_984_540_054;
 
+/// Standard deviation of what may be anything from nothing to twice a shift, each as likely as another, as a part of
+/// that shift: 1/√12 of the range of an even distribution.
+pub const SD_OVER_SHIFT: f64 = 0.58;
+
 /// The ends of the 95 % interval that a standard deviation leaves a parameter.
 ///
 /// κ is fitted by its logarithm, and its interval is symmetric in that. The moduli of Ogden's terms keep their sign;

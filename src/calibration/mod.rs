@@ -57,7 +57,7 @@ pub use contours::{Contour, ContourOptions, contours};
 pub use error::CalibrationError;
 pub use fit::{Fit, FitStart, fit};
 pub use force_readings::{ForceOnTheWay, LoadCell, ObservedForce};
-pub use interval::TWO_SIDED_95;
+pub use interval::{SD_OVER_SHIFT, TWO_SIDED_95};
 pub use law::{Law, fit_law};
 pub use measured_boundary::{Boundary, CUT_PART};
 pub use noise::estimate_noise_sd_mm;

@@ -24,6 +24,8 @@ pub struct Subject {
     pub inputs: Vec<(String, String)>,
     /// The figures.
     pub figures: Vec<Figure>,
+    /// Whether the result itself says why a figure is missing: a task that fails has none.
+    pub tells_of_failures: bool,
     /// Version of the program.
     pub version: String,
 }
@@ -112,6 +114,7 @@ fn of_evaluation(e: &Evaluation) -> Subject {
         conditions: conditions_of(e),
         inputs: inputs_of(e),
         figures,
+        tells_of_failures: false,
         version: e.version.clone(),
     }
 }
@@ -185,7 +188,14 @@ fn of_design(d: &DesignResult) -> Subject {
     };
     spread("best", &d.verification.best, &mut figures);
     spread("base", &d.verification.base, &mut figures);
-    Subject { schema: d.schema.clone(), conditions, inputs: Vec::new(), figures, version: d.version.clone() }
+    Subject {
+        schema: d.schema.clone(),
+        conditions,
+        inputs: Vec::new(),
+        figures,
+        tells_of_failures: false,
+        version: d.version.clone(),
+    }
 }
 
 /// Direction of a column of a sweep's table; none where it is no figure.
@@ -243,5 +253,12 @@ fn of_sweep(s: &SweepResult) -> Subject {
             figures.push(Figure { name: format!("{at}: {column}"), value, direction });
         }
     }
-    Subject { schema: s.schema.clone(), conditions, inputs: Vec::new(), figures, version: s.version.clone() }
+    Subject {
+        schema: s.schema.clone(),
+        conditions,
+        inputs: Vec::new(),
+        figures,
+        tells_of_failures: true,
+        version: s.version.clone(),
+    }
 }

@@ -12,6 +12,7 @@ fn subject(sum: f64, sd: Option<f64>, voxel: &str) -> Subject {
             figure("sd", sd, Direction::SmallerIsBetter),
             figure("force", Some(1.0), Direction::Neutral),
         ],
+        tells_of_failures: false,
         version: "0.1.0".into(),
     }
 }
@@ -61,4 +62,8 @@ fn what_cannot_be_compared_says_why() {
     fewer.figures.pop();
     let message = compared(&a, &fewer, CompareOptions::default()).expect_err("a figure is missing").to_string();
     assert!(message.contains("has no 'force'"), "{message}");
+    // A sweep lists the tasks that failed, and its other figures are compared all the same.
+    fewer.tells_of_failures = true;
+    let c = compared(&a, &fewer, CompareOptions::default()).expect("comparable");
+    assert_eq!((c.num_same, c.notes.len()), (2, 1), "{:?}", c.notes);
 }

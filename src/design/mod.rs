@@ -26,6 +26,7 @@ mod recommendation;
 mod response;
 mod result;
 mod rounding;
+mod rows;
 mod scan_choice;
 mod search;
 mod search_error;

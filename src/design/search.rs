@@ -137,6 +137,7 @@ impl SearchRun<'_> {
         if spaces.iter().any(|s| s.structure.num_holes() > 0) {
             self.race(&RaceRules::of_solid(study.budget.propose, &spaces), &fine, &spaces, &mut state)?;
         }
+        self.step_by_rows(&fine, &spaces, &mut state)?;
         let ranked = self.confirm_all(&base, &spaces, &mut state)?;
         let (ranked, scan) = self.with_best_scan(&base, ranked, &mut state)?;
         let equal_to_best = equal_to_best(study, &base, &ranked);
@@ -282,7 +283,7 @@ impl SearchRun<'_> {
         Ok(())
     }
 
-    fn evaluate_batch(
+    pub(super) fn evaluate_batch(
         &self,
         judge: &Judge,
         spaces: &[Subspace],

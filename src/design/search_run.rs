@@ -16,7 +16,7 @@ use crate::specimen::Specimen;
 /// How far a search is.
 #[derive(Clone, Debug)]
 pub struct Progress {
-    /// `base`, `explore`, `refine`, `propose`, `solid`, `confirm`, `repair`, `scan`, `verify`.
+    /// `base`, `explore`, `refine`, `propose`, `solid`, `rows`, `confirm`, `repair`, `scan`, `verify`.
     pub stage: &'static str,
     /// Finished in this stage.
     pub done: usize,
@@ -83,12 +83,18 @@ impl SearchRun<'_> {
         input_hash(&serde_json::json!({ "kind": kind, "scan": other, "of": of_what }))
     }
 
+    /// Whether the objective jumps where a row of voxels comes in at a free face: where it looks at voxels of a grid
+    /// that lies on the middle of each specimen.
+    pub fn jumps_by_rows(&self) -> bool {
+        let looks_at_voxels = !matches!(self.study.objective.kind, ObjectiveKind::TellApart | ObjectiveKind::Detect);
+        looks_at_voxels && self.study.scan.grid == GridPlace::Centred
+    }
+
     /// The objective of `design` in `scan` over that of `base` in the study's if the grid lay anywhere, in place of on
     /// the middle of each: `None` where the study takes it to do so, where its objective does not look at voxels or
     /// asks for a diagnosis, or where it was cancelled.
     pub fn gain_anywhere(&self, base: &Specimen, design: &Specimen, scan: &ScanSettings) -> Option<f64> {
-        let looks_at_voxels = !matches!(self.study.objective.kind, ObjectiveKind::TellApart | ObjectiveKind::Detect);
-        if self.study.scan.grid != GridPlace::Centred || !looks_at_voxels {
+        if !self.jumps_by_rows() {
             return None;
         }
         let evaluated = |specimen: &Specimen, scan: &ScanSettings| {

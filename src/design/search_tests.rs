@@ -170,6 +170,14 @@ fn the_solid_block_is_improved_too() {
         found.candidates.iter().filter(|c| c.specimen.holes.is_empty()).map(|c| &c.stage[..]).collect();
     assert!(solid.iter().any(|stage| ["propose", "solid"].contains(stage)), "{solid:?} {:?}", found.failures);
     assert!(found.candidates.iter().all(|c| c.stage != "solid" || c.specimen.holes.is_empty()));
+    // At last the best design is tried with a row of voxels more or less.
+    let apart_by_a_row = |a: &Candidate, b: &Candidate| {
+        let apart_mm = (a.specimen.block.length_mm - b.specimen.block.length_mm).abs();
+        (apart_mm - study.scan.voxel_mm[0]).abs() < 1e-9 && a.specimen.holes == b.specimen.holes
+    };
+    let last = found.candidates.iter().position(|c| c.stage == "rows").expect("rows are tried");
+    let (before, rows) = found.candidates.split_at(last);
+    assert!(rows.iter().all(|c| c.stage == "rows") && before.iter().any(|c| apart_by_a_row(c, &rows[0])));
 }
 
 /// Two blocks that differ in thickness alone, both scanned: the second follows the first, limits and rounding hold for

@@ -1,6 +1,7 @@
 //! The stage of a diagnosis that names causes: single ones round by round, the set-up as a whole where they leave much,
 //! and what later causes made needless out again.
 
+use super::artefacts::look_for_artefacts_again;
 use super::cause::CauseName;
 use super::cause_fit::CauseFit;
 use super::diagnose::Run;
@@ -12,7 +13,7 @@ use super::interior::InteriorTest;
 use super::leftover::leftover;
 use super::metric::Metric;
 use super::nominal::fit_with_terms;
-use super::rounds::{Asked, RoundLimits, ToAsk, add_causes, fit_round, look_for_artefacts_again, score_round};
+use super::rounds::{Asked, RoundLimits, ToAsk, add_causes, fit_round, score_round};
 use super::set_up::{fit_set_up, is_set_up_promising, simplest_set_up};
 use super::stand_ins::with_sponge_for_stand_ins;
 use super::supposed::Supposed;

@@ -1,6 +1,7 @@
 //! The diagnosis: fit the nominal model, look at what is left, suppose causes, fit them, and prove them on data kept
 //! back.
 
+use super::artefacts::take_out_artefacts;
 use super::cause::CauseName;
 use super::conclusion::{explain_too_little, kept_back, verdict_on};
 use super::error::DiagnosisError;
@@ -22,7 +23,6 @@ use super::options::DiagnosisOptions;
 use super::outcome::Diagnosis;
 use super::prior::{BulkPrior, FitSettings, ShearPrior, shear_modulus};
 use super::registry::Registry;
-use super::rounds::take_out_artefacts;
 use super::trace::Trace;
 use crate::calibration::{Boundary, Observed};
 use crate::material::Material;

@@ -19,6 +19,7 @@ use super::other_mesh::OtherMesh;
 use super::prior::FitSettings;
 use super::scene::Scene;
 use super::trace::Trace;
+use crate::calibration::SD_OVER_SHIFT;
 use crate::mesh::{MeshOptions, error_over_difference};
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -40,10 +41,6 @@ const HARDLY_FINER: f64 = 0.9;
 /// single mesh may shift a parameter by little because it happens to err as ours does; therefore the mean square over
 /// all meshes counts.
 const COARSER: [(f64, bool); 3] = [(1.25, false), (1.6, false), (1.6, true)];
-/// Standard deviation of a parameter as a part of its shift when the edge is made twice as wide. The true edge may have
-/// any width from sharp to twice ours, each as likely as another: the standard deviation of an even distribution is
-/// 1/√12 of its range, which is two such shifts wide.
-const SD_OVER_EDGE: f64 = 0.58;
 
 /// The finer mesh of a recording, on which what was found with ours is corrected.
 pub struct Finer<'a> {
@@ -222,8 +219,9 @@ pub fn widen<'a>(
         }
     }
     if has_edge {
+        // The true edge may have any width from sharp to twice ours.
         let theirs = laboratory.predict(&fitted.material, &wider, is_cancelled)?;
-        let shift = shift_by(&fitted.prediction.trace.plus(-1.0, &theirs.trace)) * SD_OVER_EDGE;
+        let shift = shift_by(&fitted.prediction.trace.plus(-1.0, &theirs.trace)) * SD_OVER_SHIFT;
         square += shift.component_mul(&shift);
     }
     let scales = scales(&fitted.material, &fitted.causes);

@@ -13,6 +13,7 @@
 //! implements [`Cause`], adds its cause to a [`Registry`] and calls [`diagnose_with`] (`examples/own_cause.rs`).
 
 mod adding_causes;
+mod artefacts;
 mod balls;
 mod candidate;
 mod case;
@@ -77,6 +78,7 @@ mod test_recordings;
 mod thinning;
 mod together;
 mod trace;
+mod trial;
 
 pub use crate::rate::{BeforeAfter, Verdict};
 pub use cause::{Category, Cause, CauseIdentity, CauseName, CauseParameter, Course};

@@ -29,6 +29,7 @@ mod export_model;
 mod export_recording;
 mod export_result;
 mod import;
+mod import_request;
 mod import_result;
 mod import_series;
 mod input_use;

@@ -9,7 +9,7 @@ pub static KINDS: [Kind; 19] = [
     Kind::of::<super::evaluate::EvaluationRequest>(),
     Kind::of::<super::evaluation_list::EvaluationListRequest>(),
     Kind::of::<super::scan::ScanRequest>(),
-    Kind::of::<super::import::ImportRequest>(),
+    Kind::of::<super::import_request::ImportRequest>(),
     Kind::of::<super::calibrate::CalibrationRequest>(),
     Kind::of::<super::diagnose::DiagnosisRequest>(),
     Kind::of::<super::next::NextRequest>(),

@@ -7,7 +7,8 @@ use super::options::{NextOptions, Plan};
 use super::scanned::{ForceRead, ScannedStep};
 use super::visited::Visited;
 use crate::calibration::{
-    CalibrateOptions, CalibrationProblem, Law, Objective, Observed, RecordingFit, TermCount, fit_law, mean_scans,
+    CalibrateOptions, CalibrationProblem, Law, Objective, Observed, RecordingFit, SD_OVER_SHIFT, TermCount, fit_law,
+    mean_scans,
 };
 use crate::kinematics::{Decomposition, IDENTITY, decompose};
 use crate::material::Material;
@@ -23,11 +24,6 @@ const NUM_STARTS: usize = 2;
 /// A further term is fitted where the linear model promises this part of what BIC asks of it: the fit itself may gain
 /// more, but of such a term takes most of the time that an answer has.
 const LEAST_OF_BIC: f64 = 0.5;
-/// Standard deviation of a parameter as a part of its shift by what was extrapolated of the mesh's error. Around holes
-/// and notches the order is not known: what lies beyond the finer mesh may be anything from nothing to twice as much,
-/// each as likely as another. The standard deviation of an even distribution is 1/√12 of its range, which is two such
-/// shifts wide.
-const SD_OVER_EXTRAPOLATED: f64 = 0.58;
 /// A parameter that the recordings do not determine counts as known to this relative standard deviation.
 pub(super) const UNKNOWN_RELATIVE_SD: f64 = 1.0;
 /// Materials that candidates are averaged over differ from the estimate by at most this part of each parameter.
@@ -96,6 +92,9 @@ impl Posterior {
                 information.add_times(num_scans[r] as f64 / num, &of_all)?;
             }
         }
+        // Around holes and notches the order of the mesh's error is not known: what lies beyond the finer mesh may be
+        // anything from nothing to twice what was extrapolated.
+        let mesh_sd = mesh_shift.iter().map(|shift| SD_OVER_SHIFT * shift.abs()).collect();
         Ok(Posterior {
             material: found.fit.material.clone(),
             information,
@@ -103,7 +102,7 @@ impl Posterior {
             discrepancy,
             visited,
             chi2_per_datum: found.fit.chi2_per_datum,
-            mesh_sd: mesh_shift.iter().map(|shift| SD_OVER_EXTRAPOLATED * shift.abs()).collect(),
+            mesh_sd,
             notes: found.notes,
         })
     }
