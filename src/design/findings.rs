@@ -136,7 +136,11 @@ fn force_across(study: &Study, base: &DesignEntry, best: &DesignEntry) -> Option
 /// What meshes leave open of the winner's gain, and which design to make of those that are as good.
 fn which_are_equal(ranked: &[DesignEntry], Equals { equal_to_best, simplest }: Equals) -> Option<String> {
     let best = ranked.first()?;
-    let open = format!("Meshes leave {:.1} % of this factor open (standard error).", 100.0 * best.mesh_relative_sd);
+    let part = match best.mesh_relative_sd < 5e-4 {
+        true => "less than 0.1 %".to_string(),
+        false => format!("{:.1} %", 100.0 * best.mesh_relative_sd),
+    };
+    let open = format!("Meshes leave {part} of this factor open (standard error).");
     let others: Vec<String> = equal_to_best.iter().filter(|i| **i > 0).map(|i| (i + 1).to_string()).collect();
     if others.is_empty() {
         return (best.mesh_relative_sd > 0.0).then_some(open);

@@ -129,7 +129,11 @@ fn because(
     chosen: &DesignEntry,
     scan: Option<&ChosenScan>,
 ) -> String {
-    let gain = format!("{:.3} ± {:.3} times", chosen.objective, chosen.objective * chosen.mesh_relative_sd);
+    let open = chosen.objective * chosen.mesh_relative_sd;
+    let gain = match open < 5e-4 {
+        true => format!("{:.3} times (± less than 0.001)", chosen.objective),
+        false => format!("{:.3} ± {open:.3} times", chosen.objective),
+    };
     let way = if scan.is_some() { "as the study says" } else { "in the same way" };
     let scanned = format!("the base specimen scanned {way} at {} mm", short_number(drive_mm(base)));
     let of_scan = scan.and_then(|s| s.base_objective);
@@ -148,15 +152,21 @@ fn because(
     why + &of_scan
 }
 
-/// By how much less a factor may be on average over the places of the grid without a word, relative.
-const HARDLY_LESS: f64 = 0.02;
+/// Factors that differ by less than this part of them hardly differ.
+const HARDLY_APART: f64 = 0.02;
 
 /// What is left of the chosen design's factor where the scan's grid is not placed as assumed.
 fn if_the_grid_moves(chosen: &DesignEntry, anywhere: f64) -> String {
-    if anywhere > (1.0 - HARDLY_LESS) * chosen.objective {
+    if anywhere > (1.0 - HARDLY_APART) * chosen.objective {
         return String::new();
     }
-    let worth = if anywhere > 1.0 + HARDLY_LESS { "" } else { ", no better than the base specimen" };
+    let worth = if anywhere <= 1.0 {
+        ", no better than the base specimen"
+    } else if anywhere <= 1.0 + HARDLY_APART {
+        ", hardly better than the base specimen"
+    } else {
+        ""
+    };
     format!(
         " Place the scan's grid on the middle of the sample: on average over all places where it may lie the factor is \
          {anywhere:.3}{worth}."

@@ -1,7 +1,7 @@
 //! Import: raw phases, MATLAB files, point clouds, images and the files of scanners become a recording.
 
-use super::import_result::{ImportResult, ImportStep};
 use super::import_request::{FileForm, ImportRequest};
+use super::import_result::{ImportResult, ImportStep};
 use super::import_series::open_scanner;
 use super::input_use::{InputForm, InputUse};
 use super::outcome::{RECORDING_FIELD, WithRecording, recording_identifier, to_json};

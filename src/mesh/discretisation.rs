@@ -25,15 +25,31 @@ const STUDENT: [f64; 2] = [3.182, 2.776];
 /// one are too large for errors that follow their size, and agree with it by chance.
 const COARSEST_BOUNDED: f64 = 1.25;
 
-/// Order with which results of a whole sample converge that singular edges of bonded faces leave: between one, for
-/// forces at large drives, and two. What extrapolates takes this one.
+/// Order with which results of a whole sample converge that singular edges of bonded faces leave. What extrapolates
+/// takes this one.
 const EDGE_ORDER: f64 = 1.4;
+/// Between these it lies: one, for forces at large drives, and two.
+const EDGE_ORDERS: [f64; 2] = [1.0, 2.0];
 
 /// Factor by which the difference of our mesh's result and another mesh's, of `ratio` times our element size, gives the
 /// error of ours (Richardson's extrapolation with the order 1.4 that singular edges leave); negative where the other
 /// mesh is the coarser one.
 pub fn error_over_difference(ratio: f64) -> f64 {
-    1.0 / (1.0 - ratio.powf(EDGE_ORDER))
+    error_of_order(ratio, EDGE_ORDER)
+}
+
+/// The same for errors of an order.
+fn error_of_order(ratio: f64, order: f64) -> f64 {
+    1.0 / (1.0 - ratio.powf(order))
+}
+
+/// Standard deviation of what lies beyond a finer mesh of `ratio` times our element size, as a part of what
+/// [`error_over_difference`] extrapolates beyond it, where singular edges of bonded faces alone make the error: what
+/// the two orders between which theirs lies make of it are the ends of an even distribution.
+pub fn sd_over_extrapolated(ratio: f64) -> f64 {
+    let beyond = |order: f64| error_of_order(ratio, order) - 1.0;
+    let [most, least] = EDGE_ORDERS.map(beyond);
+    (most - least) / beyond(EDGE_ORDER) / 12.0_f64.sqrt()
 }
 
 /// A kind of results that a mesh puts wrong.
@@ -113,6 +129,15 @@ mod tests {
     fn of_standard() -> CoarserMeshes {
         let specimen = published();
         CoarserMeshes::of(&MeshOptions::standard(&specimen), &specimen).expect("fine enough")
+    }
+
+    /// With elements of two fifths of the size a difference of one stands for an error of 1/0.6 at the order one and of
+    /// 1/0.84 at the order two; the order 1.4 extrapolates 0.3836 beyond it.
+    #[test]
+    fn orders_of_edges_leave_a_third_of_what_is_extrapolated() {
+        let expected = (1.0 / 0.6 - 1.0 / 0.84) / 0.3836 / 12.0_f64.sqrt();
+        assert!((sd_over_extrapolated(0.4) - expected).abs() < 1e-4, "{} {expected}", sd_over_extrapolated(0.4));
+        assert!((expected - 0.36).abs() < 0.005);
     }
 
     /// Of errors much larger than is typical, those of two coarser meshes alone count: the root of half of the mean

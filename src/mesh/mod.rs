@@ -57,7 +57,7 @@ pub use block_shape::{BlockShape, FACE_TERMS, face_term_degree, face_term_name, 
 pub use build::{mesh_specimen, mesh_specimen_along};
 pub use check::MeshQuality;
 pub use cut::{Cut, clearance_mm, cut_offset, mesh_cut_specimen, section_axes, takes_cuts};
-pub use discretisation::{COARSER, CoarserMeshes, MeshedResult, error_over_difference};
+pub use discretisation::{COARSER, CoarserMeshes, MeshedResult, error_over_difference, sd_over_extrapolated};
 pub use element::ElementKind;
 pub use error::{LigamentEnd, MeshError};
 pub use locator::{Column, ColumnShape, LevelShape, Location, Locator};

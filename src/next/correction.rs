@@ -7,10 +7,10 @@
 //! of the size is what an answer in seconds has time for.
 
 use super::error::NextError;
-use crate::calibration::{Observed, RecordingFit};
+use crate::calibration::{Observed, RecordingFit, SD_OVER_SHIFT};
 use crate::fem::{Equilibrium, ForwardModel, Nesting, SolveOptions};
 use crate::material::Material;
-use crate::mesh::{MeshOptions, error_over_difference};
+use crate::mesh::{MeshOptions, error_over_difference, sd_over_extrapolated};
 use crate::specimen::Specimen;
 
 /// Element size of the finer mesh as a factor on that of the fit, and the smallest as a factor on the standard one:
@@ -69,6 +69,16 @@ impl<'a> FinerMeshes<'a> {
             }
         }
         Ok(corrected)
+    }
+
+    /// Standard deviation of what lies beyond the finer meshes, as a part of what is extrapolated. Around holes and
+    /// notches the order of the error is not known: it may be anything from nothing to twice that.
+    pub(super) fn sd_over_extrapolated(&self) -> f64 {
+        let is_plain = |specimen: &Specimen| specimen.samples().iter().all(|sample| sample.holes.is_empty());
+        match self.observed.iter().all(|o| is_plain(&o.specimen)) {
+            true => sd_over_extrapolated(self.ratio),
+            false => SD_OVER_SHIFT,
+        }
     }
 
     /// The recordings with no more of the error taken off than the finer meshes themselves tell, where `corrected` are

@@ -7,8 +7,7 @@ use super::options::{NextOptions, Plan};
 use super::scanned::{ForceRead, ScannedStep};
 use super::visited::Visited;
 use crate::calibration::{
-    CalibrateOptions, CalibrationProblem, Law, Objective, Observed, RecordingFit, SD_OVER_SHIFT, TermCount, fit_law,
-    mean_scans,
+    CalibrateOptions, CalibrationProblem, Law, Objective, Observed, RecordingFit, TermCount, fit_law, mean_scans,
 };
 use crate::kinematics::{Decomposition, IDENTITY, decompose};
 use crate::material::Material;
@@ -75,8 +74,7 @@ impl Posterior {
     ) -> Result<Posterior, NextError> {
         let (means, num_scans): (Vec<Observed>, Vec<usize>) =
             mean_scans(observed).into_iter().map(|m| (m.mean, m.num_scans)).unzip();
-        let Fitted { corrected, law: found, mesh_shift, models } =
-            fit_together(&means, options, on_stage, is_cancelled)?;
+        let Fitted { corrected, law: found, mesh_sd, models } = fit_together(&means, options, on_stage, is_cancelled)?;
         let mut problem = models.with_data(&corrected)?;
         let discrepancy = Discrepancy::of(&corrected, &found.fit);
         let seen = Seen::of(&mut problem, &found.fit, plan, &num_scans)?;
@@ -92,9 +90,6 @@ impl Posterior {
                 information.add_times(num_scans[r] as f64 / num, &of_all)?;
             }
         }
-        // Around holes and notches the order of the mesh's error is not known: what lies beyond the finer mesh may be
-        // anything from nothing to twice what was extrapolated.
-        let mesh_sd = mesh_shift.iter().map(|shift| SD_OVER_SHIFT * shift.abs()).collect();
         Ok(Posterior {
             material: found.fit.material.clone(),
             information,
@@ -155,8 +150,8 @@ struct Fitted<'a> {
     corrected: Vec<Observed>,
     /// The law of these.
     law: Law,
-    /// Shift of every parameter by the part of the error that was extrapolated.
-    mesh_shift: Vec<f64>,
+    /// Per parameter, in its unit: standard deviation of what the part of the error that was extrapolated may make of it.
+    mesh_sd: Vec<f64>,
     /// Models of the means' specimens.
     models: CalibrationProblem<'a>,
 }
@@ -188,8 +183,8 @@ fn fit_together<'a>(
     if !options.has_mesh_correction {
         on_stage("what is known so far");
         let law = fit(&mut problem, terms, &[])?;
-        let mesh_shift = vec![0.0; law.fit.material.parameters().len()];
-        return Ok(Fitted { corrected: means.to_vec(), law, mesh_shift, models: problem });
+        let mesh_sd = vec![0.0; law.fit.material.parameters().len()];
+        return Ok(Fitted { corrected: means.to_vec(), law, mesh_sd, models: problem });
     }
     on_stage("error of the mesh");
     let mut first = fit(&mut problem, TermCount::Fixed(options.num_terms.unwrap_or(1)), &[])?;
@@ -201,8 +196,10 @@ fn fit_together<'a>(
         let law = fit(&mut present, terms, &first.by_num_terms)?;
         // A law of more terms tells the error better: large strains and small ones no longer share an exponent.
         if law.fit.material.terms.len() <= first.fit.material.terms.len() {
-            let mesh_shift = present.shift_to(&law.fit, &finer.without_extrapolation(&corrected))?;
-            return Ok(Fitted { models: present.with_data(means)?, corrected, law, mesh_shift });
+            let shift = present.shift_to(&law.fit, &finer.without_extrapolation(&corrected))?;
+            let part = finer.sd_over_extrapolated();
+            let mesh_sd = shift.iter().map(|shift| part * shift.abs()).collect();
+            return Ok(Fitted { models: present.with_data(means)?, corrected, law, mesh_sd });
         }
         problem = present.with_data(means)?;
         on_stage("error of the mesh");
