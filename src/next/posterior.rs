@@ -150,7 +150,7 @@ struct Fitted<'a> {
     corrected: Vec<Observed>,
     /// The law of these.
     law: Law,
-    /// Per parameter, in its unit: standard deviation of what the part of the error that was extrapolated may make of it.
+    /// Per parameter, in its unit: standard deviation of what the extrapolated part of the error may make of it.
     mesh_sd: Vec<f64>,
     /// Models of the means' specimens.
     models: CalibrationProblem<'a>,
