@@ -54,7 +54,7 @@ impl DrivenSample {
         };
         let mask = VoxelMask::of_specimen(sample, grid.clone())?;
         let mut model = ForwardModel::of_specimen(sample, &mesh.carried(specimen, sample))?;
-        let path = model.solve_path(material, &sample.drive_mm, solve, &|| is_cancelled())?;
+        let path = model.solve_path(material, &sample.drive_mm, solve, is_cancelled)?;
         let operator = VoxelOperator::new(sample, model.mesh(), &mask, Sampling::default())?;
         let truth = path.iter().map(|state| operator.average(&state.displacement)).collect::<Result<Vec<_>, _>>()?;
         let mut forces_n: Vec<f64> = path.iter().map(|state| state.force_n).collect();
@@ -62,7 +62,7 @@ impl DrivenSample {
         let mut on_ramps_n = forces_on_ramps(&mut model, material, &path, &ramps_mm, solve, is_cancelled)?;
         for (_, other) in samples.iter().enumerate().filter(|(n, _)| *n != index) {
             let mut model = ForwardModel::of_specimen(other, &mesh.carried(specimen, other))?;
-            let path = model.solve_path(material, &other.drive_mm, solve, &|| is_cancelled())?;
+            let path = model.solve_path(material, &other.drive_mm, solve, is_cancelled)?;
             let of_other = forces_on_ramps(&mut model, material, &path, &ramps_mm, solve, is_cancelled)?;
             on_ramps_n.iter_mut().zip(of_other).for_each(|(sum, force)| *sum += force);
             forces_n.iter_mut().zip(path).for_each(|(sum, state)| *sum += state.force_n);
@@ -103,7 +103,7 @@ fn forces_on_ramps(
     for &drive in ramps_mm {
         let known = path.iter().chain(&last).filter(|state| state.drive_mm.abs() < drive.abs());
         let start = known.max_by(|a, b| a.drive_mm.abs().total_cmp(&b.drive_mm.abs())).cloned();
-        let state = model.solve(material, drive, start.as_ref(), solve, &|| is_cancelled())?;
+        let state = model.solve(material, drive, start.as_ref(), solve, is_cancelled)?;
         forces.push(state.force_n);
         last = Some(state);
     }

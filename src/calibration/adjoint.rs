@@ -17,7 +17,7 @@ impl CalibrationProblem<'_> {
         &mut self,
         material: &Material,
         solve: &SolveOptions,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<(f64, Vec<f64>), CalibrationError> {
         self.refuse_unlike_samples("the adjoint gradient")?;
         let objective = self.objective();

@@ -57,7 +57,7 @@ impl Bench {
         material: &Material,
         near: Option<&Prediction>,
         solve: &SolveOptions,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Prediction, CalibrationError> {
         let mut all: Option<Prediction> = None;
         for (index, (model, operator)) in self.parts.iter_mut().enumerate() {
@@ -82,7 +82,7 @@ impl Bench {
         material: &Material,
         drive_mm: f64,
         solve: &SolveOptions,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<(Vec<[f64; 3]>, f64), CalibrationError> {
         let (mut voxels, mut force_n) = (Vec::new(), 0.0);
         for (model, operator) in &mut self.parts {

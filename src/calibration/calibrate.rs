@@ -35,7 +35,7 @@ pub fn calibrate(
     mesh: &dyn Fn(&Specimen, f64) -> MeshOptions,
     options: &CalibrateOptions,
     on_stage: &dyn Fn(&str),
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Calibration, CalibrationError> {
     let coarse_factor = options.mesh_factor * if options.has_mesh_allowance { MESH_RATIO } else { 1.0 };
     let mut problem = CalibrationProblem::new(observed, &|s| mesh(s, coarse_factor), options.objective)?;

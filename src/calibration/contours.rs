@@ -54,7 +54,7 @@ pub fn contours(
     problem: &mut CalibrationProblem,
     fit: &RecordingFit,
     options: &ContourOptions,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<Contour>, CalibrationError> {
     problem.refuse_unlike_samples("contours of the losses")?;
     let n = options.num_values.max(2);
@@ -108,7 +108,7 @@ pub(super) fn losses_at(
     problem: &mut CalibrationProblem,
     material: &Material,
     near: &mut [Vec<Equilibrium>],
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<[f64; 2], CalibrationError> {
     let (observed, models, views) = problem.parts();
     let (mut loss_u, mut loss_f) = ([0.0, 0.0], [0.0, 0.0]);

@@ -80,7 +80,7 @@ impl FitStart {
         drives_mm: &[f64],
         material: &Material,
         options: &FitOptions,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<FitStart, CalibrationError> {
         check_options(options)?;
         let constraints = Constraints::new(material, options)?;
@@ -104,7 +104,7 @@ impl FitStart {
         bench: &mut Bench,
         scan: &ScanSettings,
         data: &Measurement,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Fit, CalibrationError> {
         let options = &self.options;
         let target = Target::of_measurement(data, scan);
@@ -142,7 +142,7 @@ impl FitStart {
         bench: &mut Bench,
         scan: &ScanSettings,
         data: &Measurement,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<FitStart, CalibrationError> {
         let found = match self.descent(bench, Target::of_measurement(data, scan), data, is_cancelled) {
             Err(error) if !error.is_of_the_data() => return Err(error),
@@ -162,7 +162,7 @@ impl FitStart {
         bench: &mut Bench,
         target: Target,
         data: &Measurement,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Descent, CalibrationError> {
         let options = &self.options;
         data.check(bench.num_voxels(), self.prediction.states.len().saturating_sub(data.on_the_way.len()))?;
@@ -188,7 +188,7 @@ pub fn fit(
     data: &Measurement,
     start: &Material,
     options: &FitOptions,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Fit, CalibrationError> {
     data.check(bench.num_voxels(), data.drives_mm.len())?;
     let start = FitStart::new(bench, &data.all_drives_mm(), start, options, is_cancelled)?;

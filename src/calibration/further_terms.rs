@@ -24,7 +24,7 @@ pub(super) fn with_further_terms(
     fit: &RecordingFit,
     exponents: &[f64],
     options: &FitOptions,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<Group>, CalibrationError> {
     let old = &fit.material;
     let mu_kpa = NO_MODULUS * old.initial_shear_modulus_kpa();

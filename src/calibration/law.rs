@@ -28,7 +28,7 @@ pub fn fit_law(
     earlier: &[RecordingFit],
     options: &CalibrateOptions,
     on_stage: &dyn Fn(&str),
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Law, CalibrationError> {
     let has_force = problem.has_force();
     let mut run = Run::new(options, has_force, on_stage, is_cancelled).with_earlier(earlier);

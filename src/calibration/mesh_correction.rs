@@ -64,7 +64,7 @@ impl FinerMesh {
         &mut self,
         ours: &Fit,
         data: &Measurement,
-        (solve, is_cancelled): (&SolveOptions, &dyn Fn() -> bool),
+        (solve, is_cancelled): (&SolveOptions, &(dyn Fn() -> bool + Sync)),
     ) -> Result<MeshDefect, CalibrationError> {
         let mut defect = MeshDefect { displacements: Vec::new(), forces_n: Vec::new() };
         for (n, drive_mm) in data.all_drives_mm().into_iter().enumerate() {
@@ -90,7 +90,7 @@ impl FinerMesh {
         bench: &mut Bench,
         synthetic: &SyntheticScan,
         first: &Fit,
-        (solve, is_cancelled): (&SolveOptions, &dyn Fn() -> bool),
+        (solve, is_cancelled): (&SolveOptions, &(dyn Fn() -> bool + Sync)),
     ) -> Result<(MeshDefect, Fit), CalibrationError> {
         let data = synthetic.noiseless();
         let mut corrected = None;

@@ -85,7 +85,7 @@ impl Prediction {
         material: &Material,
         near: Option<&[Equilibrium]>,
         solve: &SolveOptions,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Prediction, CalibrationError> {
         let mut prediction = Prediction {
             material: material.clone(),

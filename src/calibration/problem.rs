@@ -10,7 +10,7 @@ use super::step::Constraints;
 use super::stress_path::StressPath;
 use super::system::{NormalSystem, raw_sums};
 use super::target::{Objective, Target};
-use crate::fem::{Departures, ForwardModel, SolveOptions};
+use crate::fem::{Departures, ForwardModel, SolveOptions, side_by_side};
 use crate::kinematics::IDENTITY;
 use crate::material::Material;
 use crate::mesh::MeshOptions;
@@ -124,7 +124,7 @@ impl<'a> CalibrationProblem<'a> {
         material: &Material,
         near: Option<&[Prediction]>,
         solve: &SolveOptions,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Vec<Prediction>, CalibrationError> {
         let mut models = Models { scanned: &mut self.models, others: &mut self.others, views: &self.views };
         models.predict(self.observed, material, near, solve, is_cancelled)
@@ -140,7 +140,7 @@ impl<'a> CalibrationProblem<'a> {
         start: &Material,
         near: Option<&RecordingFit>,
         options: &FitOptions,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<RecordingFit, CalibrationError> {
         check_options(options)?;
         let near = near.map(|n| &n.predictions[..]);
@@ -154,7 +154,7 @@ impl<'a> CalibrationProblem<'a> {
         &mut self,
         from: &RecordingFit,
         options: &FitOptions,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<RecordingFit, CalibrationError> {
         check_options(options)?;
         self.descend_from(from.predictions.clone(), &from.material, options, is_cancelled)
@@ -165,7 +165,7 @@ impl<'a> CalibrationProblem<'a> {
         first: Vec<Prediction>,
         start: &Material,
         options: &FitOptions,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<RecordingFit, CalibrationError> {
         let constraints = Constraints::new(start, options)?;
         let mut work = SolverWork::default();
@@ -194,7 +194,7 @@ impl<'a> CalibrationProblem<'a> {
     pub fn at(
         &mut self,
         material: &Material,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<RecordingFit, CalibrationError> {
         // A huge tolerance: converged where it stands.
         let options = FitOptions { tolerance: f64::MAX, ..FitOptions::default() };
@@ -208,7 +208,7 @@ impl<'a> CalibrationProblem<'a> {
     pub fn force_at(
         &mut self,
         material: &Material,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Vec<Vec<f64>>, CalibrationError> {
         let found = self.predict(material, None, &SolveOptions::trial(), is_cancelled)?;
         Ok(found.into_iter().map(|p| p.forces_n).collect())
@@ -288,23 +288,21 @@ impl Models<'_> {
         material: &Material,
         near: Option<&[Prediction]>,
         solve: &SolveOptions,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Vec<Prediction>, CalibrationError> {
-        let mut predictions = Vec::with_capacity(observed.len());
-        for (index, recording) in observed.iter().enumerate() {
+        let parts = self.scanned.iter_mut().zip(self.others.iter_mut()).zip(self.views).zip(observed).enumerate();
+        let predicted = side_by_side(parts.collect(), |(index, (((model, others), view), recording))| {
             let drives = recording.all_drives_mm();
             let near = near.and_then(|n| n.get(index));
-            let view = &self.views[index];
-            let states = near.and_then(|n| n.states_of(0));
-            let model = &mut self.scanned[index];
-            let mut prediction = Prediction::new(model, view, &drives, material, states, solve, is_cancelled)?;
-            for (place, other) in self.others[index].iter_mut().enumerate() {
-                let states = near.and_then(|n| n.states_of(place + 1));
+            let states = |place: usize| near.and_then(|n| n.states_of(place));
+            let mut prediction = Prediction::new(model, view, &drives, material, states(0), solve, is_cancelled)?;
+            for (place, other) in others.iter_mut().enumerate() {
+                let states = states(place + 1);
                 prediction.join(Prediction::new(other, &Unseen, &drives, material, states, solve, is_cancelled)?);
             }
-            predictions.push(prediction);
-        }
-        Ok(predictions)
+            Ok(prediction)
+        });
+        predicted.into_iter().collect()
     }
 }
 

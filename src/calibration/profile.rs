@@ -37,7 +37,7 @@ fn held_at(
     index: usize,
     value: f64,
     options: &FitOptions,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<RecordingFit, CalibrationError> {
     let mut start = fit.material.clone();
     let parameter = start.parameters()[index];
@@ -59,7 +59,7 @@ pub fn profile(
     problem: &mut CalibrationProblem,
     fit: &RecordingFit,
     options: &FitOptions,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<Profile>, CalibrationError> {
     let mut profiles = Vec::new();
     for (index, parameter) in fit.material.parameters().into_iter().enumerate() {
@@ -106,7 +106,7 @@ pub fn bulk_lower_bound_kpa(
     problem: &mut CalibrationProblem,
     fit: &RecordingFit,
     options: &FitOptions,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Option<f64>, CalibrationError> {
     let level = ONE_SIDED_95 * ONE_SIDED_95;
     let root = |held: &RecordingFit| {

@@ -40,7 +40,7 @@ pub(super) struct Run<'a> {
     /// Earlier fits on this mesh, from which those of their numbers of terms start.
     earlier: &'a [RecordingFit],
     on_stage: &'a dyn Fn(&str),
-    is_cancelled: &'a dyn Fn() -> bool,
+    is_cancelled: &'a (dyn Fn() -> bool + Sync),
     /// What all fits have taken so far.
     pub(super) work: SolverWork,
     /// Remarks for the reader.
@@ -53,7 +53,7 @@ impl<'a> Run<'a> {
         options: &'a CalibrateOptions,
         has_force: bool,
         on_stage: &'a dyn Fn(&str),
-        is_cancelled: &'a dyn Fn() -> bool,
+        is_cancelled: &'a (dyn Fn() -> bool + Sync),
     ) -> Run<'a> {
         // Without a force all moduli share a factor: μ₁ stays where it is.
         let held = if has_force { options.fit.held } else { options.fit.held.with(1) };

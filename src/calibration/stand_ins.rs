@@ -68,7 +68,7 @@ pub fn stand_ins(
     truth: &Material,
     options: &StandInOptions,
     on_stage: &dyn Fn(&str),
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<(Vec<StandIn>, Vec<Contour>), CalibrationError> {
     let solve = SolveOptions::trial();
     let truth_mesh = MeshOptions { grading: 0.4, ..MeshOptions::scaled(specimen, options.truth_factor) };

@@ -86,7 +86,7 @@ impl Candidates {
         problem: &mut CalibrationProblem,
         fit: &RecordingFit,
         options: &FitOptions,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Candidates, CalibrationError> {
         let old = &fit.material;
         let gap = 1.1 * options.min_alpha_gap;
@@ -168,7 +168,7 @@ pub(super) fn further_starts(
     fit: &RecordingFit,
     options: &FitOptions,
     count: usize,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<(f64, Material)>, CalibrationError> {
     let candidates = Candidates::new(problem, fit, options, is_cancelled)?;
     Ok(candidates.ranked(&problem.targets()?, count))

@@ -68,7 +68,7 @@ impl StressResponse {
         problem: &mut CalibrationProblem,
         fit: &RecordingFit,
         options: &FitOptions,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<StressResponse, CalibrationError> {
         let material = &fit.material;
         let num_old = material.parameters().len();

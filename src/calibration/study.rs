@@ -234,7 +234,7 @@ pub fn study(
                 let data = observe(&synthetic.draw(case.seed, draw as u64))?;
                 let mut present = problem.with_data(&data)?;
                 let is_blind = draw < case.blind_draws;
-                done.push(one_draw(&mut present, case, &reference, is_blind, &|| is_cancelled())?);
+                done.push(one_draw(&mut present, case, &reference, is_blind, is_cancelled)?);
                 problem = present.with_data(&clean)?;
                 on_draw();
             }
@@ -255,7 +255,7 @@ fn one_draw(
     case: &StudyCase,
     reference: &Reference,
     is_blind: bool,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Draw, CalibrationError> {
     let silent = |_: &str| {};
     let mut run = Run::new(&case.options, true, &silent, is_cancelled);

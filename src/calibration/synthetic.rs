@@ -118,7 +118,7 @@ impl SyntheticScan {
         protocol: &Protocol,
         mesh: &MeshOptions,
         solve: &SolveOptions,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<SyntheticScan, CalibrationError> {
         protocol.suits(specimen, specimen.drive_mm.len())?;
         let is_scanned = |drive_mm: f64| specimen.drive_mm.iter().any(|d| Protocol::is_same_drive(*d, drive_mm));

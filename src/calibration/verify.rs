@@ -199,7 +199,7 @@ pub fn verify_in_full(
     let num_models = options.draws.div_ceil(chunk).max(1);
     let solve = &options.fit.solve;
     let (protocol, mesh) = (&options.protocol, &options.truth_mesh);
-    let synthetic = SyntheticScan::new(specimen, truth, scan, protocol, mesh, solve, &|| is_cancelled())?;
+    let synthetic = SyntheticScan::new(specimen, truth, scan, protocol, mesh, solve, is_cancelled)?;
     let masks = synthetic.masks();
     let mut benches = (0..num_models)
         .into_par_iter()
@@ -247,9 +247,9 @@ fn verify_with(
     let earlier = options.draws as u64;
     let lead = |bench: &mut Bench| {
         let drawn = synthetic.draw(options.seed, earlier);
-        with_prior(&start, earlier).led_by(bench, scan, &drawn, &|| is_cancelled())
+        with_prior(&start, earlier).led_by(bench, scan, &drawn, is_cancelled)
     };
-    let fit = |bench: &mut Bench| start.fit(bench, scan, data, &|| is_cancelled());
+    let fit = |bench: &mut Bench| start.fit(bench, scan, data, is_cancelled);
     let (begun, noiseless) = match others.first_mut() {
         Some(other) => rayon::join(|| lead(bench), || fit(other)),
         None => (lead(bench), fit(bench)),
@@ -261,7 +261,7 @@ fn verify_with(
     };
     let correction = match (&options.correction_mesh, &noiseless) {
         (Some(mesh), Ok(first)) => {
-            let solver = (&fit_options.solve, &stop as &dyn Fn() -> bool);
+            let solver = (&fit_options.solve, &stop as &(dyn Fn() -> bool + Sync));
             let corrected = FinerMesh::new(specimen, mesh, synthetic)
                 .and_then(|mut finer| finer.correct(&begun, bench, synthetic, first, solver));
             match corrected {
@@ -290,7 +290,7 @@ fn verify_with(
                 let drawn = synthetic.draw(options.seed, draw);
                 let noisy = defect.as_ref().map_or_else(|| drawn.clone(), |d| d.taken_off(&drawn));
                 let own = with_prior(&begun, draw);
-                let result = own.fit(bench, scan, &noisy, &|| is_cancelled());
+                let result = own.fit(bench, scan, &noisy, is_cancelled);
                 on_draw();
                 match result {
                     Err(e) if !e.is_of_the_data() => return Err(e),

@@ -90,7 +90,7 @@ pub(super) fn ends_by_noise(
     problem: &mut CalibrationProblem,
     fit: &RecordingFit,
     options: &FitOptions,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<NoiseEnds, CalibrationError> {
     if !is_weak(fit) {
         return Ok(NoiseEnds::of_linear_model(fit));
@@ -102,7 +102,7 @@ fn ends_of_profiles(
     problem: &mut CalibrationProblem,
     fit: &RecordingFit,
     options: &FitOptions,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<Option<Ends>>, CalibrationError> {
     let response = StressResponse::new(problem, fit, options, is_cancelled)?;
     let least = response.least(fit.material.clone(), options)?;

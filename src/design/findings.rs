@@ -238,17 +238,23 @@ fn where_voxels_end(specimen: &Specimen, scan: ScanSettings) -> Option<String> {
     let extents = [("length", specimen.block.length_mm), ("width", specimen.block.width_mm)];
     let close = extents.into_iter().zip([0, 2]).filter(|(_, axis)| spare_mm[*axis] < CLOSE_TO_A_ROW_MM);
     let named: Vec<String> = close
-        .map(|((name, extent_mm), axis)| format!("its {name} ({extent_mm:.1} mm) by {:.2} mm", spare_mm[axis].max(0.0)))
+        .map(|((name, extent_mm), axis)| {
+            let by = match spare_mm[axis] {
+                spare_mm if spare_mm < 0.005 => "any".into(),
+                spare_mm => format!("{spare_mm:.2} mm"),
+            };
+            format!("its {name} ({extent_mm:.1} mm) comes out {by} smaller")
+        })
         .collect();
     if named.is_empty() {
         return None;
     }
     Some(format!(
         "Part of this factor hangs on where the scan's voxels lie: the free faces hardly reach the outermost voxels, and a \
-         row of them is lost where the block misses {}, or lies off the middle of the grid. Much of what tells the \
+         row of them is lost where the block lies off the middle of the grid, or {}. Much of what tells the \
          parameters apart is seen at free faces. Evaluate a block that is {CLOSE_TO_A_ROW_MM} mm smaller before this one \
          is made.",
-        listed(&named)
+        named.join(", or ")
     ))
 }
 

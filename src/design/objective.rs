@@ -165,7 +165,7 @@ impl<'a> Reference<'a> {
         let name = &self.study.materials[prior].name;
         let mut names: Vec<String> = Vec::new();
         if self.study.objective.guard_promised_sd.covers(prior) {
-            let guards = self.study.materials[prior].material.shear_parameters().map(|p| p.name());
+            let guards = self.study.materials[prior].material.shear_parameters().map(|p| p.symbol());
             names.extend(guards.map(|p| format!("the guard on the standard deviation of {p}, material \"{name}\"")));
         }
         names.extend(self.study.limits.max_force_n.map(|_| "the largest force".into()));

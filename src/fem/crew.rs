@@ -48,11 +48,16 @@ pub(crate) struct Crew {
 impl Crew {
     /// All threads that are idle.
     pub(crate) fn gather() -> Crew {
+        Crew::gather_up_to(usize::MAX)
+    }
+
+    /// Threads that are idle, `most` of them at the most: others may need the rest.
+    fn gather_up_to(most: usize) -> Crew {
         let threads = rayon::current_num_threads();
         let mut helpers = 0;
         let take = |at_work: usize| {
             // This thread works whether it is counted or not.
-            helpers = threads.saturating_sub(at_work.max(1));
+            helpers = threads.saturating_sub(at_work.max(1)).min(most);
             (helpers > 0).then_some(at_work + helpers)
         };
         match AT_WORK.fetch_update(Ordering::Relaxed, Ordering::Relaxed, take) {
@@ -100,11 +105,30 @@ impl Crew {
         };
         std::thread::scope(|scope| {
             for _ in 0..helpers {
-                scope.spawn(run);
+                scope.spawn(|| {
+                    // The crew counts it.
+                    IS_SEATED.set(true);
+                    run();
+                });
             }
             run();
         });
     }
+}
+
+/// What `work` makes of each of `items`, in their order: as many side by side as there are idle threads. Solves in it
+/// share what threads are left.
+#[cfg(feature = "calibration")]
+pub(crate) fn side_by_side<T: Send, R: Send>(items: Vec<T>, work: impl Fn(T) -> R + Sync) -> Vec<R> {
+    if items.len() < 2 {
+        return items.into_iter().map(work).collect();
+    }
+    let _seat = Seat::take();
+    let crew = Crew::gather_up_to(items.len() - 1);
+    let mut results: Vec<Option<R>> = items.iter().map(|_| None).collect();
+    let places = items.into_iter().zip(&mut results).collect();
+    crew.share(places, || (), |(), (item, place)| *place = Some(work(item)));
+    results.into_iter().flatten().collect()
 }
 
 /// Stops the others where a thread panics, which would else wait for its turn for ever.

@@ -171,7 +171,7 @@ impl ForwardModel {
         drive_mm: f64,
         start: Option<&Equilibrium>,
         options: &SolveOptions,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Equilibrium, SolveError> {
         check(material, drive_mm)?;
         let mut newton = self.fine.newton(material, options, is_cancelled);
@@ -194,7 +194,7 @@ impl ForwardModel {
         material: &Material,
         drives_mm: &[f64],
         options: &SolveOptions,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Vec<Equilibrium>, SolveError> {
         let mut path: Vec<Equilibrium> = Vec::with_capacity(drives_mm.len());
         for &drive in drives_mm {
@@ -235,7 +235,7 @@ impl ForwardModel {
         material: &Material,
         drive_mm: f64,
         options: &SolveOptions,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Equilibrium, SolveError> {
         check(material, drive_mm)?;
         let mut state = None;

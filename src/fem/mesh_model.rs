@@ -92,7 +92,7 @@ impl MeshModel {
         &'a mut self,
         material: &'a Material,
         options: &'a SolveOptions,
-        is_cancelled: &'a dyn Fn() -> bool,
+        is_cancelled: &'a (dyn Fn() -> bool + Sync),
     ) -> Newton<'a> {
         Newton {
             assembler: &self.assembler,

@@ -69,6 +69,8 @@ mod verification;
 
 pub use change::{Change, ChangeSensitivity};
 pub use contact::Contact;
+#[cfg(feature = "calibration")]
+pub(crate) use crew::side_by_side;
 pub use departures::{Departures, FIRM_BOND_KPA_PER_MM, Fibre, Field, PlateMotion, VectorField};
 pub use derivatives::{ParameterSensitivity, PathSensitivity};
 #[cfg(feature = "calibration")]

@@ -42,7 +42,7 @@ pub(super) struct Newton<'a> {
     /// Settings.
     pub(super) options: &'a SolveOptions,
     /// Asked before every load step and iteration.
-    pub(super) is_cancelled: &'a dyn Fn() -> bool,
+    pub(super) is_cancelled: &'a (dyn Fn() -> bool + Sync),
     /// What the run has taken so far.
     pub(super) statistics: Statistics,
 }

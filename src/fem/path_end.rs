@@ -173,7 +173,7 @@ impl ForwardModel {
         material: &Material,
         reached_mm: f64,
         asked_mm: f64,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<PathEnd, SolveError> {
         let end = self.pressing().path_end(material, reached_mm, asked_mm, is_cancelled)?;
         Ok(PathEnd { way: Way::Precompression, ..end })
@@ -189,7 +189,7 @@ impl ForwardModel {
         material: &Material,
         reached_mm: f64,
         asked_mm: f64,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<PathEnd, SolveError> {
         let small = SolveOptions { min_step: SMALLEST_STEP, ..SolveOptions::default() };
         let usual = SolveOptions::default();
@@ -239,7 +239,7 @@ impl ForwardModel {
         drive_mm: f64,
         start: Option<&Equilibrium>,
         options: &SolveOptions,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Equilibrium, SolveError> {
         let mut found = self.solve(material, drive_mm, start, options, is_cancelled);
         for _ in 0..TRIES {

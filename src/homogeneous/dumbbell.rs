@@ -120,7 +120,7 @@ pub fn gauge_stretches(
     material: &Material,
     gauge_mm: f64,
     displacement_mm: &[f64],
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<GaugePoint>, SolveError> {
     let half_mm = 0.5 * MEASURED_PART * gauge_mm;
     let path = model.solve_path(material, displacement_mm, &SolveOptions::default(), is_cancelled)?;
@@ -148,7 +148,7 @@ pub fn fit_dumbbell(
     displacement_mm: &[f64],
     force_n: &[f64],
     options: &DumbbellOptions,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<DumbbellFit, DumbbellError> {
     let drawn = specimen.outline.dumbbell().zip(specimen.profile()).filter(|_| specimen.holes.is_empty());
     let Some((gauge, profile)) = drawn else {

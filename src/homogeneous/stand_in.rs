@@ -85,7 +85,7 @@ pub struct UniaxialStandIn {
 pub fn uniaxial_stand_in(
     specimen: &Specimen,
     options: &UniaxialStandInOptions,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<UniaxialStandIn, DumbbellError> {
     let modulus = initial_shear_modulus_kpa(&TRUTH);
     let truth = OgdenTerms::free(&TRUTH).material(BULK_RATIO * modulus);

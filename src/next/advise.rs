@@ -8,7 +8,7 @@ use super::result::{CandidateResult, LeftOut, MisfitResult, NextParameter, NextR
 use super::trial::{Bench, Trial};
 use super::worth::{Knowledge, MOST_SCANS, Worth};
 use crate::calibration::{Observed, TWO_SIDED_95};
-use crate::material::Parameter;
+use crate::material::{Parameter, symbol_of_parameter};
 use crate::specimen::{Specimen, farthest_from_zero, leads_on};
 use rayon::prelude::*;
 use std::cmp::Ordering;
@@ -25,7 +25,7 @@ pub fn advise(
     on_stage: &dyn Fn(&str),
     is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<NextResult, NextError> {
-    let posterior = Posterior::new(observed, plan, options, on_stage, &|| is_cancelled())?;
+    let posterior = Posterior::new(observed, plan, options, on_stage, is_cancelled)?;
     let parameters = named(&posterior, options)?;
     let points = posterior.points()?;
     on_stage("candidates");
@@ -117,7 +117,7 @@ fn trials(
             let mut drives: Vec<f64> = own.flat_map(|c| c.drives_mm.iter().copied()).collect();
             drives.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
             drives.dedup();
-            let trial = |mut bench: Bench| bench.trial(&drives, &point.material, plan, posterior, &|| is_cancelled());
+            let trial = |mut bench: Bench| bench.trial(&drives, &point.material, plan, posterior, is_cancelled);
             bench.and_then(trial).map_err(|error| error.to_string())
         })
         .collect();
@@ -262,7 +262,7 @@ fn percent(part: f64) -> String {
 
 /// What to do, in a sentence; `before` is the standard deviation of the parameter `name`, of place `index`.
 fn sentence(name: &str, before: f64, index: usize, best: &CandidateResult, stop: Option<&Stop>) -> String {
-    let after = best.promised_relative_sd[index];
+    let (name, after) = (symbol_of_parameter(name), best.promised_relative_sd[index]);
     let advice = format!(
         "Scan next: {}. It takes the sd of {name} from {} to {} for {} minutes.",
         best.name,
@@ -282,7 +282,8 @@ fn sentence(name: &str, before: f64, index: usize, best: &CandidateResult, stop:
             format!("{advice} {scans} for the precision asked.")
         }
         Some(Stop { held_back_by: Some(held), reachable_relative_sd: Some(sd), .. }) => format!(
-            "{advice} No candidate reaches the precision asked, however often it is scanned: {held} stays at {}.",
+            "{advice} No candidate reaches the precision asked, however often it is scanned: {} stays at {}.",
+            symbol_of_parameter(held),
             percent(*sd)
         ),
         _ => advice,

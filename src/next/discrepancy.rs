@@ -1,8 +1,9 @@
-//! The misfit beyond noise that a fit leaves, as a discrepancy that what comes next will have too.
+//! The misfit beyond noise and mesh that a fit leaves, as a discrepancy that what comes next will have too.
 
+use super::correction::ErrorLeft;
 use crate::calibration::{BoxMeans, Observed, RecordingFit};
 
-/// A misfit counts as found beyond this many standard deviations of what noise alone gives.
+/// A misfit counts as found beyond this many standard deviations of what noise and mesh alone give.
 const FOUND: f64 = 2.0;
 
 /// Displacement errors that neighbouring voxels share, and relative errors of the force. Zero where none was found.
@@ -17,8 +18,9 @@ pub(super) struct Discrepancy {
 }
 
 impl Discrepancy {
-    /// What `fit` leaves of `observed`.
-    pub(super) fn of(observed: &[Observed], fit: &RecordingFit) -> Discrepancy {
+    /// What `fit` leaves of `observed`, beyond what the mesh may have left. That stands beside the estimate already, and
+    /// says nothing against the law.
+    pub(super) fn of(observed: &[Observed], fit: &RecordingFit, mesh: &ErrorLeft) -> Discrepancy {
         let mut found = Discrepancy::default();
         let (mut squares, mut excess, mut num_forces) = (0.0, 0.0, 0.0);
         for (r, recording) in observed.iter().enumerate() {
@@ -28,18 +30,24 @@ impl Discrepancy {
             };
             let residual: Vec<Vec<[f64; 3]>> = (0..recording.steps.len()).map(rest).collect();
             let means = BoxMeans::of(recording, &residual, &|_, _| true);
+            let of_mesh = BoxMeans::of(recording, &mesh.displacement_mm[r], &|_, _| true);
             for c in 0..3 {
-                if means.excess_mm2[c] > FOUND * means.excess_sd_mm2[c] {
-                    found.variance_mm2[c] = found.variance_mm2[c].max(means.excess_mm2[c]);
+                // The square of a normal amplitude scatters by √2 times its mean.
+                let mesh_mm2 = of_mesh.excess_mm2[c] + of_mesh.noise_mm2[c];
+                let excess_mm2 = means.excess_mm2[c] - mesh_mm2;
+                let sd_mm2 = means.excess_sd_mm2[c].hypot(f64::sqrt(2.0) * mesh_mm2);
+                if excess_mm2 > FOUND * sd_mm2 {
+                    found.variance_mm2[c] = found.variance_mm2[c].max(excess_mm2);
                 }
             }
             let volume_mm3 = means.voxels_per_box * recording.mask.grid.voxel_volume_mm3();
             found.volume_mm3 = found.volume_mm3.max(volume_mm3);
-            for (step, state) in recording.steps.iter().zip(fit.states(r)) {
+            for ((step, state), mesh_n) in recording.steps.iter().zip(fit.states(r)).zip(&mesh.force_n[r]) {
                 let Some(force) = step.force else { continue };
                 let misfit = force.value_n - state.force_n;
-                squares += (misfit / force.sd_n).powi(2);
-                excess += (misfit * misfit - force.sd_n * force.sd_n) / (force.value_n * force.value_n);
+                let variance = force.sd_n.powi(2) + mesh_n.powi(2);
+                squares += misfit * misfit / variance;
+                excess += (misfit * misfit - variance) / (force.value_n * force.value_n);
                 num_forces += 1.0;
             }
         }

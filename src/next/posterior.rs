@@ -1,6 +1,6 @@
 //! What is known so far: the law fitted to all recordings, its information, its misfit and the states it has visited.
 
-use super::correction::FinerMeshes;
+use super::correction::{ErrorLeft, FinerMeshes};
 use super::discrepancy::Discrepancy;
 use super::error::NextError;
 use super::options::{NextOptions, Plan};
@@ -70,13 +70,14 @@ impl Posterior {
         plan: &Plan,
         options: &NextOptions,
         on_stage: &dyn Fn(&str),
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Posterior, NextError> {
         let (means, num_scans): (Vec<Observed>, Vec<usize>) =
             mean_scans(observed).into_iter().map(|m| (m.mean, m.num_scans)).unzip();
-        let Fitted { corrected, law: found, mesh_sd, models } = fit_together(&means, options, on_stage, is_cancelled)?;
+        let Fitted { corrected, law: found, error_left, models } =
+            fit_together(&means, options, on_stage, is_cancelled)?;
         let mut problem = models.with_data(&corrected)?;
-        let discrepancy = Discrepancy::of(&corrected, &found.fit);
+        let discrepancy = Discrepancy::of(&corrected, &found.fit, &error_left);
         let seen = Seen::of(&mut problem, &found.fit, plan, &num_scans)?;
         let visited = Visited::of(seen.states.iter().flatten().flatten());
         let mut information = JointInformation::none(&found.fit.material, seen.unknown_sd.len());
@@ -97,7 +98,7 @@ impl Posterior {
             discrepancy,
             visited,
             chi2_per_datum: found.fit.chi2_per_datum,
-            mesh_sd,
+            mesh_sd: error_left.shift.iter().map(|shift| shift.abs()).collect(),
             notes: found.notes,
         })
     }
@@ -150,8 +151,8 @@ struct Fitted<'a> {
     corrected: Vec<Observed>,
     /// The law of these.
     law: Law,
-    /// Per parameter, in its unit: standard deviation of what the extrapolated part of the error may make of it.
-    mesh_sd: Vec<f64>,
+    /// What the extrapolated part of the error leaves open.
+    error_left: ErrorLeft,
     /// Models of the means' specimens.
     models: CalibrationProblem<'a>,
 }
@@ -161,7 +162,7 @@ fn fit_together<'a>(
     means: &'a [Observed],
     options: &NextOptions,
     on_stage: &dyn Fn(&str),
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Fitted<'a>, NextError> {
     let num_data: usize = means.iter().map(|o| 3 * o.mask.num_voxels() * o.steps.len()).sum();
     let fit = |problem: &mut CalibrationProblem, terms: TermCount, earlier: &[RecordingFit]| {
@@ -183,11 +184,12 @@ fn fit_together<'a>(
     if !options.has_mesh_correction {
         on_stage("what is known so far");
         let law = fit(&mut problem, terms, &[])?;
-        let mesh_sd = vec![0.0; law.fit.material.parameters().len()];
-        return Ok(Fitted { corrected: means.to_vec(), law, mesh_sd, models: problem });
+        let error_left = ErrorLeft::none(means, law.fit.material.parameters().len());
+        return Ok(Fitted { corrected: means.to_vec(), law, error_left, models: problem });
     }
     on_stage("error of the mesh");
-    let mut first = fit(&mut problem, TermCount::Fixed(options.num_terms.unwrap_or(1)), &[])?;
+    // However many terms are asked for: with the error of the mesh in the recordings a fit of several is led astray.
+    let mut first = fit(&mut problem, TermCount::Fixed(1), &[])?;
     let mut finer = FinerMeshes::new(means, options.mesh_factor)?;
     loop {
         let corrected = finer.without_mesh_error(&first.fit, is_cancelled)?;
@@ -196,10 +198,8 @@ fn fit_together<'a>(
         let law = fit(&mut present, terms, &first.by_num_terms)?;
         // A law of more terms tells the error better: large strains and small ones no longer share an exponent.
         if law.fit.material.terms.len() <= first.fit.material.terms.len() {
-            let shift = present.shift_to(&law.fit, &finer.without_extrapolation(&corrected))?;
-            let part = finer.sd_over_extrapolated();
-            let mesh_sd = shift.iter().map(|shift| part * shift.abs()).collect();
-            return Ok(Fitted { models: present.with_data(means)?, corrected, law, mesh_sd });
+            let error_left = finer.error_left(&present, &law.fit, &corrected)?;
+            return Ok(Fitted { models: present.with_data(means)?, corrected, law, error_left });
         }
         problem = present.with_data(means)?;
         on_stage("error of the mesh");

@@ -66,7 +66,7 @@ impl Bench {
         material: &Material,
         plan: &Plan,
         posterior: &Posterior,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Trial, NextError> {
         let largest = farthest_from_zero(scanned_mm.iter().copied());
         let forces_mm = plan.study.protocol.on_the_way_to(largest).force_drives_mm();

@@ -46,7 +46,7 @@ use crate::homogeneous::{Curve, CurveFitError, CurveFitOptions, CurveMatch, fit_
 pub fn analyse_load_curve(
     curves: &[LoadCurve],
     options: &LoadCurveOptions,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<LoadCurveVerdict, LoadCurveAnalysisError> {
     check(curves, options)?;
     let (elastic_curves, order): (Vec<Curve>, Vec<usize>) =

@@ -142,7 +142,7 @@ impl CauseSearch<'_> {
     pub(super) fn run(
         &self,
         baseline: &LoadCurveFit,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<FoundCauses, LoadCurveAnalysisError> {
         let mut current = baseline.clone();
         let mut evidence: Vec<HypothesisEvidence> = Vec::new();

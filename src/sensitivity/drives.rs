@@ -87,7 +87,7 @@ pub(super) fn solve_for_median(
     material: &Material,
     target: f64,
     options: &SolveOptions,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Paths, EvaluationError> {
     let mut last: Vec<Option<Equilibrium>> = fixture.parts().iter().map(|_| None).collect();
     let mut count = 0;

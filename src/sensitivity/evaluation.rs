@@ -61,7 +61,7 @@ pub fn evaluate(
     scan: &ScanSettings,
     drives: &DriveSelection,
     options: &EvaluationOptions,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<(Evaluation, EvaluationMaps), EvaluationError> {
     check_drives(specimen, drives)?;
     let mut fixture = Fixture::new(specimen, scan, options)?;
@@ -80,7 +80,7 @@ pub fn evaluate_fixture(
     drives: &DriveSelection,
     neighbours: &[Vec<Equilibrium>],
     options: &EvaluationOptions,
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<(Evaluation, EvaluationMaps), EvaluationError> {
     check_drives(fixture.specimen(), drives)?;
     options.protocol.suits(fixture.specimen(), drives.count())?;
@@ -327,7 +327,7 @@ fn add_forces(
     material: &Material,
     options: &EvaluationOptions,
     scanned: &[EvaluationStep],
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<ForceStep>, EvaluationError> {
     let is_scanned = |drive: &f64| scanned.iter().any(|s| (s.drive_mm - drive).abs() < SAME_DRIVE_MM);
     let mut drives = options.protocol.force_drives_mm();

@@ -100,7 +100,7 @@ impl Fixture {
         drives_mm: &[f64],
         neighbours: &[Vec<Equilibrium>],
         options: &SolveOptions,
-        is_cancelled: &dyn Fn() -> bool,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Vec<Vec<Equilibrium>>, SolveError> {
         let mut all = Vec::with_capacity(self.parts.len());
         for (index, part) in self.parts.iter_mut().enumerate() {

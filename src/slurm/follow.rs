@@ -90,7 +90,7 @@ pub fn follow(
     settings: &FollowSettings,
     progress_of: &dyn Fn(usize) -> Result<TaskProgress, String>,
     on_event: &dyn Fn(&Following),
-    is_cancelled: &dyn Fn() -> bool,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
     pause: &dyn Fn(Duration),
 ) -> Result<(), SlurmError> {
     let scheduler = Scheduler;

@@ -112,7 +112,7 @@ pub fn run(study: &SweepStudy, folder: &Path, options: &RunOptions) -> Result<Sw
 }
 
 /// A panic is a fault of the program, not of the sweep: it is recorded like any other failure, and the rest goes on.
-fn guarded(study: &SweepStudy, task: &Task, stop: &dyn Fn() -> bool) -> Option<Outcome> {
+fn guarded(study: &SweepStudy, task: &Task, stop: &(dyn Fn() -> bool + Sync)) -> Option<Outcome> {
     let evaluated = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| task.evaluate(study, stop)));
     evaluated.unwrap_or_else(|cause| {
         let text = cause.downcast_ref::<String>().cloned();

@@ -99,14 +99,14 @@ impl Task {
     }
 
     /// Evaluates; `None` where it was stopped from outside.
-    pub fn evaluate(&self, study: &SweepStudy, is_cancelled: &dyn Fn() -> bool) -> Option<Outcome> {
+    pub fn evaluate(&self, study: &SweepStudy, is_cancelled: &(dyn Fn() -> bool + Sync)) -> Option<Outcome> {
         self.inputs(study).evaluate(is_cancelled)
     }
 }
 
 impl TaskInputs {
     /// Evaluates; `None` where it was stopped from outside.
-    pub fn evaluate(&self, is_cancelled: &dyn Fn() -> bool) -> Option<Outcome> {
+    pub fn evaluate(&self, is_cancelled: &(dyn Fn() -> bool + Sync)) -> Option<Outcome> {
         let TaskInputs { specimen, material, scan, mesh } = self;
         if let Err(e) = specimen.validate() {
             return Some(failed("specimen", &e));
