@@ -290,8 +290,9 @@ impl Models<'_> {
         solve: &SolveOptions,
         is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Vec<Prediction>, CalibrationError> {
-        let parts = self.scanned.iter_mut().zip(self.others.iter_mut()).zip(self.views).zip(observed).enumerate();
-        let predicted = side_by_side(parts.collect(), |(index, (((model, others), view), recording))| {
+        let models = self.scanned.iter_mut().zip(self.others.iter_mut());
+        let recordings = models.zip(self.views.iter().zip(observed)).enumerate();
+        let predicted = side_by_side(recordings.collect(), |(index, ((model, others), (view, recording)))| {
             let drives = recording.all_drives_mm();
             let near = near.and_then(|n| n.get(index));
             let states = |place: usize| near.and_then(|n| n.states_of(place));

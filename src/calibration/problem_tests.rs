@@ -53,6 +53,27 @@ fn unlike_blocks_share_the_force_of_their_recordings() {
     assert!(wrong.initial_shear_modulus_kpa() / modulus > 1.5, "{wrong:?}");
 }
 
+/// A fit of several recordings does not depend on how many of them are solved at a time, to the last bit.
+#[test]
+fn recordings_may_be_solved_side_by_side() {
+    let (_, scan) = same_mesh(&truth());
+    let observed = [0, 1].map(|draw| {
+        let recording = scan.recording("draw", &block(), &scan.draw(5, draw), Filter::None).unwrap();
+        Observed::new(&recording, 0.01).unwrap()
+    });
+    let mut problem = CalibrationProblem::new(&observed, &coarse, Objective::Weighted).unwrap();
+    let mut start = truth();
+    start.terms[0].mu_kpa *= 1.3;
+    let [one, two] = [1, 2].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| problem.fit(&start, None, &tight(), &|| false)).unwrap()
+    });
+    assert!(one.is_converged && one.material == two.material, "{:?} {:?}", one.material, two.material);
+    for r in 0..observed.len() {
+        assert_eq!(one.predicted(r, 0), two.predicted(r, 0));
+    }
+}
+
 /// What other data would make of an estimate is told without fitting them. Noise shifts by about a standard deviation,
 /// which is .2 % here: of that the linear model misses as small a part.
 #[test]

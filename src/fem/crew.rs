@@ -242,6 +242,21 @@ mod tests {
         assert!(std::panic::catch_unwind(work).is_err());
     }
 
+    /// Results come in the order of their items, whoever worked on them, and nobody stays counted.
+    #[test]
+    #[cfg(feature = "calibration")]
+    fn results_come_in_order() {
+        for threads in [1, 2, 5] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            for num in [0, 1, 2, 30] {
+                let nested = |n: usize| side_by_side(vec![n, n], |n| n * n).into_iter().sum::<usize>();
+                let found = pool.install(|| side_by_side((0..num).collect(), nested));
+                assert_eq!(found, (0..num).map(|n| 2 * n * n).collect::<Vec<_>>());
+            }
+            pool.install(|| assert!(!IS_SEATED.get()));
+        }
+    }
+
     /// Each item is worked on once.
     #[test]
     fn items_are_shared_without_rest() {

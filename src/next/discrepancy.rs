@@ -1,6 +1,6 @@
 //! The misfit beyond noise and mesh that a fit leaves, as a discrepancy that what comes next will have too.
 
-use super::correction::ErrorLeft;
+use super::error_left::ErrorLeft;
 use crate::calibration::{BoxMeans, Observed, RecordingFit};
 
 /// A misfit counts as found beyond this many standard deviations of what noise and mesh alone give.

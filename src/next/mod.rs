@@ -10,6 +10,7 @@ mod candidate;
 mod correction;
 mod discrepancy;
 mod error;
+mod error_left;
 mod options;
 mod posterior;
 mod result;

@@ -1,8 +1,9 @@
 //! What is known so far: the law fitted to all recordings, its information, its misfit and the states it has visited.
 
-use super::correction::{ErrorLeft, FinerMeshes};
+use super::correction::FinerMeshes;
 use super::discrepancy::Discrepancy;
 use super::error::NextError;
+use super::error_left::ErrorLeft;
 use super::options::{NextOptions, Plan};
 use super::scanned::{ForceRead, ScannedStep};
 use super::visited::Visited;
