@@ -19,10 +19,11 @@ pub struct Law {
 
 /// Fits `problem` with as many terms as `options` say. The fits of the numbers of terms that `earlier` has, fits of
 /// the same models to nearly the same data, start where those ended. The options' allowance for the mesh, profiles and
-/// contours are those of [`super::calibrate()`] and do nothing here.
+/// contours are those of [`super::calibrate()`] and do nothing here. A fit that has not settled comes back as it stands
+/// ([`RecordingFit::settled`]): a first guess need not.
 ///
 /// # Errors
-/// [`CalibrationError`]: nothing to compare, no equilibrium, no converged fit.
+/// [`CalibrationError`]: nothing to compare, no equilibrium.
 pub fn fit_law(
     problem: &mut CalibrationProblem,
     earlier: &[RecordingFit],
@@ -34,7 +35,7 @@ pub fn fit_law(
     let mut run = Run::new(options, has_force, on_stage, is_cancelled).with_earlier(earlier);
     let (selection, by_num_terms) = run.select_terms(problem)?;
     let fit = run.in_order(problem, by_num_terms[selection.chosen - 1].clone())?;
-    run.settle(&fit)?;
+    run.note_unsettled(&fit);
     run.remark(problem.observed(), &fit, has_force, None);
     Ok(Law { fit, by_num_terms, notes: run.notes })
 }

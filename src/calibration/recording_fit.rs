@@ -1,7 +1,9 @@
 //! A material fitted to recordings: the estimate, its uncertainty, and what it predicts.
 
+use super::error::CalibrationError;
 use super::options::Held;
 use super::prediction::{Prediction, SolverWork};
+use super::terms::is_settled;
 use crate::fem::Equilibrium;
 use crate::material::{Material, Parameter};
 use crate::sensitivity::{Covariance, FisherInformation};
@@ -117,6 +119,23 @@ impl RecordingFit {
     pub fn misfit(&self, recording: usize, step: usize, measured: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let rest = |(u, m): (&[f64; 3], &[f64; 3])| [0, 1, 2].map(|c| u[c] - m[c]);
         measured.iter().zip(self.predicted(recording, step)).map(rest).collect()
+    }
+
+    /// Whether it is at the optimum, or so near it that what is left to gain is within the noise.
+    pub fn is_settled(&self) -> bool {
+        is_settled(self.is_converged, self.distance)
+    }
+
+    /// An error where it has not settled; `limit` is the distance at which it would have converged.
+    ///
+    /// # Errors
+    /// [`CalibrationError::NotConverged`].
+    pub fn settled(&self, limit: f64) -> Result<(), CalibrationError> {
+        let (iterations, distance) = (self.iterations, self.distance);
+        match self.is_settled() {
+            true => Ok(()),
+            false => Err(CalibrationError::NotConverged { iterations, distance, limit }),
+        }
     }
 
     /// How that changes with every parameter, in the order of [`Material::parameters`]: displacements of the compared

@@ -10,7 +10,7 @@ use super::problem::CalibrationProblem;
 use super::recording_fit::RecordingFit;
 use super::starts::{first_starts, further_starts, law_starts};
 use super::target::{Objective, PAPER_BETA};
-use super::terms::{DecidedBy, Rule, SETTLED, TermRow, TermSelection, choose, compare, degeneracies, is_kept};
+use super::terms::{DecidedBy, Rule, TermRow, TermSelection, choose, compare, degeneracies, is_kept};
 use crate::material::{MAX_TERMS, Material, least_relative_stiffness};
 
 /// The same material with its exponents falling.
@@ -110,18 +110,20 @@ impl<'a> Run<'a> {
     /// # Errors
     /// [`CalibrationError::NotConverged`] where it is far from it.
     pub(super) fn settle(&mut self, fit: &RecordingFit) -> Result<(), CalibrationError> {
-        let (iterations, distance, limit) = (fit.iterations, fit.distance, self.options.fit.tolerance);
-        if fit.is_converged {
-            return Ok(());
-        }
-        if distance >= SETTLED {
-            return Err(CalibrationError::NotConverged { iterations, distance, limit });
-        }
-        self.notes.push(format!(
-            "the fit was not at the optimum after {iterations} iterations, {distance:.2} standard deviations away by the \
-             linear model: the data hardly tell its terms apart"
-        ));
+        fit.settled(self.options.fit.tolerance)?;
+        self.note_unsettled(fit);
         Ok(())
+    }
+
+    /// Notes a fit that is not at its optimum.
+    pub(super) fn note_unsettled(&mut self, fit: &RecordingFit) {
+        let (iterations, distance) = (fit.iterations, fit.distance);
+        if !fit.is_converged {
+            self.notes.push(format!(
+                "the fit was not at the optimum after {iterations} iterations, {distance:.2} standard deviations away by \
+                 the linear model: the data hardly tell its terms apart"
+            ));
+        }
     }
 
     /// The best fit of each number of terms, up to the first that the deciding rule does not keep.

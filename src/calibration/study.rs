@@ -21,7 +21,7 @@ use super::recording_fit::RecordingFit;
 use super::run::{Run, with_falling_exponents};
 use super::starts::Candidates;
 use super::synthetic::SyntheticScan;
-use super::terms::{Rule, SETTLED, choose, compare};
+use super::terms::{Rule, choose, compare};
 use super::weak_intervals::{Ends, ends_by_noise};
 use crate::material::Material;
 use crate::mesh::MeshOptions;
@@ -277,7 +277,7 @@ fn one_draw(
     }
     compare(&mut rows, fits[0].num_data);
     let chosen = [Rule::Bic, Rule::FTest, Rule::Decrement].map(|r| choose(&rows, r, case.options.decrement_threshold));
-    let fit = fits.pop().filter(|f| f.is_converged || f.distance < SETTLED);
+    let fit = fits.pop().filter(RecordingFit::is_settled);
     let mut is_alike = None;
     if is_blind {
         let blind = match run.select(problem) {

@@ -153,12 +153,17 @@ pub(super) fn compare(rows: &mut [TermRow], num_data: usize) {
 
 /// Within this many standard deviations of the optimum of the linear model a fit has settled: what it may still gain,
 /// at most one in χ², is within the noise, and could only add to the evidence for its terms.
-pub(super) const SETTLED: f64 = 1.0;
+const SETTLED: f64 = 1.0;
+
+/// Whether a fit that converged, or ended so many standard deviations from the optimum of its linear model, has
+/// settled.
+pub(super) fn is_settled(is_converged: bool, distance_sd: f64) -> bool {
+    is_converged || distance_sd < SETTLED
+}
 
 /// Whether `row` is worth its last term by a rule; an unstable or unsettled term never is.
 pub(super) fn is_kept(row: &TermRow, rule: Rule, threshold: f64) -> bool {
-    let is_settled = row.is_converged || row.distance_sd < SETTLED;
-    let is_sound = is_settled && row.least_relative_stiffness > 0.0;
+    let is_sound = is_settled(row.is_converged, row.distance_sd) && row.least_relative_stiffness > 0.0;
     is_sound
         && match rule {
             Rule::Bic => row.bic_change.is_some_and(|c| c < 0.0),

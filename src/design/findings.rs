@@ -460,7 +460,7 @@ mod tests {
         let mut specimen = Specimen::from_json(include_str!("../../geometries/solid-shear.json")).expect("valid");
         (specimen.block.length_mm, specimen.block.width_mm) = (29.5, 21.75);
         let said = where_voxels_end(&specimen, scan).expect("the length is close");
-        assert!(said.contains("its length (29.5 mm) by 0.00 mm") && !said.contains("its width"), "{said}");
+        assert!(said.contains("its length (29.5 mm) comes out any smaller") && !said.contains("its width"), "{said}");
         specimen.block.length_mm = 29.8;
         assert_eq!(where_voxels_end(&specimen, scan), None);
         specimen.block.length_mm = 29.5;

@@ -75,8 +75,8 @@ impl<'a> FinerMeshes<'a> {
         Ok(corrected)
     }
 
-    /// What the error may still be beyond what was taken off of `corrected`, the recordings of `problem`, by which `fit`
-    /// was found.
+    /// What the error may still be beyond what was taken off of `corrected`, the recordings of `problem`, by which
+    /// `fit` was found.
     ///
     /// # Errors
     /// [`NextError::Calibration`]: nothing to compare.
@@ -227,8 +227,8 @@ mod tests {
         assert!(before > 1.0 && after < before / 3.0, "{before} {after}");
     }
 
-    /// With hardly any noise what the mesh leaves is seen. Part of it is told by what was extrapolated, which says nothing
-    /// against the law; the misfit of a law that is wrong is found all the same.
+    /// With hardly any noise what the mesh leaves is seen. Part of it is told by what was extrapolated, which says
+    /// nothing against the law; the misfit of a law that is wrong is found all the same.
     #[test]
     fn what_the_mesh_leaves_is_not_said_against_the_law() {
         const NOISE_MM: f64 = 1e-4;

@@ -18,8 +18,8 @@ pub(super) struct Discrepancy {
 }
 
 impl Discrepancy {
-    /// What `fit` leaves of `observed`, beyond what the mesh may have left. That stands beside the estimate already, and
-    /// says nothing against the law.
+    /// What `fit` leaves of `observed`, beyond what the mesh may have left. That stands beside the estimate already,
+    /// and says nothing against the law.
     pub(super) fn of(observed: &[Observed], fit: &RecordingFit, mesh: &ErrorLeft) -> Discrepancy {
         let mut found = Discrepancy::default();
         let (mut squares, mut excess, mut num_forces) = (0.0, 0.0, 0.0);

@@ -2,8 +2,8 @@
 
 use crate::calibration::{Observed, RecordingFit};
 
-/// What the error of the mesh may still be after a correction: one standard deviation of it, of the whole at once. It is
-/// one unknown factor on the part that is extrapolated, so that all of this goes together.
+/// What the error of the mesh may still be after a correction: one standard deviation of it, of the whole at once. It
+/// is one unknown factor on the part that is extrapolated, so that all of this goes together.
 pub(super) struct ErrorLeft {
     /// Per parameter, in its unit: what it makes of the estimate.
     pub(super) shift: Vec<f64>,
@@ -24,7 +24,8 @@ impl ErrorLeft {
         }
     }
 
-    /// With `part` of the shift and of the misfit that `fit` of the recordings `corrected` would have, were they `told`.
+    /// With `part` of the shift and of the misfit that `fit` of the recordings `corrected` would have, were they
+    /// `told`.
     pub(super) fn new(
         part: f64,
         fit: &RecordingFit,

@@ -8,7 +8,8 @@ use super::options::{NextOptions, Plan};
 use super::scanned::{ForceRead, ScannedStep};
 use super::visited::Visited;
 use crate::calibration::{
-    CalibrateOptions, CalibrationProblem, Law, Objective, Observed, RecordingFit, TermCount, fit_law, mean_scans,
+    CalibrateOptions, CalibrationProblem, FitOptions, Law, Objective, Observed, RecordingFit, TermCount, fit_law,
+    mean_scans,
 };
 use crate::kinematics::{Decomposition, IDENTITY, decompose};
 use crate::material::Material;
@@ -21,6 +22,9 @@ use nalgebra::{DMatrix, SymmetricEigen};
 const MAX_TERMS: usize = 3;
 /// Blind starts of every number of terms.
 const NUM_STARTS: usize = 2;
+/// Most iterations of a fit that only tells the mesh's error, and most rounds of these and fits.
+const FIRST_ITERATIONS: usize = 20;
+const MOST_ROUNDS: usize = 4;
 /// A further term is fitted where the linear model promises this part of what BIC asks of it: the fit itself may gain
 /// more, but of such a term takes most of the time that an answer has.
 const LEAST_OF_BIC: f64 = 0.5;
@@ -158,7 +162,7 @@ struct Fitted<'a> {
     models: CalibrationProblem<'a>,
 }
 
-/// Fits `means`, with the error of the fit's mesh taken off, which a first fit tells.
+/// Fits `means`, with the error of the fit's mesh taken off, which fits before tell.
 fn fit_together<'a>(
     means: &'a [Observed],
     options: &NextOptions,
@@ -166,10 +170,11 @@ fn fit_together<'a>(
     is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Fitted<'a>, NextError> {
     let num_data: usize = means.iter().map(|o| 3 * o.mask.num_voxels() * o.steps.len()).sum();
-    let fit = |problem: &mut CalibrationProblem, terms: TermCount, earlier: &[RecordingFit]| {
+    let fit = |problem: &mut CalibrationProblem, terms: TermCount, iterations: usize, earlier: &[RecordingFit]| {
         let settings = CalibrateOptions {
             terms,
             num_starts: NUM_STARTS,
+            fit: FitOptions { max_iterations: iterations, ..FitOptions::default() },
             least_promise: match terms {
                 // Two parameters at ln n each.
                 TermCount::Auto { .. } => LEAST_OF_BIC * 2.0 * (num_data as f64).ln(),
@@ -179,32 +184,39 @@ fn fit_together<'a>(
         };
         fit_law(problem, earlier, &settings, on_stage, is_cancelled)
     };
+    let FitOptions { max_iterations, tolerance, .. } = FitOptions::default();
     let mesh = |s: &Specimen| MeshOptions::scaled(s, options.mesh_factor);
     let mut problem = CalibrationProblem::new(means, &mesh, Objective::Weighted)?;
     let terms = options.num_terms.map_or(TermCount::Auto { max: MAX_TERMS }, TermCount::Fixed);
     if !options.has_mesh_correction {
         on_stage("what is known so far");
-        let law = fit(&mut problem, terms, &[])?;
+        let law = fit(&mut problem, terms, max_iterations, &[])?;
+        law.fit.settled(tolerance)?;
         let error_left = ErrorLeft::none(means, law.fit.material.parameters().len());
         return Ok(Fitted { corrected: means.to_vec(), law, error_left, models: problem });
     }
     on_stage("error of the mesh");
-    // However many terms are asked for: with the error of the mesh in the recordings a fit of several is led astray.
-    let mut first = fit(&mut problem, TermCount::Fixed(1), &[])?;
+    // With the error of the mesh in the recordings a fit of several terms may be led astray, and never settle.
+    let mut before = fit(&mut problem, TermCount::Fixed(options.num_terms.unwrap_or(1)), FIRST_ITERATIONS, &[])?;
     let mut finer = FinerMeshes::new(means, options.mesh_factor)?;
+    let mut round = 0;
     loop {
-        let corrected = finer.without_mesh_error(&first.fit, is_cancelled)?;
+        round += 1;
+        let corrected = finer.without_mesh_error(&before.fit, is_cancelled)?;
         on_stage("what is known so far");
         let mut present = problem.with_data(&corrected)?;
-        let law = fit(&mut present, terms, &first.by_num_terms)?;
-        // A law of more terms tells the error better: large strains and small ones no longer share an exponent.
-        if law.fit.material.terms.len() <= first.fit.material.terms.len() {
+        let law = fit(&mut present, terms, max_iterations, &before.by_num_terms)?;
+        // A law of more terms tells the error better: large strains and small ones no longer share an exponent. So does
+        // one that has settled.
+        let is_told = law.fit.material.terms.len() <= before.fit.material.terms.len() && before.fit.is_settled();
+        if is_told || round == MOST_ROUNDS {
+            law.fit.settled(tolerance)?;
             let error_left = finer.error_left(&present, &law.fit, &corrected)?;
             return Ok(Fitted { models: present.with_data(means)?, corrected, law, error_left });
         }
         problem = present.with_data(means)?;
         on_stage("error of the mesh");
-        first = law;
+        before = law;
     }
 }
 
