@@ -3,10 +3,19 @@
 use super::error::CalibrationError;
 use super::options::Held;
 use super::prediction::{Prediction, SolverWork};
-use super::terms::is_settled;
 use crate::fem::Equilibrium;
 use crate::material::{Material, Parameter};
 use crate::sensitivity::{Covariance, FisherInformation};
+
+/// Within this many standard deviations of the optimum of the linear model a fit has settled: what it may still gain,
+/// at most one in χ², is within the noise, and could only add to the evidence for its terms.
+const SETTLED: f64 = 1.0;
+
+/// Whether a fit that converged, or ended so many standard deviations from the optimum of its linear model, has
+/// settled.
+pub(super) fn is_settled(is_converged: bool, distance_sd: f64) -> bool {
+    is_converged || distance_sd < SETTLED
+}
 
 /// A material fitted to recordings.
 #[derive(Clone, Debug)]

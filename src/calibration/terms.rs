@@ -7,7 +7,7 @@
 //! * The Bayesian information criterion: Δχ²/s² against 2 ln n, with s² the misfit per datum of the largest model. It
 //!   needs no noise level and, with n in the ten thousands, is the strictest.
 
-use super::recording_fit::RecordingFit;
+use super::recording_fit::{RecordingFit, is_settled};
 use crate::material::{Material, OgdenTerm};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -149,16 +149,6 @@ pub(super) fn compare(rows: &mut [TermRow], num_data: usize) {
         row.bic_change = Some(2.0 * (num_data as f64).ln() - decrease);
         row.decrement = Some(before.paper_loss - row.paper_loss);
     }
-}
-
-/// Within this many standard deviations of the optimum of the linear model a fit has settled: what it may still gain,
-/// at most one in χ², is within the noise, and could only add to the evidence for its terms.
-const SETTLED: f64 = 1.0;
-
-/// Whether a fit that converged, or ended so many standard deviations from the optimum of its linear model, has
-/// settled.
-pub(super) fn is_settled(is_converged: bool, distance_sd: f64) -> bool {
-    is_converged || distance_sd < SETTLED
 }
 
 /// Whether `row` is worth its last term by a rule; an unstable or unsettled term never is.
