@@ -16,7 +16,7 @@ use lambdak::design::Study;
 use lambdak::fem::{SolveError, SolveOptions};
 use lambdak::material::Material;
 use lambdak::mesh::MeshOptions;
-use lambdak::next::{NextOptions, NextResult, Plan, Precision, advise};
+use lambdak::next::{NextOptions, NextParameter, NextResult, Plan, Precision, advise};
 use lambdak::recording::Filter;
 use lambdak::specimen::Specimen;
 use rayon::prelude::*;
@@ -61,6 +61,8 @@ struct Campaign {
     is_precise: bool,
     /// Intervals that hold the truth, of so many.
     covered: [usize; 2],
+    /// Errors of all estimates over the standard deviations told, squared and summed.
+    sum_of_squares: f64,
 }
 
 /// Campaigns of one way.
@@ -70,6 +72,7 @@ struct Tally {
     num_scans: usize,
     reached: usize,
     covered: [usize; 2],
+    sum_of_squares: f64,
 }
 
 /// A material to be measured.
@@ -199,10 +202,13 @@ impl Sample<'_> {
             let is_precise = self.over_precision(&known) <= 1.0;
             if is_precise || observed.len() == MOST_SCANS {
                 let truth: Vec<f64> = self.truth.parameters()[1..].iter().map(|p| self.truth.value(*p)).collect();
-                let holds =
-                    |(p, t): (&lambdak::next::NextParameter, &f64)| (p.interval_95[0]..=p.interval_95[1]).contains(t);
-                let covered = known.parameters.iter().zip(&truth).filter(|pair| holds(*pair)).count();
-                return Ok(Campaign { num_scans: observed.len(), is_precise, covered: [covered, truth.len()] });
+                let of_truth = || known.parameters.iter().zip(&truth);
+                let covered = of_truth().filter(|(p, t)| (p.interval_95[0]..=p.interval_95[1]).contains(t)).count();
+                // What intervals are made of: noise and misfit, and the mesh.
+                let sd = |p: &NextParameter| p.value.abs() * p.relative_sd.hypot(p.discretisation_relative_sd);
+                let sum_of_squares = of_truth().map(|(p, t)| ((p.value - t) / sd(p)).powi(2)).sum();
+                let covered = [covered, truth.len()];
+                return Ok(Campaign { num_scans: observed.len(), is_precise, covered, sum_of_squares });
             }
             let best_mm = known.candidates[0].drive_mm[0];
             next = DRIVES_MM.iter().position(|d| (d - best_mm).abs() < 1e-6).ok_or("a drive that is no candidate")?;
@@ -236,10 +242,10 @@ impl Kind {
 
         println!("{}: every parameter to {} %, {draws} campaigns of each material", self.name, 100.0 * self.precision);
         println!(
-            "| scans | {} | mean | reached | 95 % intervals that hold the truth |",
+            "| scans | {} | mean | reached | 95 % intervals that hold the truth | rms error over standard deviation |",
             self.truth_names().join(" | ")
         );
-        println!("|---|{}---|---|---|", "---|".repeat(samples.len()));
+        println!("|---|{}---|---|---|---|", "---|".repeat(samples.len()));
         let (adaptive, mut covered) = row("by `next`", &samples, &Way::Adaptive(largest), draws, seed)?;
         let mut best = f64::INFINITY;
         for drives in fixed {
@@ -248,7 +254,7 @@ impl Kind {
             let reached = samples.par_iter().map(|s| s.reaches(&drives, seed)).collect::<Result<Vec<_>, _>>()?;
             if reached.contains(&false) {
                 println!(
-                    "| {name} | {}| more than {MOST_SCANS} | not tried further | |",
+                    "| {name} | {}| more than {MOST_SCANS} | not tried further | | |",
                     "| ".repeat(samples.len() - 1)
                 );
                 continue;
@@ -283,10 +289,15 @@ fn row(name: &str, samples: &[Sample], way: &Way, draws: u64, seed: u64) -> Resu
         total.num_scans += num_scans;
         total.reached += all.iter().filter(|c| c.is_precise).count();
         (0..2).for_each(|n| total.covered[n] += all.iter().map(|c| c.covered[n]).sum::<usize>());
+        total.sum_of_squares += all.iter().map(|c| c.sum_of_squares).sum::<f64>();
     }
     let mean = total.num_scans as f64 / total.num_campaigns as f64;
     let Tally { num_campaigns, reached, covered, .. } = total;
     let scans = means.join(" | ");
-    println!("| {name} | {scans} | {mean:.2} | {reached} of {num_campaigns} | {} of {} |", covered[0], covered[1]);
+    let rms = (total.sum_of_squares / covered[1] as f64).sqrt();
+    println!(
+        "| {name} | {scans} | {mean:.2} | {reached} of {num_campaigns} | {} of {} | {rms:.2} |",
+        covered[0], covered[1]
+    );
     Ok((mean, covered))
 }

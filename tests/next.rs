@@ -7,6 +7,7 @@ use lambdak::material::Material;
 use lambdak::mesh::MeshOptions;
 use lambdak::next::{NextOptions, NextResult, Plan, Precision, StopVerdict, advise};
 use lambdak::recording::Filter;
+use lambdak::sensitivity::{DriveSelection, EvaluationOptions, evaluate};
 use lambdak::specimen::Specimen;
 use serde_json::json;
 
@@ -46,7 +47,8 @@ fn record(study: &Study, truth: &Material, drive_mm: f64, draw: u64) -> Observed
         SyntheticScan::new(&driven, truth, &study.scan, &study.protocol, &mesh, &SolveOptions::default(), &|| false)
             .unwrap();
     let recording = scan.recording("made", &driven, &scan.draw(7, draw), Filter::None).unwrap();
-    Observed::new(&recording, study.scan.force_sd_n).unwrap()
+    let observed = Observed::new(&recording, study.scan.force_sd_n).unwrap();
+    observed.with_protocol(&recording, &study.protocol, study.scan.force_sd_n).unwrap()
 }
 
 fn options(precision: Option<f64>) -> NextOptions {
@@ -83,6 +85,40 @@ fn promises_are_kept() {
             // The estimate moves by some standard deviations of a few per cent, and the information with it.
             assert!((p.relative_sd / promised - 1.0).abs() < 0.1, "{}: {} for {promised}", p.name, p.relative_sd);
         }
+    }
+}
+
+/// What is known after one scan is what an evaluation at the estimate promises, forces read on the way and unknown gain
+/// and zero of the load cell included: two ways to the same information. A second scan is worth what it then brings.
+#[test]
+fn forces_on_the_way_are_counted() {
+    let protocol = json!({ "force_drive_mm": [1.0, 2.0], "force_gain_sd": 0.02, "force_zero_sd_n": 0.05 });
+    let study = study(&protocol, &json!({}));
+    let first = record(&study, &one_term(), 3.0, 0);
+    assert_eq!(first.on_the_way.len(), 2);
+    let driven = Specimen { drive_mm: vec![3.0], ..study.base.clone() };
+    let now = ask(&study, std::slice::from_ref(&first), &options(None));
+    let evaluation = EvaluationOptions {
+        mesh: MeshOptions::scaled(&driven, MESH),
+        protocol: study.protocol.clone(),
+        ..EvaluationOptions::standard(&driven)
+    };
+    let drives = DriveSelection::DriveMm(driven.drive_mm.clone());
+    let (promised, _) = evaluate(&driven, &now.material, &study.scan, &drives, &evaluation, &|| false).unwrap();
+    for p in &now.parameters {
+        let of_evaluation = promised.promised_sd.iter().find(|sd| sd.parameter == p.name).unwrap().relative_sd.unwrap();
+        // Equilibria of two tolerances.
+        assert!((p.relative_sd / of_evaluation - 1.0).abs() < 1e-4, "{}: {} {of_evaluation}", p.name, p.relative_sd);
+    }
+    let less = ask(&study, &[first.without_readings()], &options(None));
+    assert!(now.parameters[0].relative_sd < 0.98 * less.parameters[0].relative_sd, "{less:?}");
+    let again = NextOptions { drives_mm: Some(vec![3.0]), ..options(None) };
+    let candidate = &ask(&study, std::slice::from_ref(&first), &again).candidates[0];
+    assert!(candidate.is_repeat && candidate.force_drive_mm == [1.0, 2.0]);
+    let after = ask(&study, &[first, record(&study, &one_term(), 3.0, 1)], &options(None));
+    for (p, promised) in after.parameters.iter().zip(&candidate.promised_relative_sd) {
+        // The estimate moves by some standard deviations of a few per cent, and the information with it.
+        assert!((p.relative_sd / promised - 1.0).abs() < 0.1, "{}: {} for {promised}", p.name, p.relative_sd);
     }
 }
 

@@ -4,10 +4,7 @@
 //! the covariance C = diag(σ²) + σ_gain² F Fᵀ + σ_zero² 1 1ᵀ; weighing them by C⁻¹ is the same as estimating gain and
 //! zero beside the material.
 
-use super::error::CalibrationError;
-use crate::recording::Recording;
 use crate::sensitivity::Protocol;
-use crate::specimen::farthest_from_zero;
 use nalgebra::{DMatrix, DVector};
 
 /// A force with its uncertainty.
@@ -43,6 +40,11 @@ impl LoadCell {
         LoadCell { gain_sd: protocol.force_gain_sd, zero_sd_n: protocol.force_zero_sd_n }
     }
 
+    /// Variance (N²) that gain and zero give a reading of `force_n`.
+    pub fn variance_n2(&self, force_n: f64) -> f64 {
+        (self.gain_sd * force_n).powi(2) + self.zero_sd_n * self.zero_sd_n
+    }
+
     /// C (N²) of readings `forces_n` with the standard deviations `sd_n` of their own.
     pub(super) fn covariance(&self, forces_n: &[f64], sd_n: &[f64]) -> DMatrix<f64> {
         let mut covariance = DMatrix::from_diagonal(&DVector::from_iterator(sd_n.len(), sd_n.iter().map(|s| s * s)));
@@ -69,35 +71,6 @@ impl LoadCell {
         }
         precision
     }
-}
-
-/// The forces that `recording`'s load curve has at the drives at which `protocol` reads the force alone, on the way to
-/// the largest drive; readings have the standard deviation of the first step that states one, else `force_sd_n`.
-///
-/// # Errors
-/// [`CalibrationError::NoForceReading`]: there is no load curve, or it does not come that far.
-pub(super) fn read_on_the_way(
-    recording: &Recording,
-    protocol: &Protocol,
-    force_sd_n: f64,
-) -> Result<Vec<ForceOnTheWay>, CalibrationError> {
-    let largest_mm = farthest_from_zero(recording.steps.iter().map(|s| s.drive_mm));
-    let sd_n = recording.steps.iter().find_map(|s| s.force_sd_n).unwrap_or(force_sd_n);
-    let is_scanned = |drive_mm: f64| recording.steps.iter().any(|s| Protocol::is_same_drive(s.drive_mm, drive_mm));
-    let mut readings = Vec::new();
-    for drive_mm in protocol.on_the_way_to(largest_mm).force_drives_mm().into_iter().filter(|d| !is_scanned(*d)) {
-        let Some(load) = &recording.load else {
-            return Err(CalibrationError::NoForceReading { drive_mm, reason: "the recording has no load curve" });
-        };
-        let Some(value_n) = load.first_force_n(drive_mm) else {
-            return Err(CalibrationError::NoForceReading {
-                drive_mm,
-                reason: "its load curve does not pass that drive",
-            });
-        };
-        readings.push(ForceOnTheWay { drive_mm, force: ObservedForce { value_n, sd_n } });
-    }
-    Ok(readings)
 }
 
 #[cfg(test)]

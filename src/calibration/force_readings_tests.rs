@@ -1,3 +1,4 @@
+use super::super::observed_forces::read_on_the_way;
 use super::super::test_problem::{block, coarse, scan, tight, truth};
 use super::super::{SyntheticScan, VerifyOptions, verify};
 use super::*;
@@ -95,11 +96,18 @@ fn forces_are_read_from_the_load_curve() {
     });
     let at = |drive_mm: f64| {
         let asked = Protocol { force_drive_mm: vec![drive_mm, 4.0], ..Protocol::default() };
-        read_on_the_way(&recording, &asked, 0.5)
+        read_on_the_way(&recording, &asked, 0.5).collect::<Result<Vec<_>, _>>()
     };
     let read = at(1.5).unwrap();
     assert_eq!((read.len(), read[0].force.value_n), (1, 6.0));
+    // Of several, those that are there.
+    let asked = Protocol { force_drive_mm: vec![1.5, 2.5], ..protocol() };
+    recording.load.as_mut().unwrap().drive_mm[3] = 2.2;
+    let (found, missing) = Observed::new(&recording, 0.5).unwrap().with_readings_found(&recording, &asked, 0.5);
+    assert_eq!(found.on_the_way.iter().map(|r| r.drive_mm).collect::<Vec<_>>(), [1.5]);
+    assert_eq!(found.load_cell, LoadCell::of_protocol(&asked));
+    assert!(missing.len() == 1 && missing[0].to_string().contains("2.5 mm"), "{missing:?}");
     recording.load = None;
-    let error = read_on_the_way(&recording, &protocol(), 0.5).unwrap_err();
+    let error = read_on_the_way(&recording, &protocol(), 0.5).next().unwrap().unwrap_err();
     assert!(error.to_string().contains("1 mm") && error.to_string().contains("no load curve"), "{error}");
 }

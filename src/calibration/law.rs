@@ -36,7 +36,7 @@ pub fn fit_law(
     let (selection, by_num_terms) = run.select_terms(problem)?;
     let fit = run.in_order(problem, by_num_terms[selection.chosen - 1].clone())?;
     run.note_unsettled(&fit);
-    run.remark(problem.observed(), &fit, has_force, None);
+    run.remark_data(problem.observed(), &fit, has_force);
     Ok(Law { fit, by_num_terms, notes: run.notes })
 }
 
@@ -44,7 +44,7 @@ pub fn fit_law(
 mod tests {
     use super::*;
     use crate::calibration::test_problem::{block, coarse, same_mesh, tight, truth};
-    use crate::calibration::{Objective, Observed, TermCount};
+    use crate::calibration::{ForceOnTheWay, Objective, Observed, ObservedForce, TermCount};
     use crate::material::Parameter;
     use crate::recording::Filter;
 
@@ -75,6 +75,28 @@ mod tests {
         let iterations = |law: &Law| law.by_num_terms[0].iterations;
         assert!(iterations(&near) < iterations(&blind), "{} {}", iterations(&near), iterations(&blind));
         // Both stopped closer to the optimum than the tolerance, in standard deviations.
+        for parameter in [Parameter::Mu(0), Parameter::Alpha(0)] {
+            let apart = blind.fit.material.value(parameter) - near.fit.material.value(parameter);
+            assert!(apart.abs() < 2.0 * tight().tolerance * blind.fit.sd(parameter).unwrap(), "{apart}");
+        }
+    }
+
+    /// An earlier fit may know less: with a force on the way that it did not have, the law is that of a blind fit.
+    #[test]
+    fn earlier_fits_may_lack_drives() {
+        let (_, scan) = same_mesh(&truth());
+        let recording = scan.recording("draw", &block(), &scan.draw(5, 0), Filter::None).unwrap();
+        let without = [Observed::new(&recording, 0.01).unwrap()];
+        let mut with = without.clone();
+        let force = ObservedForce { value_n: 3.0, sd_n: 0.2 };
+        with[0].on_the_way = vec![ForceOnTheWay { drive_mm: 1.0, force }];
+        let options = CalibrateOptions { terms: TermCount::Fixed(1), fit: tight(), ..CalibrateOptions::default() };
+        let law = |observed: &[Observed], earlier: &[RecordingFit]| {
+            let mut problem = CalibrationProblem::new(observed, &coarse, Objective::Weighted).unwrap();
+            fit_law(&mut problem, earlier, &options, &|_| (), &|| false).expect("a law")
+        };
+        let [blind, near] = [vec![], law(&without, &[]).by_num_terms].map(|earlier| law(&with, &earlier));
+        assert_eq!((blind.fit.states(0).len(), near.fit.states(0).len()), (2, 2));
         for parameter in [Parameter::Mu(0), Parameter::Alpha(0)] {
             let apart = blind.fit.material.value(parameter) - near.fit.material.value(parameter);
             assert!(apart.abs() < 2.0 * tight().tolerance * blind.fit.sd(parameter).unwrap(), "{apart}");

@@ -21,6 +21,7 @@ mod mesh_correction;
 mod noise;
 mod noise_map;
 mod observed;
+mod observed_forces;
 mod options;
 mod outcome;
 mod outliers;

@@ -2,14 +2,13 @@
 //! scan saw the sample.
 
 use super::error::CalibrationError;
-use super::force_readings::{ForceOnTheWay, LoadCell, ObservedForce, read_on_the_way};
+use super::force_readings::{ForceOnTheWay, LoadCell, ObservedForce};
 use super::noise::estimate_noise_sd_mm;
 use super::noise_map::relative_noise;
 use super::outliers::{lost_voxels, outlying_voxels};
 use crate::fem::{VectorField, turned_by};
 use crate::mesh::{BlockShape, Mesh, half_extents_mm};
 use crate::recording::{Filter, Recording};
-use crate::sensitivity::Protocol;
 use crate::specimen::Specimen;
 use crate::voxel::{HammingFilter, Sampling, VoxelGrid, VoxelMask, VoxelOperator, unbounded_where_unmeasured};
 
@@ -123,32 +122,6 @@ impl Observed {
             noise_sd_mm,
             flags,
         })
-    }
-
-    /// With the forces that `recording`, which this is, has in its load curve at the drives of `protocol`, and a load
-    /// cell as unknown as it says. Forces without a standard deviation get `force_sd_n`.
-    ///
-    /// # Errors
-    /// [`CalibrationError::NoForceReading`].
-    pub fn with_protocol(
-        self,
-        recording: &Recording,
-        protocol: &Protocol,
-        force_sd_n: f64,
-    ) -> Result<Observed, CalibrationError> {
-        let on_the_way = read_on_the_way(recording, protocol, force_sd_n)?;
-        Ok(Observed { on_the_way, load_cell: LoadCell::of_protocol(protocol), ..self })
-    }
-
-    /// Drives of the scans, then those of the forces read on the way, mm.
-    pub(super) fn all_drives_mm(&self) -> Vec<f64> {
-        let scanned = self.steps.iter().map(|s| s.drive_mm);
-        scanned.chain(self.on_the_way.iter().map(|r| r.drive_mm)).collect()
-    }
-
-    /// Forces compared.
-    pub(super) fn num_forces(&self) -> usize {
-        self.steps.iter().filter(|s| s.force.is_some()).count() + self.on_the_way.len()
     }
 
     /// Variance of the noise of a value, per component, mm²: voxel `voxel` of the mask at step `step`.

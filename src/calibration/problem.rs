@@ -149,7 +149,7 @@ impl<'a> CalibrationProblem<'a> {
     }
 
     /// Fits from where `from` stands, an earlier fit on this mesh, whose equilibria and derivatives are taken as they
-    /// are.
+    /// are; where these are not of all drives, from a start near it.
     pub(super) fn fit_from(
         &mut self,
         from: &RecordingFit,
@@ -157,6 +157,10 @@ impl<'a> CalibrationProblem<'a> {
         is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<RecordingFit, CalibrationError> {
         check_options(options)?;
+        let mut pairs = from.predictions.iter().zip(self.observed);
+        if pairs.any(|(prediction, recording)| prediction.states.len() != recording.all_drives_mm().len()) {
+            return self.fit(&from.material, Some(from), options, is_cancelled);
+        }
         self.descend_from(from.predictions.clone(), &from.material, options, is_cancelled)
     }
 

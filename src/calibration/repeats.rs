@@ -36,20 +36,20 @@ fn is_repeat(a: &Observed, b: &Observed) -> bool {
     let is_alike = |a: f64, b: f64| a == b || a.max(b) <= ALIKE * a.min(b);
     let is_same_step = |(a, b): (&ObservedStep, &ObservedStep)| {
         let is_free = |s: &ObservedStep| s.faces_per_mm.iter().all(Option::is_none);
-        let is_same_force = match (a.force, b.force) {
-            (Some(a), Some(b)) => is_alike(a.sd_n, b.sd_n),
-            (None, None) => true,
-            _ => false,
-        };
-        a.drive_mm == b.drive_mm && is_same_force && is_free(a) && is_free(b)
+        a.drive_mm == b.drive_mm && is_free(a) && is_free(b)
+    };
+    let is_same_force = |pair: (Option<ObservedForce>, Option<ObservedForce>)| match pair {
+        (Some(a), Some(b)) => is_alike(a.sd_n, b.sd_n),
+        (None, None) => true,
+        _ => false,
     };
     body(&a.specimen) == body(&b.specimen)
         && a.mask.grid == b.mask.grid
         && a.mask.voxels == b.mask.voxels
         && a.filter == b.filter
         && a.load_cell == b.load_cell
-        && a.on_the_way.is_empty()
-        && b.on_the_way.is_empty()
+        && a.on_the_way.iter().map(|r| r.drive_mm).eq(b.on_the_way.iter().map(|r| r.drive_mm))
+        && a.forces().zip(b.forces()).all(is_same_force)
         && (0..3).all(|c| is_alike(a.noise_sd_mm[c], b.noise_sd_mm[c]))
         && a.steps.len() == b.steps.len()
         && a.steps.iter().zip(&b.steps).all(is_same_step)
@@ -64,20 +64,23 @@ fn mean_of(scans: &[&Observed]) -> Observed {
     let noise_sd_mm = [0, 1, 2].map(|c| sd_of_mean(&mut scans.iter().map(|o| o.noise_sd_mm[c])));
     let step = |s: usize| {
         let steps = || scans.iter().map(|o| &o.steps[s]);
-        let forces: Option<Vec<ObservedForce>> = steps().map(|step| step.force).collect();
-        let force = forces.map(|all| ObservedForce {
-            value_n: all.iter().map(|f| f.value_n).sum::<f64>() / num,
-            sd_n: sd_of_mean(&mut all.iter().map(|f| f.sd_n)),
-        });
         let (displacement, relative_noise) =
             (0..first.mask.num_voxels()).map(|v| mean_voxel(scans, s, v, noise_sd_mm)).unzip();
         let is_even = |step: &ObservedStep| {
             step.relative_noise.is_none() && step.displacement.iter().flatten().all(|u| u.is_finite())
         };
         let relative_noise = Some(relative_noise).filter(|_| !steps().all(is_even));
-        ObservedStep { force, displacement, relative_noise, ..first.steps[s].clone() }
+        ObservedStep { displacement, relative_noise, ..first.steps[s].clone() }
     };
     let mut mean = first.with_steps((0..first.steps.len()).map(step).collect());
+    let forces: Vec<Vec<Option<ObservedForce>>> = scans.iter().map(|o| o.forces().collect()).collect();
+    for (d, force) in mean.forces_mut().enumerate() {
+        let all = || forces.iter().filter_map(|of_scan| of_scan[d]);
+        if let Some(force) = force {
+            force.value_n = all().map(|f| f.value_n).sum::<f64>() / num;
+            force.sd_n = sd_of_mean(&mut all().map(|f| f.sd_n));
+        }
+    }
     mean.noise_sd_mm = noise_sd_mm;
     mean.num_outliers = scans.iter().map(|o| o.num_outliers).max().unwrap_or(0);
     mean
@@ -109,16 +112,21 @@ fn mean_voxel(scans: &[&Observed], step: usize, voxel: usize, noise_sd_mm: [f64;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibration::ForceOnTheWay;
     use crate::calibration::test_problem::{block, coarse, same_mesh, truth};
     use crate::calibration::{CalibrateOptions, TermCount, calibrate};
     use crate::recording::Filter;
 
-    /// `num` noisy scans of one sample.
+    /// `num` noisy scans of one sample, with a force read at 1 mm on the way to each.
     fn scans(num: u64) -> Vec<Observed> {
         let (_, synthetic) = same_mesh(&truth());
         let scan = |draw: u64| {
             let measured = synthetic.draw(1, draw);
-            Observed::new(&synthetic.recording("scan", &block(), &measured, Filter::None).unwrap(), 0.01).unwrap()
+            let made = synthetic.recording("scan", &block(), &measured, Filter::None).unwrap();
+            let force = ObservedForce { value_n: 2.0 + 0.1 * draw as f64, sd_n: 0.5 };
+            let mut observed = Observed::new(&made, 0.01).unwrap();
+            observed.on_the_way = vec![ForceOnTheWay { drive_mm: 1.0, force }];
+            observed
         };
         (0..num).map(scan).collect()
     }
@@ -141,17 +149,20 @@ mod tests {
         let mean_n = all.iter().map(|o| o.steps[0].force.unwrap().value_n).sum::<f64>() / 3.0;
         assert!((force.value_n - mean_n).abs() < 1e-15);
         assert!((force.sd_n - 0.01 / 3f64.sqrt()).abs() < 1e-15);
+        let [ForceOnTheWay { drive_mm: 1.0, force }] = mean.on_the_way[..] else { panic!("{:?}", mean.on_the_way) };
+        assert!((force.value_n - 2.1).abs() < 1e-12 && (force.sd_n - 0.5 / 3f64.sqrt()).abs() < 1e-12);
     }
 
-    /// Another drive, much more noise or other voxels are no repeat.
+    /// Another drive, much more noise, other voxels or no force on the way are no repeat.
     #[test]
     fn only_repeats_are_averaged() {
-        let mut all = scans(4);
+        let mut all = scans(5);
         all[1].steps[0].drive_mm = 3.0;
         all[2].noise_sd_mm[0] *= 2.0;
         all[3].mask.voxels.pop();
+        all[4].on_the_way.clear();
         assert!(mean_scans(&all).iter().all(|m| m.num_scans == 1));
-        assert_eq!(mean_scans(&all).len(), 4);
+        assert_eq!(mean_scans(&all).len(), 5);
     }
 
     /// The mean is a sufficient statistic: the fit to it is that to all scans. The fits stop within a thousandth of a

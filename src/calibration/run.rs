@@ -290,12 +290,6 @@ impl<'a> Run<'a> {
         has_force: bool,
         meshes: Option<&MeshComparison>,
     ) {
-        if !has_force {
-            self.notes.push(
-                "no force was recorded: displacements determine exponents and ratios of moduli only; μ₁ was assumed"
-                    .into(),
-            );
-        }
         if let Some(MeshComparison { allowance, .. }) = meshes {
             self.notes.push(format!(
                 "discretisation: our mesh's displacements are {:.4} mm (rms, largest drive) from the limit of fine meshes; the \
@@ -303,6 +297,12 @@ impl<'a> Run<'a> {
                 allowance.own_error_mm, allowance.factor
             ));
         }
+        self.remark_misfit(fit);
+        self.remark_data(observed, fit, has_force);
+    }
+
+    /// Whether the misfit is more than noise, and what that does to the intervals.
+    fn remark_misfit(&mut self, fit: &RecordingFit) {
         if fit.misfit_factor > 1.0 && fit.structured_misfit > 0.0 {
             self.notes.push(format!(
                 "the misfit is {:.3} times that of the noise: model or data leave something out. The intervals hold what an \
@@ -314,6 +314,16 @@ impl<'a> Run<'a> {
                 "the misfit is {:.3} times that of the noise: no more than discretisation errors explain",
                 fit.misfit_factor
             ));
+        }
+    }
+
+    /// What the recordings lack, and at which limits the estimate stands.
+    pub(super) fn remark_data(&mut self, observed: &[Observed], fit: &RecordingFit, has_force: bool) {
+        if !has_force {
+            self.notes.push(
+                "no force was recorded: displacements determine exponents and ratios of moduli only; μ₁ was assumed"
+                    .into(),
+            );
         }
         for recording in observed.iter().filter(|o| o.is_noise_estimated) {
             self.notes.push(format!("the noise was estimated from the recording: {:.4?} mm", recording.noise_sd_mm));

@@ -196,20 +196,25 @@ impl Run for NextRequest {
     }
 
     fn run(&self, context: &Context) -> Result<Outcome, JobError> {
-        let (mut observed, mut names) = (Vec::new(), Vec::new());
+        let (mut observed, mut names, mut notes) = (Vec::new(), Vec::new(), Vec::new());
         for (index, read) in context.recordings.iter().enumerate() {
-            let recording = &read.recording;
-            observed.push(Observed::new(recording, self.study.scan.force_sd_n).map_err(|e| {
+            let (recording, force_sd_n) = (&read.recording, self.study.scan.force_sd_n);
+            let ready = Observed::new(recording, force_sd_n).map_err(|e| {
                 let error = FieldError::new(format!("/recordings/{index}"), &recording.id, "fit for a calibration");
                 JobError::from(error.remedy(e.to_string()))
-            })?);
+            })?;
+            let (ready, missing) = ready.with_readings_found(recording, &self.study.protocol, force_sd_n);
+            notes.extend(missing.iter().map(|why| format!("{}: {why}", recording.id)));
+            observed.push(ready);
             names.push(recording.id.clone());
         }
         let plan = Plan { study: &self.study, specimens: self.bodies() };
         let on_stage = |text: &str| context.progress(&Progress::stage(text));
         let hash = context.input_hash.clone();
-        let found = advise((&observed, &names), &plan, &self.options(), hash, &on_stage, &|| context.is_cancelled())
-            .map_err(|e| failure(&e, context))?;
+        let mut found =
+            advise((&observed, &names), &plan, &self.options(), hash, &on_stage, &|| context.is_cancelled())
+                .map_err(|e| failure(&e, context))?;
+        found.notes.extend(notes);
         let mut outcome = Outcome::new("next.json", &found, summary::next(&found))?;
         let (pictures, report) = next_report(&found, &self.study.name);
         outcome.add_pictures(pictures);

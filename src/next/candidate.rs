@@ -1,7 +1,7 @@
 //! What may be scanned next: every specimen at some drives, and every recording once more.
 
 use super::options::{NextOptions, Plan};
-use super::posterior::{is_same_body, is_same_drive, num_done};
+use super::posterior::{is_same_body, is_same_drive, num_done, readings_of};
 use crate::calibration::Observed;
 use crate::specimen::Specimen;
 
@@ -14,6 +14,8 @@ pub(super) struct Candidate {
     pub(super) drives_mm: Vec<f64>,
     /// How often each was scanned before.
     pub(super) num_done: Vec<usize>,
+    /// Drives of the forces that were read on the way to its specimen's scans, mm, once for each time.
+    read_mm: Vec<f64>,
     /// Whether the specimen of the last recording has to be taken out.
     pub(super) is_change: bool,
 }
@@ -22,6 +24,11 @@ impl Candidate {
     /// Whether all of it was done before.
     pub(super) fn is_repeat(&self) -> bool {
         self.num_done.iter().all(|n| *n > 0)
+    }
+
+    /// How often the force was read at a drive on the way to a scan of its specimen.
+    pub(super) fn num_read(&self, drive_mm: f64) -> usize {
+        self.read_mm.iter().filter(|read| is_same_drive(**read, drive_mm)).count()
     }
 
     /// Minutes of `num` such scans one after another.
@@ -69,7 +76,8 @@ pub(super) fn candidates(
     let new = |index: usize, drives_mm: Vec<f64>| -> Candidate {
         let body = &bodies[index];
         let num_done = drives_mm.iter().map(|d| num_done(observed, body, *d)).collect();
-        Candidate { body: index, drives_mm, num_done, is_change: is_change(body) }
+        let read_mm = readings_of(observed, body).collect();
+        Candidate { body: index, drives_mm, num_done, read_mm, is_change: is_change(body) }
     };
     let mut all: Vec<Candidate> = Vec::new();
     let mut add = |candidate: Candidate| {

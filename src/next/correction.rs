@@ -58,15 +58,16 @@ impl<'a> FinerMeshes<'a> {
         let pairs = corrected.iter_mut().zip(&mut self.meshes).enumerate();
         let taken_off = side_by_side(pairs.collect(), |(r, (recording, finer))| -> Result<(), NextError> {
             let view = recording.view(&recording.specimen, finer.fine.mesh())?;
-            let states = finer.states(&fit.material, fit.states(r), is_cancelled)?;
-            for (s, (step, state)) in recording.steps.iter_mut().zip(&states).enumerate() {
-                let fine = view.average(&state.displacement)?;
+            let states = finer.states(&fit.material, &recording.all_drives_mm(), fit.states(r), is_cancelled)?;
+            for (s, (step, [_, fine])) in recording.steps.iter_mut().zip(states).enumerate() {
+                let fine = view.average(&fine.displacement)?;
                 for ((u, fine), coarse) in step.displacement.iter_mut().zip(&fine).zip(fit.predicted(r, s)) {
                     *u = [0, 1, 2].map(|c| u[c] + whole * (coarse[c] - fine[c]));
                 }
-                let error_n = whole * (fit.force_n(r, s) - state.force_n);
-                if let Some(force) = &mut step.force {
-                    force.value_n += error_n;
+            }
+            for (force, [coarse, fine]) in recording.forces_mut().zip(states) {
+                if let Some(force) = force {
+                    force.value_n += whole * (coarse.force_n - fine.force_n);
                 }
             }
             Ok(())
@@ -107,12 +108,16 @@ impl<'a> FinerMeshes<'a> {
         let told = 1.0 / error_over_difference(self.ratio);
         let between = |measured: f64, corrected: f64| measured + told * (corrected - measured);
         let mut all = self.observed.to_vec();
-        for (step, corrected) in all.iter_mut().zip(corrected).flat_map(|(a, b)| a.steps.iter_mut().zip(&b.steps)) {
-            for (u, corrected) in step.displacement.iter_mut().zip(&corrected.displacement) {
-                *u = [0, 1, 2].map(|c| between(u[c], corrected[c]));
+        for (recording, corrected) in all.iter_mut().zip(corrected) {
+            for (step, corrected) in recording.steps.iter_mut().zip(&corrected.steps) {
+                for (u, corrected) in step.displacement.iter_mut().zip(&corrected.displacement) {
+                    *u = [0, 1, 2].map(|c| between(u[c], corrected[c]));
+                }
             }
-            if let (Some(force), Some(corrected)) = (&mut step.force, &corrected.force) {
-                force.value_n = between(force.value_n, corrected.value_n);
+            for (force, corrected) in recording.forces_mut().zip(corrected.forces()) {
+                if let (Some(force), Some(corrected)) = (force, corrected) {
+                    force.value_n = between(force.value_n, corrected.value_n);
+                }
             }
         }
         all
@@ -138,29 +143,40 @@ impl Finer {
         Ok(Finer { coarse, fine, nesting, known: Vec::new() })
     }
 
-    /// The equilibria on the finer mesh where the fit's mesh has `coarse`: from there, with what that mesh got wrong
-    /// the last time taken off; where that leads to none, from the last drive's.
+    /// The equilibria at `drives_mm` on the two meshes, those of the fit's mesh as far as they are `known`; those of
+    /// the finer one from there, with what that mesh got wrong the last time taken off; where that leads to none, from
+    /// the last drive's.
     fn states(
         &mut self,
         material: &Material,
-        coarse: &[Equilibrium],
+        drives_mm: &[f64],
+        known: &[Equilibrium],
         is_cancelled: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Vec<Equilibrium>, NextError> {
+    ) -> Result<&[[Equilibrium; 2]], NextError> {
         let options = SolveOptions::trial();
-        let mut found: Vec<Equilibrium> = Vec::new();
-        for (s, state) in coarse.iter().enumerate() {
+        let mut found: Vec<[Equilibrium; 2]> = Vec::new();
+        for (d, &drive_mm) in drives_mm.iter().enumerate() {
+            let last = |mesh: usize| found.last().map(|both| &both[mesh]);
+            let coarse = match known.get(d) {
+                Some(state) => state.clone(),
+                None => {
+                    let near = self.known.get(d).map(|both| &both[0]).or(last(0));
+                    self.coarse.solve(material, drive_mm, near, &options, is_cancelled)?
+                }
+            };
             let near = self.nesting.as_ref().and_then(|nesting| {
-                let known = self.known.get(s).map(|[coarse, fine]| [coarse, fine]);
-                let start = self.fine.start_from(&self.coarse, nesting, material, state, known);
-                self.fine.solve(material, state.drive_mm, Some(&start), &options, is_cancelled).ok()
+                let known = self.known.get(d).map(|[coarse, fine]| [coarse, fine]);
+                let start = self.fine.start_from(&self.coarse, nesting, material, &coarse, known);
+                self.fine.solve(material, drive_mm, Some(&start), &options, is_cancelled).ok()
             });
-            found.push(match near {
+            let fine = match near {
                 Some(near) => near,
-                None => self.fine.solve(material, state.drive_mm, found.last(), &options, is_cancelled)?,
-            });
+                None => self.fine.solve(material, drive_mm, last(1), &options, is_cancelled)?,
+            };
+            found.push([coarse, fine]);
         }
-        self.known = coarse.iter().cloned().zip(found.iter().cloned()).map(|(c, f)| [c, f]).collect();
-        Ok(found)
+        self.known = found;
+        Ok(&self.known)
     }
 }
 
@@ -183,16 +199,19 @@ mod tests {
         .unwrap()
     }
 
-    /// Without noise, of a fine mesh, compared as if there were noise of `noise_mm`.
+    /// Without noise, of a fine mesh, compared as if there were noise of `noise_mm`; the force at 2 mm was read on the
+    /// way.
     fn scanned(truth: &Material, noise_mm: f64) -> [Observed; 1] {
         let specimen = block();
         let noise_sd_mm = [noise_mm; 3];
         let settings = ScanSettings { voxel_mm: [1.0, 0.5, 1.0], noise_sd_mm, ..ScanSettings::default() };
         let fine = MeshOptions { grading: 0.4, ..MeshOptions::scaled(&specimen, 0.6) };
-        let (protocol, solve) = (Protocol::default(), SolveOptions::default());
+        let (protocol, solve) =
+            (Protocol { force_drive_mm: vec![2.0], ..Protocol::default() }, SolveOptions::default());
         let scan = SyntheticScan::new(&specimen, truth, &settings, &protocol, &fine, &solve, &|| false).unwrap();
         let made = scan.recording("block", &specimen, scan.noiseless(), Filter::None).unwrap();
-        let mut observed = Observed::new(&made, settings.force_sd_n).unwrap();
+        let observed = Observed::new(&made, settings.force_sd_n).unwrap();
+        let mut observed = observed.with_protocol(&made, &protocol, settings.force_sd_n).unwrap();
         observed.noise_sd_mm = noise_sd_mm;
         [observed]
     }
@@ -225,6 +244,26 @@ mod tests {
         let corrected = FinerMeshes::new(&observed, COARSE).unwrap().without_mesh_error(&coarse, &|| false).unwrap();
         let [before, after] = [&coarse, &fit(&mut problem(&corrected))].map(missed_by);
         assert!(before > 1.0 && after < before / 3.0, "{before} {after}");
+    }
+
+    /// The force that was read on the way is corrected as that of the scan is, though the fit that tells the error
+    /// knows of the scan alone: less than a third of what the coarse mesh is wrong by is left.
+    #[test]
+    fn forces_on_the_way_are_corrected() {
+        let truth = one_term();
+        let observed = scanned(&truth, 0.05);
+        let scan = observed.each_ref().map(Observed::without_readings);
+        let told = fit(&mut problem(&scan));
+        let corrected = FinerMeshes::new(&observed, COARSE).unwrap().without_mesh_error(&told, &|| false).unwrap();
+        let coarse_n = &problem(&observed).force_at(&truth, &|| false).unwrap()[0];
+        let errors_n = |o: &Observed| -> Vec<f64> {
+            o.forces().zip(coarse_n).map(|(force, coarse)| (force.unwrap().value_n - coarse).abs()).collect()
+        };
+        let (before, after) = (errors_n(&observed[0]), errors_n(&corrected[0]));
+        assert_eq!(before.len(), 2);
+        for (before, after) in before.iter().zip(&after) {
+            assert!(*after < before / 3.0, "{before} {after}");
+        }
     }
 
     /// With hardly any noise what the mesh leaves is seen. Part of it is told by what was extrapolated, which says

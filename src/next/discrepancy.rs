@@ -42,10 +42,12 @@ impl Discrepancy {
             }
             let volume_mm3 = means.voxels_per_box * recording.mask.grid.voxel_volume_mm3();
             found.volume_mm3 = found.volume_mm3.max(volume_mm3);
-            for ((step, state), mesh_n) in recording.steps.iter().zip(fit.states(r)).zip(&mesh.force_n[r]) {
-                let Some(force) = step.force else { continue };
+            for ((force, state), mesh_n) in recording.forces().zip(fit.states(r)).zip(&mesh.force_n[r]) {
+                let Some(force) = force else { continue };
                 let misfit = force.value_n - state.force_n;
-                let variance = force.sd_n.powi(2) + mesh_n.powi(2);
+                // What gain and zero of the load cell may make of it says nothing against the law either.
+                let of_cell_n2 = recording.load_cell.variance_n2(force.value_n);
+                let variance = force.sd_n.powi(2) + mesh_n.powi(2) + of_cell_n2;
                 squares += misfit * misfit / variance;
                 excess += (misfit * misfit - variance) / (force.value_n * force.value_n);
                 num_forces += 1.0;

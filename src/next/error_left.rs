@@ -1,6 +1,6 @@
 //! What a correction leaves of the mesh's error.
 
-use crate::calibration::{Observed, RecordingFit};
+use crate::calibration::{Observed, ObservedForce, RecordingFit};
 
 /// What the error of the mesh may still be after a correction: one standard deviation of it, of the whole at once. It
 /// is one unknown factor on the part that is extrapolated, so that all of this goes together.
@@ -9,7 +9,7 @@ pub(super) struct ErrorLeft {
     pub(super) shift: Vec<f64>,
     /// Per recording and drive: displacements of the compared voxels that no change of the parameters takes up, mm.
     pub(super) displacement_mm: Vec<Vec<Vec<[f64; 3]>>>,
-    /// Likewise of the force, N.
+    /// Per recording and drive, those of the forces read on the way last: likewise of the force, N.
     pub(super) force_n: Vec<Vec<f64>>,
 }
 
@@ -20,7 +20,7 @@ impl ErrorLeft {
         ErrorLeft {
             shift: vec![0.0; num_parameters],
             displacement_mm: observed.iter().map(still).collect(),
-            force_n: observed.iter().map(|o| vec![0.0; o.steps.len()]).collect(),
+            force_n: observed.iter().map(|o| o.forces().map(|_| 0.0).collect()).collect(),
         }
     }
 
@@ -33,21 +33,23 @@ impl ErrorLeft {
         corrected: &[Observed],
         told: &[Observed],
     ) -> ErrorLeft {
-        let (mut displacement_mm, mut force_n) = (Vec::new(), Vec::new());
+        let (mut displacement_mm, mut force_n): (Vec<_>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
         for (r, (corrected, told)) in corrected.iter().zip(told).enumerate() {
-            let (mut fields, mut forces) = (Vec::new(), Vec::new());
+            let mut fields = Vec::new();
             for (s, (corrected, told)) in corrected.steps.iter().zip(&told.steps).enumerate() {
-                let (by_parameter, force_by_parameter) = fit.sensitivities(r, s);
+                let (by_parameter, _) = fit.sensitivities(r, s);
                 let taken_up = |v: usize, c: usize| -> f64 {
                     by_parameter.iter().zip(shift).map(|(field, shift)| field[v][c] * shift).sum()
                 };
                 let pairs = corrected.displacement.iter().zip(&told.displacement).enumerate();
                 fields
                     .push(pairs.map(|(v, (u, t))| [0, 1, 2].map(|c| part * (t[c] - u[c] - taken_up(v, c)))).collect());
-                let of_force: f64 = force_by_parameter.iter().zip(shift).map(|(f, shift)| f * shift).sum();
-                let both = corrected.force.zip(told.force);
-                forces.push(both.map_or(0.0, |(f, t)| part * (t.value_n - f.value_n - of_force)));
             }
+            let of_force = |(d, (corrected, told)): (usize, (Option<ObservedForce>, Option<ObservedForce>))| {
+                let taken_up: f64 = fit.sensitivities(r, d).1.iter().zip(shift).map(|(f, shift)| f * shift).sum();
+                corrected.zip(told).map_or(0.0, |(f, t)| part * (t.value_n - f.value_n - taken_up))
+            };
+            let forces = corrected.forces().zip(told.forces()).enumerate().map(of_force).collect();
             displacement_mm.push(fields);
             force_n.push(forces);
         }

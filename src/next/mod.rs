@@ -15,6 +15,7 @@ mod options;
 mod posterior;
 mod result;
 mod scanned;
+mod seen;
 mod trial;
 mod visited;
 mod worth;

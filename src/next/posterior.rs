@@ -5,16 +5,15 @@ use super::discrepancy::Discrepancy;
 use super::error::NextError;
 use super::error_left::ErrorLeft;
 use super::options::{NextOptions, Plan};
-use super::scanned::{ForceRead, ScannedStep};
+use super::seen::Seen;
 use super::visited::Visited;
 use crate::calibration::{
     CalibrateOptions, CalibrationProblem, FitOptions, Law, Objective, Observed, RecordingFit, TermCount, fit_law,
     mean_scans,
 };
-use crate::kinematics::{Decomposition, IDENTITY, decompose};
 use crate::material::Material;
 use crate::mesh::MeshOptions;
-use crate::sensitivity::{Covariance, FisherInformation, JointInformation, median, unknowns_of};
+use crate::sensitivity::{Covariance, FisherInformation, JointInformation, median};
 use crate::specimen::Specimen;
 use nalgebra::{DMatrix, SymmetricEigen};
 
@@ -86,13 +85,19 @@ impl Posterior {
         let seen = Seen::of(&mut problem, &found.fit, plan, &num_scans)?;
         let visited = Visited::of(seen.states.iter().flatten().flatten());
         let mut information = JointInformation::none(&found.fit.material, seen.unknown_sd.len());
-        for (r, steps) in seen.steps.iter().enumerate() {
-            for (s, step) in steps.iter().enumerate() {
-                let here = &corrected[r];
-                let num = num_done(observed, &here.specimen, here.steps[s].drive_mm) as f64;
-                let (material, num_unknowns) = (&found.fit.material, seen.unknown_sd.len());
-                // Scans of one drive share their discrepancy: each has its part of what their mean tells.
+        for (r, here) in corrected.iter().enumerate() {
+            let (material, num_unknowns) = (&found.fit.material, seen.unknown_sd.len());
+            // Scans of one drive share their discrepancy, as readings of one force do: each has its part of what their
+            // mean tells.
+            for (step, measured) in seen.steps[r].iter().zip(&here.steps) {
+                let num = num_done(observed, &here.specimen, measured.drive_mm) as f64;
                 let of_all = step.information(material, num_unknowns, num, &discrepancy)?;
+                information.add_times(num_scans[r] as f64 / num, &of_all)?;
+            }
+            let read_mm: Vec<f64> = readings_of(observed, &here.specimen).collect();
+            for (force, reading) in seen.readings[r].iter().zip(&here.on_the_way) {
+                let num = read_mm.iter().filter(|read| is_same_drive(**read, reading.drive_mm)).count() as f64;
+                let of_all = force.information(material, num, &discrepancy);
                 information.add_times(num_scans[r] as f64 / num, &of_all)?;
             }
         }
@@ -196,7 +201,10 @@ fn fit_together<'a>(
         return Ok(Fitted { corrected: means.to_vec(), law, error_left, models: problem });
     }
     on_stage("error of the mesh");
-    // With the error of the mesh in the recordings a fit of several terms may be led astray, and never settle.
+    // The error is told by the scans alone: forces on the way would take most of the time. With the error in the
+    // recordings a fit of several terms may be led astray, and never settle.
+    let scans: Vec<Observed> = means.iter().map(Observed::without_readings).collect();
+    let mut problem = problem.with_data(&scans)?;
     let mut before = fit(&mut problem, TermCount::Fixed(options.num_terms.unwrap_or(1)), FIRST_ITERATIONS, &[])?;
     let mut finer = FinerMeshes::new(means, options.mesh_factor)?;
     let mut round = 0;
@@ -207,14 +215,16 @@ fn fit_together<'a>(
         let mut present = problem.with_data(&corrected)?;
         let law = fit(&mut present, terms, max_iterations, &before.by_num_terms)?;
         // A law of more terms tells the error better: large strains and small ones no longer share an exponent. So does
-        // one that has settled.
-        let is_told = law.fit.material.terms.len() <= before.fit.material.terms.len() && before.fit.is_settled();
+        // one that has settled, and one that knows of all forces.
+        let is_told = law.fit.material.terms.len() <= before.fit.material.terms.len()
+            && before.fit.is_settled()
+            && (round > 1 || means.iter().all(|o| o.on_the_way.is_empty()));
         if is_told || round == MOST_ROUNDS {
             law.fit.settled(tolerance)?;
             let error_left = finer.error_left(&present, &law.fit, &corrected)?;
             return Ok(Fitted { models: present.with_data(means)?, corrected, law, error_left });
         }
-        problem = present.with_data(means)?;
+        problem = present.with_data(&scans)?;
         on_stage("error of the mesh");
         before = law;
     }
@@ -242,6 +252,12 @@ pub(super) fn num_done(observed: &[Observed], specimen: &Specimen, drive_mm: f64
     observed.iter().filter(|o| is_same_body(&o.specimen, specimen) && is_at(o)).count()
 }
 
+/// Drives of all forces that were read on the way to scans of this specimen, mm, once for each time.
+pub(super) fn readings_of(observed: &[Observed], specimen: &Specimen) -> impl Iterator<Item = f64> {
+    let of_body = observed.iter().filter(move |o| is_same_body(&o.specimen, specimen));
+    of_body.flat_map(|o| o.on_the_way.iter().map(|r| r.drive_mm))
+}
+
 /// Whether two drives are one: actuators keep a micrometre.
 pub(super) fn is_same_drive(a: f64, b: f64) -> bool {
     (a - b).abs() < 1e-3
@@ -251,82 +267,6 @@ pub(super) fn is_same_drive(a: f64, b: f64) -> bool {
 pub(super) fn is_same_body(a: &Specimen, b: &Specimen) -> bool {
     let body = |s: &Specimen| Specimen { name: String::new(), drive_mm: Vec::new(), ..s.clone() };
     body(a) == body(b) && !a.is_other_way(b.largest_drive_mm())
-}
-
-/// What the recordings tell, at the estimate.
-struct Seen {
-    /// Per recording and drive.
-    steps: Vec<Vec<ScannedStep>>,
-    /// Per recording and drive: the voxels' states.
-    states: Vec<Vec<Vec<Decomposition>>>,
-    unknown_sd: Vec<f64>,
-}
-
-impl Seen {
-    /// `num_scans`: of how many scans each recording is the mean.
-    fn of(
-        problem: &mut CalibrationProblem,
-        fit: &RecordingFit,
-        plan: &Plan,
-        num_scans: &[usize],
-    ) -> Result<Seen, NextError> {
-        problem.refuse_unlike_samples("what to scan next")?;
-        let observed = problem.observed();
-        let mut seen = Seen { steps: Vec::new(), states: Vec::new(), unknown_sd: Vec::new() };
-        for (r, (model, view)) in problem.models_and_views().enumerate() {
-            let (recording, num) = (&observed[r], num_scans[r] as f64);
-            let (mut steps, mut states) = (Vec::new(), Vec::new());
-            for (s, equilibrium) in fit.states(r).iter().enumerate() {
-                let measured = &recording.steps[s];
-                let of_voxels: Vec<Decomposition> = view
-                    .gradients(&equilibrium.displacement)?
-                    .iter()
-                    .map(|g| decompose(&[0, 1, 2].map(|i| [0, 1, 2].map(|j| IDENTITY[i][j] + g[i][j]))))
-                    .collect();
-                let mut tangent = model.tangent(&fit.material, equilibrium)?;
-                let unknowns = unknowns_of(&plan.study.protocol, equilibrium, &mut tangent)?;
-                let (fields, forces) = fit.sensitivities(r, s);
-                let is_whole = |u: &[f64; 3]| u.iter().all(|x| x.is_finite());
-                let weights: Vec<f64> = measured
-                    .displacement
-                    .iter()
-                    .zip(&fields[0])
-                    .map(|(u, f)| f64::from(u8::from(is_whole(u) && is_whole(f))))
-                    .collect();
-                // What is missing must not enter a product.
-                let filled = |field: &[[f64; 3]]| -> Vec<[f64; 3]> {
-                    field.iter().map(|u| if is_whole(u) { *u } else { [0.0; 3] }).collect()
-                };
-                let by_unknown = unknowns
-                    .iter()
-                    .map(|u| u.displacement.as_ref().map(|d| view.average(d).map(|f| filled(&f))).transpose())
-                    .collect::<Result<Vec<_>, _>>()?;
-                steps.push(ScannedStep {
-                    by_parameter: fields.iter().map(|f| filled(f)).collect(),
-                    by_unknown,
-                    // The states that the law was fitted to are those visited.
-                    beyond: vec![0.0; weights.len()],
-                    weights,
-                    signal: None,
-                    // Of one scan.
-                    noise_mm2: recording.noise_sd_mm.map(|sd| num * sd * sd * recording.noise_correlation()),
-                    voxel_mm3: recording.mask.grid.voxel_volume_mm3(),
-                    force: measured.force.map(|force| ForceRead {
-                        force_n: equilibrium.force_n,
-                        by_parameter: forces.to_vec(),
-                        by_unknown: unknowns.iter().map(|u| u.force_n).collect(),
-                        sd_n: num.sqrt() * force.sd_n,
-                        beyond: 0.0,
-                    }),
-                });
-                states.push(of_voxels);
-                seen.unknown_sd = unknowns.iter().map(|u| u.sd).collect();
-            }
-            seen.steps.push(steps);
-            seen.states.push(states);
-        }
-        Ok(seen)
-    }
 }
 
 /// The typical distance of voxels beyond the states visited: their median.

@@ -33,8 +33,17 @@ impl ForceRead {
     }
 
     /// Adds what the mean of `num` readings tells.
-    pub(super) fn add_to(&self, joint: &mut JointInformation, num: f64, discrepancy: &Discrepancy) {
+    fn add_to(&self, joint: &mut JointInformation, num: f64, discrepancy: &Discrepancy) {
         joint.add_force(&self.by_parameter, &self.by_unknown, self.sd_of(num, discrepancy));
+    }
+
+    /// What the mean of `num` readings tells of the material and the unknowns of the set-up.
+    pub(super) fn information(&self, material: &Material, num: f64, discrepancy: &Discrepancy) -> JointInformation {
+        let mut joint = JointInformation::none(material, self.by_unknown.len());
+        if num > 0.0 {
+            self.add_to(&mut joint, num, discrepancy);
+        }
+        joint
     }
 }
 

@@ -99,7 +99,12 @@ impl Worth<'_> {
         let is_scanned = |drive: f64| self.candidate.drives_mm.contains(&drive);
         let readings =
             self.trials[p].readings.iter().filter(|(drive, _)| leads_on(*drive, largest) && !is_scanned(*drive));
-        readings.for_each(|(_, reading)| reading.add_to(&mut sum, num, discrepancy));
+        for (drive, reading) in readings {
+            let done = self.candidate.num_read(*drive) as f64;
+            let of = |count: f64| reading.information(&point.material, count, discrepancy);
+            sum.add_times(1.0, &of(done + num))?;
+            sum.add_times(-1.0, &of(done))?;
+        }
         Ok(Some(sum.carried_to(material)?))
     }
 

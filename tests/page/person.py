@@ -109,6 +109,8 @@ def plan(page):
     page.screen("plan-words-at-the-field")
     page.put("Drives", "5")
     page.put("Name", "a person's specimen")
+    page.put("Forces read at", "2.5")
+    page.put("Load cell’s gain", "1")
     page.until(KEPT)
     page.open(f"{address}/#/plan")
     page.until("[...document.querySelectorAll('input')].some((i) => i.value === \"a person's specimen\")")
@@ -116,6 +118,7 @@ def plan(page):
     page.choose("select[aria-label='Save as a file']", 2)
     study = page.downloaded("a-person-s-specimen-study.json").read_text()
     assert json.loads(study)["schema"] == "study/1"
+    assert json.loads(study)["protocol"] == {"force_drive_mm": [2.5], "force_gain_sd": 0.01}
     link = page.js(
         "import('/assets/draft.js').then((m) =>"
         " m.linkOf({ ...m.kept(), specimen: { ...m.kept().specimen, name: 'linked' } }))"
@@ -124,6 +127,9 @@ def plan(page):
     page.until("[...document.querySelectorAll('input')].some((i) => i.value === 'linked')")
     page.files("#plan-file", {"study.json": base64.b64encode(study.encode()).decode()})
     page.until("[...document.querySelectorAll('input')].some((i) => i.value === \"a person's specimen\")")
+    page.put("Forces read at", "")
+    page.put("Load cell’s gain", "")
+    page.until(KEPT)
 
 
 def evaluate(page):
@@ -197,7 +203,7 @@ def sweep(page):
 
 def recordings(page):
     """A zip file looked at before it is kept; the fit that must not be believed, with its maps by keyboard; the
-    diagnosis that it leads to."""
+    diagnosis that it leads to; what to scan next."""
     page.go("recordings")
     page.until("document.getElementById('recording-zip')")
     # Files of another program: what they are is asked, and they are kept as a recording.
@@ -249,6 +255,17 @@ def recordings(page):
     page.put("Plane", "1")
     page.until("document.querySelector('.slices output').textContent.startsWith('y')")
     page.screen("diagnosis")
+
+    page.go("recordings")
+    page.until(mine)
+    page.js(f"""(() => {{ const s = {mine};
+      for (const [label, value] of [["Precision asked", "0.01"], ["Number of terms", "1"]]) {{
+        const e = s.querySelector(`select[aria-label='${{label}}']`); e.value = value;
+        e.dispatchEvent(new Event('change')); }} s.querySelector('button.next').click(); }})()""")
+    page.until("location.hash.startsWith('#/job/')")
+    page.until(f"document.querySelector('.callout') && {PICTURES}", LONG_S)
+    page.says("sd of μ₁")
+    page.screen("next-scan")
 
 
 def compare_and_tidy(page):

@@ -15,6 +15,7 @@ const planOf = (study, specimen) => ({
   base: study?.base,
   material: study?.materials?.[0]?.material,
   scan: study?.scan,
+  protocol: study?.protocol ?? {},
   limits: study?.limits,
   vary: study?.vary,
   objective: study?.objective,

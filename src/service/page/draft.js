@@ -2,7 +2,7 @@
 
 const KEY = "lambdak plan";
 const MOST_STEPS = 200;
-const PARTS = ["specimen", "base", "material", "scan", "limits", "vary", "objective", "budget", "draws"];
+const PARTS = ["specimen", "base", "material", "scan", "protocol", "limits", "vary", "objective", "budget", "draws"];
 
 const partsOf = (model) => Object.fromEntries(PARTS.filter((p) => model[p] !== undefined).map((p) => [p, model[p]]));
 
@@ -97,6 +97,7 @@ const FORMATS = {
     base: study.base,
     material: study.materials[0].material,
     scan: study.scan,
+    protocol: study.protocol ?? {},
     limits: study.limits,
     vary: study.vary,
     objective: study.objective,

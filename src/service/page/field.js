@@ -22,19 +22,27 @@ const numbers = (example, count) => (text) => {
   return values;
 };
 
+/** A whole number. */
+const whole = (example) => (text) => {
+  const value = number(example)(text);
+  if (!Number.isInteger(value)) throw new Error(`give a whole number such as ${example}`);
+  return value;
+};
+
+/** The same where nothing need be given. */
+const optional = (read) => (text) => (text.trim() === "" ? undefined : read(text));
+
 /** How the text of a field is read, by its kind; `example` stands in the words of its error. */
 const READERS = {
   text: () => (text) => text,
   number,
-  whole: (example) => (text) => {
-    const value = number(example)(text);
-    if (!Number.isInteger(value)) throw new Error(`give a whole number such as ${example}`);
-    return value;
-  },
+  whole,
   numbers: (example) => numbers(example),
   triple: (example) => numbers(example, 3),
-  optional: (example) => (text) => (text.trim() === "" ? undefined : number(example)(text)),
-  optionalTriple: (example) => (text) => (text.trim() === "" ? undefined : numbers(example, 3)(text)),
+  optional: (example) => optional(number(example)),
+  optionalWhole: (example) => optional(whole(example)),
+  optionalNumbers: (example) => optional(numbers(example)),
+  optionalTriple: (example) => optional(numbers(example, 3)),
 };
 
 let made = 0;

@@ -3,6 +3,7 @@
 import { getBlob, getJson, post, remove } from "./api.js";
 import { fill, h, term } from "./dom.js";
 import { digits, percent, sensitivityUnit, symbol, withUnit } from "./numbers.js";
+import { subjectOf } from "./plan_study.js";
 import { GLOSSARY } from "./words.js";
 import { view3d } from "./view3d.js";
 
@@ -99,13 +100,7 @@ export function livePanel(model, signal, isSound) {
     state.turn += 1;
   });
 
-  const request = (specimen, has_files) => ({
-    specimen,
-    material: model.material,
-    scan: model.scan,
-    mesh: "search",
-    has_files,
-  });
+  const request = (specimen, has_files) => ({ ...subjectOf(model, specimen), mesh: "search", has_files });
 
   async function baseFigures(isStale) {
     const wanted = request(model.base, false);

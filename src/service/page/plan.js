@@ -9,28 +9,14 @@ import { markErrors, unreadField } from "./field.js";
 import { livePanel } from "./live.js";
 import { planBar, undoKeys } from "./plan_bar.js";
 import { materialForm, specimenForm } from "./plan_forms.js";
+import { fresh, studyOf, subjectOf } from "./plan_study.js";
+import { protocolForm } from "./protocol_form.js";
 import { startJob } from "./start.js";
-import { goalForm, limitsForm, limitsOf, scanForm, varyOf } from "./study_forms.js";
+import { goalForm, limitsForm, limitsOf, scanForm } from "./study_forms.js";
 import { sweepForm } from "./sweep.js";
 import { inWords } from "./words.js";
 
 const CHECK_WAIT_MS = 180;
-
-/** A plan to begin with. */
-function fresh(library) {
-  const study = library.studies[0];
-  return apart({
-    specimen: library.specimens[0],
-    base: library.specimens[0],
-    material: library.materials[0].material,
-    scan: study.scan,
-    limits: study.limits,
-    vary: study.vary,
-    objective: study.objective,
-    budget: { explore: 40, refine: 3, iterations: 6, confirm: 4 },
-    draws: 0,
-  });
-}
 
 /** The plan of an address: of a job (its identifier), of a link (after ~), or the one that this browser keeps. */
 async function planOf(from, library) {
@@ -39,24 +25,7 @@ async function planOf(from, library) {
   return planOfFile(JSON.stringify(await getJson(`/v1/jobs/${from}/request`)));
 }
 
-/** The study of a plan. */
-function study(model) {
-  return {
-    schema: "study/1",
-    name: model.specimen.name,
-    base: model.specimen,
-    materials: [{ name: "material", material: model.material, relative_sd: 0, weight: 1 }],
-    scan: model.scan,
-    vary: varyOf(model),
-    limits: limitsOf(model),
-    objective: model.objective,
-    budget: model.budget,
-    verification: { is_on: model.draws > 0, draws: Math.max(1, model.draws) },
-    seed: 1,
-  };
-}
-
-const evaluationOf = (model, mesh) => ({ specimen: model.specimen, material: model.material, scan: model.scan, mesh });
+const evaluationOf = (model, mesh) => ({ ...subjectOf(model), mesh });
 const scanOf = (model, mesh) => ({
   specimen: model.specimen,
   material: model.material,
@@ -81,6 +50,7 @@ export async function planView(content, signal, from) {
     specimen: h("div", {}),
     material: h("div", {}),
     scan: h("div", {}),
+    protocol: h("div", {}),
     limits: h("div", {}),
     goal: h("div", {}),
   };
@@ -94,6 +64,7 @@ export async function planView(content, signal, from) {
     fill(forms.specimen, specimenForm(model, library, edited));
     fill(forms.material, materialForm(model, library, edited));
     fill(forms.scan, scanForm(model, edited));
+    fill(forms.protocol, protocolForm(model, edited));
     fill(forms.limits, limitsForm(model, edited));
     fill(forms.goal, goalForm(model, edited));
   };
@@ -136,7 +107,7 @@ export async function planView(content, signal, from) {
     past.push();
     shown();
   };
-  const bar = planBar(model, past, study, { replace, restored: shown, fresh: () => replace(fresh(library)) });
+  const bar = planBar(model, past, studyOf, { replace, restored: shown, fresh: () => replace(fresh(library)) });
 
   async function check() {
     const mine = (number += 1);
@@ -231,6 +202,7 @@ export async function planView(content, signal, from) {
         sheet("Specimen", forms.specimen),
         sheet("Material", forms.material),
         sheet("Scan", forms.scan),
+        sheet("Protocol", forms.protocol),
       ),
       h(
         "div",
@@ -278,7 +250,7 @@ export async function planView(content, signal, from) {
           h(
             "p",
             {},
-            start("Search", "design", "designs", () => study(model)),
+            start("Search", "design", "designs", () => studyOf(model)),
           ),
         ),
       ),

@@ -1,6 +1,9 @@
-// What can be started on recordings: a calibration, a diagnosis, an import of raw phases; and what they can be told.
+// What can be started on recordings: a calibration, a diagnosis, the question what to scan next, an import of raw
+// phases; and what they can be told.
 
 import { h } from "./dom.js";
+import { kept } from "./draft.js";
+import { fresh, studyOf } from "./plan_study.js";
 import { startJob } from "./start.js";
 
 /** What several recordings are started with, and one. */
@@ -30,15 +33,24 @@ function settings(library) {
     ["", "material unknown"],
     ...library.materials.map((m, i) => [i, m.name]),
   ]);
+  const precision = options("Precision asked", [
+    ["", "no precision asked"],
+    ...[1, 2, 5, 10, 20].map((part) => [part / 100, `every parameter to ${part} %`]),
+  ]);
+  const count = () => (terms.value === "" ? {} : { num_terms: Number(terms.value) });
   const factor = () => (mesh.value === "" ? {} : { mesh_factor: Number(mesh.value) });
   return {
     mesh,
     terms,
     material,
-    calibration: (ids) => ({
+    precision,
+    calibration: (ids) => ({ recordings: ids, ...count(), ...factor() }),
+    // Candidates, scan and limits are those of the plan.
+    next: (ids) => ({
       recordings: ids,
-      ...(terms.value === "" ? {} : { num_terms: Number(terms.value) }),
-      ...factor(),
+      study: studyOf({ ...fresh(library), ...kept() }),
+      ...count(),
+      ...(precision.value === "" ? {} : { precision: Number(precision.value) }),
     }),
     diagnosis: (ids) => ({
       ...several(ids),
@@ -76,13 +88,19 @@ export function starters(library, ids, fail, isRaw = false) {
       { class: "row" },
       start("Import: unwrap the phases", "import", "imports", () => ({ recording: ids()[0] })),
     );
-  return h(
-    "div",
-    { class: "row starters" },
-    start("Calibrate", "calibrate", "calibrations", () => chosen.calibration(ids())),
-    h("div", {}, chosen.terms),
-    start("Diagnose", "diagnose", "diagnoses", () => chosen.diagnosis(ids())),
-    h("div", {}, chosen.material),
-    h("div", {}, chosen.mesh),
-  );
+  const row = (...parts) => h("div", { class: "row starters" }, parts);
+  return [
+    row(
+      start("Calibrate", "calibrate", "calibrations", () => chosen.calibration(ids())),
+      h("div", {}, chosen.terms),
+      start("Diagnose", "diagnose", "diagnoses", () => chosen.diagnosis(ids())),
+      h("div", {}, chosen.material),
+      h("div", {}, chosen.mesh),
+    ),
+    row(
+      start("What to scan next", "next", "next-scans", () => chosen.next(ids())),
+      h("div", {}, chosen.precision),
+      h("span", { class: "quiet" }, "with the specimen, the scan, the protocol and the limits of the plan"),
+    ),
+  ];
 }

@@ -8,6 +8,7 @@ import { fill, h, more, sheet } from "./dom.js";
 import { evaluation } from "./evaluation.js";
 import { figureSheet } from "./figures.js";
 import { evaluationList } from "./evaluation_list.js";
+import { next } from "./next.js";
 import { numbered } from "./parts.js";
 import { onward, scan } from "./scan.js";
 import { slicesView } from "./slices.js";
@@ -21,6 +22,7 @@ const VIEWS = {
   "calibration/1": calibration,
   "diagnosis/1": diagnosis,
   "diagnoses/1": diagnoses,
+  "next/1": next,
 };
 
 /** What has no view of its own is shown as it is: its figures, its maps, its content. */

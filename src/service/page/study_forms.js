@@ -58,7 +58,7 @@ export const scanForm = (model, edited) =>
       label: "The grid lies",
       value: model.scan.grid ?? "centred",
       options: [
-        ["centred", "on the sample's middle"],
+        ["centred", "in the middle"],
         ["anywhere", "anywhere"],
       ],
       put: (v) => {

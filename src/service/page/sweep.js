@@ -3,6 +3,7 @@
 import { fill, h } from "./dom.js";
 import { lawNumbers } from "./law.js";
 import { digits, symbol } from "./numbers.js";
+import { subjectOf } from "./plan_study.js";
 
 /** What of an evaluation can vary: pointer, words, value now. */
 function variables(model) {
@@ -208,7 +209,7 @@ export function sweepForm(model) {
   render();
 
   const body = (mesh) => {
-    const base = { specimen: model.specimen, material: model.material, scan: model.scan, mesh };
+    const base = { ...subjectOf(model), mesh };
     const name = `sweep of ${model.specimen.name}`.slice(0, 200);
     return state.how === "sample"
       ? {

@@ -158,6 +158,7 @@ export const OBJECTIVES = [
   ["e_optimal", "E-optimal"],
   ["worst_relative_sd", "worst relative deviation"],
   ["tell_apart", "telling materials apart"],
+  ["detect", "finding errors of the experiment"],
 ];
 
 /** Limits: words, unit, and the side that is allowed. */
