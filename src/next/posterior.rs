@@ -201,25 +201,31 @@ fn fit_together<'a>(
         return Ok(Fitted { corrected: means.to_vec(), law, error_left, models: problem });
     }
     on_stage("error of the mesh");
-    // The error is told by the scans alone: forces on the way would take most of the time. With the error in the
-    // recordings a fit of several terms may be led astray, and never settle.
+    // At first by the scans alone: forces on the way would take most of the time. They may be what tells terms apart,
+    // so that one term has to do there. With the error in the recordings a fit of several terms may be led astray, and
+    // never settle.
+    let has_readings = means.iter().any(|o| !o.on_the_way.is_empty());
+    let num_terms = options.num_terms.filter(|_| !has_readings).unwrap_or(1);
     let scans: Vec<Observed> = means.iter().map(Observed::without_readings).collect();
     let mut problem = problem.with_data(&scans)?;
-    let mut before = fit(&mut problem, TermCount::Fixed(options.num_terms.unwrap_or(1)), FIRST_ITERATIONS, &[])?;
+    let mut before = fit(&mut problem, TermCount::Fixed(num_terms), FIRST_ITERATIONS, &[])?;
     let mut finer = FinerMeshes::new(means, options.mesh_factor)?;
     let mut round = 0;
     loop {
         round += 1;
+        let knows_all = round > 1 || !has_readings;
         let corrected = finer.without_mesh_error(&before.fit, is_cancelled)?;
         on_stage("what is known so far");
         let mut present = problem.with_data(&corrected)?;
-        let law = fit(&mut present, terms, max_iterations, &before.by_num_terms)?;
+        let mut law = fit(&mut present, terms, max_iterations, &before.by_num_terms)?;
         // A law of more terms tells the error better: large strains and small ones no longer share an exponent. So does
         // one that has settled, and one that knows of all forces.
-        let is_told = law.fit.material.terms.len() <= before.fit.material.terms.len()
-            && before.fit.is_settled()
-            && (round > 1 || means.iter().all(|o| o.on_the_way.is_empty()));
+        let is_told =
+            law.fit.material.terms.len() <= before.fit.material.terms.len() && before.fit.is_settled() && knows_all;
         if is_told || round == MOST_ROUNDS {
+            if !law.fit.is_settled() {
+                law = fit(&mut present, terms, max_iterations, &[])?;
+            }
             law.fit.settled(tolerance)?;
             let error_left = finer.error_left(&present, &law.fit, &corrected)?;
             return Ok(Fitted { models: present.with_data(means)?, corrected, law, error_left });
