@@ -28,6 +28,9 @@ export const subjectOf = (model, specimen = model.specimen) => ({
   protocol: model.protocol,
 });
 
+/** The budget of a plan: what errors can be found has no derivatives by the design, so that none is improved by them. */
+const budgetOf = ({ budget, objective }) => (objective.kind === "detect" ? { ...budget, refine: 0 } : budget);
+
 /** The study of a plan. */
 export function studyOf(model) {
   return {
@@ -40,7 +43,7 @@ export function studyOf(model) {
     vary: varyOf(model),
     limits: limitsOf(model),
     objective: model.objective,
-    budget: model.budget,
+    budget: budgetOf(model),
     verification: { is_on: model.draws > 0, draws: Math.max(1, model.draws) },
     seed: 1,
   };
