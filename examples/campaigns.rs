@@ -2,7 +2,7 @@
 //! that is fixed beforehand.
 //!
 //! ```text
-//! cargo run --release --example campaigns -- [DRAWS SEED [TERMS]]
+//! cargo run --release --example campaigns -- [DRAWS SEED [TERMS [GAIN]]]
 //! ```
 //!
 //! The laboratory knows what kind of material it has, but not which: a fixed protocol has to suit every material of the
@@ -10,6 +10,9 @@
 //! and again, and every two such drives by turns. `next` starts as the protocol of the largest such drive does. A campaign
 //! ends when the posterior says that every μ and α has its precision, or after [`MOST_SCANS`]. The truth is solved on
 //! a mesh of its own. The 95 % intervals at the end are compared with the truth.
+//!
+//! With GAIN, 0.005 say, every campaign has a load cell of its own that reads so much too much, to one standard
+//! deviation, in all its scans alike, and that is known of it.
 
 use lambdak::calibration::{CalibrationError, Observed, SyntheticScan};
 use lambdak::design::Study;
@@ -18,7 +21,11 @@ use lambdak::material::Material;
 use lambdak::mesh::MeshOptions;
 use lambdak::next::{NextOptions, NextParameter, NextResult, Plan, Precision, advise};
 use lambdak::recording::Filter;
+use lambdak::sensitivity::Protocol;
 use lambdak::specimen::Specimen;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use serde_json::json;
 use std::error::Error;
@@ -87,7 +94,9 @@ struct Sample<'a> {
 }
 
 fn main() -> Result<(), Failure> {
-    let numbers: Vec<u64> = std::env::args().skip(1).map(|n| n.parse()).collect::<Result<_, _>>()?;
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let numbers: Vec<u64> = arguments.iter().take(3).map(|n| n.parse()).collect::<Result<_, _>>()?;
+    let gain_sd: f64 = arguments.get(3).map_or(Ok(0.0), |gain| gain.parse())?;
     let draws = numbers.first().copied().unwrap_or(20).min(MOST_CAMPAIGNS);
     let seed = numbers.get(1).copied().unwrap_or(1);
     let of = |terms: &[(f64, f64)]| Material::new(400.0, terms.iter().copied());
@@ -110,20 +119,21 @@ fn main() -> Result<(), Failure> {
     for kind in kinds {
         let num_terms = kind.truths[0].terms.len() as u64;
         if numbers.get(2).is_none_or(|asked| *asked == num_terms) {
-            kind.compare(draws, seed)?;
+            kind.compare(draws, seed, gain_sd)?;
         }
     }
     Ok(())
 }
 
 /// The block that is scanned, and what is planned with it.
-fn study(kind: &Kind) -> Result<Study, Failure> {
+fn study(kind: &Kind, gain_sd: f64) -> Result<Study, Failure> {
     let study = json!({
         "schema": "study/1", "name": "campaign",
         "base": { "schema": "specimen/1", "name": "shear block", "test": "double_lap_shear", "drive_mm": DRIVES_MM,
             "block": { "length_mm": 12.0, "thickness_mm": 4.0, "width_mm": 9.0 }, "holes": [], "samples_in_parallel": 2 },
         "materials": [{ "name": "of this kind", "material": kind.truths[0] }],
         "scan": { "voxel_mm": [1.0, 0.5, 1.0], "noise_sd_mm": [0.05, 0.05, 0.05], "force_sd_n": 0.02 },
+        "protocol": { "force_gain_sd": gain_sd },
         "vary": { "hole_count": { "min": 0, "max": 0 }, "drive_mm": { "min": DRIVES_MM[0], "max": 6.0 } },
         "limits": { "min_ligament_hole_hole_mm": 1.0, "min_ligament_hole_edge_mm": 1.0, "max_force_n": MOST_FORCE_N,
             "diameter_mm": { "min": 1.0, "max": 3.0 } }
@@ -143,7 +153,8 @@ impl Sample<'_> {
             let body = driven(study, drive);
             let mesh = MeshOptions { grading: 0.4, ..MeshOptions::scaled(&body, TRUTH_MESH) };
             let solve = SolveOptions::default();
-            match SyntheticScan::new(&body, truth, &study.scan, &study.protocol, &mesh, &solve, &|| false) {
+            // A scan of its own would have a gain of its own.
+            match SyntheticScan::new(&body, truth, &study.scan, &Protocol::default(), &mesh, &solve, &|| false) {
                 Ok(scan) => Ok(Some(scan)),
                 Err(CalibrationError::Solve(SolveError::Diverged { .. })) => Ok(None),
                 Err(error) => Err(error.into()),
@@ -159,7 +170,20 @@ impl Sample<'_> {
         let scan = self.scans[drive].as_ref().ok_or("a drive at which the sample gives way")?;
         let own = (self.place * MOST_CAMPAIGNS + campaign) * MOST_SCANS as u64 + num_before as u64;
         let recording = scan.recording("scan", &driven(self.study, drive), &scan.draw(seed, own), Filter::None)?;
-        Ok(Observed::new(&recording, self.study.scan.force_sd_n)?)
+        let (protocol, force_sd_n) = (&self.study.protocol, self.study.scan.force_sd_n);
+        let mut observed = Observed::new(&recording, force_sd_n)?.with_protocol(&recording, protocol, force_sd_n)?;
+        let gain = self.gain(seed, campaign);
+        observed.forces_mut().flatten().for_each(|force| force.value_n *= gain);
+        Ok(observed)
+    }
+
+    /// Of a campaign's load cell.
+    fn gain(&self, seed: u64, campaign: u64) -> f64 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        // Streams of the noise count up from zero, these down from the top.
+        random.set_stream(u64::MAX - (self.place * MOST_CAMPAIGNS + campaign));
+        let sds: f64 = StandardNormal.sample(&mut random);
+        1.0 + self.study.protocol.force_gain_sd * sds
     }
 
     /// What is known from `observed`, and which of `drives_mm` should come next.
@@ -224,8 +248,8 @@ impl Sample<'_> {
 }
 
 impl Kind {
-    fn compare(&self, draws: u64, seed: u64) -> Result<(), Failure> {
-        let study = study(self)?;
+    fn compare(&self, draws: u64, seed: u64, gain_sd: f64) -> Result<(), Failure> {
+        let study = study(self, gain_sd)?;
         let samples: Vec<Sample> = (0..self.truths.len())
             .into_par_iter()
             .map(|place| Sample::new(place, self, &study))

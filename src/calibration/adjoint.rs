@@ -3,6 +3,7 @@
 //!
 //! The fit itself uses the sensitivities, which also give the curvature. This gradient is independent of them.
 
+use super::all_forces::AllForces;
 use super::error::CalibrationError;
 use super::problem::CalibrationProblem;
 use crate::fem::{Equilibrium, SolveOptions};
@@ -25,20 +26,21 @@ impl CalibrationProblem<'_> {
         let targets = super::target::Target::of_recordings(observed, views, objective)?;
         let mut value = 0.0;
         let mut gradient = vec![0.0; material.parameters().len()];
-        for (((recording, model), view), target) in observed.iter().zip(models).zip(views).zip(&targets) {
-            let mut states: Vec<Equilibrium> = Vec::new();
-            for drive in recording.all_drives_mm() {
-                states.push(model.solve(material, drive, states.last(), solve, is_cancelled)?);
-            }
-            let forces_n: Vec<f64> = states.iter().map(|s| s.force_n).collect();
-            let misfits = target.force_misfits(&forces_n);
-            let weighed = target.force_weights() * &misfits;
-            value += misfits.dot(&weighed);
-            let mut by_forces = vec![0.0; states.len()];
-            for ((place, _), weighed) in target.forces().zip(&weighed) {
-                by_forces[place] = -2.0 * weighed;
-            }
-            for ((state, step), by_force) in states.iter().zip(&target.steps).zip(by_forces) {
+        let mut states: Vec<Vec<Equilibrium>> = Vec::new();
+        for (recording, model) in observed.iter().zip(models.iter_mut()) {
+            let drives_mm = recording.all_drives_mm();
+            states.push(model.own_mut().solve_path(material, &drives_mm, solve, is_cancelled)?);
+        }
+        let forces = AllForces::of(&targets);
+        let misfits = forces.misfits(&|r, d| states[r][d].force_n);
+        let weighed = forces.weights() * &misfits;
+        value += misfits.dot(&weighed);
+        let mut by_forces: Vec<Vec<f64>> = states.iter().map(|s| vec![0.0; s.len()]).collect();
+        for (&(r, d), weighed) in forces.places().iter().zip(&weighed) {
+            by_forces[r][d] = -2.0 * weighed;
+        }
+        for (r, (model, view)) in models.iter_mut().zip(views).enumerate() {
+            for ((state, step), &by_force) in states[r].iter().zip(&targets[r].steps).zip(&by_forces[r]) {
                 let seen = view.average(&state.displacement)?;
                 let mut load = vec![[0.0; 3]; seen.len()];
                 for v in step.used() {
@@ -49,7 +51,7 @@ impl CalibrationProblem<'_> {
                     }
                 }
                 let nodal = view.average_transposed(&load)?;
-                let of_step = model.tangent(material, state)?.adjoint_gradient(&nodal, by_force)?;
+                let of_step = model.own_mut().tangent(material, state)?.adjoint_gradient(&nodal, by_force)?;
                 for (g, d) in gradient.iter_mut().zip(of_step) {
                     *g += d;
                 }

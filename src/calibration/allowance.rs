@@ -9,6 +9,7 @@
 //! Weighing data down where meshes differ does not help: errors of meshes look like changes of the exponents to a few
 //! micrometres, so that what is weighed down in the misfit is weighed down in the sensitivities too.
 
+use super::all_forces::AllForces;
 use super::recording_fit::RecordingFit;
 use super::target::Target;
 use crate::mesh::error_over_difference;
@@ -58,9 +59,10 @@ impl Allowance {
                     }
                 }
             }
-            let apart = target.force_misfits(&ours.forces_n) - target.force_misfits(&theirs.forces_n);
-            objective += apart.dot(&(target.force_weights() * &apart));
         }
+        let forces = AllForces::of(targets);
+        let apart = forces.misfits_of(&fine.predictions) - forces.misfits_of(&coarse.predictions);
+        objective += apart.dot(&(forces.weights() * &apart));
         Allowance {
             factor,
             own_error_mm: error_over_shift() * (squares / count.max(1) as f64).sqrt(),

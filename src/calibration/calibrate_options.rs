@@ -45,6 +45,10 @@ pub struct CalibrateOptions {
     pub discretisation_factor: f64,
     /// Starts of every number of terms.
     pub num_starts: usize,
+    /// Whether they are all tried. If not, the first that leads to an optimum which is as good as the linear model
+    /// promised of the likeliest start is the last, and of one term the first that leads to an optimum: where an answer
+    /// has to come soon.
+    pub tries_all_starts: bool,
     /// A further term is not fitted where the linear model promises less than this decrease of the objective. Zero fits
     /// every term, to show what it does.
     pub least_promise: f64,
@@ -67,6 +71,7 @@ impl Default for CalibrateOptions {
             has_mesh_allowance: true,
             discretisation_factor: DISCRETISATION_FACTOR,
             num_starts: 3,
+            tries_all_starts: true,
             least_promise: 0.0,
             has_profiles: false,
             contours: None,

@@ -114,7 +114,8 @@ pub(super) fn losses_at(
     let (mut loss_u, mut loss_f) = ([0.0, 0.0], [0.0, 0.0]);
     for (((recording, model), view), states) in observed.iter().zip(models).zip(views).zip(near) {
         for (step, state) in recording.steps.iter().zip(states) {
-            *state = model.solve(material, step.drive_mm, Some(state), &SolveOptions::trial(), is_cancelled)?;
+            *state =
+                model.own_mut().solve(material, step.drive_mm, Some(state), &SolveOptions::trial(), is_cancelled)?;
             let (mut sum, mut largest, mut count) = (0.0, 0.0f64, 0.0);
             for (u, m) in view.average(&state.displacement)?.iter().zip(&step.displacement) {
                 if m.iter().all(|x| x.is_finite()) {

@@ -224,7 +224,11 @@ pub(super) fn descend(
     let rules = Rules {
         shortening: Shortening::Damped(DAMPING),
         tolerated_rise: EQUAL,
-        stop: Stop::after_trials(options.max_iterations),
+        stop: Stop {
+            rests_within: Some(EQUAL),
+            to_beat: options.to_beat,
+            ..Stop::after_trials(options.max_iterations)
+        },
     };
     let found = optimise::descend(&mut problem, start, (), &rules)?;
     let Point { predictions, system } = found.at;

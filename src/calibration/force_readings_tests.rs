@@ -10,18 +10,6 @@ fn protocol() -> Protocol {
     Protocol { force_drive_mm: vec![1.0, 2.5], force_gain_sd: 0.02, force_zero_sd_n: 0.03, ..Protocol::default() }
 }
 
-/// The weights are the inverse of the covariance.
-#[test]
-fn the_precision_inverts_the_covariance() {
-    let cell = LoadCell { gain_sd: 0.03, zero_sd_n: 0.2 };
-    let (forces, sds) = ([1.5, 4.0, 9.0], [0.02, 0.05, 0.01]);
-    let product = cell.covariance(&forces, &sds) * cell.precision(&forces, &sds);
-    // Entries of the two are up to 10⁴ apart: rounding of their product.
-    assert!((product - DMatrix::identity(3, 3)).abs().max() < 1e-10);
-    let perfect = LoadCell::default().precision(&forces, &sds);
-    assert_eq!(perfect[(0, 1)].to_bits(), 0.0f64.to_bits());
-}
-
 /// What is promised of a fit whose forces are weighed by their covariance is what an evaluation promises that estimates
 /// gain and zero beside the material: two derivations of one thing.
 #[test]

@@ -2,6 +2,7 @@
 //! promise is kept.
 
 mod adjoint;
+mod all_forces;
 mod allowance;
 mod bench;
 mod box_means;
@@ -13,11 +14,11 @@ mod doubt;
 mod error;
 mod fit;
 mod force_readings;
-mod further_terms;
 mod interval;
 mod law;
 mod measured_boundary;
 mod mesh_correction;
+mod models;
 mod noise;
 mod noise_map;
 mod observed;

@@ -46,6 +46,9 @@ impl Held {
 pub struct FitOptions {
     /// Levenberg–Marquardt iterations, rejected ones included.
     pub max_iterations: usize,
+    /// An objective that another start is known to lead to: a fit that would not come below it in its iterations is
+    /// given up ([`crate::optimise::Stop::to_beat`]).
+    pub to_beat: Option<f64>,
     /// Converged when the optimum of the linear model is nearer than this, in standard deviations of the worst
     /// combination of parameters.
     pub tolerance: f64,
@@ -63,6 +66,7 @@ impl Default for FitOptions {
     fn default() -> Self {
         FitOptions {
             max_iterations: 25,
+            to_beat: None,
             tolerance: 0.02,
             min_alpha_gap: 1.0,
             bulk: Bulk::Free,

@@ -2,20 +2,20 @@
 
 use super::descend::{Descent, Start, descend};
 use super::error::CalibrationError;
+use super::models::Models;
 use super::observed::{Observed, View};
 use super::options::{Bulk, FitOptions, check_options};
-use super::prediction::{Prediction, SolverWork, Unseen};
+use super::prediction::{Prediction, SolverWork};
 use super::recording_fit::RecordingFit;
 use super::step::Constraints;
 use super::stress_path::StressPath;
 use super::system::{NormalSystem, raw_sums};
-use super::target::{Objective, Target};
-use crate::fem::{Departures, ForwardModel, SolveOptions, side_by_side};
+use super::target::{Objective, Target, score};
+use crate::fem::{ForwardModel, ModelPool, SolveOptions};
 use crate::kinematics::IDENTITY;
 use crate::material::Material;
 use crate::mesh::MeshOptions;
 use crate::specimen::Specimen;
-use nalgebra::DMatrix;
 
 /// A misfit counts as more than noise beyond this many standard deviations of χ².
 const MISFIT_LIMIT: f64 = 4.0;
@@ -23,11 +23,7 @@ const MISFIT_LIMIT: f64 = 4.0;
 /// Recordings with a model of each.
 pub struct CalibrationProblem<'a> {
     observed: &'a [Observed],
-    /// Of the sample that was scanned, the first that each recording's specimen lists.
-    models: Vec<ForwardModel>,
-    /// Of the other samples that share each recording's load cell, where it has forces.
-    others: Vec<Vec<ForwardModel>>,
-    views: Vec<View>,
+    models: Models,
     objective: Objective,
 }
 
@@ -42,20 +38,7 @@ impl<'a> CalibrationProblem<'a> {
         mesh: &dyn Fn(&Specimen) -> MeshOptions,
         objective: Objective,
     ) -> Result<CalibrationProblem<'a>, CalibrationError> {
-        let (models, others, views) = (Vec::new(), Vec::new(), Vec::new());
-        let mut problem = CalibrationProblem { observed, models, others, views, objective };
-        for recording in observed {
-            let mut samples = recording.specimen.samples();
-            // Others are felt in the force alone.
-            let others = if recording.num_forces() > 0 { samples.split_off(1) } else { Vec::new() };
-            let specimen = &samples[0];
-            let model = ForwardModel::of_specimen(specimen, &mesh(specimen))?;
-            problem.views.push(recording.view(specimen, model.mesh())?);
-            problem.models.push(with_boundary(model, recording)?);
-            let of_other = |sample: &Specimen| ForwardModel::of_specimen(sample, &mesh(sample));
-            problem.others.push(others.iter().map(of_other).collect::<Result<_, _>>()?);
-        }
-        Ok(problem)
+        Ok(CalibrationProblem { observed, models: Models::new(observed, mesh)?, objective })
     }
 
     /// The same models for other data of the same specimens, voxels and filter: draws of noise.
@@ -70,8 +53,8 @@ impl<'a> CalibrationProblem<'a> {
         for (new, old) in observed.iter().zip(self.observed) {
             length("list of compared voxels", new.mask.num_voxels(), old.mask.num_voxels())?;
         }
-        let CalibrationProblem { models, others, views, objective, .. } = self;
-        Ok(CalibrationProblem { observed, models, others, views, objective })
+        let CalibrationProblem { models, objective, .. } = self;
+        Ok(CalibrationProblem { observed, models, objective })
     }
 
     /// The recordings.
@@ -89,34 +72,38 @@ impl<'a> CalibrationProblem<'a> {
     /// # Errors
     /// [`CalibrationError::UnlikeSamples`].
     pub fn refuse_unlike_samples(&self, what: &'static str) -> Result<(), CalibrationError> {
-        if self.others.iter().all(Vec::is_empty) { Ok(()) } else { Err(CalibrationError::UnlikeSamples { what }) }
+        if self.models.others.iter().all(Vec::is_empty) {
+            Ok(())
+        } else {
+            Err(CalibrationError::UnlikeSamples { what })
+        }
     }
 
     /// The model of each recording's specimen and how the scan sees it, in the order of the recordings.
     pub fn models_and_views(&mut self) -> impl Iterator<Item = (&mut ForwardModel, &View)> {
-        self.models.iter_mut().zip(&self.views)
+        self.models.scanned.iter_mut().map(ModelPool::own_mut).zip(&self.models.views)
     }
 
     /// Free displacement unknowns of each model.
     pub fn num_unknowns(&self) -> Vec<usize> {
-        self.models.iter().map(ForwardModel::num_unknowns).collect()
+        self.models.scanned.iter().map(|m| m.own().num_unknowns()).collect()
     }
 
     pub(super) fn objective(&self) -> Objective {
         self.objective
     }
 
-    pub(super) fn parts(&mut self) -> (&'a [Observed], &mut [ForwardModel], &[View]) {
-        (self.observed, &mut self.models, &self.views)
+    pub(super) fn parts(&mut self) -> (&'a [Observed], &mut [ModelPool], &[View]) {
+        (self.observed, &mut self.models.scanned, &self.models.views)
     }
 
     pub(super) fn targets(&self) -> Result<Vec<Target<'_>>, CalibrationError> {
-        Target::of_recordings(self.observed, &self.views, self.objective)
+        Target::of_recordings(self.observed, &self.models.views, self.objective)
     }
 
     /// The states that predictions of `material` visit.
     pub(super) fn stress_path(&self, material: &Material, predictions: &[Prediction]) -> StressPath {
-        path_of(&self.models, material, predictions)
+        self.models.stress_path(material, predictions)
     }
 
     pub(super) fn predict(
@@ -126,8 +113,22 @@ impl<'a> CalibrationProblem<'a> {
         solve: &SolveOptions,
         is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Vec<Prediction>, CalibrationError> {
-        let mut models = Models { scanned: &mut self.models, others: &mut self.others, views: &self.views };
-        models.predict(self.observed, material, near, solve, is_cancelled)
+        self.models.predict(self.observed, material, near, solve, is_cancelled)
+    }
+
+    /// The predictions of `fit`, a fit of this problem, with derivatives by the moduli of further terms of `exponents`
+    /// (per kPa, of terms that are not there yet), in their order behind those by its own parameters. Does not depend
+    /// on the data.
+    ///
+    /// # Errors
+    /// [`CalibrationError::Solve`]: the material has as many terms as it may have, or it was cancelled.
+    pub(super) fn with_further_terms(
+        &self,
+        fit: &RecordingFit,
+        exponents: &[f64],
+        is_cancelled: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Vec<Prediction>, CalibrationError> {
+        self.models.with_further_terms(&fit.predictions, exponents, is_cancelled)
     }
 
     /// Fits from `start`; `near` is an earlier fit of this problem whose equilibria are used as first guesses. A fit
@@ -174,10 +175,9 @@ impl<'a> CalibrationProblem<'a> {
         let constraints = Constraints::new(start, options)?;
         let mut work = SolverWork::default();
         first.iter().for_each(|p| work.add(p.work));
-        let CalibrationProblem { observed, models, others, views, objective } = self;
-        let path = path_of(models, start, &first);
-        let targets = Target::of_recordings(observed, views, *objective)?;
-        let mut models = Models { scanned: models, others, views };
+        let CalibrationProblem { observed, models, objective } = self;
+        let path = models.stress_path(start, &first);
+        let targets = Target::of_recordings(observed, &models.views, *objective)?;
         let mut trial = |material: &Material, near: &[Prediction]| {
             models.predict(observed, material, Some(near), &options.solve, is_cancelled)
         };
@@ -186,7 +186,7 @@ impl<'a> CalibrationProblem<'a> {
         let first = Start { path, predictions: first };
         let descent = descend(&constraints, options, first, expected, &mut trial, &evaluate)?;
         work.add(descent.work);
-        let mut fit = finished(descent, &targets, observed, views, options, *objective)?;
+        let mut fit = finished(descent, &targets, observed, &models.views, options, *objective)?;
         fit.work = work;
         Ok(fit)
     }
@@ -225,7 +225,7 @@ impl<'a> CalibrationProblem<'a> {
     /// [`CalibrationError`]: nothing to compare.
     pub fn shift_to(&self, fit: &RecordingFit, other: &[Observed]) -> Result<Vec<f64>, CalibrationError> {
         let gradient = |targets: &[Target]| raw_sums(&fit.predictions, targets).1;
-        let moved = Target::of_recordings(other, &self.views, self.objective)?;
+        let moved = Target::of_recordings(other, &self.models.views, self.objective)?;
         let change = gradient(&moved) - gradient(&self.targets()?);
         let covariance = fit.information.covariance();
         let part = |i: usize, j: usize| covariance.covariance(i, j).map_or(0.0, |c| c * change[j]);
@@ -238,7 +238,7 @@ impl<'a> CalibrationProblem<'a> {
     /// [`CalibrationError::Voxel`].
     pub fn visited_stretches(&self, fit: &RecordingFit) -> Result<Vec<[f64; 3]>, CalibrationError> {
         let mut all = Vec::new();
-        for ((view, recording), prediction) in self.views.iter().zip(self.observed).zip(&fit.predictions) {
+        for ((view, recording), prediction) in self.models.views.iter().zip(self.observed).zip(&fit.predictions) {
             for state in prediction.states.iter().take(recording.steps.len()) {
                 for slope in view.gradients(&state.displacement)? {
                     let f = [0, 1, 2].map(|i| [0, 1, 2].map(|j| IDENTITY[i][j] + slope[i][j]));
@@ -253,64 +253,6 @@ impl<'a> CalibrationProblem<'a> {
     }
 }
 
-/// A model with what was measured at the boundary of a recording.
-fn with_boundary(model: ForwardModel, recording: &Observed) -> Result<ForwardModel, CalibrationError> {
-    match &recording.steps[..] {
-        _ if !recording.has_measured_faces() => Ok(model),
-        _ if !recording.specimen.other_samples.is_empty() => {
-            let reason = "other samples share the load cell, and nothing was measured at their boundaries";
-            Err(CalibrationError::NoMeasuredBoundary { reason })
-        }
-        [step] => Ok(model.departed(&Departures { faces_per_mm: step.faces_per_mm.clone(), ..Departures::default() })),
-        _ => {
-            let reason = "several steps share a model; take the steps apart";
-            Err(CalibrationError::NoMeasuredBoundary { reason })
-        }
-    }
-}
-
-fn path_of(models: &[ForwardModel], material: &Material, predictions: &[Prediction]) -> StressPath {
-    predictions
-        .iter()
-        .zip(models)
-        .map(|(prediction, model)| StressPath::new(model, material, &prediction.states))
-        .fold(StressPath::default(), StressPath::join)
-}
-
-/// The models of all recordings.
-struct Models<'m> {
-    scanned: &'m mut [ForwardModel],
-    others: &'m mut [Vec<ForwardModel>],
-    views: &'m [View],
-}
-
-impl Models<'_> {
-    /// What `material` predicts of every recording.
-    fn predict(
-        &mut self,
-        observed: &[Observed],
-        material: &Material,
-        near: Option<&[Prediction]>,
-        solve: &SolveOptions,
-        is_cancelled: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Vec<Prediction>, CalibrationError> {
-        let models = self.scanned.iter_mut().zip(self.others.iter_mut());
-        let recordings = models.zip(self.views.iter().zip(observed)).enumerate();
-        let predicted = side_by_side(recordings.collect(), |(index, ((model, others), (view, recording)))| {
-            let drives = recording.all_drives_mm();
-            let near = near.and_then(|n| n.get(index));
-            let states = |place: usize| near.and_then(|n| n.states_of(place));
-            let mut prediction = Prediction::new(model, view, &drives, material, states(0), solve, is_cancelled)?;
-            for (place, other) in others.iter_mut().enumerate() {
-                let states = states(place + 1);
-                prediction.join(Prediction::new(other, &Unseen, &drives, material, states, solve, is_cancelled)?);
-            }
-            Ok(prediction)
-        });
-        predicted.into_iter().collect()
-    }
-}
-
 fn finished(
     descent: Descent,
     targets: &[Target],
@@ -322,10 +264,7 @@ fn finished(
     let Descent { predictions, system, is_converged, iterations, distance, reached, history, .. } = descent;
     let n = system.parameters.len();
     let held = if options.bulk == Bulk::Held { options.held.with(0) } else { options.held };
-    let mut score = DMatrix::zeros(n, n);
-    for (target, prediction) in targets.iter().zip(&predictions) {
-        target.add_score(prediction, &mut score)?;
-    }
+    let mut score = score(targets, &predictions, n)?;
     if let Bulk::LogPrior { log_sd, .. } = options.bulk {
         score[(0, 0)] += (log_sd * system.values[0]).powi(-2);
     }

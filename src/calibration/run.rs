@@ -32,6 +32,11 @@ fn start_in_words(start: &Material) -> String {
     format!("{count} term{} from α {exponents:?}", if count == 1 { "" } else { "s" })
 }
 
+/// The objective that a fit reached.
+fn reached(fit: &RecordingFit) -> f64 {
+    fit.history.last().copied().unwrap_or(f64::INFINITY)
+}
+
 /// What the stages of a calibration share.
 pub(super) struct Run<'a> {
     options: &'a CalibrateOptions,
@@ -102,7 +107,16 @@ impl<'a> Run<'a> {
         fit: RecordingFit,
     ) -> Result<RecordingFit, CalibrationError> {
         let sorted = with_falling_exponents(&fit.material);
-        if sorted == fit.material { Ok(fit) } else { self.fit(problem, &sorted, Some(&fit)) }
+        if sorted == fit.material {
+            return Ok(fit);
+        }
+        let mut order: Vec<usize> = (0..sorted.terms.len()).collect();
+        order.sort_by(|&a, &b| fit.material.terms[b].alpha.total_cmp(&fit.material.terms[a].alpha));
+        let predictions = fit.predictions.into_iter().map(|p| p.with_terms_in_order(&order)).collect();
+        let there = RecordingFit { material: sorted, predictions, ..fit };
+        let fit = problem.fit_from(&there, &self.fit_options, self.is_cancelled)?;
+        self.count(&there.material, &fit);
+        Ok(fit)
     }
 
     /// Notes a fit that is near its optimum only.
@@ -135,7 +149,7 @@ impl<'a> Run<'a> {
         if let Some(kind) = self.options.law {
             (self.on_stage)("a law in the first invariant");
             let starts = law_starts(problem.observed(), kind);
-            return Ok(self.best_of(problem, &starts)?.map_or((rows, fits), |(row, fit)| (vec![row], vec![fit])));
+            return Ok(self.best_of(problem, &starts, None)?.map_or((rows, fits), |(row, fit)| (vec![row], vec![fit])));
         }
         let (most, is_auto) = match self.options.terms {
             TermCount::Auto { max } => (max, true),
@@ -146,8 +160,8 @@ impl<'a> Run<'a> {
             let found = match self.again(problem, rows.len() + 1)? {
                 Some(found) => Some(found),
                 None => {
-                    let starts = self.blind_starts(problem, fits.last())?;
-                    self.best_of(problem, &starts)?
+                    let (starts, enough) = self.blind_starts(problem, fits.last())?;
+                    self.best_of(problem, &starts, enough.filter(|_| !self.options.tries_all_starts))?
                 }
             };
             let Some((row, fit)) = found else { break };
@@ -180,16 +194,19 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Starts of a first term, or of one more than the `last` fit has.
+    /// Starts of a first term, or of one more than the `last` fit has; and the objective that the likeliest of them
+    /// promises.
     fn blind_starts(
         &self,
         problem: &mut CalibrationProblem,
         last: Option<&RecordingFit>,
-    ) -> Result<Vec<Material>, CalibrationError> {
-        let Some(last) = last else { return Ok(first_starts(problem.observed())) };
+    ) -> Result<(Vec<Material>, Option<f64>), CalibrationError> {
+        // Of a first term nothing is promised: any optimum will do.
+        let Some(last) = last else { return Ok((first_starts(problem.observed()), Some(f64::INFINITY))) };
         let further = further_starts(problem, last, &self.fit_options, self.options.num_starts, self.is_cancelled)?;
         let is_promising = |(promise, _): &(f64, Material)| *promise >= self.options.least_promise;
-        Ok(further.into_iter().filter(is_promising).map(|(_, start)| start).collect())
+        let promised = further.first().map(|(promise, _)| reached(last) - promise);
+        Ok((further.into_iter().filter(is_promising).map(|(_, start)| start).collect(), promised))
     }
 
     /// Counts and tells a fit.
@@ -210,19 +227,42 @@ impl<'a> Run<'a> {
         Ok(fit)
     }
 
-    /// The best of the fits from `starts`; none where none has an equilibrium or is stable.
+    /// The same from a start of several, given up where it would not come below `to_beat`.
+    fn fit_against(
+        &mut self,
+        problem: &mut CalibrationProblem,
+        start: &Material,
+        to_beat: Option<f64>,
+    ) -> Result<RecordingFit, CalibrationError> {
+        let options = FitOptions { to_beat, ..self.fit_options };
+        let fit = problem.fit(start, None, &options, self.is_cancelled)?;
+        self.count(start, &fit);
+        Ok(fit)
+    }
+
+    /// The best of the fits from `starts`, of which none is tried after one that converged at an objective of `enough`;
+    /// none where none has an equilibrium or is stable.
     pub(super) fn best_of(
         &mut self,
         problem: &mut CalibrationProblem,
         starts: &[Material],
+        enough: Option<f64>,
     ) -> Result<Option<(TermRow, RecordingFit)>, CalibrationError> {
         let mut found: Vec<RecordingFit> = Vec::new();
         let mut failure = None;
+        // A fit that converged is one that others have to come below.
+        let mut to_beat: Option<f64> = None;
         for start in starts.iter().take(self.options.num_starts.max(1)) {
-            match self.fit(problem, start, None) {
+            if to_beat.zip(enough).is_some_and(|(best, enough)| best <= enough) {
+                break;
+            }
+            match self.fit_against(problem, start, to_beat) {
                 Ok(fit) => {
                     let visited = problem.visited_stretches(&fit)?;
                     if least_relative_stiffness(&fit.material, &visited) > 0.0 {
+                        if fit.is_converged && to_beat.is_none_or(|best| reached(&fit) < best) {
+                            to_beat = Some(reached(&fit));
+                        }
                         found.push(fit);
                     }
                 }
@@ -233,10 +273,9 @@ impl<'a> Run<'a> {
                 Err(e) => return Err(e),
             }
         }
-        let last = |f: &RecordingFit| f.history.last().copied().unwrap_or(f64::INFINITY);
-        found.sort_by(|a, b| last(a).total_cmp(&last(b)));
+        found.sort_by(|a, b| reached(a).total_cmp(&reached(b)));
         // An optimum beats a point on the way that is no better than the noise of a step.
-        let best = found.iter().position(|f| f.is_converged && last(f) < last(&found[0]) + 1.0).unwrap_or(0);
+        let best = found.iter().position(|f| f.is_converged && reached(f) < reached(&found[0]) + 1.0).unwrap_or(0);
         if found.is_empty() {
             return match failure {
                 Some(e) if starts.first().is_some_and(|s| s.terms.len() < 2) => Err(e),
@@ -244,7 +283,7 @@ impl<'a> Run<'a> {
             };
         }
         let fit = found[best].clone();
-        let num_agreeing = found.iter().filter(|f| last(f) < last(&fit) + 1.0).count();
+        let num_agreeing = found.iter().filter(|f| reached(f) < reached(&fit) + 1.0).count();
         Ok(Some((self.row(problem, &fit, starts.len(), num_agreeing)?, fit)))
     }
 

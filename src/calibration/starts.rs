@@ -1,9 +1,9 @@
 //! Where fits start: from a force by hand's formula, and new terms by what they promise to gain.
 
 use super::error::CalibrationError;
-use super::further_terms::{Group, with_further_terms};
 use super::observed::Observed;
 use super::options::{FitOptions, Held};
+use super::prediction::Prediction;
 use super::problem::CalibrationProblem;
 use super::recording_fit::RecordingFit;
 use super::system::raw_sums;
@@ -74,7 +74,9 @@ pub(super) fn law_starts(observed: &[Observed], kind: LawKind) -> Vec<Material> 
 pub(super) struct Candidates {
     old: Material,
     held: Held,
-    groups: Vec<Group>,
+    exponents: Vec<f64>,
+    /// With derivatives by the moduli of further terms of these exponents.
+    predictions: Vec<Prediction>,
 }
 
 impl Candidates {
@@ -92,8 +94,8 @@ impl Candidates {
         let gap = 1.1 * options.min_alpha_gap;
         let exponents: Vec<f64> =
             NEXT_EXPONENTS.into_iter().filter(|a| old.terms.iter().all(|t| (t.alpha - a).abs() > gap)).collect();
-        let groups = with_further_terms(problem, fit, &exponents, options, is_cancelled)?;
-        Ok(Candidates { old: old.clone(), held: fit.held, groups })
+        let predictions = problem.with_further_terms(fit, &exponents, is_cancelled)?;
+        Ok(Candidates { old: old.clone(), held: fit.held, exponents, predictions })
     }
 
     /// The fit's material with one term more, in the order of the decrease of the objective that the new term promises:
@@ -104,36 +106,34 @@ impl Candidates {
         let num_old = 2 * old.terms.len() + 1;
         let shear = old.initial_shear_modulus_kpa();
         let mut candidates: Vec<(f64, Material)> = Vec::new();
-        for (chunk, predictions) in &self.groups {
-            let (matrix, gradient) = raw_sums(predictions, targets);
-            let free: Vec<usize> = (0..num_old).filter(|&i| !self.held.contains(i)).collect();
-            let inner = matrix.select_rows(&free).select_columns(&free);
-            // Relative parameters: a unit diagonal, and a ridge for directions without information.
-            let root: Vec<f64> = free.iter().map(|&i| matrix[(i, i)].sqrt().max(f64::MIN_POSITIVE)).collect();
-            let scaled = inner.map_with_location(|a, b, x| x / (root[a] * root[b]) + if a == b { 1e-9 } else { 0.0 });
-            let Some(factor) = scaled.cholesky() else { continue };
-            for (n, &alpha) in chunk.iter().enumerate() {
-                let at = num_old + 2 * n;
-                let coupling =
-                    DVector::from_iterator(free.len(), free.iter().zip(&root).map(|(&i, r)| matrix[(i, at)] / r));
-                let rest = DVector::from_iterator(free.len(), free.iter().zip(&root).map(|(&i, r)| gradient[i] / r));
-                let solved = factor.solve(&coupling);
-                let slope = gradient[at] - solved.dot(&rest);
-                let curvature = matrix[(at, at)] - solved.dot(&coupling);
-                if !(curvature > 0.0) {
-                    continue;
-                }
-                let best = slope / curvature;
-                let is_stable = best * alpha > 0.0;
-                let gain = if is_stable { slope * slope / curvature } else { 0.0 };
-                let share = (0.5 * best * alpha / shear).abs().clamp(FIRST_SHARE[0], FIRST_SHARE[1]);
-                let mut start = old.clone();
-                for term in &mut start.terms {
-                    term.mu_kpa *= 1.0 - share;
-                }
-                start.terms.push(OgdenTerm { mu_kpa: 2.0 * share * shear / alpha, alpha });
-                candidates.push((gain, start));
+        let (matrix, gradient) = raw_sums(&self.predictions, targets);
+        let free: Vec<usize> = (0..num_old).filter(|&i| !self.held.contains(i)).collect();
+        let inner = matrix.select_rows(&free).select_columns(&free);
+        // Relative parameters: a unit diagonal, and a ridge for directions without information.
+        let root: Vec<f64> = free.iter().map(|&i| matrix[(i, i)].sqrt().max(f64::MIN_POSITIVE)).collect();
+        let scaled = inner.map_with_location(|a, b, x| x / (root[a] * root[b]) + if a == b { 1e-9 } else { 0.0 });
+        let Some(factor) = scaled.cholesky() else { return Vec::new() };
+        let rest = DVector::from_iterator(free.len(), free.iter().zip(&root).map(|(&i, r)| gradient[i] / r));
+        for (n, &alpha) in self.exponents.iter().enumerate() {
+            let at = num_old + n;
+            let coupling =
+                DVector::from_iterator(free.len(), free.iter().zip(&root).map(|(&i, r)| matrix[(i, at)] / r));
+            let solved = factor.solve(&coupling);
+            let slope = gradient[at] - solved.dot(&rest);
+            let curvature = matrix[(at, at)] - solved.dot(&coupling);
+            if !(curvature > 0.0) {
+                continue;
             }
+            let best = slope / curvature;
+            let is_stable = best * alpha > 0.0;
+            let gain = if is_stable { slope * slope / curvature } else { 0.0 };
+            let share = (0.5 * best * alpha / shear).abs().clamp(FIRST_SHARE[0], FIRST_SHARE[1]);
+            let mut start = old.clone();
+            for term in &mut start.terms {
+                term.mu_kpa *= 1.0 - share;
+            }
+            start.terms.push(OgdenTerm { mu_kpa: 2.0 * share * shear / alpha, alpha });
+            candidates.push((gain, start));
         }
         candidates.sort_by(|a, b| b.0.total_cmp(&a.0));
         // Neighbouring exponents lead to the same optimum: spread the starts.

@@ -23,7 +23,7 @@ const NUM_STATES: usize = 256;
 const RULES: Rules = Rules {
     shortening: Shortening::Halved { num_lengths: 6 },
     tolerated_rise: 0.0,
-    stop: Stop { max_trials: usize::MAX, max_steps: 20, least_relative_gain: Some(1e-6) },
+    stop: Stop { max_steps: 20, least_relative_gain: Some(1e-6), ..Stop::NEVER },
 };
 /// Beyond this many times the length of the linear step (ln |μ|, relative α) the linear step is taken: the promise is
 /// then met, if at all, by quite another material.

@@ -10,7 +10,6 @@
 
 use super::descend::DAMPING;
 use super::error::CalibrationError;
-use super::further_terms::with_further_terms;
 use super::options::{Bulk, FitOptions};
 use super::problem::CalibrationProblem;
 use super::recording_fit::RecordingFit;
@@ -73,20 +72,7 @@ impl StressResponse {
         let material = &fit.material;
         let num_old = material.parameters().len();
         let path = problem.stress_path(material, &fit.predictions);
-        let groups = with_further_terms(problem, fit, &EXPONENTS, options, is_cancelled)?;
-        let mut all = fit.predictions.clone();
-        for (exponents, predictions) in groups {
-            for (prediction, further) in all.iter_mut().zip(predictions) {
-                // κ, μ₁, α₁, … and then every further term's μ and α, of which the α has no effect yet.
-                let moduli = |n: usize| num_old + 2 * n;
-                for (own, theirs) in prediction.sensitivities.iter_mut().zip(further.sensitivities) {
-                    own.extend(theirs.into_iter().skip(num_old).step_by(2));
-                }
-                for (own, theirs) in prediction.force_sensitivities.iter_mut().zip(&further.force_sensitivities) {
-                    own.extend((0..exponents.len()).map(|n| theirs[moduli(n)]));
-                }
-            }
-        }
+        let all = problem.with_further_terms(fit, &EXPONENTS, is_cancelled)?;
         let targets = problem.targets()?;
         let plain = NormalSystem::new(&fit.predictions, &targets, Bulk::Free, options.held)?;
         let (mut curvature, mut slope) = raw_sums(&all, &targets);

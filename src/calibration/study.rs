@@ -272,7 +272,7 @@ fn one_draw(
     let starts = reference.candidates.ranked(&problem.targets()?, case.options.num_starts);
     let starts: Vec<Material> =
         starts.into_iter().filter(|(promise, _)| *promise >= case.options.least_promise).map(|(_, s)| s).collect();
-    if let Some((row, _)) = run.best_of(problem, &starts)? {
+    if let Some((row, _)) = run.best_of(problem, &starts, None)? {
         rows.push(row);
     }
     compare(&mut rows, fits[0].num_data);

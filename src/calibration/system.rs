@@ -7,6 +7,7 @@
 //! short. With the residuals r and their derivatives the gradient is g = −½ ∂χ²/∂s and the matrix is H = ½ ∂²χ²/∂s²
 //! without the second derivatives of the model.
 
+use super::all_forces::AllForces;
 use super::error::CalibrationError;
 use super::options::{Bulk, Held};
 use super::prediction::{HELD_LOG_SD, Prediction};
@@ -51,10 +52,7 @@ impl NormalSystem {
         let parameters = material.parameters();
         let n = parameters.len();
         let values: Vec<f64> = parameters.iter().map(|p| material.value(*p)).collect();
-        let mut sums = Sums { matrix: DMatrix::zeros(n, n), gradient: DVector::zeros(n), ..Sums::default() };
-        for (prediction, target) in predictions.iter().zip(targets) {
-            sums.add(prediction, target);
-        }
+        let sums = Sums::of(predictions, targets, n);
         let mut information = FisherInformation::from_matrix(material, sums.matrix.clone())?;
         match bulk {
             Bulk::Free => {}
@@ -119,10 +117,7 @@ pub(super) fn scales_of(material: &Material) -> Vec<f64> {
 /// own unit, for parameters that may be zero.
 pub(super) fn raw_sums(predictions: &[Prediction], targets: &[Target]) -> (DMatrix<f64>, DVector<f64>) {
     let n = predictions.first().and_then(|p| p.sensitivities.first()).map_or(0, Vec::len);
-    let mut sums = Sums { matrix: DMatrix::zeros(n, n), gradient: DVector::zeros(n), ..Sums::default() };
-    for (prediction, target) in predictions.iter().zip(targets) {
-        sums.add(prediction, target);
-    }
+    let sums = Sums::of(predictions, targets, n);
     (sums.matrix, sums.gradient)
 }
 
@@ -139,7 +134,17 @@ struct Sums {
 }
 
 impl Sums {
-    fn add(&mut self, prediction: &Prediction, target: &Target) {
+    /// Over everything that is compared, by `num` parameters.
+    fn of(predictions: &[Prediction], targets: &[Target], num: usize) -> Sums {
+        let mut sums = Sums { matrix: DMatrix::zeros(num, num), gradient: DVector::zeros(num), ..Sums::default() };
+        for (prediction, target) in predictions.iter().zip(targets) {
+            sums.add_displacements(prediction, target);
+        }
+        sums.add_forces(predictions, &AllForces::of(targets));
+        sums
+    }
+
+    fn add_displacements(&mut self, prediction: &Prediction, target: &Target) {
         let n = self.gradient.len();
         for (d, step) in target.steps.iter().enumerate() {
             let fields = &prediction.sensitivities[d];
@@ -177,13 +182,16 @@ impl Sums {
                 self.matrix[(j, i)] = self.matrix[(i, j)];
             }
         }
-        let (misfits, slopes) = (target.force_misfits(&prediction.forces_n), target.force_slopes(prediction, n));
-        let weights = target.force_weights();
+    }
+
+    fn add_forces(&mut self, predictions: &[Prediction], forces: &AllForces) {
+        let (misfits, slopes) = (forces.misfits_of(predictions), forces.slopes(predictions, self.gradient.len()));
+        let weights = forces.weights();
         let weighed = &weights * &misfits;
         self.chi2 += misfits.dot(&weighed);
         self.gradient += slopes.transpose() * weighed;
         self.matrix += slopes.transpose() * weights * &slopes;
-        for ((_, force), misfit) in target.forces().zip(&misfits) {
+        for (force, misfit) in forces.forces().iter().zip(&misfits) {
             self.loss_f += (misfit / force.value_n).powi(2);
             self.num_forces += 1;
         }

@@ -1,17 +1,18 @@
 //! What a fit compares with: measured values, their weights in the objective, and the noise that they carry.
 //!
 //! The objective is Σ_drives [ Σ_voxels Σ_c p_c (u_c − ū_c)² + p_F (F − F_model)² ]. With p = 1/σ² it is χ²; what is
-//! unknown of the load cell then couples the forces (see [`super::force_readings`]). With other p (the paper's
+//! unknown of the load cell then couples the forces (see [`super::all_forces`]). With other p (the paper's
 //! ℓ_u + βℓ_F, or values that share their noise with their neighbours) the covariance of the estimate is a sandwich of
 //! the objective's curvature and the noise's true covariance.
 
+use super::all_forces::AllForces;
 use super::error::CalibrationError;
 use super::force_readings::{ForceOnTheWay, LoadCell};
 use super::observed::{Observed, View};
 use super::prediction::Prediction;
 use super::synthetic::Measurement;
 use crate::sensitivity::ScanSettings;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 /// What a fit minimises.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -48,6 +49,24 @@ pub(super) struct TargetStep<'a> {
     /// has no bound, as of what is not measured, so that its products with a weight of zero are numbers.
     noise_mm2: Vec<[f64; 3]>,
     pub(super) force: Option<TargetForce>,
+}
+
+/// Covariance of the objective's half gradient by the `num` parameters, in their units, under the noise of `targets`.
+///
+/// # Errors
+/// [`CalibrationError::Voxel`]: a filter does not fit the voxels.
+pub(super) fn score(
+    targets: &[Target],
+    predictions: &[Prediction],
+    num: usize,
+) -> Result<DMatrix<f64>, CalibrationError> {
+    let forces = AllForces::of(targets);
+    let weighed = forces.weights() * forces.slopes(predictions, num);
+    let mut score = weighed.transpose() * forces.covariance() * &weighed;
+    for (target, prediction) in targets.iter().zip(predictions) {
+        target.add_score(prediction, &mut score)?;
+    }
+    Ok(score)
 }
 
 /// Whether any component counts.
@@ -91,9 +110,9 @@ impl<'a> TargetStep<'a> {
 pub(super) struct Target<'a> {
     /// Those of the scans, then those at which the force alone was read.
     pub(super) steps: Vec<TargetStep<'a>>,
-    load_cell: LoadCell,
+    pub(super) load_cell: LoadCell,
     /// Whether the weights of the forces are the inverse of their covariance.
-    is_weighed_by_noise: bool,
+    pub(super) is_weighed_by_noise: bool,
     /// Of filtered data.
     view: Option<&'a View>,
 }
@@ -207,36 +226,6 @@ impl<'a> Target<'a> {
         self.steps.iter().enumerate().filter_map(|(d, step)| Some((d, step.force?)))
     }
 
-    fn values_and_sds(&self) -> (Vec<f64>, Vec<f64>) {
-        self.forces().map(|(_, f)| (f.value_n, f.sd_n)).unzip()
-    }
-
-    /// Weights of the products of the forces' misfits in the objective, N⁻².
-    pub(super) fn force_weights(&self) -> DMatrix<f64> {
-        if self.is_weighed_by_noise && self.load_cell != LoadCell::default() {
-            let (values, sds) = self.values_and_sds();
-            return self.load_cell.precision(&values, &sds);
-        }
-        DMatrix::from_diagonal(&DVector::from_vec(self.forces().map(|(_, f)| f.weight).collect()))
-    }
-
-    /// Covariance of the forces, N².
-    fn force_covariance(&self) -> DMatrix<f64> {
-        let (values, sds) = self.values_and_sds();
-        self.load_cell.covariance(&values, &sds)
-    }
-
-    /// Derivatives of the forces (rows) by the `num` parameters, N per unit.
-    pub(super) fn force_slopes(&self, prediction: &Prediction, num: usize) -> DMatrix<f64> {
-        let rows: Vec<usize> = self.forces().map(|(d, _)| d).collect();
-        DMatrix::from_fn(rows.len(), num, |row, i| prediction.force_sensitivities[rows[row]][i])
-    }
-
-    /// Misfits of the forces, N: measured minus those predicted, `forces_n` of every step.
-    pub(super) fn force_misfits(&self, forces_n: &[f64]) -> DVector<f64> {
-        DVector::from_vec(self.forces().map(|(d, f)| f.value_n - forces_n[d]).collect())
-    }
-
     /// Expected objective of pure noise, and the number of data.
     pub(super) fn expectation(&self) -> (f64, usize) {
         let averaged = self.view.map(View::num_averaged);
@@ -258,12 +247,9 @@ impl<'a> Target<'a> {
         (sum, count)
     }
 
-    /// Adds the covariance of the objective's half gradient under the noise, in the parameters' units.
-    pub(super) fn add_score(&self, prediction: &Prediction, score: &mut DMatrix<f64>) -> Result<(), CalibrationError> {
+    /// Adds what the displacements' noise gives the covariance of the objective's half gradient.
+    fn add_score(&self, prediction: &Prediction, score: &mut DMatrix<f64>) -> Result<(), CalibrationError> {
         let n = score.nrows();
-        let forces = self.force_slopes(prediction, n);
-        let weighed = self.force_weights() * &forces;
-        *score += weighed.transpose() * self.force_covariance() * &weighed;
         for (step, (fields, _)) in self.steps.iter().zip(prediction.derivatives()).filter(|(s, _)| s.is_scanned()) {
             // What a change of each value by the standard deviation of its noise adds to the half gradient; missing
             // voxels have no weight, and what stands there must not enter a product.

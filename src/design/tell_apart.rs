@@ -15,7 +15,7 @@ use nalgebra::DVector;
 const RULES: Rules = Rules {
     shortening: Shortening::Halved { num_lengths: 5 },
     tolerated_rise: 0.0,
-    stop: Stop { max_trials: usize::MAX, max_steps: 10, least_relative_gain: None },
+    stop: Stop { max_steps: 10, ..Stop::NEVER },
 };
 /// Converged where a step gains less than this part of the squared distance…
 const GAIN: f64 = 1e-5;

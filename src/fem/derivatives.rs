@@ -15,8 +15,12 @@ use super::change::{ACCURACY, Change, ChangeSensitivity};
 use super::error::{SolveError, StepFailure};
 use super::rates::Rates;
 use super::tangent::Tangent;
-use crate::material::Parameter;
+use crate::material::{MAX_TERMS, Material, OgdenTerm, Parameter};
 use crate::mesh::Mesh;
+
+/// A term of this part of the shear modulus is not there yet; its derivatives exist. Not even at singular edges, where
+/// powers of large exponents are 10¹⁰, it is anything.
+const NO_MODULUS: f64 = 1e-30;
 
 /// Derivative of an equilibrium with respect to one material parameter.
 #[derive(Clone, Debug)]
@@ -57,30 +61,60 @@ impl Tangent<'_> {
     /// # Errors
     /// [`SolveError::Linear`] if the tangent is not positive definite.
     pub fn material_sensitivities(&mut self) -> Result<Vec<ParameterSensitivity>, SolveError> {
-        let assembler = self.assembler.clone();
         let parameters = self.material.parameters();
+        let found = self.sensitivities_by(self.material, &parameters)?;
+        let named = parameters.into_iter().zip(found);
+        Ok(named
+            .map(|(parameter, s)| ParameterSensitivity { parameter, displacement: s.displacement, force_n: s.force_n })
+            .collect())
+    }
+
+    /// ∂u/∂μ and ∂F/∂μ, per kPa, of Ogden terms of `exponents` that the material does not have: what they would change.
+    ///
+    /// # Errors
+    /// [`SolveError::TooManyTerms`] where the material has room for none; as [`Self::material_sensitivities`].
+    pub fn further_term_sensitivities(&mut self, exponents: &[f64]) -> Result<Vec<ChangeSensitivity>, SolveError> {
+        let num_own = self.material.terms.len();
+        if num_own >= MAX_TERMS {
+            return Err(SolveError::TooManyTerms { num_terms: num_own + 1, limit: MAX_TERMS });
+        }
+        let mu_kpa = NO_MODULUS * self.material.initial_shear_modulus_kpa();
+        let mut all = Vec::with_capacity(exponents.len());
+        for chunk in exponents.chunks(MAX_TERMS - num_own) {
+            let mut wide = self.material.clone();
+            wide.terms.extend(chunk.iter().map(|&alpha| OgdenTerm { mu_kpa, alpha }));
+            let moduli: Vec<Parameter> = (num_own..wide.terms.len()).map(Parameter::Mu).collect();
+            all.extend(self.sensitivities_by(&wide, &moduli)?);
+        }
+        Ok(all)
+    }
+
+    /// Those by some parameters of `material`, with which this is an equilibrium too.
+    fn sensitivities_by(
+        &mut self,
+        material: &Material,
+        parameters: &[Parameter],
+    ) -> Result<Vec<ChangeSensitivity>, SolveError> {
+        let assembler = self.assembler.clone();
         let rates_of = |displacement| {
             move |&parameter: &Parameter| Rates { parameter: Some(parameter), displacement, ..Rates::default() }
         };
         let rates: Vec<Rates> = parameters.iter().map(rates_of(None)).collect();
-        let derivatives =
-            assembler.assemble_rates(&self.configuration(), &rates, None).map_err(|cause| self.diverged(cause))?;
+        let at = Configuration { material, ..self.configuration() };
+        let derivatives = assembler.assemble_rates(&at, &rates, None).map_err(|cause| self.diverged(cause))?;
         let right: Vec<Vec<f64>> = derivatives.iter().map(|d| assembler.collect(d, -1.0)).collect();
         let displacements: Vec<Vec<[f64; 3]>> =
             self.solve_all(&right, ACCURACY)?.iter().map(|x| assembler.spread(x)).collect();
         let rates: Vec<Rates> =
             parameters.iter().zip(&displacements).map(|(parameter, u)| rates_of(Some(u))(parameter)).collect();
         let driven = Some(&assembler.plates().driven_elements[..]);
-        let forces =
-            assembler.assemble_rates(&self.configuration(), &rates, driven).map_err(|cause| self.diverged(cause))?;
-        let found = parameters.into_iter().zip(displacements).zip(&forces);
-        Ok(found
-            .map(|((parameter, displacement), f)| ParameterSensitivity {
-                parameter,
-                displacement,
-                force_n: assembler.forces_n(assembler.reaction(f))[0],
-            })
-            .collect())
+        let at = Configuration { material, ..self.configuration() };
+        let forces = assembler.assemble_rates(&at, &rates, driven).map_err(|cause| self.diverged(cause))?;
+        let of_parameter = |(displacement, residual): (Vec<[f64; 3]>, &Vec<[f64; 3]>)| {
+            let [force_n, normal_force_n] = assembler.forces_n(assembler.reaction(residual));
+            ChangeSensitivity { displacement, force_n, normal_force_n }
+        };
+        Ok(displacements.into_iter().zip(&forces).map(of_parameter).collect())
     }
 
     /// Derivatives along t ↦ (node positions X + t `velocity`, drive + t `drive_rate`) at t = 0; `sensitivities` are

@@ -106,6 +106,11 @@ impl ForwardModel {
         }
     }
 
+    /// The same model with nothing solved, which shares what [`Self::departed`] shares.
+    pub fn another(&self) -> ForwardModel {
+        self.departed(self.departures())
+    }
+
     /// A model of the same elements and released nodes with the nodes at other positions (mm), which departs in
     /// nothing. Elimination order and symbolic factorisation are shared.
     ///

@@ -43,6 +43,8 @@ mod linear;
 mod linearisation;
 mod mesh_model;
 mod minimum_degree;
+#[cfg(feature = "calibration")]
+mod model_pool;
 mod multifrontal;
 #[cfg(feature = "metis")]
 mod nested_dissection;
@@ -80,6 +82,8 @@ pub use error::{LinearError, PrepareError, SolveError, StepFailure};
 pub use fields::QuadraturePoint;
 pub use forward_model::ForwardModel;
 pub use law_correction::LawCorrection;
+#[cfg(feature = "calibration")]
+pub use model_pool::ModelPool;
 pub use nesting::Nesting;
 pub use options::{SolveOptions, Statistics};
 pub use path_end::{EndCause, PathEnd, Way};

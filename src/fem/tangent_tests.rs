@@ -1,7 +1,7 @@
 //! A tangent is a value: what its model or a model beside it solves meanwhile does not change it.
 
 use super::*;
-use crate::material::Material;
+use crate::material::{MAX_TERMS, Material, OgdenTerm};
 use crate::mesh::{MeshOptions, mesh_specimen};
 use crate::specimen::Specimen;
 
@@ -113,4 +113,31 @@ fn departed_and_nominal_models_do_not_disturb_each_other() {
     assert_eq!(found[0], alone(&Departures::default()));
     assert_eq!(found[1], alone(&departures));
     assert_ne!(found[0], found[1]);
+}
+
+/// What a further term would change is told without it: the same as the derivative by its modulus where it is there,
+/// but hardly. More exponents than a material has room for are told in turns.
+#[test]
+fn further_terms_are_told_before_they_are_there() {
+    let (mut model, material) = model();
+    let state = solve(&mut model, &material, 4.0);
+    let exponents = [-9.0, -4.0, 1.0, 3.0, 6.0, 12.0];
+    let told = model.tangent(&material, &state).unwrap().further_term_sensitivities(&exponents).unwrap();
+    assert_eq!(told.len(), exponents.len());
+    for (told, alpha) in told.iter().zip(exponents) {
+        let mut with_term = material.clone();
+        with_term.terms.push(OgdenTerm { mu_kpa: 1e-9, alpha });
+        let found = model.tangent(&with_term, &state).unwrap().material_sensitivities().unwrap();
+        let found = &found[found.len() - 2];
+        let largest = told.displacement.iter().flatten().fold(0.0f64, |s, x| s.max(x.abs()));
+        let apart = told.displacement.iter().flatten().zip(found.displacement.iter().flatten());
+        let apart = apart.fold(0.0f64, |s, (a, b)| s.max((a - b).abs()));
+        // Derivatives are solved to 10⁻⁸.
+        assert!(largest > 0.0 && apart < 1e-6 * largest, "{alpha}: {apart} {largest}");
+        assert!((told.force_n - found.force_n).abs() < 1e-6 * found.force_n.abs(), "{alpha}");
+    }
+    let mut full = material.clone();
+    full.terms.resize(MAX_TERMS, material.terms[0]);
+    let refused = model.tangent(&full, &state).unwrap().further_term_sensitivities(&exponents);
+    assert!(matches!(refused, Err(SolveError::TooManyTerms { .. })));
 }

@@ -3,20 +3,24 @@
 //! Without it the coarse mesh's own error would count as a misfit of the law, and would shift the estimates by more
 //! than the noise does: those of a block of 12 × 4 × 9 mm, sheared by 4 or 5 mm, by 1.7 to 2.6 standard deviations of
 //! one scan. Exponents are told by singular edges, where errors fall slowly: a mesh of half the size leaves 0.6 to 0.9
-//! of these, one of a third 0.3 to 0.4. Extrapolated with the order of such edges at most 0.2 are left. Of two fifths
-//! of the size is what an answer in seconds has time for.
+//! of these, one of a third 0.3 to 0.4. Extrapolated with the order of such edges at most 0.2 are left. Of three tenths
+//! of the size, and of two fifths where specimens are large or drives are many, is what an answer in seconds has time
+//! for.
 
 use super::error::NextError;
 use super::error_left::ErrorLeft;
 use crate::calibration::{CalibrationProblem, Observed, RecordingFit, SD_OVER_SHIFT};
-use crate::fem::{Equilibrium, ForwardModel, Nesting, SolveOptions, side_by_side};
+use crate::fem::{Equilibrium, ForwardModel, ModelPool, Nesting, SolveError, SolveOptions, side_by_side};
 use crate::material::Material;
 use crate::mesh::{MeshOptions, error_over_difference, sd_over_extrapolated};
 use crate::specimen::Specimen;
 
-/// Element size of the finer mesh as a factor on that of the fit, and the smallest as a factor on the standard one:
-/// finer meshes take longer than an answer may.
-const FINER: f64 = 0.4;
+/// The smallest and the largest element size of finer meshes as a factor on that of the fit.
+const FINER: [f64; 2] = [0.3, 0.4];
+/// Elements that finer meshes have together, those of one counted for each of its drives, unless one of the two sizes
+/// says otherwise: with more an answer takes longer than it may.
+const NUM_ELEMENTS: f64 = 7500.0;
+/// The smallest element size as a factor on the standard one.
 const FINEST: f64 = 0.6;
 /// Of a finer mesh whose element size is closer to ours than this factor the difference would be multiplied by more
 /// than 2.5: nothing is taken off.
@@ -37,10 +41,22 @@ impl<'a> FinerMeshes<'a> {
     /// # Errors
     /// [`NextError`] where a specimen cannot be meshed so.
     pub(super) fn new(observed: &'a [Observed], mesh_factor: f64) -> Result<FinerMeshes<'a>, NextError> {
-        let ratio = FINER.max(FINEST / mesh_factor);
-        let finer = |o: &Observed| Finer::new(&o.specimen, [mesh_factor, ratio * mesh_factor]);
-        let to_mesh = if ratio > HARDLY_FINER { Vec::new() } else { observed.iter().collect() };
-        let meshes = side_by_side(to_mesh, finer).into_iter().collect::<Result<_, _>>()?;
+        let mesh = |(o, factor): (&Observed, f64)| {
+            ForwardModel::of_specimen(&o.specimen, &MeshOptions::scaled(&o.specimen, factor))
+        };
+        let mesh_all = |factor: f64| -> Result<Vec<ForwardModel>, NextError> {
+            let models = side_by_side(observed.iter().map(|o| (o, factor)).collect(), mesh);
+            Ok(models.into_iter().collect::<Result<_, _>>()?)
+        };
+        let coarse = mesh_all(mesh_factor)?;
+        let elements = |(o, m): (&Observed, &ForwardModel)| o.all_drives_mm().len() * m.mesh().num_elements();
+        let num_elements: usize = observed.iter().zip(&coarse).map(elements).sum();
+        let ratio = ratio_of(num_elements).max(FINEST / mesh_factor);
+        if ratio > HARDLY_FINER {
+            return Ok(FinerMeshes { observed, ratio, meshes: Vec::new() });
+        }
+        let fine = mesh_all(ratio * mesh_factor)?;
+        let meshes = coarse.into_iter().zip(fine).map(|(coarse, fine)| Finer::new(coarse, fine)).collect();
         Ok(FinerMeshes { observed, ratio, meshes })
     }
 
@@ -57,7 +73,7 @@ impl<'a> FinerMeshes<'a> {
         let mut corrected = self.observed.to_vec();
         let pairs = corrected.iter_mut().zip(&mut self.meshes).enumerate();
         let taken_off = side_by_side(pairs.collect(), |(r, (recording, finer))| -> Result<(), NextError> {
-            let view = recording.view(&recording.specimen, finer.fine.mesh())?;
+            let view = recording.view(&recording.specimen, finer.fine.own().mesh())?;
             let states = finer.states(&fit.material, &recording.all_drives_mm(), fit.states(r), is_cancelled)?;
             for (s, (step, [_, fine])) in recording.steps.iter_mut().zip(states).enumerate() {
                 let fine = view.average(&fine.displacement)?;
@@ -124,10 +140,16 @@ impl<'a> FinerMeshes<'a> {
     }
 }
 
+/// Element size of the finer meshes as a factor on that of coarse ones of so many elements, counted for each drive:
+/// they have as many elements as an answer has time for.
+fn ratio_of(num_elements: usize) -> f64 {
+    (num_elements as f64 / NUM_ELEMENTS).cbrt().clamp(FINER[0], FINER[1])
+}
+
 /// A finer mesh of a specimen beside that of the fit.
 struct Finer {
     coarse: ForwardModel,
-    fine: ForwardModel,
+    fine: ModelPool,
     /// How the fine mesh lies in the coarse one; `None` where it does not.
     nesting: Option<Nesting>,
     /// Equilibria of the drives, last found on the two meshes.
@@ -135,17 +157,15 @@ struct Finer {
 }
 
 impl Finer {
-    /// With element sizes of the fit's mesh and of the finer one, as factors on the standard one.
-    fn new(specimen: &Specimen, mesh_factors: [f64; 2]) -> Result<Finer, NextError> {
-        let model = |factor: f64| ForwardModel::of_specimen(specimen, &MeshOptions::scaled(specimen, factor));
-        let (coarse, fine) = (model(mesh_factors[0])?, model(mesh_factors[1])?);
+    /// On the fit's mesh and on the finer one.
+    fn new(coarse: ForwardModel, fine: ForwardModel) -> Finer {
         let nesting = Nesting::located(coarse.mesh(), fine.mesh());
-        Ok(Finer { coarse, fine, nesting, known: Vec::new() })
+        Finer { coarse, fine: ModelPool::new(fine), nesting, known: Vec::new() }
     }
 
     /// The equilibria at `drives_mm` on the two meshes, those of the fit's mesh as far as they are `known`; those of
     /// the finer one from there, with what that mesh got wrong the last time taken off; where that leads to none, from
-    /// the last drive's.
+    /// rest.
     fn states(
         &mut self,
         material: &Material,
@@ -154,27 +174,30 @@ impl Finer {
         is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<&[[Equilibrium; 2]], NextError> {
         let options = SolveOptions::trial();
-        let mut found: Vec<[Equilibrium; 2]> = Vec::new();
+        let mut coarse: Vec<Equilibrium> = Vec::new();
         for (d, &drive_mm) in drives_mm.iter().enumerate() {
-            let last = |mesh: usize| found.last().map(|both| &both[mesh]);
-            let coarse = match known.get(d) {
+            let state = match known.get(d) {
                 Some(state) => state.clone(),
                 None => {
-                    let near = self.known.get(d).map(|both| &both[0]).or(last(0));
+                    let near = self.known.get(d).map(|both| &both[0]).or(coarse.last());
                     self.coarse.solve(material, drive_mm, near, &options, is_cancelled)?
                 }
             };
-            let near = self.nesting.as_ref().and_then(|nesting| {
-                let known = self.known.get(d).map(|[coarse, fine]| [coarse, fine]);
-                let start = self.fine.start_from(&self.coarse, nesting, material, &coarse, known);
-                self.fine.solve(material, drive_mm, Some(&start), &options, is_cancelled).ok()
-            });
-            let fine = match near {
-                Some(near) => near,
-                None => self.fine.solve(material, drive_mm, last(1), &options, is_cancelled)?,
-            };
-            found.push([coarse, fine]);
+            coarse.push(state);
         }
+        let Finer { coarse: coarse_model, fine, nesting, known } = &*self;
+        let solved = side_by_side(coarse.into_iter().enumerate().collect(), |(d, coarse): (usize, Equilibrium)| {
+            let start = nesting.as_ref().map(|nesting| {
+                let known = known.get(d).map(|[coarse, fine]| [coarse, fine]);
+                fine.own().start_from(coarse_model, nesting, material, &coarse, known)
+            });
+            fine.with(|model| {
+                let mut solve = |start| model.solve(material, drives_mm[d], start, &options, is_cancelled);
+                let near = start.as_ref().and_then(|start| solve(Some(start)).ok());
+                Ok([coarse, near.map_or_else(|| solve(None), Ok)?])
+            })
+        });
+        let found = solved.into_iter().collect::<Result<_, SolveError>>()?;
         self.known = found;
         Ok(&self.known)
     }
@@ -244,6 +267,16 @@ mod tests {
         let corrected = FinerMeshes::new(&observed, COARSE).unwrap().without_mesh_error(&coarse, &|| false).unwrap();
         let [before, after] = [&coarse, &fit(&mut problem(&corrected))].map(missed_by);
         assert!(before > 1.0 && after < before / 3.0, "{before} {after}");
+    }
+
+    /// Finer meshes are the finer the fewer elements there are, within the two limits.
+    #[test]
+    fn few_elements_are_made_finer() {
+        assert_eq!([ratio_of(1), ratio_of(10_000_000)], FINER);
+        let between = ratio_of(320);
+        assert!(
+            between > FINER[0] && between < FINER[1] && (320.0 / between.powi(3) / NUM_ELEMENTS - 1.0).abs() < 1e-9
+        );
     }
 
     /// The force that was read on the way is corrected as that of the scan is, though the fit that tells the error

@@ -19,7 +19,7 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 /// Most terms where BIC chooses.
 const MAX_TERMS: usize = 3;
-/// Blind starts of every number of terms.
+/// Most blind starts of every number of terms.
 const NUM_STARTS: usize = 2;
 /// Most iterations of a fit that only tells the mesh's error, and most rounds of these and fits.
 const FIRST_ITERATIONS: usize = 20;
@@ -179,6 +179,7 @@ fn fit_together<'a>(
         let settings = CalibrateOptions {
             terms,
             num_starts: NUM_STARTS,
+            tries_all_starts: false,
             fit: FitOptions { max_iterations: iterations, ..FitOptions::default() },
             least_promise: match terms {
                 // Two parameters at ln n each.

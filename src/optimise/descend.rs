@@ -70,6 +70,8 @@ pub enum End {
     Stuck,
     /// The trials or steps ran out.
     RanOut,
+    /// It would not come below what is within reach from elsewhere ([`super::Stop::to_beat`]).
+    Behind,
 }
 
 /// Where a descent ended.
@@ -109,11 +111,18 @@ pub fn descend<P: LeastSquares>(
     let mut length = Length { damping, part: 1.0, num_tried: 0 };
     let (mut at, mut linear) = (start, linear);
     let mut history = vec![problem.objective(&at)];
+    let mut by_trial = history.clone();
     let mut num_trials = 0;
     let mut known_step: Option<Step> = None;
     let end = loop {
         if num_trials >= rules.stop.max_trials || history.len() > rules.stop.max_steps {
             break End::RanOut;
+        }
+        if rules.stop.is_at_rest(&history) {
+            break End::Stuck;
+        }
+        if rules.stop.is_behind(&by_trial) {
+            break End::Behind;
         }
         let step = match known_step.take() {
             Some(step) => step,
@@ -135,6 +144,7 @@ pub fn descend<P: LeastSquares>(
             (at, linear) = next;
             history.push(problem.objective(&at));
         }
+        by_trial.push(problem.objective(&at));
         let gain = value.map(|v| present - v);
         if has_moved && is_little(gain, present, rules.stop.least_relative_gain) {
             break End::Converged;
@@ -293,5 +303,60 @@ mod tests {
             let (found, _) = run(3.0, f64::NEG_INFINITY, shortening, stop);
             assert_eq!((found.end, found.history.len()), (End::Converged, 2));
         }
+    }
+
+    /// A descent that crawls is given up where it would not come below what is known from elsewhere; one that may is
+    /// not.
+    #[test]
+    fn what_is_left_behind_is_given_up() {
+        let stop = |to_beat| Stop { to_beat: Some(to_beat), ..Stop::after_trials(30) };
+        // From −5 the first steps are all too long: only the damping makes them short, by and by.
+        let (free, _) = run(-5.0, f64::NEG_INFINITY, damped(), Stop::after_trials(30));
+        assert_eq!(free.end, End::Converged);
+        let (found, _) = run(-5.0, f64::NEG_INFINITY, damped(), stop(-1.0));
+        assert!(found.end == End::Behind && found.num_trials < free.num_trials, "{:?} {}", found.end, found.num_trials);
+        let (found, _) = run(-5.0, f64::NEG_INFINITY, damped(), stop(10.0));
+        assert_eq!((found.end, found.num_trials), (End::Converged, free.num_trials));
+    }
+
+    /// r² = x² + 10⁶, of which a step halves x where it promises to take all of it: what is left of x is soon below the
+    /// accuracy of the objective.
+    struct Crawling;
+
+    impl LeastSquares for Crawling {
+        type Point = f64;
+        type Linear = ();
+        type Error = std::convert::Infallible;
+
+        fn objective(&self, x: &f64) -> f64 {
+            x * x + 1e6
+        }
+
+        fn linearise(&mut self, _: &f64) -> Result<Option<()>, Self::Error> {
+            Ok(Some(()))
+        }
+
+        fn step(&mut self, x: &f64, (): &(), _: f64) -> Result<Option<Step>, Self::Error> {
+            Ok(Some(Step { change: DVector::from_element(1, -x), promised: x * x }))
+        }
+
+        fn trial(&mut self, x: &f64, (): &(), step: &Step, _: f64) -> Result<Option<f64>, Self::Error> {
+            Ok(Some(x + 0.5 * step.change[0]))
+        }
+    }
+
+    /// A descent whose steps gain nothing that the objective's accuracy would show is stuck; else it goes on.
+    #[test]
+    fn a_descent_without_gain_rests() {
+        let run = |stop| {
+            let rules = Rules { shortening: damped(), tolerated_rise: 0.0, stop };
+            let Ok(found) = descend(&mut Crawling, 1.0, (), &rules);
+            (found.end, found.at)
+        };
+        let stop = Stop::after_trials(20);
+        assert_eq!(run(stop).0, End::RanOut);
+        let (end, at) = run(Stop { rests_within: Some(1e-9), ..stop });
+        // Three steps gain 63/64 of what x² was before them: less than 10⁶ · 10⁻⁹ from x = 2⁻⁵ on.
+        assert_eq!((end, at), (End::Stuck, 2.0f64.powi(-8)));
     }
 }

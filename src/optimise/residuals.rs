@@ -192,7 +192,7 @@ pub fn minimise(
         sum_of_squares,
         num_evaluations: found.num_trials + 1,
         // Where no step helps, that is a minimum up to rounding.
-        is_converged: found.end != End::RanOut,
+        is_converged: matches!(found.end, End::Converged | End::Stuck),
         reached,
     })
 }

@@ -83,16 +83,53 @@ pub struct Stop {
     /// Converged where a step that was taken lowered the objective by less than this part of it; none: never for this
     /// reason.
     pub least_relative_gain: Option<f64>,
+    /// Stuck where the last three steps that were taken together lowered the objective by less than this part of it:
+    /// the accuracy of its values. None: never for this reason.
+    pub rests_within: Option<f64>,
+    /// An objective that is known to be within reach from elsewhere: ended where, at the pace of the last trials, those
+    /// that are left would not lead below it. None: never for this reason.
+    pub to_beat: Option<f64>,
 }
 
+/// Steps after which a descent that gains nothing rests.
+const RESTING: usize = 3;
+
+/// Trials whose pace counts.
+const PACE: usize = 5;
+
 impl Stop {
+    /// Where the problem has no further step to offer.
+    pub const NEVER: Stop = Stop {
+        max_trials: usize::MAX,
+        max_steps: usize::MAX,
+        least_relative_gain: None,
+        rests_within: None,
+        to_beat: None,
+    };
+
     /// After so many trials.
     pub const fn after_trials(max_trials: usize) -> Stop {
-        Stop { max_trials, max_steps: usize::MAX, least_relative_gain: None }
+        Stop { max_trials, max_steps: usize::MAX, ..Stop::NEVER }
     }
 
     /// After so many steps taken.
     pub fn after_steps(max_steps: usize) -> Stop {
-        Stop { max_trials: usize::MAX, max_steps, least_relative_gain: None }
+        Stop { max_steps, ..Stop::NEVER }
+    }
+
+    /// Whether a descent gains nothing any more, with the objective at the start and after every step taken.
+    pub(super) fn is_at_rest(&self, history: &[f64]) -> bool {
+        let Some(part) = self.rests_within.filter(|_| history.len() > RESTING) else { return false };
+        let present = history[history.len() - 1];
+        history[history.len() - 1 - RESTING] - present < part * present
+    }
+
+    /// Whether a descent is left behind, with the objective at the start and after every trial.
+    pub(super) fn is_behind(&self, by_trial: &[f64]) -> bool {
+        let num_trials = by_trial.len() - 1;
+        let Some(to_beat) = self.to_beat.filter(|_| num_trials >= PACE) else { return false };
+        let present = by_trial[num_trials];
+        let pace = (by_trial[num_trials - PACE] - present) / PACE as f64;
+        present - pace * self.max_trials.saturating_sub(num_trials) as f64 > to_beat
     }
 }
