@@ -36,7 +36,7 @@ impl ToSolve<'_> {
         let num = self.drives_mm.len();
         match self.near {
             Some(near) if near.len() >= num => (0..num).map(|d| d..d + 1).collect(),
-            _ => vec![0..num],
+            _ => std::iter::once(0..num).collect(),
         }
     }
 

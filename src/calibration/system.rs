@@ -121,6 +121,24 @@ pub(super) fn raw_sums(predictions: &[Prediction], targets: &[Target]) -> (DMatr
     (sums.matrix, sums.gradient)
 }
 
+/// Covariance of the objective's half gradient by the `num` parameters, in their units, under the noise of `targets`.
+///
+/// # Errors
+/// [`CalibrationError::Voxel`]: a filter does not fit the voxels.
+pub(super) fn score(
+    targets: &[Target],
+    predictions: &[Prediction],
+    num: usize,
+) -> Result<DMatrix<f64>, CalibrationError> {
+    let forces = AllForces::of(targets);
+    let weighed = forces.weights() * forces.slopes(predictions, num);
+    let mut score = weighed.transpose() * forces.covariance() * &weighed;
+    for (target, prediction) in targets.iter().zip(predictions) {
+        target.add_score(prediction, &mut score)?;
+    }
+    Ok(score)
+}
+
 /// Sums over all data, in the parameters' units.
 #[derive(Default)]
 struct Sums {

@@ -5,7 +5,6 @@
 //! ℓ_u + βℓ_F, or values that share their noise with their neighbours) the covariance of the estimate is a sandwich of
 //! the objective's curvature and the noise's true covariance.
 
-use super::all_forces::AllForces;
 use super::error::CalibrationError;
 use super::force_readings::{ForceOnTheWay, LoadCell};
 use super::observed::{Observed, View};
@@ -49,24 +48,6 @@ pub(super) struct TargetStep<'a> {
     /// has no bound, as of what is not measured, so that its products with a weight of zero are numbers.
     noise_mm2: Vec<[f64; 3]>,
     pub(super) force: Option<TargetForce>,
-}
-
-/// Covariance of the objective's half gradient by the `num` parameters, in their units, under the noise of `targets`.
-///
-/// # Errors
-/// [`CalibrationError::Voxel`]: a filter does not fit the voxels.
-pub(super) fn score(
-    targets: &[Target],
-    predictions: &[Prediction],
-    num: usize,
-) -> Result<DMatrix<f64>, CalibrationError> {
-    let forces = AllForces::of(targets);
-    let weighed = forces.weights() * forces.slopes(predictions, num);
-    let mut score = weighed.transpose() * forces.covariance() * &weighed;
-    for (target, prediction) in targets.iter().zip(predictions) {
-        target.add_score(prediction, &mut score)?;
-    }
-    Ok(score)
 }
 
 /// Whether any component counts.
@@ -248,7 +229,7 @@ impl<'a> Target<'a> {
     }
 
     /// Adds what the displacements' noise gives the covariance of the objective's half gradient.
-    fn add_score(&self, prediction: &Prediction, score: &mut DMatrix<f64>) -> Result<(), CalibrationError> {
+    pub(super) fn add_score(&self, prediction: &Prediction, score: &mut DMatrix<f64>) -> Result<(), CalibrationError> {
         let n = score.nrows();
         for (step, (fields, _)) in self.steps.iter().zip(prediction.derivatives()).filter(|(s, _)| s.is_scanned()) {
             // What a change of each value by the standard deviation of its noise adds to the half gradient; missing
