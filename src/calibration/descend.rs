@@ -8,7 +8,7 @@ use super::stress_path::StressPath;
 use super::system::NormalSystem;
 use crate::fem::SolveError;
 use crate::material::Material;
-use crate::optimise::{self, Damping, LeastSquares, Raise, Rules, Shortening, Stop};
+use crate::optimise::{self, Damping, LeastSquares, Raise, Rules, Secant, Shortening, Stop};
 
 /// Where a descent ended.
 #[derive(Debug)]
@@ -116,15 +116,25 @@ struct DescentProblem<'a, 'p> {
     predict: &'a mut Predict<'p>,
     evaluate: &'a Evaluate<'a>,
     way: Way,
+    /// What the second derivatives of the model add to the curvature of the objective.
+    secant: Secant,
+    /// Where the last step that was taken led.
+    last: NormalSystem,
     failure: Option<SolveError>,
     work: SolverWork,
 }
 
 impl DescentProblem<'_, '_> {
-    /// The whole step to the optimum of the linear model, and how far that is in standard deviations. Where the misfit
-    /// is more than noise, so are the standard deviations in which the distance counts.
+    /// `system` with the curvature that is known best.
+    fn modelled(&self, system: &NormalSystem) -> NormalSystem {
+        let matrix = self.secant.added_to(&system.matrix).unwrap_or_else(|| system.matrix.clone());
+        NormalSystem { matrix, ..system.clone() }
+    }
+
+    /// The whole step to the optimum of the quadratic model, and how far that is in standard deviations. Where the
+    /// misfit is more than noise, so are the standard deviations in which the distance counts.
     fn outlook(&self, system: &NormalSystem) -> Result<(step::Step, f64), CalibrationError> {
-        let full = self.constraints.step(system, 0.0, false)?;
+        let full = self.constraints.step(&self.modelled(system), 0.0, false)?;
         let distance = full.distance / (system.chi2 / self.expected.max(1.0)).max(1.0).sqrt();
         Ok((full, distance))
     }
@@ -139,7 +149,10 @@ impl LeastSquares for DescentProblem<'_, '_> {
         at.system.chi2
     }
 
-    fn linearise(&mut self, _: &Point) -> Result<Option<()>, CalibrationError> {
+    fn linearise(&mut self, at: &Point) -> Result<Option<()>, CalibrationError> {
+        let step = self.last.change_to(&at.system);
+        self.secant.learn(&step, [&self.last, &at.system].map(NormalSystem::on_the_way));
+        self.last = at.system.clone();
         Ok(Some(()))
     }
 
@@ -148,7 +161,7 @@ impl LeastSquares for DescentProblem<'_, '_> {
         if self.outlook(&at.system)?.1 < self.tolerance {
             return Ok(None);
         }
-        let step = self.constraints.step(&at.system, damping, true)?;
+        let step = self.constraints.step(&self.modelled(&at.system), damping, true)?;
         Ok(Some(optimise::Step { change: step.change, promised: step.distance * step.distance }))
     }
 
@@ -179,6 +192,7 @@ impl LeastSquares for DescentProblem<'_, '_> {
             Err(CalibrationError::Solve(cause @ SolveError::Cancelled { .. })) => Err(cause.into()),
             Err(CalibrationError::Solve(cause)) => {
                 self.failure = Some(cause);
+                self.secant.distrust();
                 self.way.is_lost(&self.path);
                 Ok(None)
             }
@@ -191,6 +205,7 @@ impl LeastSquares for DescentProblem<'_, '_> {
     }
 
     fn has_other_way(&mut self) -> bool {
+        self.secant.distrust();
         !self.way.is_lost(&self.path)
     }
 }
@@ -218,6 +233,8 @@ pub(super) fn descend(
         predict,
         evaluate,
         way: Way { is_followed: true, num_poor: 0 },
+        secant: Secant::unknown(start.system.values.len()),
+        last: start.system.clone(),
         failure: None,
         work: SolverWork::default(),
     };

@@ -13,6 +13,7 @@ use super::options::{Bulk, Held};
 use super::prediction::{HELD_LOG_SD, Prediction};
 use super::target::Target;
 use crate::material::{Material, Parameter};
+use crate::optimise::OnTheWay;
 use crate::sensitivity::FisherInformation;
 use nalgebra::{DMatrix, DVector};
 
@@ -103,6 +104,19 @@ impl NormalSystem {
             next.set(parameter, moved);
         }
         next
+    }
+
+    /// The scaled change from here to the material of `other`.
+    pub(super) fn change_to(&self, other: &NormalSystem) -> DVector<f64> {
+        DVector::from_fn(self.values.len(), |i, _| {
+            let (from, to) = (self.values[i], other.values[i]);
+            if self.parameters[i].has_any_sign() { (to - from) / self.scales[i] } else { (to / from).ln() }
+        })
+    }
+
+    /// What a descent learns from on its way through here.
+    pub(super) fn on_the_way(&self) -> OnTheWay<'_> {
+        OnTheWay { objective: self.chi2, gradient: &self.gradient, matrix: &self.matrix }
     }
 }
 

@@ -48,33 +48,37 @@ impl Guide {
         drive_mm: f64,
         start: Option<&Equilibrium>,
     ) -> Result<Equilibrium, SolveError> {
-        if let Some(found) = self.lead(fine, drive_mm, start) {
+        let mut known = Vec::new();
+        if let Some(found) = self.lead(fine, drive_mm, start, &mut known) {
             return Ok(found);
         }
         let from_mm = start.map_or(0.0, |s| s.drive_mm);
         // What the coarse mesh gets wrong halfway is known when the other half is led.
-        let Some(halfway) = self.lead(fine, 0.5 * (from_mm + drive_mm), start) else {
+        let Some(halfway) = self.lead(fine, 0.5 * (from_mm + drive_mm), start, &mut known) else {
             return fine.solve(drive_mm, start);
         };
-        match self.lead(fine, drive_mm, Some(&halfway)) {
+        match self.lead(fine, drive_mm, Some(&halfway), &mut known) {
             Some(found) => Ok(found),
             None => fine.solve(drive_mm, Some(&halfway)),
         }
     }
 
     /// Takes `fine` to a drive (mm) in one load step from the coarse equilibrium there; `None` where either fails.
+    /// Coarse equilibria of this material that are `known` are not sought again.
     ///
     /// With an equilibrium of the fine mesh at another drive of the same direction as `start`, what the coarse mesh
     /// gets wrong there is taken off in proportion to the drive: the error of a mesh changes far more slowly than what
     /// it is the error of. Two factorisations are left of four or five.
-    fn lead(&mut self, fine: &mut Newton, drive_mm: f64, start: Option<&Equilibrium>) -> Option<Equilibrium> {
-        // A loose coarse solution is enough: its error is the mesh's.
-        let loose = SolveOptions { tolerance: 1e-4, ..*fine.options };
-        let mut coarse = self.coarse.newton(fine.material, &loose, fine.is_cancelled);
+    fn lead(
+        &mut self,
+        fine: &mut Newton,
+        drive_mm: f64,
+        start: Option<&Equilibrium>,
+        known: &mut Vec<Equilibrium>,
+    ) -> Option<Equilibrium> {
         let start = start.filter(|s| s.drive_mm * drive_mm > 0.0);
-        let beside_start = start.and_then(|start| Some((start, coarse.solve(start.drive_mm, None).ok()?)));
-        let there = coarse.solve(drive_mm, beside_start.as_ref().map(|(_, at_start)| at_start)).ok();
-        let found = there.and_then(|there| {
+        let beside_start = start.and_then(|start| Some((start, self.coarse_at(fine, start.drive_mm, known)?)));
+        let found = self.coarse_at(fine, drive_mm, known).and_then(|there| {
             let mut first_guess = self.transfer(fine, &there);
             if let Some((start, at_start)) = beside_start {
                 let from_coarse = self.transfer(fine, &at_start);
@@ -87,6 +91,20 @@ impl Guide {
             None => fine.statistics.failed_steps += 1,
         }
         found
+    }
+
+    /// The coarse equilibrium at a drive (mm), from the nearest one before it that is `known`, to which it is added.
+    fn coarse_at(&mut self, fine: &Newton, drive_mm: f64, known: &mut Vec<Equilibrium>) -> Option<Equilibrium> {
+        if let Some(found) = known.iter().find(|s| s.drive_mm == drive_mm) {
+            return Some(found.clone());
+        }
+        let is_before = |s: &&Equilibrium| s.drive_mm * drive_mm > 0.0 && s.drive_mm.abs() < drive_mm.abs();
+        let nearest = known.iter().filter(is_before).max_by(|a, b| a.drive_mm.abs().total_cmp(&b.drive_mm.abs()));
+        // A loose coarse solution is enough: its error is the mesh's.
+        let loose = SolveOptions { tolerance: 1e-4, ..*fine.options };
+        let found = self.coarse.newton(fine.material, &loose, fine.is_cancelled).solve(drive_mm, nearest).ok()?;
+        known.push(found.clone());
+        Some(found)
     }
 
     /// The coarse equilibrium `from` on the mesh of `fine`.

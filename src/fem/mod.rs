@@ -83,7 +83,7 @@ pub use fields::QuadraturePoint;
 pub use forward_model::ForwardModel;
 pub use law_correction::LawCorrection;
 #[cfg(feature = "calibration")]
-pub use model_pool::ModelPool;
+pub(crate) use model_pool::ModelPool;
 pub use nesting::Nesting;
 pub use options::{SolveOptions, Statistics};
 pub use path_end::{EndCause, PathEnd, Way};

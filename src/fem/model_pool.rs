@@ -5,30 +5,30 @@ use std::sync::{Mutex, MutexGuard};
 
 /// A model, and as many others like it as were needed at a time. They share mesh, elimination order and symbolic
 /// factorisation; each has a tangent and a factor of its own, which stay from one use to the next.
-pub struct ModelPool {
+pub(crate) struct ModelPool {
     own: ForwardModel,
     idle: Mutex<Vec<ForwardModel>>,
 }
 
 impl ModelPool {
     /// Of `own`.
-    pub fn new(own: ForwardModel) -> ModelPool {
+    pub(crate) fn new(own: ForwardModel) -> ModelPool {
         ModelPool { own, idle: Mutex::default() }
     }
 
     /// The model that all are like.
-    pub fn own(&self) -> &ForwardModel {
+    pub(crate) fn own(&self) -> &ForwardModel {
         &self.own
     }
 
     /// The same, to be solved with where nothing else is at the same time.
-    pub fn own_mut(&mut self) -> &mut ForwardModel {
+    pub(crate) fn own_mut(&mut self) -> &mut ForwardModel {
         &mut self.own
     }
 
     /// Does `work` with a model that nothing else uses meanwhile. What comes of it does not depend on which it is: what
     /// a model solved last never changes what is solved next.
-    pub fn with<R>(&self, work: impl FnOnce(&mut ForwardModel) -> R) -> R {
+    pub(crate) fn with<R>(&self, work: impl FnOnce(&mut ForwardModel) -> R) -> R {
         let idle = self.idle().pop();
         let mut model = idle.unwrap_or_else(|| self.own.another());
         let result = work(&mut model);

@@ -1,8 +1,9 @@
 //! What may be scanned next: every specimen at some drives, and every recording once more.
 
+use super::body::{is_same_body, num_done, readings_of};
 use super::options::{NextOptions, Plan};
-use super::posterior::{is_same_body, is_same_drive, num_done, readings_of};
 use crate::calibration::Observed;
+use crate::sensitivity::Protocol;
 use crate::specimen::Specimen;
 
 /// A scan that may come next.
@@ -28,7 +29,7 @@ impl Candidate {
 
     /// How often the force was read at a drive on the way to a scan of its specimen.
     pub(super) fn num_read(&self, drive_mm: f64) -> usize {
-        self.read_mm.iter().filter(|read| is_same_drive(**read, drive_mm)).count()
+        self.read_mm.iter().filter(|read| Protocol::is_same_drive(**read, drive_mm)).count()
     }
 
     /// Minutes of `num` such scans one after another.
@@ -85,7 +86,7 @@ pub(super) fn candidates(
             let pairs = || known.drives_mm.iter().zip(&candidate.drives_mm);
             known.body == candidate.body
                 && known.drives_mm.len() == candidate.drives_mm.len()
-                && pairs().all(|(a, b)| is_same_drive(*a, *b))
+                && pairs().all(|(a, b)| Protocol::is_same_drive(*a, *b))
         };
         if !all.iter().any(is_same) {
             all.push(candidate);

@@ -7,11 +7,12 @@
 //! of the size, and of two fifths where specimens are large or drives are many, is what an answer in seconds has time
 //! for.
 
+use super::body::is_same_body;
 use super::error::NextError;
 use super::error_left::ErrorLeft;
+use super::two_meshes::TwoMeshes;
 use crate::calibration::{CalibrationProblem, Observed, RecordingFit, SD_OVER_SHIFT};
-use crate::fem::{Equilibrium, ForwardModel, ModelPool, Nesting, SolveError, SolveOptions, side_by_side};
-use crate::material::Material;
+use crate::fem::{Equilibrium, ForwardModel, side_by_side};
 use crate::mesh::{MeshOptions, error_over_difference, sd_over_extrapolated};
 use crate::specimen::Specimen;
 
@@ -26,13 +27,27 @@ const FINEST: f64 = 0.6;
 /// than 2.5: nothing is taken off.
 const HARDLY_FINER: f64 = 0.7;
 
-/// Recordings with a finer mesh of each.
+/// Recordings with a finer mesh of each body.
 pub(super) struct FinerMeshes<'a> {
     observed: &'a [Observed],
     /// Element size of the finer meshes as a factor on that of the fit's.
     ratio: f64,
-    /// Of each recording; none where these would say nothing.
-    meshes: Vec<Finer>,
+    /// None where finer meshes would say nothing.
+    bodies: Vec<Body>,
+}
+
+/// The recordings of one body.
+struct Group {
+    /// Their places.
+    recordings: Vec<usize>,
+    /// All their drives once, in the order of their sizes, mm.
+    drives_mm: Vec<f64>,
+}
+
+/// A body that was recorded.
+struct Body {
+    recorded: Group,
+    meshes: TwoMeshes,
 }
 
 impl<'a> FinerMeshes<'a> {
@@ -41,23 +56,26 @@ impl<'a> FinerMeshes<'a> {
     /// # Errors
     /// [`NextError`] where a specimen cannot be meshed so.
     pub(super) fn new(observed: &'a [Observed], mesh_factor: f64) -> Result<FinerMeshes<'a>, NextError> {
-        let mesh = |(o, factor): (&Observed, f64)| {
-            ForwardModel::of_specimen(&o.specimen, &MeshOptions::scaled(&o.specimen, factor))
-        };
+        let groups = by_body(observed);
         let mesh_all = |factor: f64| -> Result<Vec<ForwardModel>, NextError> {
-            let models = side_by_side(observed.iter().map(|o| (o, factor)).collect(), mesh);
+            let mesh = |group: &Group| {
+                let specimen = &observed[group.recordings[0]].specimen;
+                ForwardModel::of_specimen(specimen, &MeshOptions::scaled(specimen, factor))
+            };
+            let models = side_by_side(groups.iter().collect(), mesh);
             Ok(models.into_iter().collect::<Result<_, _>>()?)
         };
         let coarse = mesh_all(mesh_factor)?;
-        let elements = |(o, m): (&Observed, &ForwardModel)| o.all_drives_mm().len() * m.mesh().num_elements();
-        let num_elements: usize = observed.iter().zip(&coarse).map(elements).sum();
+        let elements = |(group, m): (&Group, &ForwardModel)| group.drives_mm.len() * m.mesh().num_elements();
+        let num_elements: usize = groups.iter().zip(&coarse).map(elements).sum();
         let ratio = ratio_of(num_elements).max(FINEST / mesh_factor);
         if ratio > HARDLY_FINER {
-            return Ok(FinerMeshes { observed, ratio, meshes: Vec::new() });
+            return Ok(FinerMeshes { observed, ratio, bodies: Vec::new() });
         }
-        let fine = mesh_all(ratio * mesh_factor)?;
-        let meshes = coarse.into_iter().zip(fine).map(|(coarse, fine)| Finer::new(coarse, fine)).collect();
-        Ok(FinerMeshes { observed, ratio, meshes })
+        let pairs = coarse.into_iter().zip(mesh_all(ratio * mesh_factor)?);
+        let groups = groups.into_iter().zip(pairs);
+        let body = |(recorded, (coarse, fine))| Body { recorded, meshes: TwoMeshes::new(coarse, fine) };
+        Ok(FinerMeshes { observed, ratio, bodies: groups.map(body).collect() })
     }
 
     /// The recordings plus the error that the fit's mesh has with the law of `fit`, as the finer meshes tell it.
@@ -69,27 +87,14 @@ impl<'a> FinerMeshes<'a> {
         fit: &RecordingFit,
         is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Vec<Observed>, NextError> {
-        let whole = error_over_difference(self.ratio);
-        let mut corrected = self.observed.to_vec();
-        let pairs = corrected.iter_mut().zip(&mut self.meshes).enumerate();
-        let taken_off = side_by_side(pairs.collect(), |(r, (recording, finer))| -> Result<(), NextError> {
-            let view = recording.view(&recording.specimen, finer.fine.own().mesh())?;
-            let states = finer.states(&fit.material, &recording.all_drives_mm(), fit.states(r), is_cancelled)?;
-            for (s, (step, [_, fine])) in recording.steps.iter_mut().zip(states).enumerate() {
-                let fine = view.average(&fine.displacement)?;
-                for ((u, fine), coarse) in step.displacement.iter_mut().zip(&fine).zip(fit.predicted(r, s)) {
-                    *u = [0, 1, 2].map(|c| u[c] + whole * (coarse[c] - fine[c]));
-                }
-            }
-            for (force, [coarse, fine]) in recording.forces_mut().zip(states) {
-                if let Some(force) = force {
-                    force.value_n += whole * (coarse.force_n - fine.force_n);
-                }
-            }
-            Ok(())
-        });
-        taken_off.into_iter().collect::<Result<(), _>>()?;
-        Ok(corrected)
+        let (observed, whole) = (self.observed, error_over_difference(self.ratio));
+        let told =
+            side_by_side(self.bodies.iter_mut().collect(), |body| body.corrected(observed, fit, whole, is_cancelled));
+        let mut all = observed.to_vec();
+        for (r, recording) in told.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().flatten() {
+            all[r] = recording;
+        }
+        Ok(all)
     }
 
     /// What the error may still be beyond what was taken off of `corrected`, the recordings of `problem`, by which
@@ -140,67 +145,76 @@ impl<'a> FinerMeshes<'a> {
     }
 }
 
+/// Which recordings are of one body.
+fn by_body(observed: &[Observed]) -> Vec<Group> {
+    let mut groups: Vec<Group> = Vec::new();
+    for (r, recording) in observed.iter().enumerate() {
+        let is_of = |group: &&mut Group| is_same_body(&observed[group.recordings[0]].specimen, &recording.specimen);
+        let drives_mm = recording.all_drives_mm();
+        match groups.iter_mut().find(is_of) {
+            Some(group) => {
+                group.recordings.push(r);
+                group.drives_mm.extend(drives_mm);
+            }
+            None => groups.push(Group { recordings: vec![r], drives_mm }),
+        }
+    }
+    for Group { drives_mm, .. } in &mut groups {
+        drives_mm.sort_by(|a, b| a.abs().total_cmp(&b.abs()).then(a.total_cmp(b)));
+        drives_mm.dedup();
+    }
+    groups
+}
+
+impl Body {
+    /// Its recordings plus `whole` times the difference of the two meshes with the law of `fit`, with their places.
+    ///
+    /// # Errors
+    /// As [`FinerMeshes::without_mesh_error`].
+    fn corrected(
+        &mut self,
+        observed: &[Observed],
+        fit: &RecordingFit,
+        whole: f64,
+        is_cancelled: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Vec<(usize, Observed)>, NextError> {
+        let Body { recorded: Group { recordings, drives_mm }, meshes } = self;
+        let known_at = |drive_mm: &f64| {
+            recordings.iter().find_map(|&r| {
+                let place = observed[r].all_drives_mm().iter().position(|d| d == drive_mm)?;
+                fit.states(r).get(place)
+            })
+        };
+        let known: Vec<Option<&Equilibrium>> = drives_mm.iter().map(known_at).collect();
+        let states = meshes.states(&fit.material, drives_mm, &known, is_cancelled)?;
+        let mut corrected: Vec<(usize, Observed)> = Vec::new();
+        for &r in recordings.iter() {
+            let mut recording = observed[r].clone();
+            let view = recording.view(&recording.specimen, meshes.fine_mesh())?;
+            let own_drives_mm = recording.all_drives_mm();
+            let at = |drive_mm: &f64| drives_mm.iter().position(|d| d == drive_mm).map(|place| &states[place]);
+            let own: Vec<&[Equilibrium; 2]> = own_drives_mm.iter().filter_map(at).collect();
+            for (s, (step, [_, fine])) in recording.steps.iter_mut().zip(&own).enumerate() {
+                let fine = view.average(&fine.displacement)?;
+                for ((u, fine), coarse) in step.displacement.iter_mut().zip(&fine).zip(fit.predicted(r, s)) {
+                    *u = [0, 1, 2].map(|c| u[c] + whole * (coarse[c] - fine[c]));
+                }
+            }
+            for (force, [coarse, fine]) in recording.forces_mut().zip(&own) {
+                if let Some(force) = force {
+                    force.value_n += whole * (coarse.force_n - fine.force_n);
+                }
+            }
+            corrected.push((r, recording));
+        }
+        Ok(corrected)
+    }
+}
+
 /// Element size of the finer meshes as a factor on that of coarse ones of so many elements, counted for each drive:
 /// they have as many elements as an answer has time for.
 fn ratio_of(num_elements: usize) -> f64 {
     (num_elements as f64 / NUM_ELEMENTS).cbrt().clamp(FINER[0], FINER[1])
-}
-
-/// A finer mesh of a specimen beside that of the fit.
-struct Finer {
-    coarse: ForwardModel,
-    fine: ModelPool,
-    /// How the fine mesh lies in the coarse one; `None` where it does not.
-    nesting: Option<Nesting>,
-    /// Equilibria of the drives, last found on the two meshes.
-    known: Vec<[Equilibrium; 2]>,
-}
-
-impl Finer {
-    /// On the fit's mesh and on the finer one.
-    fn new(coarse: ForwardModel, fine: ForwardModel) -> Finer {
-        let nesting = Nesting::located(coarse.mesh(), fine.mesh());
-        Finer { coarse, fine: ModelPool::new(fine), nesting, known: Vec::new() }
-    }
-
-    /// The equilibria at `drives_mm` on the two meshes, those of the fit's mesh as far as they are `known`; those of
-    /// the finer one from there, with what that mesh got wrong the last time taken off; where that leads to none, from
-    /// rest.
-    fn states(
-        &mut self,
-        material: &Material,
-        drives_mm: &[f64],
-        known: &[Equilibrium],
-        is_cancelled: &(dyn Fn() -> bool + Sync),
-    ) -> Result<&[[Equilibrium; 2]], NextError> {
-        let options = SolveOptions::trial();
-        let mut coarse: Vec<Equilibrium> = Vec::new();
-        for (d, &drive_mm) in drives_mm.iter().enumerate() {
-            let state = match known.get(d) {
-                Some(state) => state.clone(),
-                None => {
-                    let near = self.known.get(d).map(|both| &both[0]).or(coarse.last());
-                    self.coarse.solve(material, drive_mm, near, &options, is_cancelled)?
-                }
-            };
-            coarse.push(state);
-        }
-        let Finer { coarse: coarse_model, fine, nesting, known } = &*self;
-        let solved = side_by_side(coarse.into_iter().enumerate().collect(), |(d, coarse): (usize, Equilibrium)| {
-            let start = nesting.as_ref().map(|nesting| {
-                let known = known.get(d).map(|[coarse, fine]| [coarse, fine]);
-                fine.own().start_from(coarse_model, nesting, material, &coarse, known)
-            });
-            fine.with(|model| {
-                let mut solve = |start| model.solve(material, drives_mm[d], start, &options, is_cancelled);
-                let near = start.as_ref().and_then(|start| solve(Some(start)).ok());
-                Ok([coarse, near.map_or_else(|| solve(None), Ok)?])
-            })
-        });
-        let found = solved.into_iter().collect::<Result<_, SolveError>>()?;
-        self.known = found;
-        Ok(&self.known)
-    }
 }
 
 #[cfg(test)]
@@ -208,24 +222,29 @@ mod tests {
     use super::super::discrepancy::Discrepancy;
     use super::*;
     use crate::calibration::{FitOptions, Objective, SyntheticScan};
-    use crate::material::Parameter;
+    use crate::fem::SolveOptions;
+    use crate::material::{Material, Parameter};
     use crate::recording::Filter;
     use crate::sensitivity::{Protocol, ScanSettings};
 
     const COARSE: f64 = 2.5;
 
-    fn block() -> Specimen {
-        Specimen::from_json(
+    fn block(drive_mm: f64) -> Specimen {
+        let block = Specimen::from_json(
             r#"{ "schema": "specimen/1", "name": "block", "test": "double_lap_shear", "drive_mm": [4.0], "holes": [],
                 "block": { "length_mm": 12.0, "thickness_mm": 4.0, "width_mm": 9.0 }, "samples_in_parallel": 2 }"#,
-        )
-        .unwrap()
+        );
+        Specimen { drive_mm: vec![drive_mm], ..block.unwrap() }
     }
 
     /// Without noise, of a fine mesh, compared as if there were noise of `noise_mm`; the force at 2 mm was read on the
-    /// way.
+    /// way to 4 mm.
     fn scanned(truth: &Material, noise_mm: f64) -> [Observed; 1] {
-        let specimen = block();
+        [scanned_at(4.0, truth, noise_mm)]
+    }
+
+    fn scanned_at(drive_mm: f64, truth: &Material, noise_mm: f64) -> Observed {
+        let specimen = block(drive_mm);
         let noise_sd_mm = [noise_mm; 3];
         let settings = ScanSettings { voxel_mm: [1.0, 0.5, 1.0], noise_sd_mm, ..ScanSettings::default() };
         let fine = MeshOptions { grading: 0.4, ..MeshOptions::scaled(&specimen, 0.6) };
@@ -236,7 +255,7 @@ mod tests {
         let observed = Observed::new(&made, settings.force_sd_n).unwrap();
         let mut observed = observed.with_protocol(&made, &protocol, settings.force_sd_n).unwrap();
         observed.noise_sd_mm = noise_sd_mm;
-        [observed]
+        observed
     }
 
     fn problem(observed: &[Observed]) -> CalibrationProblem<'_> {
@@ -267,6 +286,30 @@ mod tests {
         let corrected = FinerMeshes::new(&observed, COARSE).unwrap().without_mesh_error(&coarse, &|| false).unwrap();
         let [before, after] = [&coarse, &fit(&mut problem(&corrected))].map(missed_by);
         assert!(before > 1.0 && after < before / 3.0, "{before} {after}");
+    }
+
+    /// Two scans of one body share a finer mesh, on which the larger drive may start from the smaller one; what is taken
+    /// off is what each alone would have taken off, up to what equilibria are solved to.
+    #[test]
+    fn recordings_of_one_body_share_its_meshes() {
+        let law = one_term();
+        let both = [5.0, 3.0].map(|drive_mm| scanned_at(drive_mm, &law, 0.05));
+        let corrected = |observed: &[Observed]| {
+            let fit = problem(observed).at(&law, &|| false).unwrap();
+            let mut finer = FinerMeshes::new(observed, COARSE).unwrap();
+            assert_eq!(finer.bodies.len(), 1);
+            finer.without_mesh_error(&fit, &|| false).unwrap()
+        };
+        let together = corrected(&both);
+        for (before, together) in both.iter().zip(&together) {
+            let alone = &corrected(std::slice::from_ref(before))[0];
+            let differences = |a: &Observed, b: &Observed| {
+                let pairs = a.steps[0].displacement.iter().flatten().zip(b.steps[0].displacement.iter().flatten());
+                pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+            };
+            let (taken_off, apart) = (differences(before, together), differences(alone, together));
+            assert!(taken_off > 1e-3 && apart < 1e-3 * taken_off, "{taken_off} {apart}");
+        }
     }
 
     /// Finer meshes are the finer the fewer elements there are, within the two limits.

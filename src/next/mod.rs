@@ -6,6 +6,7 @@
 //! and they together promise, on average over materials that the posterior leaves possible, per minute.
 
 mod advise;
+mod body;
 mod candidate;
 mod correction;
 mod discrepancy;
@@ -17,6 +18,7 @@ mod result;
 mod scanned;
 mod seen;
 mod trial;
+mod two_meshes;
 mod visited;
 mod worth;
 

@@ -1,5 +1,6 @@
 //! What is known so far: the law fitted to all recordings, its information, its misfit and the states it has visited.
 
+use super::body::{num_done, readings_of};
 use super::correction::FinerMeshes;
 use super::discrepancy::Discrepancy;
 use super::error::NextError;
@@ -13,7 +14,7 @@ use crate::calibration::{
 };
 use crate::material::Material;
 use crate::mesh::MeshOptions;
-use crate::sensitivity::{Covariance, FisherInformation, JointInformation, median};
+use crate::sensitivity::{Covariance, FisherInformation, JointInformation, Protocol, median};
 use crate::specimen::Specimen;
 use nalgebra::{DMatrix, SymmetricEigen};
 
@@ -21,6 +22,8 @@ use nalgebra::{DMatrix, SymmetricEigen};
 const MAX_TERMS: usize = 3;
 /// Most blind starts of every number of terms.
 const NUM_STARTS: usize = 2;
+/// A fit has converged within this part of a standard deviation, which is what a plan asks for.
+const TOLERANCE: f64 = 0.05;
 /// Most iterations of a fit that only tells the mesh's error, and most rounds of these and fits.
 const FIRST_ITERATIONS: usize = 20;
 const MOST_ROUNDS: usize = 4;
@@ -96,7 +99,8 @@ impl Posterior {
             }
             let read_mm: Vec<f64> = readings_of(observed, &here.specimen).collect();
             for (force, reading) in seen.readings[r].iter().zip(&here.on_the_way) {
-                let num = read_mm.iter().filter(|read| is_same_drive(**read, reading.drive_mm)).count() as f64;
+                let num =
+                    read_mm.iter().filter(|read| Protocol::is_same_drive(**read, reading.drive_mm)).count() as f64;
                 let of_all = force.information(material, num, &discrepancy);
                 information.add_times(num_scans[r] as f64 / num, &of_all)?;
             }
@@ -180,7 +184,7 @@ fn fit_together<'a>(
             terms,
             num_starts: NUM_STARTS,
             tries_all_starts: false,
-            fit: FitOptions { max_iterations: iterations, ..FitOptions::default() },
+            fit: FitOptions { max_iterations: iterations, tolerance: TOLERANCE, ..FitOptions::default() },
             least_promise: match terms {
                 // Two parameters at ln n each.
                 TermCount::Auto { .. } => LEAST_OF_BIC * 2.0 * (num_data as f64).ln(),
@@ -190,26 +194,24 @@ fn fit_together<'a>(
         };
         fit_law(problem, earlier, &settings, on_stage, is_cancelled)
     };
-    let FitOptions { max_iterations, tolerance, .. } = FitOptions::default();
+    let FitOptions { max_iterations, .. } = FitOptions::default();
     let mesh = |s: &Specimen| MeshOptions::scaled(s, options.mesh_factor);
     let mut problem = CalibrationProblem::new(means, &mesh, Objective::Weighted)?;
     let terms = options.num_terms.map_or(TermCount::Auto { max: MAX_TERMS }, TermCount::Fixed);
     if !options.has_mesh_correction {
         on_stage("what is known so far");
         let law = fit(&mut problem, terms, max_iterations, &[])?;
-        law.fit.settled(tolerance)?;
+        law.fit.settled(TOLERANCE)?;
         let error_left = ErrorLeft::none(means, law.fit.material.parameters().len());
         return Ok(Fitted { corrected: means.to_vec(), law, error_left, models: problem });
     }
     on_stage("error of the mesh");
-    // At first by the scans alone: forces on the way would take most of the time. They may be what tells terms apart,
-    // so that one term has to do there. With the error in the recordings a fit of several terms may be led astray, and
-    // never settle.
+    // At first one term, by the scans alone: forces on the way would take most of the time. With the error in the
+    // recordings a fit of several terms may be led astray, and never settle.
     let has_readings = means.iter().any(|o| !o.on_the_way.is_empty());
-    let num_terms = options.num_terms.filter(|_| !has_readings).unwrap_or(1);
     let scans: Vec<Observed> = means.iter().map(Observed::without_readings).collect();
     let mut problem = problem.with_data(&scans)?;
-    let mut before = fit(&mut problem, TermCount::Fixed(num_terms), FIRST_ITERATIONS, &[])?;
+    let mut before = fit(&mut problem, TermCount::Fixed(1), FIRST_ITERATIONS, &[])?;
     let mut finer = FinerMeshes::new(means, options.mesh_factor)?;
     let mut round = 0;
     loop {
@@ -227,7 +229,7 @@ fn fit_together<'a>(
             if !law.fit.is_settled() {
                 law = fit(&mut present, terms, max_iterations, &[])?;
             }
-            law.fit.settled(tolerance)?;
+            law.fit.settled(TOLERANCE)?;
             let error_left = finer.error_left(&present, &law.fit, &corrected)?;
             return Ok(Fitted { models: present.with_data(means)?, corrected, law, error_left });
         }
@@ -251,29 +253,6 @@ fn least_known_direction(covariance: &Covariance, shear: &[usize], values: &[f64
     let leading = eigen.eigenvalues.imax();
     let size = (3.0 * eigen.eigenvalues[leading].max(0.0)).sqrt();
     eigen.eigenvectors.column(leading).iter().map(|v| v * size).collect()
-}
-
-/// How many of the recordings scanned this specimen at this drive.
-pub(super) fn num_done(observed: &[Observed], specimen: &Specimen, drive_mm: f64) -> usize {
-    let is_at = |o: &Observed| o.steps.iter().any(|s| is_same_drive(s.drive_mm, drive_mm));
-    observed.iter().filter(|o| is_same_body(&o.specimen, specimen) && is_at(o)).count()
-}
-
-/// Drives of all forces that were read on the way to scans of this specimen, mm, once for each time.
-pub(super) fn readings_of(observed: &[Observed], specimen: &Specimen) -> impl Iterator<Item = f64> {
-    let of_body = observed.iter().filter(move |o| is_same_body(&o.specimen, specimen));
-    of_body.flat_map(|o| o.on_the_way.iter().map(|r| r.drive_mm))
-}
-
-/// Whether two drives are one: actuators keep a micrometre.
-pub(super) fn is_same_drive(a: f64, b: f64) -> bool {
-    (a - b).abs() < 1e-3
-}
-
-/// Whether two specimens differ by name and drives alone, and are driven in the same direction.
-pub(super) fn is_same_body(a: &Specimen, b: &Specimen) -> bool {
-    let body = |s: &Specimen| Specimen { name: String::new(), drive_mm: Vec::new(), ..s.clone() };
-    body(a) == body(b) && !a.is_other_way(b.largest_drive_mm())
 }
 
 /// The typical distance of voxels beyond the states visited: their median.

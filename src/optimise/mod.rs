@@ -3,6 +3,7 @@
 //!
 //! * [`descend()`]: the loop of every nonlinear fit. What is fitted is a [`LeastSquares`] problem; how steps are
 //!   shortened and when the loop ends are its [`Rules`].
+//! * [`Secant`]: what the second derivatives of the residuals add to the matrix of such a fit.
 //! * [`minimise`]: a fit whose residuals and Jacobian are at hand, with linear limits on its parameters.
 //! * [`limited_step()`]: the least of a quadratic model within linear limits, to rounding.
 //! * [`QuadraticProgramme`]: any convex quadratic programme with linear limits, by an interior-point method (Clarabel).
@@ -25,6 +26,8 @@ mod limited_step;
 mod quadratic;
 mod residuals;
 mod rules;
+#[cfg(feature = "calibration")]
+mod secant;
 
 pub use covariance::covariance;
 pub use descend::{Descent, End, LeastSquares, Step, descend};
@@ -37,3 +40,5 @@ pub use limited_step::{NoStep, limited_step};
 pub use quadratic::{Precision, QuadraticProgramme, QuadraticSolution, SolverStatus};
 pub use residuals::{Evaluation, LeastSquaresOptions, Minimum, minimise};
 pub use rules::{Damping, Raise, Rules, Shortening, Stop};
+#[cfg(feature = "calibration")]
+pub use secant::{OnTheWay, Secant};
