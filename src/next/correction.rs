@@ -288,8 +288,8 @@ mod tests {
         assert!(before > 1.0 && after < before / 3.0, "{before} {after}");
     }
 
-    /// Two scans of one body share a finer mesh, on which the larger drive may start from the smaller one; what is taken
-    /// off is what each alone would have taken off, up to what equilibria are solved to.
+    /// Two scans of one body share a finer mesh, on which the larger drive may start from the smaller one. What is
+    /// taken off is what each alone would have taken off, up to what equilibria are solved to.
     #[test]
     fn recordings_of_one_body_share_its_meshes() {
         let law = one_term();

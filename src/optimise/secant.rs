@@ -1,7 +1,7 @@
 //! What the second derivatives of the residuals add to a Gauss–Newton matrix, learnt from the gradients on the way.
 //!
-//! Where a model cannot follow the data, the residuals stay large, and what H = JᵀJ leaves out of the second derivatives
-//! of the objective, S = Σ rₖ ∇²rₖ, makes Gauss–Newton's steps too long or too short: they then approach the optimum by
+//! Where a model cannot follow the data, the residuals stay large. What H = JᵀJ leaves out of the second derivatives of
+//! the objective, S = Σ rₖ ∇²rₖ, then makes Gauss–Newton's steps too long or too short: they approach the optimum by
 //! the same factor each time. S is learnt as by Dennis, Gay and Welsch (NL2SOL, ACM Trans. Math. Softw. 7 (1981),
 //! 348–368): the least change of what is known of it that explains how the gradient changed along the last step.
 //! Whether H or H + S is the model of the next step is decided by which foretold the last one better.
