@@ -31,6 +31,9 @@ pub struct Secant {
 const TOLD_ABOVE: f64 = 1e-6;
 /// H + S is a model where it is at least this part of H in every direction.
 const LEAST_PART: f64 = 0.1;
+/// Nothing is learnt of a step along which the gradient changed by less than this part of what H foretold: it would be
+/// divided by.
+const LEAST_CHANGE: f64 = 0.01;
 
 impl Secant {
     /// Nothing is known yet of a problem of `num` unknowns.
@@ -53,8 +56,7 @@ impl Secant {
         let whole = before.gradient - after.gradient;
         let wanted = &whole - 0.5 * (before.matrix + after.matrix) * step;
         let slope = whole.dot(step);
-        // A gradient that hardly changed would be divided by.
-        if !(slope > LEAST_PART * LEAST_PART * length) {
+        if !(slope > LEAST_CHANGE * length) {
             return;
         }
         let known = along(&self.matrix);
