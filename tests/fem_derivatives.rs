@@ -6,9 +6,9 @@ use common::{
     bar, ellipse_and_slot, model, never, norm, norm_of_sum, off_axis, short_dumbbell, solve, tight, two_holes,
     two_terms,
 };
-use lambdak::fem::{Equilibrium, ForwardModel, ParameterSensitivity};
+use lambdak::fem::{Departures, Equilibrium, ForwardModel, ParameterSensitivity, PlateMotion};
 use lambdak::material::Material;
-use lambdak::mesh::{DesignVariable, morphed, shape_velocity};
+use lambdak::mesh::{DesignVariable, MeshOptions, mesh_specimen, morphed, shape_velocity};
 use lambdak::specimen::Specimen;
 
 /// A state along a path: displacement, force, and sensitivities to each material parameter.
@@ -127,6 +127,45 @@ fn material_derivatives_are_of_second_order() {
     check_material("two holes", &two_holes(), 5.0, &mut failures);
     check_material("bar", &bar(), 20.0, &mut failures);
     assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+/// The moved plate turned about each axis; on half of a mirrored sample it turns about the one across the mirror alone.
+#[test]
+fn derivatives_by_a_turning_plate_are_of_second_order() {
+    let (specimen, material, drive) = (two_holes(), two_terms(), 5.0);
+    let meshed = |use_mirror: bool| {
+        let options = MeshOptions { use_mirror, ..MeshOptions::scaled(&specimen, 2.5) };
+        ForwardModel::new(mesh_specimen(&specimen, &options).unwrap(), &specimen).unwrap()
+    };
+    let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let mut model = meshed(false);
+    let base = model.solve(&material, drive, None, &tight(), &never).unwrap();
+    let mut failures = Vec::new();
+    for about in axes {
+        let mut tangent = model.tangent(&material, &base).unwrap();
+        let change = tangent.change_of_turning_plate(about).unwrap();
+        let derivative = tangent.sensitivities(&[change]).unwrap().swap_remove(0);
+        let steps = [0.02, 0.01];
+        let states = steps.map(|t| {
+            let turn = PlateMotion { rotation_rad: about.map(|w| t * w), ..PlateMotion::default() };
+            let mut turned = model.departed(&Departures { moved_plate: turn, ..Departures::default() });
+            turned.solve(&material, drive, Some(&base), &tight(), &never).unwrap()
+        });
+        let differences = states.each_ref().map(|s| -> Vec<[f64; 3]> {
+            let pairs = s.displacement.iter().zip(&base.displacement);
+            pairs.map(|(a, b)| [0, 1, 2].map(|i| a[i] - b[i])).collect()
+        });
+        let remainders = [0, 1].map(|k: usize| norm_of_sum(&differences[k], -steps[k], &derivative.displacement));
+        judge(&format!("plate about {about:?} u'"), remainders, norm(&differences[0]), &mut failures);
+        let of_force = states.each_ref().map(|s| s.force_n - base.force_n);
+        let remainders = [0, 1].map(|k: usize| (of_force[k] - steps[k] * derivative.force_n).abs());
+        judge(&format!("plate about {about:?} F'"), remainders, of_force[0].abs(), &mut failures);
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+    let mut half = meshed(true);
+    let base = half.solve(&material, drive, None, &tight(), &never).unwrap();
+    let tangent = half.tangent(&material, &base).unwrap();
+    assert_eq!(axes.map(|about| tangent.change_of_turning_plate(about).is_some()), [false, false, true]);
 }
 
 #[test]

@@ -81,6 +81,7 @@ const EVALUATE: &[Flag] = &[
     Flag::of("force-gain-sd", "protocol/force_gain_sd"),
     Flag::of("force-zero-sd", "protocol/force_zero_sd_n"),
     Flag::of("drive-zero-sd", "protocol/drive_zero_sd_mm"),
+    Flag::of("plate-tilt-sd", "protocol/plate_tilt_sd_deg"),
     Flag::of("blocks-scanned", "protocol/blocks_scanned"),
     Flag::of("scan-shares", "protocol/scan_share"),
     Flag::of("detect", "has_detectable"),

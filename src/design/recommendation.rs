@@ -5,6 +5,7 @@ use super::entry::DesignEntry;
 use super::findings::Equals;
 use super::search::Found;
 use super::study::Study;
+use super::tolerances::in_words;
 use super::vary_scan::ChosenScan;
 use super::words::{listed, plates_in_words, sample_in_words, short_number};
 use crate::material::symbol_of_parameter;
@@ -22,6 +23,9 @@ pub struct Recommendation {
     pub precision: String,
     /// What these figures assume of scanner, load cell and blocks.
     pub assumptions: String,
+    /// How exactly it is to be made; empty where that is not known.
+    #[serde(default)]
+    pub dimensions: String,
 }
 
 /// What is assumed of a scan that was found.
@@ -64,6 +68,7 @@ impl Recommendation {
             make: advice,
             precision: precision(base, chosen),
             assumptions: assumptions(study, chosen, scan),
+            dimensions: in_words(&found.tolerances),
         }
     }
 }
@@ -238,5 +243,10 @@ fn set_up(protocol: &Protocol) -> String {
     } else {
         String::new()
     };
-    format!("{cell}{drive}")
+    let plate = if protocol.plate_tilt_sd_deg > 0.0 {
+        format!(", a moved plate whose angles are known to {}°", short_number(protocol.plate_tilt_sd_deg))
+    } else {
+        String::new()
+    };
+    format!("{cell}{drive}{plate}")
 }

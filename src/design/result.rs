@@ -8,11 +8,13 @@ use super::recommendation::Recommendation;
 use super::search::Found;
 use super::study::Study;
 use super::study_hash::study_hash;
+use super::tolerances::{DimensionTolerance, on_drawings};
 use super::vary_scan::ChosenScan;
 use crate::calibration::ParameterSpread;
 use crate::material::symbol_of_parameter;
 use crate::provenance::VERSION;
 use crate::sensitivity::Protocol;
+use crate::specimen::Tolerances;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -52,6 +54,9 @@ pub struct DesignResult {
     /// Index in `ranked` of the one of them that is simplest to make: fewest holes, then fewest different diameters.
     #[serde(default)]
     pub simplest: usize,
+    /// What the design that is recommended loses where its dimensions are off, and by how much they may be.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tolerances: Vec<DimensionTolerance>,
     /// Indices in `ranked` of the trade-off between information (D-optimal figure of the first material) and force:
     /// none of the others has both less force and a smaller standard deviation.
     pub pareto: Vec<usize>,
@@ -120,6 +125,11 @@ impl DesignResult {
         self.ranked.get(self.simplest).unwrap_or(&self.best)
     }
 
+    /// Tolerances of the drawing of every sample of the design to make.
+    pub fn drawing_tolerances(&self) -> Vec<Tolerances> {
+        on_drawings(&self.tolerances, &self.recommended().specimen)
+    }
+
     /// Puts a search's findings together; `None` if nothing was confirmed.
     pub fn new(study: &Study, found: &Found) -> Option<DesignResult> {
         let ranked: Vec<DesignEntry> = found.ranked.iter().filter_map(DesignEntry::of).collect();
@@ -139,6 +149,7 @@ impl DesignResult {
             scan: found.scan,
             equal_to_best: found.equal_to_best.clone(),
             simplest: found.simplest,
+            tolerances: found.tolerances.clone(),
             disagreement,
             base,
             best,

@@ -6,11 +6,16 @@ use crate::specimen::{Block, Hole, MIRROR_TOLERANCE_MM, ManufacturingLimits, Spe
 /// The step where limits state none, mm.
 const USUAL_STEP_MM: f64 = 0.1;
 
+/// The step in which dimensions are made, mm.
+pub(super) fn made_in_steps_of(limits: &ManufacturingLimits) -> f64 {
+    limits.dimension_step_mm.unwrap_or(USUAL_STEP_MM)
+}
+
 /// The design nearest to `specimen` whose dimensions, places and drive are multiples of the limits' step, whose angles
 /// are whole degrees, and that can be made: holes are smaller by up to two steps where the nearest ones come too close
 /// to something. Punches keep their diameters. `None` where no such design can be made.
 pub(super) fn in_steps(specimen: &Specimen, limits: &ManufacturingLimits, voxel_mm: [f64; 3]) -> Option<Specimen> {
-    let step = limits.dimension_step_mm.unwrap_or(USUAL_STEP_MM);
+    let step = made_in_steps_of(limits);
     let nearest = |value: f64| multiple(step, (value / step).round());
     let mut rounded = specimen.clone();
     rounded.drive_mm.iter_mut().for_each(|d| *d = nearest(*d));
@@ -63,7 +68,7 @@ pub(super) fn in_steps(specimen: &Specimen, limits: &ManufacturingLimits, voxel_
 }
 
 /// The centre of a notch in steps: on the side of the block as rounded, where it was on that of the block as drawn.
-fn notch_center(hole: &Hole, drawn: &Block, rounded: &Block, nearest: impl Fn(f64) -> f64) -> [f64; 2] {
+pub(super) fn notch_center(hole: &Hole, drawn: &Block, rounded: &Block, nearest: impl Fn(f64) -> f64) -> [f64; 2] {
     let [before, after] = [drawn, rounded].map(|block| hole.axis.section_of(block));
     [0, 1].map(|c| {
         let value = hole.center_mm[c];
@@ -73,13 +78,13 @@ fn notch_center(hole: &Hole, drawn: &Block, rounded: &Block, nearest: impl Fn(f6
 }
 
 /// Block and holes of every sample.
-fn shapes_of(specimen: &mut Specimen) -> impl Iterator<Item = (&mut Block, &mut Vec<Hole>)> {
+pub(super) fn shapes_of(specimen: &mut Specimen) -> impl Iterator<Item = (&mut Block, &mut Vec<Hole>)> {
     let Specimen { block, holes, other_samples, .. } = specimen;
     std::iter::once((block, holes)).chain(other_samples.iter_mut().map(|s| (&mut s.block, &mut s.holes)))
 }
 
 /// `count` steps, without the last digit that a product of a decimal fraction leaves.
-fn multiple(step: f64, count: f64) -> f64 {
+pub(super) fn multiple(step: f64, count: f64) -> f64 {
     let per_mm = (1.0 / step).round();
     if (per_mm * step - 1.0).abs() < 1e-12 { count / per_mm } else { count * step }
 }

@@ -20,6 +20,7 @@ use super::state::{MOST_FINE_FAILURES, State};
 use super::structure_problem::StructureProblem;
 use super::study::Study;
 use super::ties::{equal_to_best, simplest};
+use super::tolerances::DimensionTolerance;
 use super::unfinished::Unfinished;
 use super::vary_scan::ChosenScan;
 use crate::specimen::Specimen;
@@ -46,6 +47,8 @@ pub struct Found {
     pub equal_to_best: Vec<usize>,
     /// Place of the one of them that is simplest to make, which is recommended.
     pub simplest: usize,
+    /// What the design that is recommended loses where its dimensions are off.
+    pub tolerances: Vec<DimensionTolerance>,
     /// What is left of the gains if the scan's grid lies anywhere; `None` where the study takes it to do so, or its
     /// objective does not hang on it.
     pub gain_anywhere: Option<GainAnywhere>,
@@ -142,6 +145,10 @@ impl SearchRun<'_> {
         let (ranked, scan) = self.with_best_scan(&base, ranked, &mut state)?;
         let equal_to_best = equal_to_best(study, &base, &ranked);
         let simplest = simplest(&ranked, &equal_to_best).unwrap_or(0);
+        let tolerances = match ranked.get(simplest) {
+            Some(recommended) => self.tolerances(&base.specimen, recommended, &state)?,
+            None => Vec::new(),
+        };
         let anywhere = |place: usize| {
             let design: &Confirmed = ranked.get(place)?;
             self.gain_anywhere(&base.specimen, &design.specimen, design.scan()?)
@@ -152,6 +159,7 @@ impl SearchRun<'_> {
             gain_anywhere: best.zip(recommended).map(|(best, recommended)| GainAnywhere { best, recommended }),
             equal_to_best,
             simplest,
+            tolerances,
             scan,
             base,
             ranked,

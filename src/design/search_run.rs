@@ -16,7 +16,8 @@ use crate::specimen::Specimen;
 /// How far a search is.
 #[derive(Clone, Debug)]
 pub struct Progress {
-    /// `base`, `explore`, `refine`, `propose`, `solid`, `rows`, `confirm`, `repair`, `scan`, `verify`.
+    /// `base`, `explore`, `refine`, `propose`, `solid`, `rows`, `confirm`, `repair`, `scan`,
+    /// `tolerances`, `verify`.
     pub stage: &'static str,
     /// Finished in this stage.
     pub done: usize,

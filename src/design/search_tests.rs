@@ -108,7 +108,22 @@ fn proposals_keep_the_limits() {
     for (gain, confirmed) in [(anywhere.best, &found.ranked[0]), (anywhere.recommended, recommended)] {
         assert!((gain / confirmed.objective - 1.0).abs() < 0.3, "{gain} {}", confirmed.objective);
     }
+    // It is told how exactly the recommended bar is to be made, and what it loses otherwise.
+    let whole = ["length", "thickness", "width"];
+    assert_eq!(found.tolerances.iter().map(|t| t.name.as_str()).take(3).collect::<Vec<_>>(), whole);
+    for t in &found.tolerances {
+        let [smaller, larger] =
+            [t.relative_change_smaller, t.relative_change_larger].map(|c| c.expect("bars have an equilibrium"));
+        let within = t.tolerance_mm.expect("both sides are known");
+        assert!(t.step_mm == 0.1 && within > 0.0 && within <= 0.2, "{t:?}");
+        assert_eq!(within < 0.1, smaller.min(larger) < -0.01, "{t:?}");
+        let changed = [-0.1, 0.1].map(|by_mm| t.dimension.changed(&recommended.specimen, by_mm));
+        assert!(changed.iter().all(|s| s.validate().is_ok() && *s != recommended.specimen));
+    }
     let result = DesignResult::new(&study, &found).expect("something was confirmed");
+    let thickness = &result.tolerances[1];
+    assert_eq!(result.drawing_tolerances()[0].block_mm[1], thickness.tolerance_mm);
+    assert!(result.recommendation.dimensions.contains("thickness"), "{}", result.recommendation.dimensions);
     let said = &result.findings;
     assert!(said.iter().any(|s| s.contains(&format!("it is {:.3}", anywhere.best))), "{said:?}");
     let advice = &result.recommendation.make;

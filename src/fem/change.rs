@@ -5,7 +5,7 @@
 //! faces, which is differenced.
 
 use super::assembler::Assembler;
-use super::departures::Departures;
+use super::departures::{Departures, PlateMotion};
 use super::element_data::{FibreDifference, MAX_GROUPS};
 use super::error::SolveError;
 use super::law_correction::LawCorrection;
@@ -119,6 +119,25 @@ impl Tangent<'_> {
             imposed[v as usize] = rate;
         }
         Change { imposed, ..Change::default() }
+    }
+
+    /// The change as the moved plate turns about the centre of its bonded face by the rotation vector `about` (rad per
+    /// unit of t), once it is where the drive brings it. `None` where a mirror plane of the mesh turns that rotation
+    /// round: its change is then odd across the plane, where all that the mesh tells is even.
+    pub fn change_of_turning_plate(&self, about: [f64; 3]) -> Option<Change> {
+        const STEP: f64 = 1e-4;
+        let mirror = self.assembler.mesh().mirror;
+        // A mirror keeps of a rotation vector the component across its plane.
+        let is_turned_round = |across: usize| (0..3).any(|axis| axis != across && about[axis].abs() > 0.0);
+        if mirror.y && is_turned_round(1) || mirror.z && is_turned_round(2) {
+            return None;
+        }
+        let present = self.assembler.departures().clone();
+        let turned = |t: f64| {
+            let turn = PlateMotion { rotation_rad: about.map(|w| t * w), ..PlateMotion::default() };
+            Departures { moved_plate: present.moved_plate.plus(&turn), ..present.clone() }
+        };
+        Some(self.change_of_plates(&turned, STEP))
     }
 
     /// The change as the held nodes move by `rate` (mm per unit of t; other nodes' entries are ignored).

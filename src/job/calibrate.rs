@@ -180,9 +180,13 @@ impl Request for CalibrationRequest {
     fn check(self) -> Result<Box<dyn Run>, Vec<FieldError>> {
         let mut errors: Vec<FieldError> =
             self.protocol.field_errors().into_iter().map(|e| e.below("/protocol")).collect();
-        if self.protocol.drive_zero_sd_mm > 0.0 {
-            let error = FieldError::new("/protocol/drive_zero_sd_mm", self.protocol.drive_zero_sd_mm, "0");
-            errors.push(error.remedy("a calibration takes the drive as recorded; `diagnose` finds its zero"));
+        let of_plates = [
+            ("/protocol/drive_zero_sd_mm", self.protocol.drive_zero_sd_mm),
+            ("/protocol/plate_tilt_sd_deg", self.protocol.plate_tilt_sd_deg),
+        ];
+        for (pointer, sd) in of_plates.into_iter().filter(|(_, sd)| *sd > 0.0) {
+            let error = FieldError::new(pointer, sd, "0");
+            errors.push(error.remedy("a calibration takes the plates as recorded; `diagnose` finds where they were"));
         }
         if self.protocol.blocks_scanned != 1 {
             let error = FieldError::new("/protocol/blocks_scanned", self.protocol.blocks_scanned, "1");

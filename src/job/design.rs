@@ -125,12 +125,14 @@ impl Run for CheckedStudy {
         outcome.add("report.html", design_report(&result, &pictures));
         let mut best = result.best.specimen.clone();
         best.name = format!("{} (designed for: {})", best.name, result.name).chars().take(200).collect();
-        add_drawings(&mut outcome, &best, "best-specimen")?;
+        let tolerances = result.drawing_tolerances();
+        let of_best = if result.simplest == 0 { &tolerances[..] } else { &[] };
+        add_drawings(&mut outcome, &best, "best-specimen", of_best)?;
         if result.simplest > 0 {
             let mut recommended = result.recommended().specimen.clone();
             recommended.name =
                 format!("{} (recommended for: {})", recommended.name, result.name).chars().take(200).collect();
-            add_drawings(&mut outcome, &recommended, "recommended-specimen")?;
+            add_drawings(&mut outcome, &recommended, "recommended-specimen", &tolerances)?;
         }
         Ok(outcome)
     }

@@ -262,7 +262,7 @@ impl Run for CheckedEvaluation {
             outcome.add("detectable.svg", detectable_picture(&evaluation.detectable));
         }
         self.add_samples(&mut outcome, &fixture, &maps, context)?;
-        add_drawings(&mut outcome, specimen, "specimen")?;
+        add_drawings(&mut outcome, specimen, "specimen", &[])?;
         let formats = array_formats(&self.request.arrays);
         if !formats.is_empty() {
             add_arrays(&mut outcome, "evaluation", evaluation_arrays(&evaluation, &maps), &formats, context)?;

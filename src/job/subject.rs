@@ -4,7 +4,7 @@ use super::{Context, JobError, Outcome};
 use crate::fem::{ForwardModel, PrepareError};
 use crate::field::FieldError;
 use crate::mesh::{MeshOptions, MeshSize, mesh_specimen};
-use crate::specimen::{Specimen, mould_to_step, to_dxf, to_step, to_stl, to_svg};
+use crate::specimen::{Specimen, Tolerances, mould_to_step, to_dxf_with, to_step, to_stl, to_svg_with};
 
 /// The specimen driven to `drive_mm`, where given, with everything that is wrong with it added to `errors`.
 pub fn driven(specimen: &Specimen, drive_mm: Option<&Vec<f64>>, errors: &mut Vec<FieldError>) -> Specimen {
@@ -88,18 +88,26 @@ pub fn check_count(count: usize, pointer: &str, max_elements: usize) -> Result<(
     Err(FieldError::new(pointer, found, format!("at most {max_elements}")).remedy("use a coarser mesh"))
 }
 
-/// Adds the specimen's file and the drawings for the mould maker, of every sample its own.
+/// Adds the specimen's file and the drawings for the mould maker, of every sample its own, with its `tolerances` where
+/// there are any.
 ///
 /// # Errors
 /// [`JobError::NoSolution`] where the solid cannot be drawn.
-pub fn add_drawings(outcome: &mut Outcome, specimen: &Specimen, stem: &str) -> Result<(), JobError> {
+pub fn add_drawings(
+    outcome: &mut Outcome,
+    specimen: &Specimen,
+    stem: &str,
+    tolerances: &[Tolerances],
+) -> Result<(), JobError> {
     outcome.add(format!("{stem}.json"), specimen.to_json());
     let no_drawing = |e: &dyn std::fmt::Display| JobError::NoSolution(e.to_string());
     for (index, sample) in specimen.samples().iter().enumerate() {
         let mould = name_of_sample(&format!("{stem}-mould"), index);
         let stem = name_of_sample(stem, index);
-        outcome.add(format!("{stem}.svg"), to_svg(sample));
-        outcome.add(format!("{stem}.dxf"), to_dxf(sample));
+        let none = Tolerances::default();
+        let tolerances = tolerances.get(index).unwrap_or(&none);
+        outcome.add(format!("{stem}.svg"), to_svg_with(sample, tolerances));
+        outcome.add(format!("{stem}.dxf"), to_dxf_with(sample, tolerances));
         outcome.add(format!("{stem}.stl"), to_stl(sample).map_err(|e| no_drawing(&e))?);
         outcome.add(format!("{stem}.step"), to_step(sample).map_err(|e| no_drawing(&e))?);
         outcome.add(format!("{mould}.step"), mould_to_step(sample).map_err(|e| no_drawing(&e))?);

@@ -6,7 +6,7 @@ use super::{
     design_verification::verification, significant, symbol_of_parameter,
 };
 use crate::design::{DesignEntry, DesignResult, block_in_brief, holes_in_brief, plates_in_words};
-use crate::specimen::{LimitMargin, Specimen, to_svg};
+use crate::specimen::{LimitMargin, Specimen, to_svg_with};
 
 /// Pictures made elsewhere, put in the page where they belong.
 #[derive(Clone, Debug, Default)]
@@ -29,8 +29,14 @@ fn what_to_do(page: &mut Report, result: &DesignResult) {
     page.paragraph(&advice.precision);
     page.paragraph(&advice.assumptions);
     let samples = recommended.specimen.samples();
-    let drawings = samples.iter().map(|s| (to_svg(s), format!("Drawing of \"{}\"; dimensions in mm.", s.name)));
+    let tolerances = result.drawing_tolerances();
+    let drawings = samples.iter().zip(&tolerances);
+    let drawings = drawings.map(|(s, t)| (to_svg_with(s, t), format!("Drawing of \"{}\"; dimensions in mm.", s.name)));
     page.figures(&drawings.collect::<Vec<_>>());
+    if !result.tolerances.is_empty() {
+        page.paragraph(&advice.dimensions);
+        page.table(&tolerance_table(result));
+    }
     page.table(&precision_table(result));
     page.table(&force_table(result));
 }
@@ -65,6 +71,36 @@ fn precision_table(result: &DesignResult) -> Table {
         ],
         rows,
         note: "Moduli (μ, κ) in kPa, exponents (α) are pure numbers. κ is hardly seen in such a test.".into(),
+        ..Table::default()
+    }
+}
+
+/// What each dimension of the recommended specimen costs where it is off.
+fn tolerance_table(result: &DesignResult) -> Table {
+    let percent = |change: Option<f64>| change.map_or("no equilibrium".into(), |c| format!("{:+.2}", 100.0 * c));
+    let rows = result.tolerances.iter().map(|t| {
+        vec![
+            t.name.clone(),
+            significant(t.drawn_mm, 3),
+            percent(t.relative_change_smaller),
+            percent(t.relative_change_larger),
+            t.tolerance_mm.map_or("–".into(), |mm| mm.to_string()),
+        ]
+    });
+    let step_mm = result.tolerances.first().map_or(0.0, |t| t.step_mm);
+    Table {
+        caption: format!("Change of the objective where a dimension is off by {step_mm} mm."),
+        columns: vec![
+            Column::words("Dimension"),
+            Column::numbers("As drawn", "mm"),
+            Column::numbers("Smaller", "%"),
+            Column::numbers("Larger", "%"),
+            Column::numbers("Tolerance", "± mm"),
+        ],
+        rows: rows.collect(),
+        note: "Of the recommended specimen, on the coarse mesh of the search, all else held; mirror images together. On a grid that is \
+               centred on the sample it changes in jumps where a row of voxels comes in."
+            .into(),
         ..Table::default()
     }
 }

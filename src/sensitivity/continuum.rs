@@ -158,13 +158,13 @@ pub fn information_of_protocol(
             gram_over_quadrature(block.mesh, block.points, &fields, noise, voxel_volume_mm3)? * f64::from(block.count);
     }
     let unknowns: Vec<(Nuisance, f64)> =
-        forces.protocol.nuisances().into_iter().filter(|(n, _)| *n != Nuisance::DriveZero).collect();
+        forces.protocol.nuisances().into_iter().filter(|(n, _)| n.is_of_load_cell()).collect();
     let mut joint = JointInformation::of_scan(FisherInformation::from_matrix(material, gram)?, unknowns.len());
     for reading in forces.readings {
         check_length("a force's sensitivities", reading.sensitivities.len(), num)?;
         let of_unknown = |(unknown, _): &(Nuisance, f64)| match unknown {
             Nuisance::ForceGain => reading.force_n,
-            Nuisance::ForceZero | Nuisance::DriveZero => 1.0,
+            _ => 1.0,
         };
         let of_unknowns: Vec<f64> = unknowns.iter().map(of_unknown).collect();
         joint.add_force(&reading.sensitivities, &of_unknowns, noise.force_sd_n);

@@ -314,6 +314,18 @@ fn unknowns_at(
                 let along = tangent.path_sensitivity(&[], None, 1.0)?;
                 (Some(along.displacement), along.force_n)
             }
+            Nuisance::PlateTilt(axis) => {
+                let mut about = [0.0; 3];
+                about[axis] = 1.0;
+                match tangent.change_of_turning_plate(about) {
+                    Some(change) => {
+                        let along = tangent.path_sensitivity_of(&[], &change)?;
+                        (Some(along.displacement), along.force_n)
+                    }
+                    // What is mirrored is told as well as if the plate were not turned so.
+                    None => (None, 0.0),
+                }
+            }
         };
         Ok(Unknown { sd, displacement, force_n })
     };

@@ -13,6 +13,8 @@ schema_type! {
     ForceDrivesMm = numbers(number(), 0..=1000);
     /// A standard deviation of at most 1000, or 0 for what is known exactly.
     SdOrZero = number_within(0.0..=1000.0);
+    /// A standard deviation of an angle, degrees, or 0 for what is known exactly.
+    PlateTiltSdDeg = number_within(0.0..=MAX_TILT_SD_DEG);
     /// A number of samples.
     BlocksScanned = integer_within(1..=MAX_BLOCKS_SCANNED as usize);
     /// Shares of the time of one scan, each above 0, together at most 1.
@@ -21,6 +23,8 @@ schema_type! {
 
 /// Most samples that a scan can see: as many as a specimen can have.
 const MAX_BLOCKS_SCANNED: u32 = MAX_SAMPLES_IN_PARALLEL + MAX_OTHER_SAMPLES as u32;
+/// Largest standard deviation of a plate's angles, degrees: what they change is told to first order.
+const MAX_TILT_SD_DEG: f64 = 10.0;
 /// Smallest share of the time that a scan may get: less is none.
 const LEAST_SHARE: f64 = 1e-6;
 /// Rounding that shares which use up all of the time may have.
@@ -49,6 +53,10 @@ pub struct Protocol {
     /// Standard deviation of the drive's zero, mm: every drive is as much too large or too small.
     #[cfg_attr(feature = "schema", schema(value_type = SdOrZero))]
     pub drive_zero_sd_mm: f64,
+    /// Standard deviation of the angles by which the moved plate or grip is turned about x, y and z, each, degrees: at
+    /// every drive alike, about the centre of its bonded face.
+    #[cfg_attr(feature = "schema", schema(value_type = PlateTiltSdDeg))]
+    pub plate_tilt_sd_deg: f64,
     /// How many of the specimen's samples are scanned, the first ones of those listed. They lie in the scanner
     /// together, so that each has the voxels and the noise of the scan, and another one takes no time.
     #[serde(skip_serializing_if = "is_one")]
@@ -73,6 +81,7 @@ impl Default for Protocol {
             force_gain_sd: 0.0,
             force_zero_sd_n: 0.0,
             drive_zero_sd_mm: 0.0,
+            plate_tilt_sd_deg: 0.0,
             blocks_scanned: 1,
             scan_share: Vec::new(),
         }
@@ -142,17 +151,31 @@ pub(super) enum Nuisance {
     ForceZero,
     /// The drive's zero.
     DriveZero,
+    /// The moved plate's angle about an axis.
+    PlateTilt(usize),
+}
+
+impl Nuisance {
+    /// Whether it is one of the load cell, which voxels do not see.
+    pub(super) fn is_of_load_cell(self) -> bool {
+        match self {
+            Nuisance::ForceGain | Nuisance::ForceZero => true,
+            Nuisance::DriveZero | Nuisance::PlateTilt(_) => false,
+        }
+    }
 }
 
 impl Protocol {
     /// The unknowns, each with the standard deviation to which it is known beforehand.
     pub(super) fn nuisances(&self) -> Vec<(Nuisance, f64)> {
+        let tilts = [0, 1, 2].map(|axis| (Nuisance::PlateTilt(axis), self.plate_tilt_sd_deg.to_radians()));
         [
             (Nuisance::ForceGain, self.force_gain_sd),
             (Nuisance::ForceZero, self.force_zero_sd_n),
             (Nuisance::DriveZero, self.drive_zero_sd_mm),
         ]
         .into_iter()
+        .chain(tilts)
         .filter(|(_, sd)| *sd > 0.0)
         .collect()
     }
@@ -234,6 +257,10 @@ impl Protocol {
             if !(sd >= 0.0 && sd.is_finite()) {
                 errors.push(FieldError::new(FieldPath::of(name).pointer(), sd, "a finite number, 0 or above"));
             }
+        }
+        if !(0.0..=MAX_TILT_SD_DEG).contains(&self.plate_tilt_sd_deg) {
+            let allowed = format!("from 0 to {MAX_TILT_SD_DEG}");
+            errors.push(FieldError::new("/plate_tilt_sd_deg", self.plate_tilt_sd_deg, allowed));
         }
         errors
     }

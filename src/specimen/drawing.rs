@@ -8,7 +8,8 @@ use super::drawing_labels::spread;
 use super::drawing_sheet::{Anchor, CHARACTER_WIDTH, Drawing, Layer, Shape, TEXT_HEIGHT, format_mm};
 use super::drawing_table::{ROW_HEIGHT, table_width};
 use super::section_loop::{SectionCurve, outline};
-use super::{HoleAxis, Outline, Specimen, TestKind};
+use super::tolerances::dimension;
+use super::{HoleAxis, Outline, Specimen, TestKind, Tolerances};
 
 const MARGIN: f64 = 10.0;
 /// Width of the title, mm.
@@ -27,13 +28,13 @@ const SCALES: [f64; 14] = [50.0, 20.0, 10.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.5, 0.2, 
 
 impl Drawing {
     /// Lays out the drawing of a specimen.
-    pub(super) fn new(specimen: &Specimen) -> Drawing {
+    pub(super) fn new(specimen: &Specimen, tolerances: &Tolerances) -> Drawing {
         let num_holes = specimen.holes.len();
         let rows_of = |height: f64| ((height - 2.0 * MARGIN - TITLE_HEIGHT - 16.0) / ROW_HEIGHT) as usize;
         let size = if num_holes <= rows_of(210.0) { [297.0, 210.0] } else { [420.0, 297.0] };
         let rows = rows_of(size[1]);
         let num_tables = num_holes.div_ceil(rows).max(1);
-        let panel = num_tables as f64 * table_width(specimen);
+        let panel = num_tables as f64 * table_width(specimen, tolerances);
 
         let block = specimen.block;
         let [_, thickness_mm, _] = block.extents_mm();
@@ -61,8 +62,8 @@ impl Drawing {
         drawing.section_view(specimen, section);
         drawing.ordinates(specimen, section);
         drawing.hidden_holes(specimen, other);
-        drawing.overall_dimensions(specimen, front_center, side_center);
-        drawing.table(specimen, rows, [size[0] - MARGIN - panel, size[1] - MARGIN]);
+        drawing.overall_dimensions(specimen, tolerances, front_center, side_center);
+        drawing.table(specimen, tolerances, rows, [size[0] - MARGIN - panel, size[1] - MARGIN]);
         drawing.title(specimen);
         drawing
     }
@@ -158,18 +159,19 @@ impl Drawing {
         }
     }
 
-    fn overall_dimensions(&mut self, specimen: &Specimen, front: [f64; 2], side: [f64; 2]) {
+    fn overall_dimensions(&mut self, specimen: &Specimen, tolerances: &Tolerances, front: [f64; 2], side: [f64; 2]) {
+        let [of_length, of_thickness, of_width] = tolerances.block_mm;
         let [hx, hy, hz] = specimen.block.extents_mm().map(|c| 0.5 * self.scale * c);
         let top = front[1] + hz;
         let ends = [[front[0] - hx, top], [front[0] + hx, top]];
-        self.dimension_x(ends, top + 12.0, format_mm(specimen.block.length_mm));
-        self.dimension_y(front, [hx, hz], format_mm(specimen.block.width_mm));
+        self.dimension_x(ends, top + 12.0, dimension(specimen.block.length_mm, of_length));
+        self.dimension_y(front, [hx, hz], dimension(specimen.block.width_mm, of_width));
         if specimen.block.taper().is_even() {
-            self.dimension_y(side, [hx, hy], format_mm(specimen.block.thickness_mm));
+            self.dimension_y(side, [hx, hy], dimension(specimen.block.thickness_mm, of_thickness));
         } else {
             for (sign, thickness_mm) in [-1.0, 1.0].into_iter().zip(specimen.block.end_thicknesses_mm()) {
                 let half = [hx, 0.5 * self.scale * thickness_mm];
-                self.dimension_of_end(side, half, sign, format_mm(thickness_mm));
+                self.dimension_of_end(side, half, sign, dimension(thickness_mm, of_thickness));
             }
         }
         let title_x = front[0] - hx;
@@ -283,16 +285,18 @@ fn wrap(text: &str, per_line: usize, max_lines: usize) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::specimen::HoleTolerances;
     use crate::specimen::drawing_sheet::Text;
     use crate::specimen::sampling::{dumbbell_with_hole, valid_specimen, valid_wedge};
     use proptest::prelude::*;
 
+    fn texts(drawing: &Drawing) -> Vec<&Text> {
+        let texts = drawing.entities.iter();
+        texts.filter_map(|entity| if let Shape::Text(text) = &entity.shape { Some(text) } else { None }).collect()
+    }
+
     fn check_texts(drawing: &Drawing) -> Result<(), String> {
-        let texts: Vec<&Text> = drawing
-            .entities
-            .iter()
-            .filter_map(|entity| if let Shape::Text(text) = &entity.shape { Some(text) } else { None })
-            .collect();
+        let texts = texts(drawing);
         for (i, a) in texts.iter().enumerate() {
             let [a0, a1] = a.bounds();
             if a0[0] < 4.0 || a0[1] < 4.0 || a1[0] > drawing.size[0] - 4.0 || a1[1] > drawing.size[1] - 4.0 {
@@ -316,24 +320,45 @@ mod tests {
         assert!(wrap("", 10, 2).is_empty());
     }
 
+    /// Every dimension to 0.05 mm.
+    fn toleranced(specimen: &Specimen) -> Tolerances {
+        let hole = HoleTolerances { center_mm: [Some(0.05); 2], diameter_mm: Some(0.05), length_mm: Some(0.05) };
+        Tolerances { block_mm: [Some(0.05); 3], holes: vec![hole; specimen.holes.len()] }
+    }
+
+    /// The published specimen's drawing tells the tolerances of its block beside its dimensions, those of its holes in
+    /// the table.
+    #[test]
+    fn tolerances_are_drawn() {
+        let specimen = Specimen::from_json(include_str!("../../geometries/two-hole-shear.json")).unwrap();
+        let drawing = Drawing::new(&specimen, &toleranced(&specimen));
+        let has = |text: &str| texts(&drawing).iter().filter(|t| t.content == text).count();
+        assert_eq!(["25.4 ±0.05", "6.4 ±0.05", "19.1 ±0.05", "±", "0.05"].map(has), [1, 1, 1, 3, 6]);
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig { cases: 128, failure_persistence: None, ..ProptestConfig::default() })]
 
         #[test]
         fn texts_do_not_overlap(specimen in valid_specimen()) {
-            prop_assert_eq!(check_texts(&Drawing::new(&specimen)), Ok(()));
+            prop_assert_eq!(check_texts(&Drawing::new(&specimen, &Tolerances::default())), Ok(()));
+        }
+
+        #[test]
+        fn texts_do_not_overlap_with_tolerances(specimen in valid_specimen()) {
+            prop_assert_eq!(check_texts(&Drawing::new(&specimen, &toleranced(&specimen))), Ok(()));
         }
 
         #[test]
         fn texts_do_not_overlap_in_wedges(specimen in valid_wedge()) {
             prop_assert_eq!(specimen.validate(), Ok(()));
-            prop_assert_eq!(check_texts(&Drawing::new(&specimen)), Ok(()));
+            prop_assert_eq!(check_texts(&Drawing::new(&specimen, &Tolerances::default())), Ok(()));
         }
 
         #[test]
         fn texts_do_not_overlap_in_dumbbells(specimen in dumbbell_with_hole()) {
             prop_assume!(specimen.validate().is_ok());
-            prop_assert_eq!(check_texts(&Drawing::new(&specimen)), Ok(()));
+            prop_assert_eq!(check_texts(&Drawing::new(&specimen, &Tolerances::default())), Ok(()));
         }
     }
 }

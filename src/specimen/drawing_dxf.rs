@@ -1,7 +1,7 @@
 //! The dimensioned drawing as DXF (R12, ASCII) for cutting and for CAD.
 
-use super::Specimen;
 use super::drawing_sheet::{Anchor, Drawing, Layer, Shape};
+use super::{Specimen, Tolerances};
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 
@@ -12,7 +12,12 @@ const CHORD_ERROR_MM: f64 = 0.002;
 /// the front view's centre at the origin. Layers: OUTLINE, HOLES, CENTRE, DIMENSIONS. R12 knows no ellipse: one is a
 /// closed POLYLINE of chords within 0.002 mm. The specimen should be valid.
 pub fn to_dxf(specimen: &Specimen) -> String {
-    let drawing = Drawing::new(specimen);
+    to_dxf_with(specimen, &Tolerances::default())
+}
+
+/// As [`to_dxf`], overall dimensions with their tolerances.
+pub fn to_dxf_with(specimen: &Specimen, tolerances: &Tolerances) -> String {
+    let drawing = Drawing::new(specimen, tolerances);
     let scale = drawing.scale;
     let place = |p: [f64; 2]| [0, 1].map(|k| (p[k] - drawing.front_center[k]) / scale);
     let mut dxf = Groups(String::new());

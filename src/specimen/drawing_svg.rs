@@ -1,7 +1,7 @@
 //! The dimensioned drawing as SVG, for reading and printing.
 
-use super::Specimen;
 use super::drawing_sheet::{Anchor, Drawing, Layer, Shape};
+use super::{Specimen, Tolerances};
 use crate::field::escape_xml;
 use std::fmt::Write;
 
@@ -9,7 +9,12 @@ use std::fmt::Write;
 /// diameter, overall dimensions, a table of holes, name, units and scale. A sheet of A4 (A3 for many holes),
 /// printed true to the stated scale. The specimen should be valid.
 pub fn to_svg(specimen: &Specimen) -> String {
-    let drawing = Drawing::new(specimen);
+    to_svg_with(specimen, &Tolerances::default())
+}
+
+/// As [`to_svg`], dimensions with their tolerances.
+pub fn to_svg_with(specimen: &Specimen, tolerances: &Tolerances) -> String {
+    let drawing = Drawing::new(specimen, tolerances);
     let [width, height] = drawing.size;
     let mut svg = format!(
         concat!(

@@ -1,56 +1,101 @@
 //! The table of holes on a drawing.
 
 use super::drawing_sheet::{Anchor, Drawing, Layer, TEXT_HEIGHT, format_deg, format_mm};
-use super::{Hole, HoleAxis, Specimen};
+use super::{Hole, HoleAxis, HoleTolerances, Specimen, Tolerances};
 
 pub(super) const ROW_HEIGHT: f64 = 4.0;
-/// Of holes that are all circles: number, two coordinates, two distances, diameter.
-const WIDTHS_OF_CIRCLES: [f64; 6] = [9.0, 15.0, 15.0, 15.0, 15.0, 15.0];
-/// Of others: number, two coordinates, two distances, outline, width, length, angle.
-const WIDTHS_OF_OUTLINES: [f64; 9] = [9.0, 15.0, 15.0, 15.0, 15.0, 13.0, 13.0, 13.0, 13.0];
+/// Widths of columns, mm: of numbers, of coordinates and circles' diameters, of what outlines have, of tolerances.
+const NUMBER: f64 = 9.0;
+const LENGTH: f64 = 15.0;
+const OF_OUTLINE: f64 = 13.0;
+const TOLERANCE: f64 = 10.0;
 
-/// Widths of the columns of a specimen's table.
-fn column_widths(specimen: &Specimen) -> &'static [f64] {
+/// What a column says of a hole with its tolerances.
+type Cell = Box<dyn Fn(&Hole, &HoleTolerances) -> String>;
+
+/// A column behind that of the numbers.
+struct TableColumn {
+    header: String,
+    width: f64,
+    cell: Cell,
+}
+
+impl TableColumn {
+    fn new(header: &str, width: f64, cell: impl Fn(&Hole, &HoleTolerances) -> String + 'static) -> TableColumn {
+        TableColumn { header: header.into(), width, cell: Box::new(cell) }
+    }
+
+    fn tolerance(of: fn(&HoleTolerances) -> Option<f64>) -> TableColumn {
+        TableColumn::new("±", TOLERANCE, move |_, t| of(t).map_or(String::new(), format_mm))
+    }
+}
+
+/// The columns of a specimen's table. Where holes have tolerances, these stand in place of the distances from the ends,
+/// which the overall dimensions tell.
+fn columns(specimen: &Specimen, tolerances: &Tolerances) -> Vec<TableColumn> {
+    let lateral = if specimen.extrusion_axis() == HoleAxis::Thickness { "z" } else { "y" };
+    let has_tolerances = !tolerances.holes.is_empty();
     let has_circles_only = specimen.holes.iter().all(|hole| hole.shape.is_none());
-    if has_circles_only { &WIDTHS_OF_CIRCLES } else { &WIDTHS_OF_OUTLINES }
+    let [half_length, half_lateral] = specimen.section_size().map(|extent| 0.5 * extent);
+    let mut all = Vec::new();
+    let mut add = |column: TableColumn, tolerance: fn(&HoleTolerances) -> Option<f64>| {
+        all.push(column);
+        if has_tolerances {
+            all.push(TableColumn::tolerance(tolerance));
+        }
+    };
+    add(TableColumn::new("x", LENGTH, |h, _| format_mm(h.center_mm[0])), |t| t.center_mm[0]);
+    add(TableColumn::new(lateral, LENGTH, |h, _| format_mm(h.center_mm[1])), |t| t.center_mm[1]);
+    if has_circles_only {
+        add(TableColumn::new("⌀", LENGTH, |h, _| format_mm(h.diameter_mm)), |t| t.diameter_mm);
+    } else {
+        add(TableColumn::new("width", OF_OUTLINE, |h, _| format_mm(h.diameter_mm)), |t| t.diameter_mm);
+        let length = |h: &Hole, _: &HoleTolerances| h.shape.map_or(String::new(), |s| format_mm(s.length_mm));
+        add(TableColumn::new("length", OF_OUTLINE, length), |t| t.length_mm);
+        let kind = |h: &Hole, _: &HoleTolerances| h.shape.map_or("round", |s| s.kind.name()).to_string();
+        let angle =
+            |h: &Hole, _: &HoleTolerances| h.shape.map_or(String::new(), |s| format!("{}°", format_deg(s.angle_deg)));
+        let place = all.iter().position(|c| c.header == "width").unwrap_or(all.len());
+        all.insert(place, TableColumn::new("outline", OF_OUTLINE, kind));
+        all.push(TableColumn::new("angle", OF_OUTLINE, angle));
+    }
+    if !has_tolerances {
+        let from_end = TableColumn::new("from -x", LENGTH, move |h, _| format_mm(half_length + h.center_mm[0]));
+        let from_side = move |h: &Hole, _: &HoleTolerances| format_mm(half_lateral + h.center_mm[1]);
+        all.splice(2..2, [from_end, TableColumn::new(&format!("from -{lateral}"), LENGTH, from_side)]);
+    }
+    all
 }
 
 /// Width of a specimen's table, mm.
-pub(super) fn table_width(specimen: &Specimen) -> f64 {
-    column_widths(specimen).iter().sum()
+pub(super) fn table_width(specimen: &Specimen, tolerances: &Tolerances) -> f64 {
+    NUMBER + columns(specimen, tolerances).iter().map(|c| c.width).sum::<f64>()
 }
 
 impl Drawing {
     /// The table of holes; `rows` per table, tables side by side from `top_left`.
-    pub(super) fn table(&mut self, specimen: &Specimen, rows: usize, top_left: [f64; 2]) {
+    pub(super) fn table(&mut self, specimen: &Specimen, tolerances: &Tolerances, rows: usize, top_left: [f64; 2]) {
         if specimen.holes.is_empty() {
             return;
         }
-        let widths = column_widths(specimen);
-        let b = if specimen.extrusion_axis() == HoleAxis::Thickness { "z" } else { "y" };
-        let of_size: &[&str] =
-            if widths.len() == WIDTHS_OF_CIRCLES.len() { &["⌀"] } else { &["outline", "width", "length", "angle"] };
-        let from_side = format!("from -{b}");
+        let columns = columns(specimen, tolerances);
+        let table_width = table_width(specimen, tolerances);
+        let widths: Vec<f64> = std::iter::once(NUMBER).chain(columns.iter().map(|c| c.width)).collect();
         let header: Vec<String> =
-            ["hole", "x", b, "from -x", &from_side].iter().chain(of_size).map(|t| (*t).to_string()).collect();
-        let [length, lateral] = specimen.section_size();
+            std::iter::once("hole".to_string()).chain(columns.iter().map(|c| c.header.clone())).collect();
         for (table, holes) in specimen.holes.chunks(rows).enumerate() {
-            let left = top_left[0] + table as f64 * table_width(specimen);
+            let left = top_left[0] + table as f64 * table_width;
             let mut y = top_left[1] - 6.0;
-            self.table_row(left, y, &header, widths);
-            let right = left + table_width(specimen) - 2.0;
+            self.table_row(left, y, &header, &widths);
+            let right = left + table_width - 2.0;
             self.line(Layer::Sheet, [left, y - 1.2], [right, y - 1.2]);
             for (i, hole) in holes.iter().enumerate() {
                 y -= ROW_HEIGHT + if i == 0 { 1.0 } else { 0.0 };
-                let [x, b] = hole.center_mm;
-                let mut row = vec![(table * rows + i + 1).to_string()];
-                row.extend([x, b, 0.5 * length + x, 0.5 * lateral + b].map(format_mm));
-                if widths.len() == WIDTHS_OF_CIRCLES.len() {
-                    row.push(format_mm(hole.diameter_mm));
-                } else {
-                    row.extend(outline_cells(hole));
-                }
-                self.table_row(left, y, &row, widths);
+                let place = table * rows + i;
+                let own = tolerances.holes.get(place).copied().unwrap_or_default();
+                let cells = columns.iter().map(|c| (c.cell)(hole, &own));
+                let row: Vec<String> = std::iter::once((place + 1).to_string()).chain(cells).collect();
+                self.table_row(left, y, &row, &widths);
             }
         }
     }
@@ -60,18 +105,6 @@ impl Drawing {
         for (cell, width) in cells.iter().zip(widths) {
             right += width;
             self.text(Layer::Sheet, [right - 2.0, y], TEXT_HEIGHT, Anchor::End, false, cell.clone());
-        }
-    }
-}
-
-/// Outline, extent across, extent along and angle of a hole.
-fn outline_cells(hole: &Hole) -> [String; 4] {
-    let width = format_mm(hole.diameter_mm);
-    match hole.shape {
-        None => ["round".into(), width, String::new(), String::new()],
-        Some(shape) => {
-            let angle = format!("{}°", format_deg(shape.angle_deg));
-            [shape.kind.name().into(), width, format_mm(shape.length_mm), angle]
         }
     }
 }

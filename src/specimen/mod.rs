@@ -50,6 +50,7 @@ mod taper;
 mod taper_tests;
 #[cfg(test)]
 mod tests;
+mod tolerances;
 
 #[cfg(feature = "design")]
 pub(crate) use file::Name;
@@ -58,11 +59,11 @@ pub use bounds::{
     MAX_DIAMETER_MM, MAX_HOLES, MAX_NAME_LENGTH, MAX_OTHER_SAMPLES, MAX_SAMPLES_IN_PARALLEL, MAX_SIZE_MM,
     MIN_DIAMETER_MM, MIN_SIZE_MM, SCHEMA,
 };
-pub use drawing_dxf::to_dxf;
+pub use drawing_dxf::{to_dxf, to_dxf_with};
 pub use drawing_step::{MOULD_WALL_MM, mould_to_step, to_step};
 #[cfg(feature = "triangles")]
 pub use drawing_stl::{DrawingError, to_stl};
-pub use drawing_svg::to_svg;
+pub use drawing_svg::{to_svg, to_svg_with};
 pub use drives::{
     MAX_DRIVE_ANGLE_DEG, MAX_DRIVES, MAX_NOMINAL_STRETCH, MAX_PRECOMPRESSION, MAX_SHEAR_STRAIN, MIN_NOMINAL_STRETCH,
     PRECOMPRESSION_DIRECTION, farthest_from_zero, leads_on, way_across_plates,
@@ -79,6 +80,7 @@ pub use notch::{MAX_NOTCH_INSET, MIN_NOTCH_DEPTH, Notch, NotchProblem, NotchRate
 pub use read::min_meshable_ligament_mm;
 pub use read_error::SpecimenError;
 pub use taper::{MAX_WEDGE_OF_LENGTH, MAX_WEDGE_OF_THICKNESS, Taper};
+pub use tolerances::{HoleTolerances, Tolerances};
 
 use serde::{Deserialize, Serialize};
 

@@ -9,7 +9,8 @@ use crate::specimen::LimitMargin;
 pub(in crate::job) fn design(result: &DesignResult) -> String {
     let mut text = format!("{}\n\n", result.name);
     let advice = &result.recommendation;
-    for said in [&advice.make, &advice.precision, &advice.assumptions] {
+    let all = [&advice.make, &advice.precision, &advice.assumptions, &advice.dimensions];
+    for said in all.into_iter().filter(|said| !said.is_empty()) {
         text += &format!("{said}\n\n");
     }
     for sentence in &result.findings {

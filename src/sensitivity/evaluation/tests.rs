@@ -266,6 +266,38 @@ fn comparison_at_equal_median_stretch() {
     }
 }
 
+/// Unknown angles of the moved plate take back what they imitate of the material, the more the less they are known. On
+/// half of a mirrored sample only the turn in the plane that is kept counts; the whole sample says the same of the
+/// material, of which the other turns, odd across the mirror, tell nothing.
+#[test]
+fn a_plate_out_of_true_takes_precision_back() {
+    let specimen = with_hole();
+    let material = Material::new(2000.0, [(12.0, 1.5)]).unwrap();
+    let drives = DriveSelection::DriveMm(vec![2.5]);
+    let promised = |plate_tilt_sd_deg: f64, use_mirror: bool| -> Vec<f64> {
+        let options = EvaluationOptions {
+            mesh: MeshOptions { use_mirror, ..MeshOptions::search(&specimen) },
+            protocol: Protocol { plate_tilt_sd_deg, ..Protocol::default() },
+            ..EvaluationOptions::standard(&specimen)
+        };
+        let (found, _) = evaluate(&specimen, &material, &coarse_scan(), &drives, &options, &|| false).unwrap();
+        found.promised_sd.iter().map(|p| p.value.unwrap()).collect()
+    };
+    let [known, somewhat, unknown] = [1e-9, 0.1, 5.0].map(|sd_deg| promised(sd_deg, true));
+    let exactly = promised(0.0, true);
+    for i in 0..exactly.len() {
+        assert!((known[i] / exactly[i] - 1.0).abs() < 1e-9, "{known:?} {exactly:?}");
+        assert!(somewhat[i] > exactly[i] * (1.0 - 1e-9) && unknown[i] > somewhat[i] * (1.0 - 1e-9));
+    }
+    assert!(unknown.iter().zip(&exactly).any(|(a, b)| *a > 1.001 * b), "{unknown:?} {exactly:?}");
+    // Both meshes are the same but for rounding and where the section was divided.
+    let ratios = |whole: &[f64], half: &[f64]| whole.iter().zip(half).map(|(a, b)| a / b).collect::<Vec<_>>();
+    let (of_known, of_unknown) = (ratios(&promised(0.0, false), &exactly), ratios(&promised(5.0, false), &unknown));
+    for (a, b) in of_known.iter().zip(&of_unknown) {
+        assert!((a / b - 1.0).abs() < 1e-3, "{of_known:?} {of_unknown:?}");
+    }
+}
+
 /// Forces on the way to a scan tell two terms apart; an unknown gain of the load cell takes some of that back, and a
 /// gain as good as known takes nothing.
 #[test]

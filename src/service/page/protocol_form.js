@@ -41,6 +41,13 @@ const ASKED = [
     "One standard deviation: every drive is as much too large or too small. Empty: known exactly.",
   ],
   [
+    "plate_tilt_sd_deg",
+    "Angles of the moved plate, known to, °",
+    "optional",
+    "0.5",
+    "One standard deviation about each axis, at every drive alike. Empty: known exactly.",
+  ],
+  [
     "blocks_scanned",
     "Samples scanned",
     "optionalWhole",
