@@ -55,6 +55,7 @@ pub struct Protocol {
     pub drive_zero_sd_mm: f64,
     /// Standard deviation of the angles by which the moved plate or grip is turned about x, y and z, each, degrees: at
     /// every drive alike, about the centre of its bonded face.
+    #[serde(skip_serializing_if = "is_exact")]
     #[cfg_attr(feature = "schema", schema(value_type = PlateTiltSdDeg))]
     pub plate_tilt_sd_deg: f64,
     /// How many of the specimen's samples are scanned, the first ones of those listed. They lie in the scanner
@@ -67,6 +68,10 @@ pub struct Protocol {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[cfg_attr(feature = "schema", schema(value_type = ScanShares))]
     pub scan_share: Vec<f64>,
+}
+
+fn is_exact(sd: &f64) -> bool {
+    !(sd.abs() > 0.0)
 }
 
 fn is_one(blocks: &u32) -> bool {
