@@ -2,7 +2,7 @@
 
 use super::rounding::{notch_center, shapes_of};
 use super::words::listed;
-use crate::specimen::{Hole, HoleAxis, MIRROR_TOLERANCE_MM, Outline, Specimen};
+use crate::specimen::{Hole, HoleAxis, MAX_PRECOMPRESSION, MIRROR_TOLERANCE_MM, Outline, Specimen};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -103,7 +103,8 @@ impl Dimension {
         }
     }
 
-    /// The specimen with it larger by so much, mm, all else held; notches stay on their sides.
+    /// The specimen with it larger by so much, mm, all else held; notches stay on their sides, and plates are brought no
+    /// further than they may be.
     pub(super) fn changed(&self, specimen: &Specimen, by_mm: f64) -> Specimen {
         use DimensionKind as K;
         let mut made = specimen.clone();
@@ -137,6 +138,9 @@ impl Dimension {
                 hole.center_mm = notch_center(hole, &drawn, block, |value| value);
             }
         }
+        let ends_mm = shapes_of(&mut made).flat_map(|(block, _)| block.end_thicknesses_mm());
+        let most_mm = MAX_PRECOMPRESSION * ends_mm.fold(f64::INFINITY, f64::min).max(0.0);
+        made.precompression_mm = made.precompression_mm.clamp(-most_mm, most_mm);
         made
     }
 
@@ -219,6 +223,17 @@ mod tests {
                 let expected = if other == changed { 0.1 } else { 0.0 };
                 assert!((by_mm - expected).abs() < 1e-12, "{changed:?} {other:?} {by_mm}");
             }
+        }
+    }
+
+    /// Of a block whose plates are pulled apart as far as may be, a thinner one is still valid.
+    #[test]
+    fn plates_keep_their_limit() {
+        let specimen = Specimen { precompression_mm: -1.6, ..two_holes() };
+        assert_eq!(specimen.validate(), Ok(()));
+        for dimension in Dimension::all_of(&specimen) {
+            let both = [-0.1, 0.1].map(|by_mm| dimension.changed(&specimen, by_mm));
+            assert!(both.iter().all(|s| s.validate().is_ok()), "{dimension:?}");
         }
     }
 

@@ -36,13 +36,13 @@ pub struct DimensionTolerance {
     pub drawn_mm: f64,
     /// The step by which it was changed, mm.
     pub step_mm: f64,
-    /// Relative change of the objective where it is smaller by the step; null where the specimen then has no
-    /// equilibrium.
+    /// Relative change of the objective where it is smaller by the step; null where the specimen then cannot
+    /// be solved.
     pub relative_change_smaller: Option<f64>,
     /// The same where it is larger.
     pub relative_change_larger: Option<f64>,
     /// By how much it may be off, ± mm, so that the objective falls by at most a hundredth for it alone; two steps at
-    /// most. Null where a specimen one step off has no equilibrium.
+    /// most. Null where a specimen one step off cannot be solved.
     pub tolerance_mm: Option<f64>,
 }
 
@@ -161,7 +161,7 @@ pub(super) fn in_words(tolerances: &[DimensionTolerance]) -> String {
     let unstable = names_of(None);
     if let (false, Some(step_mm)) = (unstable.is_empty(), tolerances.first().map(|t| t.step_mm)) {
         said.push(format!(
-            "The {} must be held better than to {} mm: so far off the specimen has no equilibrium.",
+            "The {} must be held better than to {} mm: so far off the specimen cannot be solved.",
             listed(&unstable),
             short_number(step_mm)
         ));
@@ -216,8 +216,8 @@ mod tests {
         assert_eq!(
             in_words(&all),
             "Make the thickness to ±0.05 mm; the length and ⌀ of holes 1 and 2 to ±0.2 mm. Each of them alone then costs at most 1 % \
-             of the objective. The x of holes 1 and 2 must be held better than to 0.1 mm: so far off the specimen has no \
-             equilibrium."
+             of the objective. The x of holes 1 and 2 must be held better than to 0.1 mm: so far off the specimen cannot be \
+             solved."
         );
         assert_eq!(in_words(&[]), "");
     }

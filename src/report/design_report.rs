@@ -77,7 +77,7 @@ fn precision_table(result: &DesignResult) -> Table {
 
 /// What each dimension of the recommended specimen costs where it is off.
 fn tolerance_table(result: &DesignResult) -> Table {
-    let percent = |change: Option<f64>| change.map_or("no equilibrium".into(), |c| format!("{:+.2}", 100.0 * c));
+    let percent = |change: Option<f64>| change.map_or("not solved".into(), |c| format!("{:+.2}", 100.0 * c));
     let rows = result.tolerances.iter().map(|t| {
         vec![
             t.name.clone(),
