@@ -103,8 +103,8 @@ impl Dimension {
         }
     }
 
-    /// The specimen with it larger by so much, mm, all else held; notches stay on their sides, and plates are brought no
-    /// further than they may be.
+    /// The specimen with it larger by so much, mm, all else held; notches stay on their sides, and plates are brought
+    /// no further than they may be.
     pub(super) fn changed(&self, specimen: &Specimen, by_mm: f64) -> Specimen {
         use DimensionKind as K;
         let mut made = specimen.clone();
