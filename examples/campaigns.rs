@@ -2,7 +2,7 @@
 //! that is fixed beforehand.
 //!
 //! ```text
-//! cargo run --release --example campaigns -- [DRAWS SEED [TERMS [GAIN]]]
+//! cargo run --release --example campaigns -- [DRAWS SEED [TERMS [GAIN [TRUTH]]]]
 //! ```
 //!
 //! The laboratory knows what kind of material it has, but not which: a fixed protocol has to suit every material of the
@@ -13,6 +13,9 @@
 //!
 //! With GAIN, 0.005 say, every campaign has a load cell of its own that reads so much too much, to one standard
 //! deviation, in all its scans alike, and that is known of it.
+//!
+//! TRUTH is the element size of the mesh that the truth is solved on, relative to standard, 0.5 where it is left out:
+//! finer elements go on to show more at the bonded edges, and a sample has none.
 
 use lambdak::calibration::{CalibrationError, Observed, SyntheticScan};
 use lambdak::design::Study;
@@ -37,9 +40,10 @@ type Failure = Box<dyn Error + Send + Sync>;
 const MOST_SCANS: usize = 8;
 /// Of one material and way to choose the scans.
 const MOST_CAMPAIGNS: u64 = 1000;
-/// Element sizes relative to standard: of the truth, fine enough that its own error (0.1 % of the force) is less than what
-/// noise leaves, and of the fits, as in the command `next`.
+/// Element size of the truth relative to standard where none is given: so fine that its own error (0.1 % of the force) is
+/// less than what noise leaves.
 const TRUTH_MESH: f64 = 0.5;
+/// Element size of the fits, as in the command `next`.
 const FIT_MESH: f64 = 2.5;
 /// Drives that may be scanned, mm.
 const DRIVES_MM: [f64; 5] = [2.0, 3.0, 4.0, 5.0, 6.0];
@@ -51,6 +55,14 @@ struct Kind {
     name: &'static str,
     truths: Vec<Material>,
     precision: f64,
+}
+
+/// What is the same in all campaigns.
+struct Laboratory {
+    /// Of the load cell.
+    gain_sd: f64,
+    /// Element size of the truth relative to standard.
+    truth_mesh: f64,
 }
 
 /// One way to choose the scans; drives by their place among [`DRIVES_MM`].
@@ -96,7 +108,10 @@ struct Sample<'a> {
 fn main() -> Result<(), Failure> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let numbers: Vec<u64> = arguments.iter().take(3).map(|n| n.parse()).collect::<Result<_, _>>()?;
-    let gain_sd: f64 = arguments.get(3).map_or(Ok(0.0), |gain| gain.parse())?;
+    let laboratory = Laboratory {
+        gain_sd: arguments.get(3).map_or(Ok(0.0), |gain| gain.parse())?,
+        truth_mesh: arguments.get(4).map_or(Ok(TRUTH_MESH), |size| size.parse())?,
+    };
     let draws = numbers.first().copied().unwrap_or(20).min(MOST_CAMPAIGNS);
     let seed = numbers.get(1).copied().unwrap_or(1);
     let of = |terms: &[(f64, f64)]| Material::new(400.0, terms.iter().copied());
@@ -119,7 +134,7 @@ fn main() -> Result<(), Failure> {
     for kind in kinds {
         let num_terms = kind.truths[0].terms.len() as u64;
         if numbers.get(2).is_none_or(|asked| *asked == num_terms) {
-            kind.compare(draws, seed, gain_sd)?;
+            kind.compare(draws, seed, &laboratory)?;
         }
     }
     Ok(())
@@ -147,11 +162,11 @@ fn driven(study: &Study, drive: usize) -> Specimen {
 }
 
 impl Sample<'_> {
-    fn new<'a>(place: usize, kind: &'a Kind, study: &'a Study) -> Result<Sample<'a>, Failure> {
+    fn new<'a>(place: usize, (kind, study): (&'a Kind, &'a Study), truth_mesh: f64) -> Result<Sample<'a>, Failure> {
         let truth = &kind.truths[place];
         let scan = |drive: usize| -> Result<Option<SyntheticScan>, Failure> {
             let body = driven(study, drive);
-            let mesh = MeshOptions { grading: 0.4, ..MeshOptions::scaled(&body, TRUTH_MESH) };
+            let mesh = MeshOptions { grading: 0.4, ..MeshOptions::scaled(&body, truth_mesh) };
             let solve = SolveOptions::default();
             // A scan of its own would have a gain of its own.
             match SyntheticScan::new(&body, truth, &study.scan, &Protocol::default(), &mesh, &solve, &|| false) {
@@ -248,11 +263,11 @@ impl Sample<'_> {
 }
 
 impl Kind {
-    fn compare(&self, draws: u64, seed: u64, gain_sd: f64) -> Result<(), Failure> {
-        let study = study(self, gain_sd)?;
+    fn compare(&self, draws: u64, seed: u64, laboratory: &Laboratory) -> Result<(), Failure> {
+        let study = study(self, laboratory.gain_sd)?;
         let samples: Vec<Sample> = (0..self.truths.len())
             .into_par_iter()
-            .map(|place| Sample::new(place, self, &study))
+            .map(|place| Sample::new(place, (self, &study), laboratory.truth_mesh))
             .collect::<Result<_, _>>()?;
         let holds = |drive: &usize| {
             let is_borne = |scan: &SyntheticScan| scan.noiseless().forces_n[0] <= MOST_FORCE_N;

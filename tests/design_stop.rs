@@ -102,6 +102,27 @@ fn ctrl_c_keeps_what_was_found() {
     assert!(out.join("design.json").exists());
 }
 
+/// The search of a study that is verified by more draws is taken from the checkpoint, its verification is not.
+#[test]
+fn more_draws_are_verified_anew() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = write_study(folder.path());
+    let out = folder.path().join("out");
+    for draws in [1, 2] {
+        let mut asked = json(&study);
+        asked["verification"] = serde_json::json!({ "is_on": true, "draws": draws });
+        std::fs::write(&study, asked.to_string()).unwrap();
+        let output = design(&study, &out, &[]);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{said}");
+        assert_eq!(said.contains("taken from the checkpoint"), draws == 2, "{said}");
+        let verified = &json(&out.join("design.json"))["verification"];
+        for row in verified["best"].as_array().unwrap().iter().chain(verified["base"].as_array().unwrap()) {
+            assert_eq!(row["draws"], draws, "{row}");
+        }
+    }
+}
+
 #[test]
 fn a_wrong_time_limit_is_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -175,13 +175,17 @@ impl CheckedStudy {
         let draws = study.verification.draws;
         let total = 2 * study.materials.len() * draws;
         let done = AtomicUsize::new(0);
+        let tell = |count: usize| {
+            let (best, best_specimen) = (Some(result.best.objective), Some(result.best.specimen.clone()));
+            context.progress(&Progress { best, best_specimen, ..Progress::new("verify", count, total) });
+        };
+        // The truth of the first draws takes its time.
+        tell(0);
         let of = |entry: &DesignEntry, material: &Material| -> Option<Verified> {
             let told = AtomicUsize::new(0);
             let on_draw = || {
                 told.fetch_add(1, Ordering::Relaxed);
-                let count = done.fetch_add(1, Ordering::Relaxed) + 1;
-                let (best, best_specimen) = (Some(result.best.objective), Some(result.best.specimen.clone()));
-                context.progress(&Progress { best, best_specimen, ..Progress::new("verify", count, total) });
+                tell(done.fetch_add(1, Ordering::Relaxed) + 1);
             };
             let on = |options: VerifyOptions| {
                 let protocol = Protocol { scan_share: entry.evaluation.scan_share.clone(), ..study.protocol.clone() };
@@ -230,6 +234,7 @@ impl CheckedStudy {
         let key = input_hash(&json!({
             "specimen": specimen, "material": material, "kind": "verification", "truth_mesh": options.truth_mesh,
             "fit_mesh": options.fit_mesh, "max_iterations": options.fit.max_iterations, "protocol": options.protocol, "scan": scan,
+            "draws": options.draws, "seed": options.seed,
         }));
         let (spreads, failure) = checkpoint.get_or(&key, || {
             match verify_in_full(specimen, material, scan, options, on_draw, &is_cancelled) {

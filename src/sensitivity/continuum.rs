@@ -164,7 +164,9 @@ pub fn information_of_protocol(
         check_length("a force's sensitivities", reading.sensitivities.len(), num)?;
         let of_unknown = |(unknown, _): &(Nuisance, f64)| match unknown {
             Nuisance::ForceGain => reading.force_n,
-            _ => 1.0,
+            Nuisance::ForceZero => 1.0,
+            // Left out above: they change the displacements.
+            Nuisance::DriveZero | Nuisance::PlateTilt(_) => 0.0,
         };
         let of_unknowns: Vec<f64> = unknowns.iter().map(of_unknown).collect();
         joint.add_force(&reading.sensitivities, &of_unknowns, noise.force_sd_n);
