@@ -4,8 +4,8 @@
 //! than the noise does: those of a block of 12 × 4 × 9 mm, sheared by 4 or 5 mm, by 1.7 to 2.6 standard deviations of
 //! one scan. Exponents are told by singular edges, where errors fall slowly: a mesh of half the size leaves 0.6 to 0.9
 //! of these, one of a third 0.3 to 0.4. Extrapolated with the order of such edges at most 0.2 are left of what a mesh
-//! shows whose elements are half of the standard ones; still finer ones show more at the edges. Of three
-//! tenths of the size, and of two fifths where specimens are large or drives are many, is what an answer in seconds has
+//! shows whose elements are half of the standard ones; still finer ones show more at the edges. A finer mesh of three
+//! tenths of the size, or of two fifths where specimens are large or drives are many, is what an answer in seconds has
 //! time for.
 
 use super::body::is_same_body;
