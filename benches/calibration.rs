@@ -67,7 +67,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             ("1.2, whole specimen", MeshOptions { use_mirror: false, ..MeshOptions::scaled(&specimen, 1.2) }),
         ] {
             let at_start = cpu_seconds(begin);
-            let mut problem = CalibrationProblem::new(&observed, &|_| mesh, Objective::Weighted)?;
+            let problem = CalibrationProblem::new(&observed, &|_| mesh, Objective::Weighted)?;
             let prepared = cpu_seconds(begin);
             let fit = problem.fit(&start, None, &FitOptions::default(), &never)?;
             let done = cpu_seconds(begin);

@@ -82,7 +82,7 @@ fn real_blocks_predict_one_another() -> Result<(), Missing> {
     }
     let length = |r: [f64; 3]| r.iter().map(|x| x * x).sum::<f64>().sqrt();
     for (n, (name, data)) in ["a", "b"].iter().zip(&data).enumerate() {
-        let mut problem = CalibrationProblem::new(data, &|s| mesh(s, 1.4), Objective::Weighted).unwrap();
+        let problem = CalibrationProblem::new(data, &|s| mesh(s, 1.4), Objective::Weighted).unwrap();
         let predicted = problem.at(&materials[1 - n], &|| false).unwrap();
         let (rms, _) = rms_misfit_mm(predicted.predicted(0, 0), &data[0].steps[0].displacement);
         println!("block {name} predicted from the other: misfit {rms:.3?} mm (own fit {:.3?})", own[n]);

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{Random, random_material, random_specimen};
+use common::{Random, random_scanned_case};
 use lambdak::material::Material;
 use lambdak::mesh::MeshOptions;
 use lambdak::sensitivity::{
@@ -34,17 +34,6 @@ struct Bounded {
 }
 
 const KINDS: [&str; 3] = ["force", "integrated sensitivity", "promised standard deviation"];
-
-/// One or two terms (one scan tells no three apart), at most two holes, a quarter to four fifths of the largest drive.
-fn random_case(random: &mut Random) -> (Specimen, Material) {
-    loop {
-        let (mut specimen, material) = (random_specimen(random), random_material(random));
-        if material.terms.len() < 3 && specimen.holes.len() < 3 {
-            specimen.drive_mm[0] *= random.between(0.25, 0.8);
-            return (specimen, material);
-        }
-    }
-}
 
 fn evaluated(specimen: &Specimen, material: &Material, options: &EvaluationOptions) -> Option<Evaluation> {
     let scan = ScanSettings {
@@ -112,7 +101,7 @@ fn table(all: &[&Bounded]) -> String {
 fn random_cases() {
     let stated = |name: &str| std::env::var(name).ok().and_then(|v| v.parse().ok());
     let mut random = Random::new(stated("SEED").unwrap_or(4));
-    let cases: Vec<_> = (0..stated("CASES").unwrap_or(160)).map(|_| random_case(&mut random)).collect();
+    let cases: Vec<_> = (0..stated("CASES").unwrap_or(160)).map(|_| random_scanned_case(&mut random)).collect();
     // Those that are done, among them those with a reference.
     let progress = Mutex::new((0, Vec::new()));
     cases.par_iter().for_each(|case| {

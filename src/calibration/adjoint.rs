@@ -15,7 +15,7 @@ impl CalibrationProblem<'_> {
     /// # Errors
     /// [`CalibrationError`].
     pub fn objective_and_adjoint_gradient(
-        &mut self,
+        &self,
         material: &Material,
         solve: &SolveOptions,
         is_cancelled: &(dyn Fn() -> bool + Sync),
@@ -27,9 +27,9 @@ impl CalibrationProblem<'_> {
         let mut value = 0.0;
         let mut gradient = vec![0.0; material.parameters().len()];
         let mut states: Vec<Vec<Equilibrium>> = Vec::new();
-        for (recording, model) in observed.iter().zip(models.iter_mut()) {
+        for (recording, model) in observed.iter().zip(models) {
             let drives_mm = recording.all_drives_mm();
-            states.push(model.own_mut().solve_path(material, &drives_mm, solve, is_cancelled)?);
+            states.push(model.with(|model| model.solve_path(material, &drives_mm, solve, is_cancelled))?);
         }
         let forces = AllForces::of(&targets);
         let misfits = forces.misfits(&|r, d| states[r][d].force_n);
@@ -39,7 +39,7 @@ impl CalibrationProblem<'_> {
         for (&(r, d), weighed) in forces.places().iter().zip(&weighed) {
             by_forces[r][d] = -2.0 * weighed;
         }
-        for (r, (model, view)) in models.iter_mut().zip(views).enumerate() {
+        for (r, (model, view)) in models.iter().zip(views).enumerate() {
             for ((state, step), &by_force) in states[r].iter().zip(&targets[r].steps).zip(&by_forces[r]) {
                 let seen = view.average(&state.displacement)?;
                 let mut load = vec![[0.0; 3]; seen.len()];
@@ -51,7 +51,7 @@ impl CalibrationProblem<'_> {
                     }
                 }
                 let nodal = view.average_transposed(&load)?;
-                let of_step = model.own_mut().tangent(material, state)?.adjoint_gradient(&nodal, by_force)?;
+                let of_step = model.with(|model| model.tangent(material, state)?.adjoint_gradient(&nodal, by_force))?;
                 for (g, d) in gradient.iter_mut().zip(of_step) {
                     *g += d;
                 }
@@ -91,7 +91,7 @@ mod tests {
             let relative = |v: usize| [1.0 + v as f64 / num_voxels as f64, 0.5, 2.0];
             observed[0].steps[0].relative_noise = Some((0..num_voxels).map(relative).collect());
             let mesh = |s: &_| crate::mesh::MeshOptions { use_mirror, ..coarse(s) };
-            let mut problem = CalibrationProblem::new(&observed, &mesh, objective).unwrap();
+            let problem = CalibrationProblem::new(&observed, &mesh, objective).unwrap();
             let (value, gradient) = problem.objective_and_adjoint_gradient(&at, &solve, &|| false).unwrap();
             let predictions = problem.predict(&at, None, &solve, &|| false).unwrap();
             let (_, half) = raw_sums(&predictions, &problem.targets().unwrap());
@@ -102,7 +102,7 @@ mod tests {
                 assert!((g + 2.0 * half[i]).abs() < 1e-6 * scale.max(g.abs()), "{objective:?} {i}: {g} {}", half[i]);
             }
             let slope: f64 = gradient.iter().zip(&parameters).map(|(g, p)| g * at.value(*p)).sum();
-            let mut remainder = |h: f64| {
+            let remainder = |h: f64| {
                 let mut moved = at.clone();
                 for p in &parameters {
                     moved.set(*p, at.value(*p) * (1.0 + h));

@@ -55,7 +55,7 @@ fn weights_invert_the_covariance() {
 fn recordings_share_the_load_cell() {
     let both = two_drives(&cell());
     let fit = |observed: &[Observed]| {
-        let mut problem = CalibrationProblem::new(observed, &coarse, Objective::Weighted).unwrap();
+        let problem = CalibrationProblem::new(observed, &coarse, Objective::Weighted).unwrap();
         problem.fit(&truth(), None, &tight(), &|| false).unwrap()
     };
     let (one, two) = (fit(std::slice::from_ref(&both)), fit(&apart(&both)));

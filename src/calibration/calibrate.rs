@@ -20,7 +20,7 @@ use super::starts::Candidates;
 use super::target::Objective;
 use super::terms::{DecidedBy, compare, is_kept};
 use super::weak_intervals::{Ends, ends_by_noise, is_weak};
-use crate::material::{Material, Parameter};
+use crate::material::Parameter;
 use crate::mesh::MeshOptions;
 use crate::sensitivity::IDENTIFIABILITY_LIMIT;
 use crate::specimen::Specimen;
@@ -41,21 +41,21 @@ pub fn calibrate(
     let mut problem = CalibrationProblem::new(observed, &|s| mesh(s, coarse_factor), options.objective)?;
     let has_force = problem.has_force();
     let mut run = Run::new(options, has_force, on_stage, is_cancelled);
-    let (mut selection, fits) = run.select_terms(&mut problem)?;
+    let (mut selection, fits) = run.select_terms(&problem)?;
     let mut coarse = fits[selection.chosen - 1].clone();
     let mut meshes = None;
     let mut fit = coarse.clone();
     if options.has_mesh_allowance {
         on_stage("finer mesh");
-        let mut finer = CalibrationProblem::new(observed, &|s| mesh(s, options.mesh_factor), options.objective)?;
-        fit = run.fit(&mut finer, &with_falling_exponents(&coarse.material), None)?;
+        let finer = CalibrationProblem::new(observed, &|s| mesh(s, options.mesh_factor), options.objective)?;
+        fit = run.fit(&finer, &with_falling_exponents(&coarse.material), None)?;
         while selection.chosen > 1 && selection.decided_by != DecidedBy::Fixed {
             let fewer = &fits[selection.chosen - 2];
-            let smaller = run.fit(&mut finer, &with_falling_exponents(&fewer.material), None)?;
+            let smaller = run.fit(&finer, &with_falling_exponents(&fewer.material), None)?;
             let mut pair = vec![run.row(&finer, &smaller, 1, 1)?, run.row(&finer, &fit, 1, 1)?];
             // What a discretisation error within the allowance could make a term of is no evidence for one.
-            let start = run.fit(&mut problem, &fewer.material, Some(fewer))?;
-            let candidates = Candidates::new(&mut problem, &start, &run.fit_options, is_cancelled)?;
+            let start = run.fit(&problem, &fewer.material, Some(fewer))?;
+            let candidates = Candidates::new(&problem, &start, &run.fit_options, is_cancelled)?;
             let of_mesh = (options.discretisation_factor * error_over_shift()).powi(2)
                 * candidates.promise_of_mesh(&problem.targets()?, &smaller);
             pair[0].chi2 = (pair[0].chi2 - of_mesh).max(pair[1].chi2);
@@ -75,23 +75,19 @@ pub fn calibrate(
         }
         let sum = |p: &CalibrationProblem| p.num_unknowns().iter().sum();
         let num_unknowns = [sum(&problem), sum(&finer)];
-        coarse = run.fit(&mut problem, &with_falling_exponents(&coarse.material), None)?;
+        coarse = run.fit(&problem, &with_falling_exponents(&coarse.material), None)?;
         let allowance = Allowance::new(&fit, &coarse, &finer.targets()?, options.discretisation_factor);
         fit.structured_misfit = allowance.unexplained(fit.structured_misfit);
         meshes = Some(MeshComparison { num_unknowns, coarse: coarse.material.clone(), allowance });
         problem = finer;
     } else {
-        fit = run.in_order(&mut problem, fit)?;
+        fit = run.in_order(&problem, fit)?;
     }
     run.settle(&fit)?;
-    let mesh_error = |value: &dyn Fn(&Material) -> f64| match &meshes {
-        Some(m) => error_over_shift() * (value(&fit.material) - value(&m.coarse)).abs(),
-        None => 0.0,
-    };
     if is_weak(&fit) {
         on_stage("profiles of weakly known terms");
     }
-    let of_noise = ends_by_noise(&mut problem, &fit, &run.fit_options, is_cancelled)?;
+    let of_noise = ends_by_noise(&problem, &fit, &run.fit_options, is_cancelled)?;
     if is_weak(&fit) {
         let how = match of_noise.are_of_profiles {
             true => {
@@ -108,11 +104,7 @@ pub fn calibrate(
     let mut estimates: Vec<Estimate> = Vec::new();
     for (parameter, ends) in fit.material.parameters().into_iter().zip(&of_noise.ends) {
         let value = fit.material.value(parameter);
-        // κ is positive and hardly known: its logarithm is nearer to Gaussian.
-        let mesh_error = match parameter {
-            Parameter::Kappa => value * mesh_error(&|m: &Material| m.value(parameter).ln()),
-            _ => mesh_error(&|m: &Material| m.value(parameter)),
-        };
+        let mesh_error = meshes.as_ref().map_or(0.0, |m| m.allowance.mesh_error_of(parameter, &fit, &m.coarse));
         // Symmetric intervals say nothing of what is not identifiable; profiles do.
         let ends = ends
             .filter(|_| is_identifiable(&fit, parameter) || parameter != Parameter::Kappa && of_noise.are_of_profiles);
@@ -121,11 +113,15 @@ pub fn calibrate(
     // Without forces κ is in proportion to the μ₁ that was assumed.
     if has_force && !estimates[0].is_identifiable && !fit.held.contains(0) && options.objective == Objective::Weighted {
         on_stage("bound of kappa");
-        estimates[0].interval_95 = [bulk_lower_bound_kpa(&mut problem, &fit, &run.fit_options, is_cancelled)?, None];
+        estimates[0].interval_95 = [bulk_lower_bound_kpa(&problem, &fit, &run.fit_options, is_cancelled)?, None];
     }
     let initial_shear_modulus = has_force.then(|| {
         let (value, sd) = fit.initial_shear_modulus();
-        let error = mesh_error(&Material::initial_shear_modulus_kpa);
+        let gradient = fit.material.initial_shear_modulus_derivatives();
+        let error = meshes.as_ref().map_or(0.0, |m| {
+            let by_curvature = fit.information.covariance().sd_along(&gradient);
+            m.allowance.mesh_error(value - m.coarse.initial_shear_modulus_kpa(), by_curvature)
+        });
         // The shift of a sum of parameters is bounded by its own standard deviation likewise.
         let shift = sd.unwrap_or(0.0) / fit.misfit_factor.sqrt() * fit.structured_misfit;
         let error = options.discretisation_factor * error;
@@ -134,12 +130,12 @@ pub fn calibrate(
     let mut profiles = Vec::new();
     if options.has_profiles {
         on_stage("profiles");
-        profiles = profile(&mut problem, &fit, &run.fit_options, is_cancelled)?;
+        profiles = profile(&problem, &fit, &run.fit_options, is_cancelled)?;
     }
     let mut around = Vec::new();
     if let Some(contour_options) = &options.contours {
         on_stage("contours");
-        around = contours(&mut problem, &fit, contour_options, is_cancelled)?;
+        around = contours(&problem, &fit, contour_options, is_cancelled)?;
     }
     let mut stretches: Vec<f64> =
         problem.visited_stretches(&fit)?.iter().map(|s| s.iter().copied().fold(1.0, f64::max)).collect();
@@ -167,7 +163,8 @@ fn half_width(sd: f64, discretisation_sd: f64, possible_shift: f64) -> f64 {
     (TWO_SIDED_95 * sd.hypot(discretisation_sd)).hypot(possible_shift)
 }
 
-fn is_identifiable(fit: &RecordingFit, parameter: Parameter) -> bool {
+/// Whether the standard deviation is below half of the value.
+pub(super) fn is_identifiable(fit: &RecordingFit, parameter: Parameter) -> bool {
     fit.sd(parameter).is_some_and(|sd| sd < IDENTIFIABILITY_LIMIT * fit.material.value(parameter).abs())
 }
 

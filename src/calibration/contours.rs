@@ -1,9 +1,12 @@
 //! ℓ_u, ℓ_F and ℓ around an estimate over pairs of κ, μ₁ and α₁ (the paper's figure 8).
 
 use super::error::CalibrationError;
+use super::observed::Observed;
+use super::patch::{Losses, Patch};
+use super::prediction::Prediction;
 use super::problem::CalibrationProblem;
 use super::recording_fit::RecordingFit;
-use crate::fem::{Equilibrium, SolveOptions};
+use crate::fem::{Equilibrium, SolveOptions, side_by_side};
 use crate::material::{Material, Parameter};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -45,67 +48,175 @@ pub struct Contour {
     pub total: Vec<Option<f64>>,
 }
 
+/// A parameter and how far the contours go in it; places are told by a part from −1 to 1.
+struct Axis {
+    /// Its place in the order of [`Material::parameters`].
+    index: usize,
+    parameter: Parameter,
+    at: f64,
+    options: ContourOptions,
+}
+
+impl Axis {
+    fn of(fit: &RecordingFit, index: usize, options: &ContourOptions) -> Axis {
+        let parameter = fit.material.parameters()[index];
+        Axis { index, parameter, at: fit.material.value(parameter), options: *options }
+    }
+
+    fn value(&self, part: f64) -> f64 {
+        match self.parameter {
+            Parameter::Kappa => self.at * self.options.bulk_factor.powf(part),
+            p if p.is_modulus() => self.at * (1.0 + self.options.mu_range * part),
+            _ => self.at * (1.0 + self.options.alpha_range * part),
+        }
+    }
+
+    /// How the value changes with the part.
+    fn slope(&self, part: f64) -> f64 {
+        match self.parameter {
+            Parameter::Kappa => self.value(part) * self.options.bulk_factor.ln(),
+            p if p.is_modulus() => self.at * self.options.mu_range,
+            _ => self.at * self.options.alpha_range,
+        }
+    }
+
+    /// All values along it.
+    fn values(&self) -> Vec<f64> {
+        self.parts().into_iter().map(|part| self.value(part)).collect()
+    }
+
+    fn parts(&self) -> Vec<f64> {
+        let n = self.options.num_values.max(2);
+        (0..n).map(|i| 2.0 * i as f64 / (n - 1) as f64 - 1.0).collect()
+    }
+}
+
+/// `material` at a place over two axes.
+fn moved(material: &Material, axes: [&Axis; 2], parts: [f64; 2]) -> Material {
+    let mut moved = material.clone();
+    for (axis, part) in axes.into_iter().zip(parts) {
+        moved.set(axis.parameter, axis.value(part));
+    }
+    moved
+}
+
+/// The parts at both ends of an axis.
+const SIDES: [f64; 2] = [-1.0, 1.0];
+/// The pairs of axes.
+const PAIRS: [[usize; 2]; 3] = [[0, 1], [0, 2], [1, 2]];
+
+/// What a material predicts; none where it has no equilibrium.
+type Solved = Option<Vec<Prediction>>;
+
 /// Computes the three pairs (κ, μ₁), (κ, α₁), (μ₁, α₁) (of a law its first two parameters), other parameters staying at
 /// the estimate.
+///
+/// What a material predicts is smooth in its parameters: it is solved, with its derivatives, at the estimate and at the
+/// ends and the corners of each pair, and is a polynomial in between ([`super::patch`]). A pair that has an end or a
+/// corner without an equilibrium, or that polynomials do not follow, is solved place by place.
 ///
 /// # Errors
 /// [`CalibrationError`].
 pub fn contours(
-    problem: &mut CalibrationProblem,
+    problem: &CalibrationProblem,
     fit: &RecordingFit,
     options: &ContourOptions,
     is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<Contour>, CalibrationError> {
     problem.refuse_unlike_samples("contours of the losses")?;
-    let n = options.num_values.max(2);
-    let part = |i: usize| 2.0 * i as f64 / (n - 1) as f64 - 1.0;
-    let values = |parameter: Parameter| -> Vec<f64> {
-        let at = fit.material.value(parameter);
-        (0..n)
-            .map(|i| match parameter {
-                Parameter::Kappa => at * options.bulk_factor.powf(part(i)),
-                _ if parameter.is_modulus() => at * (1.0 + options.mu_range * part(i)),
-                _ => at * (1.0 + options.alpha_range * part(i)),
-            })
-            .collect()
-    };
     // κ, and the first two of the others.
-    let parameters = fit.material.parameters();
-    let (first, second) = (parameters[1], parameters[2]);
-    let pairs = [[Parameter::Kappa, first], [Parameter::Kappa, second], [first, second]];
-    let mut all = Vec::new();
-    for pair in pairs {
-        let axes = pair.map(values);
-        let mut losses = vec![None; n * n];
-        let mut near: Vec<Vec<Equilibrium>> = fit.predictions.iter().map(|p| p.states.clone()).collect();
-        for j in 0..n {
-            for step in 0..n {
-                // There and back again, so that neighbours are solved one after the other.
-                let i = if j % 2 == 0 { step } else { n - 1 - step };
-                let mut material = fit.material.clone();
-                material.set(pair[0], axes[0][i]);
-                material.set(pair[1], axes[1][j]);
-                losses[i + n * j] = match losses_at(problem, &material, &mut near, is_cancelled) {
-                    Ok(found) => Some(found),
-                    Err(e) if e.is_of_the_data() => None,
-                    Err(e) => return Err(e),
-                };
-            }
+    let axes = [0, 1, 2].map(|index| Axis::of(fit, index, options));
+    let solved = |(material, near): (Material, &[Prediction])| -> Result<Solved, CalibrationError> {
+        match problem.predict(&material, Some(near), &SolveOptions::trial(), is_cancelled) {
+            Ok(found) => Ok(Some(found)),
+            Err(e) if e.is_of_the_data() => Ok(None),
+            Err(e) => Err(e),
         }
+    };
+    let ends = axes.iter().flat_map(|axis| SIDES.map(|part| moved(&fit.material, [axis, axis], [part; 2])));
+    let ends = side_by_side(ends.map(|material| (material, &fit.predictions[..])).collect(), solved);
+    let ends = ends.into_iter().collect::<Result<Vec<Solved>, _>>()?;
+    let corners = PAIRS.iter().flat_map(|&pair| [0, 1, 2, 3].map(|corner| (pair, [corner / 2, corner % 2])));
+    let corners = side_by_side(corners.collect(), |([first, second], [i, j]): ([usize; 2], [usize; 2])| {
+        let Some(near) = &ends[2 * first + i] else { return Ok(None) };
+        solved((moved(&fit.material, [&axes[first], &axes[second]], [SIDES[i], SIDES[j]]), near))
+    });
+    let corners = corners.into_iter().collect::<Result<Vec<Solved>, _>>()?;
+    let mut all = Vec::new();
+    for ([first, second], corners) in PAIRS.into_iter().zip(corners.chunks(4)) {
+        let pair = [&axes[first], &axes[second]];
+        let mut places: Vec<([f64; 2], &Solved)> = Vec::new();
+        for (i, x) in SIDES.into_iter().enumerate() {
+            places.push(([x, 0.0], &ends[2 * first + i]));
+            places.push(([0.0, x], &ends[2 * second + i]));
+            places.extend(SIDES.into_iter().enumerate().map(|(j, y)| ([x, y], &corners[2 * i + j])));
+        }
+        let losses = polynomials(problem.observed(), fit, pair, &places);
+        let [along, across] = pair.map(Axis::parts);
+        let losses: Vec<Option<[f64; 2]>> = match losses {
+            Some(losses) => {
+                across.iter().flat_map(|&y| along.iter().map(move |&x| [x, y])).map(|at| Some(losses.at(at))).collect()
+            }
+            None => place_by_place(problem, fit, pair, is_cancelled)?,
+        };
+        let total = |[u, f]: [f64; 2]| u + options.beta * f;
         all.push(Contour {
-            parameters: pair.map(Parameter::name),
-            values: axes,
+            parameters: pair.map(|axis| axis.parameter.name()),
+            values: pair.map(Axis::values),
             loss_u: losses.iter().map(|l| l.map(|l| l[0])).collect(),
             loss_f: losses.iter().map(|l| l.map(|l| l[1])).collect(),
-            total: losses.iter().map(|l| l.map(|l| l[0] + options.beta * l[1])).collect(),
+            total: losses.iter().map(|l| l.map(total)).collect(),
         });
     }
     Ok(all)
 }
 
+/// The losses over two axes from what was solved at places around the estimate; none where a place has no equilibrium
+/// or polynomials do not follow.
+fn polynomials(
+    observed: &[Observed],
+    fit: &RecordingFit,
+    axes: [&Axis; 2],
+    places: &[([f64; 2], &Solved)],
+) -> Option<Losses> {
+    let mut patch = Patch::new(observed, &fit.predictions);
+    let slopes = |parts: [f64; 2]| [0, 1].map(|a| (axes[a].index, axes[a].slope(parts[a])));
+    patch.add([0.0; 2], &fit.predictions, slopes([0.0; 2]));
+    for (parts, solved) in places {
+        patch.add(*parts, solved.as_ref()?, slopes(*parts));
+    }
+    patch.losses()
+}
+
+/// The losses at all places, the first axis fastest, each solved from its neighbour.
+fn place_by_place(
+    problem: &CalibrationProblem,
+    fit: &RecordingFit,
+    axes: [&Axis; 2],
+    is_cancelled: &(dyn Fn() -> bool + Sync),
+) -> Result<Vec<Option<[f64; 2]>>, CalibrationError> {
+    let [along, across] = axes.map(Axis::parts);
+    let n = along.len();
+    let mut losses = vec![None; n * across.len()];
+    let mut near: Vec<Vec<Equilibrium>> = fit.predictions.iter().map(|p| p.states.clone()).collect();
+    for (j, &second) in across.iter().enumerate() {
+        for step in 0..n {
+            // There and back again, so that neighbours are solved one after the other.
+            let i = if j % 2 == 0 { step } else { n - 1 - step };
+            let material = moved(&fit.material, axes, [along[i], second]);
+            losses[i + n * j] = match losses_at(problem, &material, &mut near, is_cancelled) {
+                Ok(found) => Some(found),
+                Err(e) if e.is_of_the_data() => None,
+                Err(e) => return Err(e),
+            };
+        }
+    }
+    Ok(losses)
+}
+
 /// ℓ_u and ℓ_F of a material; `near` is replaced by its equilibria.
-pub(super) fn losses_at(
-    problem: &mut CalibrationProblem,
+fn losses_at(
+    problem: &CalibrationProblem,
     material: &Material,
     near: &mut [Vec<Equilibrium>],
     is_cancelled: &(dyn Fn() -> bool + Sync),
@@ -114,8 +225,9 @@ pub(super) fn losses_at(
     let (mut loss_u, mut loss_f) = ([0.0, 0.0], [0.0, 0.0]);
     for (((recording, model), view), states) in observed.iter().zip(models).zip(views).zip(near) {
         for (step, state) in recording.steps.iter().zip(states) {
+            let near = Some(&*state);
             *state =
-                model.own_mut().solve(material, step.drive_mm, Some(state), &SolveOptions::trial(), is_cancelled)?;
+                model.with(|model| model.solve(material, step.drive_mm, near, &SolveOptions::trial(), is_cancelled))?;
             let (mut sum, mut largest, mut count) = (0.0, 0.0f64, 0.0);
             for (u, m) in view.average(&state.displacement)?.iter().zip(&step.displacement) {
                 if m.iter().all(|x| x.is_finite()) {
@@ -132,3 +244,7 @@ pub(super) fn losses_at(
     }
     Ok([loss_u, loss_f].map(|[sum, count]| if count > 0.0 { sum / count } else { 0.0 }))
 }
+
+#[cfg(test)]
+#[path = "contours_tests.rs"]
+mod tests;

@@ -25,7 +25,7 @@ pub struct Law {
 /// # Errors
 /// [`CalibrationError`]: nothing to compare, no equilibrium.
 pub fn fit_law(
-    problem: &mut CalibrationProblem,
+    problem: &CalibrationProblem,
     earlier: &[RecordingFit],
     options: &CalibrateOptions,
     on_stage: &dyn Fn(&str),
@@ -63,13 +63,13 @@ mod tests {
             num_starts: 2,
             ..CalibrateOptions::default()
         };
-        let law = |problem: &mut CalibrationProblem, earlier: &[RecordingFit]| {
+        let law = |problem: &CalibrationProblem, earlier: &[RecordingFit]| {
             fit_law(problem, earlier, &options, &|_| (), &|| false).expect("a law")
         };
-        let mut problem = CalibrationProblem::new(&one, &coarse, Objective::Weighted).unwrap();
-        let earlier = law(&mut problem, &[]);
-        let mut problem = problem.with_data(&other).unwrap();
-        let [blind, near] = [&[], &earlier.by_num_terms[..]].map(|earlier| law(&mut problem, earlier));
+        let problem = CalibrationProblem::new(&one, &coarse, Objective::Weighted).unwrap();
+        let earlier = law(&problem, &[]);
+        let problem = problem.with_data(&other).unwrap();
+        let [blind, near] = [&[], &earlier.by_num_terms[..]].map(|earlier| law(&problem, earlier));
         assert_eq!(blind.fit.material.terms.len(), 1);
         assert_eq!(near.by_num_terms.len(), earlier.by_num_terms.len());
         let iterations = |law: &Law| law.by_num_terms[0].iterations;
@@ -92,8 +92,8 @@ mod tests {
         with[0].on_the_way = vec![ForceOnTheWay { drive_mm: 1.0, force }];
         let options = CalibrateOptions { terms: TermCount::Fixed(1), fit: tight(), ..CalibrateOptions::default() };
         let law = |observed: &[Observed], earlier: &[RecordingFit]| {
-            let mut problem = CalibrationProblem::new(observed, &coarse, Objective::Weighted).unwrap();
-            fit_law(&mut problem, earlier, &options, &|_| (), &|| false).expect("a law")
+            let problem = CalibrationProblem::new(observed, &coarse, Objective::Weighted).unwrap();
+            fit_law(&problem, earlier, &options, &|_| (), &|| false).expect("a law")
         };
         let [blind, near] = [vec![], law(&without, &[]).by_num_terms].map(|earlier| law(&with, &earlier));
         assert_eq!((blind.fit.states(0).len(), near.fit.states(0).len()), (2, 2));

@@ -26,6 +26,7 @@ mod observed_forces;
 mod options;
 mod outcome;
 mod outliers;
+mod patch;
 mod prediction;
 mod problem;
 mod profile;

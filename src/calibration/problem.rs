@@ -93,8 +93,8 @@ impl<'a> CalibrationProblem<'a> {
         self.objective
     }
 
-    pub(super) fn parts(&mut self) -> (&'a [Observed], &mut [ModelPool], &[View]) {
-        (self.observed, &mut self.models.scanned, &self.models.views)
+    pub(super) fn parts(&self) -> (&'a [Observed], &[ModelPool], &[View]) {
+        (self.observed, &self.models.scanned, &self.models.views)
     }
 
     pub(super) fn targets(&self) -> Result<Vec<Target<'_>>, CalibrationError> {
@@ -107,7 +107,7 @@ impl<'a> CalibrationProblem<'a> {
     }
 
     pub(super) fn predict(
-        &mut self,
+        &self,
         material: &Material,
         near: Option<&[Prediction]>,
         solve: &SolveOptions,
@@ -137,7 +137,7 @@ impl<'a> CalibrationProblem<'a> {
     /// # Errors
     /// [`CalibrationError`].
     pub fn fit(
-        &mut self,
+        &self,
         start: &Material,
         near: Option<&RecordingFit>,
         options: &FitOptions,
@@ -152,7 +152,7 @@ impl<'a> CalibrationProblem<'a> {
     /// Fits from where `from` stands, an earlier fit on this mesh, whose equilibria and derivatives are taken as they
     /// are; where these are not of all drives, from a start near it.
     pub(super) fn fit_from(
-        &mut self,
+        &self,
         from: &RecordingFit,
         options: &FitOptions,
         is_cancelled: &(dyn Fn() -> bool + Sync),
@@ -166,7 +166,7 @@ impl<'a> CalibrationProblem<'a> {
     }
 
     fn descend_from(
-        &mut self,
+        &self,
         first: Vec<Prediction>,
         start: &Material,
         options: &FitOptions,
@@ -196,7 +196,7 @@ impl<'a> CalibrationProblem<'a> {
     /// # Errors
     /// [`CalibrationError`].
     pub fn at(
-        &mut self,
+        &self,
         material: &Material,
         is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<RecordingFit, CalibrationError> {
@@ -210,7 +210,7 @@ impl<'a> CalibrationProblem<'a> {
     /// # Errors
     /// [`CalibrationError::Solve`].
     pub fn force_at(
-        &mut self,
+        &self,
         material: &Material,
         is_cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Vec<Vec<f64>>, CalibrationError> {

@@ -33,7 +33,7 @@ fn unlike_blocks_share_the_force_of_their_recordings() {
     assert_eq!(second.specimen.block.thickness_mm, 5.5);
     let fitted = |observed: &[Observed]| {
         let mesh = |s: &Specimen| coarse(&specimen).carried(&specimen, s);
-        let mut problem = CalibrationProblem::new(observed, &mesh, Objective::Weighted).unwrap();
+        let problem = CalibrationProblem::new(observed, &mesh, Objective::Weighted).unwrap();
         let mut start = truth();
         start.terms[0].mu_kpa *= 1.3;
         start.terms[0].alpha *= 0.8;
@@ -61,7 +61,7 @@ fn recordings_may_be_solved_side_by_side() {
         let recording = scan.recording("draw", &block(), &scan.draw(5, draw), Filter::None).unwrap();
         Observed::new(&recording, 0.01).unwrap()
     });
-    let mut problem = CalibrationProblem::new(&observed, &coarse, Objective::Weighted).unwrap();
+    let problem = CalibrationProblem::new(&observed, &coarse, Objective::Weighted).unwrap();
     let mut start = truth();
     start.terms[0].mu_kpa *= 1.3;
     let [one, two] = [1, 2].map(|threads| {
@@ -85,7 +85,7 @@ fn drives_may_be_solved_side_by_side() {
     let made = made.unwrap();
     let recording = made.recording("drives", &specimen, &made.draw(2, 0), Filter::None).unwrap();
     let observed = [Observed::new(&recording, scan.force_sd_n).unwrap()];
-    let mut problem = CalibrationProblem::new(&observed, &coarse, Objective::Weighted).unwrap();
+    let problem = CalibrationProblem::new(&observed, &coarse, Objective::Weighted).unwrap();
     let start = super::super::test_problem::ogden(260.0, &[[0.6, 5.0], [12.0, 1.7]]);
     let options = FitOptions { max_iterations: 3, ..tight() };
     let [one, two] = [1, 2].map(|threads| {
@@ -124,7 +124,7 @@ fn shifts_are_told_without_a_fit() {
     let (mut clean, noisy) = (observe(scan.noiseless()), observe(&scan.draw(3, 0)));
     // Of data without noise none can be estimated.
     clean[0].noise_sd_mm = noisy[0].noise_sd_mm;
-    let mut problem = CalibrationProblem::new(&clean, &coarse, Objective::Weighted).unwrap();
+    let problem = CalibrationProblem::new(&clean, &coarse, Objective::Weighted).unwrap();
     let fit = problem.fit(&truth(), None, &tight(), &|| false).unwrap();
     let told = problem.shift_to(&fit, &noisy).unwrap();
     let moved = problem.with_data(&noisy).unwrap().fit(&truth(), None, &tight(), &|| false).unwrap();
@@ -152,7 +152,7 @@ fn voxels_count_by_their_noise() {
     let relative = |&v: &u32| [1.0 + 0.5 * grid.center_mm(v as usize)[0].abs(), 1.0, 3.0];
     observed[0].steps[0].relative_noise = Some(observed[0].mask.voxels.iter().map(relative).collect());
     let covariance_of = |objective: Objective| {
-        let mut problem = CalibrationProblem::new(&observed, &coarse, objective).unwrap();
+        let problem = CalibrationProblem::new(&observed, &coarse, objective).unwrap();
         let predictions = problem.predict(&truth(), None, &tight().solve, &|| false).unwrap();
         let targets = problem.targets().unwrap();
         let (curvature, _) = raw_sums(&predictions, &targets);

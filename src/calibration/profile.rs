@@ -5,12 +5,15 @@ use super::interval::TWO_SIDED_95;
 use super::options::FitOptions;
 use super::problem::CalibrationProblem;
 use super::recording_fit::RecordingFit;
+use crate::fem::side_by_side;
 use crate::material::Parameter;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 /// Distances from the optimum, in standard deviations.
 const PLACES: [f64; 6] = [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0];
+/// How near the other parameters come to their optimum, in standard deviations: the increase is wrong by its square.
+const TOLERANCE: f64 = 0.05;
 /// 95 % point: one-sided bounds.
 pub const ONE_SIDED_95: f64 = 1.644_854;
 /// Most halvings of κ on the way to its bound.
@@ -32,7 +35,7 @@ pub struct Profile {
 
 /// Refits with one parameter (`index` in κ, μ₁, α₁, …) held at `value`.
 fn held_at(
-    problem: &mut CalibrationProblem,
+    problem: &CalibrationProblem,
     fit: &RecordingFit,
     index: usize,
     value: f64,
@@ -43,6 +46,36 @@ fn held_at(
     let parameter = start.parameters()[index];
     start.set(parameter, value);
     problem.fit(&start, Some(fit), &FitOptions { held: options.held.with(index), ..*options }, is_cancelled)
+}
+
+/// As [`held_at`] for a value a few standard deviations away, from where the linear model has the other parameters.
+fn held_near(
+    problem: &CalibrationProblem,
+    fit: &RecordingFit,
+    index: usize,
+    value: f64,
+    options: &FitOptions,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
+) -> Result<RecordingFit, CalibrationError> {
+    let mut start = fit.material.clone();
+    let parameters = start.parameters();
+    let change = value - start.value(parameters[index]);
+    let covariance = fit.information.covariance();
+    let variance = covariance.covariance(index, index);
+    for (other, &parameter) in parameters.iter().enumerate().filter(|(other, _)| *other != index) {
+        let Some((shared, variance)) = covariance.covariance(other, index).zip(variance) else { continue };
+        if options.held.contains(other) {
+            continue;
+        }
+        let (at, moved) = (start.value(parameter), change * shared / variance);
+        // What keeps its sign moves in its logarithm.
+        let keeps_its_sign = parameter.is_modulus() && !parameter.has_any_sign();
+        start.set(parameter, if keeps_its_sign { at * (moved / at).exp() } else { at + moved });
+    }
+    start.set(parameters[index], value);
+    let options =
+        FitOptions { held: options.held.with(index), tolerance: options.tolerance.max(TOLERANCE), ..*options };
+    problem.fit(&start, Some(fit), &options, is_cancelled)
 }
 
 /// The increase of the objective in units in which one sandwich standard deviation is one.
@@ -56,29 +89,40 @@ fn increase(fit: &RecordingFit, held: &RecordingFit, index: usize) -> f64 {
 /// # Errors
 /// [`CalibrationError`]; places without an equilibrium are left out.
 pub fn profile(
-    problem: &mut CalibrationProblem,
+    problem: &CalibrationProblem,
     fit: &RecordingFit,
     options: &FitOptions,
     is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<Profile>, CalibrationError> {
-    let mut profiles = Vec::new();
-    for (index, parameter) in fit.material.parameters().into_iter().enumerate() {
-        let Some(sd) = fit.sd(parameter) else { continue };
-        let optimum = fit.material.value(parameter);
+    let profiled: Vec<(usize, Parameter, f64)> = fit
+        .material
+        .parameters()
+        .into_iter()
+        .enumerate()
+        .filter_map(|(index, parameter)| Some((index, parameter, fit.sd(parameter)?)))
         // Beyond half of its value a parameter is not told by a parabola; κ has its own bound.
-        if sd > 0.5 * optimum.abs() {
-            continue;
+        .filter(|&(_, parameter, sd)| sd <= 0.5 * fit.material.value(parameter).abs())
+        .collect();
+    let places: Vec<(usize, f64)> = profiled
+        .iter()
+        .flat_map(|&(index, parameter, sd)| PLACES.map(|place| (index, fit.material.value(parameter) + place * sd)))
+        .collect();
+    let mut found = side_by_side(places, |(index, value)| {
+        // Along a curved valley the linear model may lead nowhere.
+        let near = held_near(problem, fit, index, value, options, is_cancelled);
+        match near.or_else(|_| held_at(problem, fit, index, value, options, is_cancelled)) {
+            Ok(held) => Ok(held.is_converged.then(|| (value, increase(fit, &held, index)))),
+            Err(e) if e.is_of_the_data() => Ok(None),
+            Err(e) => Err(e),
         }
+    })
+    .into_iter();
+    let mut profiles = Vec::new();
+    for (_, parameter, _) in profiled {
+        let optimum = fit.material.value(parameter);
+        let solved = found.by_ref().take(PLACES.len()).collect::<Result<Vec<_>, _>>()?;
         let mut points = vec![(optimum, 0.0)];
-        for place in PLACES {
-            let value = optimum + place * sd;
-            match held_at(problem, fit, index, value, options, is_cancelled) {
-                Ok(held) if held.is_converged => points.push((value, increase(fit, &held, index))),
-                Ok(_) => {}
-                Err(e) if e.is_of_the_data() => {}
-                Err(e) => return Err(e),
-            }
-        }
+        points.extend(solved.into_iter().flatten());
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         // The signed root is nearly straight: interpolate it.
         let roots: Vec<(f64, f64)> = points.iter().map(|(v, d)| (*v, d.sqrt() * (v - optimum).signum())).collect();
@@ -103,7 +147,7 @@ pub fn profile(
 /// # Errors
 /// [`CalibrationError`].
 pub fn bulk_lower_bound_kpa(
-    problem: &mut CalibrationProblem,
+    problem: &CalibrationProblem,
     fit: &RecordingFit,
     options: &FitOptions,
     is_cancelled: &(dyn Fn() -> bool + Sync),

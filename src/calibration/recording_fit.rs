@@ -84,11 +84,16 @@ impl RecordingFit {
         Some(self.covariance.sd_along(gradient)? * self.misfit_factor.sqrt())
     }
 
+    /// Standard deviation of a parameter by the curvature of the objective alone, which is that of the noise where the
+    /// objective weighs by it; none as for [`Self::sd`].
+    pub(super) fn sd_by_curvature(&self, parameter: Parameter) -> Option<f64> {
+        let index = self.information.index_of(parameter).ok()?;
+        self.information.covariance().sd(index).filter(|_| !self.held.contains(index))
+    }
+
     /// The largest shift of a parameter that a structured error as large as the structured misfit could make.
     pub fn possible_shift(&self, parameter: Parameter) -> Option<f64> {
-        let index = self.information.index_of(parameter).ok()?;
-        let plain = self.information.covariance().sd(index).filter(|_| !self.held.contains(index))?;
-        Some(plain * self.structured_misfit)
+        Some(self.sd_by_curvature(parameter)? * self.structured_misfit)
     }
 
     /// By how much the objective is higher one standard deviation ([`Self::sd`]) of a parameter away, all others

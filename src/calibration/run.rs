@@ -11,6 +11,7 @@ use super::recording_fit::RecordingFit;
 use super::starts::{first_starts, further_starts, law_starts};
 use super::target::{Objective, PAPER_BETA};
 use super::terms::{DecidedBy, Rule, TermRow, TermSelection, choose, compare, degeneracies, is_kept};
+use crate::fem::side_by_side;
 use crate::material::{MAX_TERMS, Material, least_relative_stiffness};
 
 /// The same material with its exponents falling.
@@ -78,7 +79,7 @@ impl<'a> Run<'a> {
     /// [`CalibrationError::NotConverged`] where no fit is left; any other error of the fits.
     pub(super) fn select_terms(
         &mut self,
-        problem: &mut CalibrationProblem,
+        problem: &CalibrationProblem,
     ) -> Result<(TermSelection, Vec<RecordingFit>), CalibrationError> {
         let options = self.options;
         let (rows, fits) = self.select(problem)?;
@@ -103,7 +104,7 @@ impl<'a> Run<'a> {
     /// `fit` with its terms in the order of falling exponents.
     pub(super) fn in_order(
         &mut self,
-        problem: &mut CalibrationProblem,
+        problem: &CalibrationProblem,
         fit: RecordingFit,
     ) -> Result<RecordingFit, CalibrationError> {
         let sorted = with_falling_exponents(&fit.material);
@@ -143,7 +144,7 @@ impl<'a> Run<'a> {
     /// The best fit of each number of terms, up to the first that the deciding rule does not keep.
     pub(super) fn select(
         &mut self,
-        problem: &mut CalibrationProblem,
+        problem: &CalibrationProblem,
     ) -> Result<(Vec<TermRow>, Vec<RecordingFit>), CalibrationError> {
         let (mut rows, mut fits): (Vec<TermRow>, Vec<RecordingFit>) = (Vec::new(), Vec::new());
         if let Some(kind) = self.options.law {
@@ -180,7 +181,7 @@ impl<'a> Run<'a> {
     /// start any more.
     fn again(
         &mut self,
-        problem: &mut CalibrationProblem,
+        problem: &CalibrationProblem,
         num_terms: usize,
     ) -> Result<Option<(TermRow, RecordingFit)>, CalibrationError> {
         let Some(earlier) = self.earlier.iter().find(|f| f.material.terms.len() == num_terms) else { return Ok(None) };
@@ -198,7 +199,7 @@ impl<'a> Run<'a> {
     /// promises.
     fn blind_starts(
         &self,
-        problem: &mut CalibrationProblem,
+        problem: &CalibrationProblem,
         last: Option<&RecordingFit>,
     ) -> Result<(Vec<Material>, Option<f64>), CalibrationError> {
         // Of a first term nothing is promised: any optimum will do.
@@ -218,7 +219,7 @@ impl<'a> Run<'a> {
     /// One fit, counted and told.
     pub(super) fn fit(
         &mut self,
-        problem: &mut CalibrationProblem,
+        problem: &CalibrationProblem,
         start: &Material,
         near: Option<&RecordingFit>,
     ) -> Result<RecordingFit, CalibrationError> {
@@ -227,24 +228,11 @@ impl<'a> Run<'a> {
         Ok(fit)
     }
 
-    /// The same from a start of several, given up where it would not come below `to_beat`.
-    fn fit_against(
-        &mut self,
-        problem: &mut CalibrationProblem,
-        start: &Material,
-        to_beat: Option<f64>,
-    ) -> Result<RecordingFit, CalibrationError> {
-        let options = FitOptions { to_beat, ..self.fit_options };
-        let fit = problem.fit(start, None, &options, self.is_cancelled)?;
-        self.count(start, &fit);
-        Ok(fit)
-    }
-
     /// The best of the fits from `starts`, of which none is tried after one that converged at an objective of `enough`;
     /// none where none has an equilibrium or is stable.
     pub(super) fn best_of(
         &mut self,
-        problem: &mut CalibrationProblem,
+        problem: &CalibrationProblem,
         starts: &[Material],
         enough: Option<f64>,
     ) -> Result<Option<(TermRow, RecordingFit)>, CalibrationError> {
@@ -252,25 +240,32 @@ impl<'a> Run<'a> {
         let mut failure = None;
         // A fit that converged is one that others have to come below.
         let mut to_beat: Option<f64> = None;
-        for start in starts.iter().take(self.options.num_starts.max(1)) {
-            if to_beat.zip(enough).is_some_and(|(best, enough)| best <= enough) {
-                break;
-            }
-            match self.fit_against(problem, start, to_beat) {
-                Ok(fit) => {
-                    let visited = problem.visited_stretches(&fit)?;
-                    if least_relative_stiffness(&fit.material, &visited) > 0.0 {
-                        if fit.is_converged && to_beat.is_none_or(|best| reached(&fit) < best) {
-                            to_beat = Some(reached(&fit));
+        let mut left = &starts[..starts.len().min(self.options.num_starts.max(1))];
+        while !left.is_empty() && !to_beat.zip(enough).is_some_and(|(best, enough)| best <= enough) {
+            // The first alone, for the others to come below; then side by side, unless one of them may be enough.
+            let is_alone = enough.is_some() || found.is_empty();
+            let (batch, others) = left.split_at(if is_alone { 1 } else { left.len() });
+            left = others;
+            let (options, is_cancelled) = (FitOptions { to_beat, ..self.fit_options }, self.is_cancelled);
+            let fits = side_by_side(batch.iter().collect(), |start| problem.fit(start, None, &options, is_cancelled));
+            for (start, fit) in batch.iter().zip(fits) {
+                match fit {
+                    Ok(fit) => {
+                        self.count(start, &fit);
+                        let visited = problem.visited_stretches(&fit)?;
+                        if least_relative_stiffness(&fit.material, &visited) > 0.0 {
+                            if fit.is_converged && to_beat.is_none_or(|best| reached(&fit) < best) {
+                                to_beat = Some(reached(&fit));
+                            }
+                            found.push(fit);
                         }
-                        found.push(fit);
                     }
+                    Err(e) if e.is_of_the_data() => {
+                        (self.on_stage)(&format!("  {}: {e}", start_in_words(start)));
+                        failure = Some(e);
+                    }
+                    Err(e) => return Err(e),
                 }
-                Err(e) if e.is_of_the_data() => {
-                    (self.on_stage)(&format!("  {}: {e}", start_in_words(start)));
-                    failure = Some(e);
-                }
-                Err(e) => return Err(e),
             }
         }
         found.sort_by(|a, b| reached(a).total_cmp(&reached(b)));

@@ -108,10 +108,10 @@ pub fn stand_ins(
             let terms = vec![crate::material::OgdenTerm { mu_kpa, alpha }];
             let material = Material { bulk_kpa, terms, law: None };
             let mesh = |s: &Specimen| MeshOptions::scaled(s, options.fit_factor);
-            let mut problem = CalibrationProblem::new(observed, &mesh, options.objective)?;
+            let problem = CalibrationProblem::new(observed, &mesh, options.objective)?;
             let fit = problem.at(&material, is_cancelled)?;
             let beta = if let Objective::Paper { beta } = options.objective { beta } else { PAPER_BETA };
-            around = contours(&mut problem, &fit, &ContourOptions { beta, ..ContourOptions::default() }, is_cancelled)?;
+            around = contours(&problem, &fit, &ContourOptions { beta, ..ContourOptions::default() }, is_cancelled)?;
         }
     }
     Ok((all, around))

@@ -85,7 +85,7 @@ impl Candidates {
     /// # Errors
     /// [`CalibrationError`].
     pub(super) fn new(
-        problem: &mut CalibrationProblem,
+        problem: &CalibrationProblem,
         fit: &RecordingFit,
         options: &FitOptions,
         is_cancelled: &(dyn Fn() -> bool + Sync),
@@ -164,7 +164,7 @@ impl Candidates {
 /// # Errors
 /// [`CalibrationError`].
 pub(super) fn further_starts(
-    problem: &mut CalibrationProblem,
+    problem: &CalibrationProblem,
     fit: &RecordingFit,
     options: &FitOptions,
     count: usize,

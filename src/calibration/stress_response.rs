@@ -64,7 +64,7 @@ impl StressResponse {
     /// # Errors
     /// [`CalibrationError`].
     pub(super) fn new(
-        problem: &mut CalibrationProblem,
+        problem: &CalibrationProblem,
         fit: &RecordingFit,
         options: &FitOptions,
         is_cancelled: &(dyn Fn() -> bool + Sync),

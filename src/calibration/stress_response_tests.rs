@@ -22,10 +22,10 @@ fn it_is_the_objective_of_refits_where_parameters_change_by_factors() {
     let scan = same_mesh(&truth).1;
     let recording = scan.recording("r", &block(), scan.noiseless(), Filter::None).unwrap();
     let observed = [Observed::new(&recording, 0.01).unwrap()];
-    let mut problem = CalibrationProblem::new(&observed, &coarse, Objective::Weighted).unwrap();
+    let problem = CalibrationProblem::new(&observed, &coarse, Objective::Weighted).unwrap();
     let fit = problem.fit(&truth, None, &options(), &|| false).unwrap();
     assert!(fit.is_converged && is_weak(&fit), "{:?}", fit.material);
-    let response = StressResponse::new(&mut problem, &fit, &options(), &|| false).unwrap();
+    let response = StressResponse::new(&problem, &fit, &options(), &|| false).unwrap();
     let start = response.at(fit.material.clone());
     // χ² is as good as nothing without noise.
     assert!((start.chi2 - fit.chi2).abs() < 1e-9, "{} {}", start.chi2, fit.chi2);
@@ -39,7 +39,7 @@ fn it_is_the_objective_of_refits_where_parameters_change_by_factors() {
             assert!((system.matrix[(i, j)] - of_fit[(i, j)]).abs() < 1e-6 * scale, "{i} {j}");
         }
     }
-    let found = ends_by_noise(&mut problem, &fit, &options(), &|| false).unwrap();
+    let found = ends_by_noise(&problem, &fit, &options(), &|| false).unwrap();
     assert!(found.are_of_profiles);
     let ends = found.ends;
     let mut num_ends = 0;
@@ -73,13 +73,13 @@ fn well_known_terms_keep_the_linear_model() {
         let mut recording = scan.recording("r", &block(), scan.noiseless(), Filter::None).unwrap();
         recording.noise_sd_mm = Some([1e-4; 3]);
         let observed = [Observed::new(&recording, error).unwrap()];
-        let mut problem = CalibrationProblem::new(&observed, &coarse, Objective::Weighted).unwrap();
+        let problem = CalibrationProblem::new(&observed, &coarse, Objective::Weighted).unwrap();
         let fit = problem.fit(&truth, None, &options(), &|| false).unwrap();
         assert!(!is_weak(&fit));
         // So does a fit whose profiles have no equilibrium, and it does not call them profiles.
         let lost = CalibrationError::NotConverged { iterations: 1, distance: 2.0, limit: 0.1 };
         let without_profiles = NoiseEnds::or_linear(Err(lost), &fit).unwrap();
-        for found in [ends_by_noise(&mut problem, &fit, &options(), &|| false).unwrap(), without_profiles] {
+        for found in [ends_by_noise(&problem, &fit, &options(), &|| false).unwrap(), without_profiles] {
             assert!(!found.are_of_profiles);
             for (parameter, ends) in fit.material.parameters().into_iter().zip(found.ends) {
                 let linear = linear_ends(parameter, fit.material.value(parameter), fit.sd(parameter).unwrap());

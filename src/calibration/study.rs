@@ -11,7 +11,8 @@
 //! whose equilibria and derivatives all draws share. The first draws are also fitted from blind starts, which must end
 //! in the same optimum.
 
-use super::allowance::{MESH_RATIO, error_over_shift};
+use super::allowance::{Allowance, MESH_RATIO};
+use super::calibrate::is_identifiable;
 use super::calibrate_options::CalibrateOptions;
 use super::error::CalibrationError;
 use super::interval::widened;
@@ -65,6 +66,8 @@ pub struct StudyRow {
     pub truth: f64,
     /// Shift by the mesh: the estimate from the noiseless scan minus the truth.
     pub mesh_shift: f64,
+    /// Whether the noise leaves the noiseless estimate a standard deviation below half of its value.
+    pub is_identifiable: bool,
     /// Mean of the estimates minus the noiseless estimate.
     pub mean_shift: f64,
     /// Standard deviation of the estimates.
@@ -207,7 +210,7 @@ pub fn study(
     let new_problem = |factor: f64| -> Result<CalibrationProblem<'_>, CalibrationError> {
         CalibrationProblem::new(&clean, &|s| (case.fit_mesh)(s, factor), case.options.objective)
     };
-    let mut problem = new_problem(1.0)?;
+    let problem = new_problem(1.0)?;
     let noiseless = problem.fit(&truth, None, &case.options.fit, &stop)?;
     let coarse = new_problem(MESH_RATIO)?.fit(&truth, None, &case.options.fit, &stop)?;
     let needed_decrease = 2.0 * (noiseless.num_data as f64).ln();
@@ -215,10 +218,10 @@ pub fn study(
     if num_terms > 1 {
         let silent = |_: &str| {};
         let fewer = CalibrateOptions { terms: super::TermCount::Fixed(num_terms - 1), ..case.options };
-        fits = Run::new(&fewer, true, &silent, &stop).select(&mut problem)?.1;
+        fits = Run::new(&fewer, true, &silent, &stop).select(&problem)?.1;
     }
     let expected_decrease = fits.last().map(|f| (f.chi2 - noiseless.chi2).max(0.0));
-    let candidates = Candidates::new(&mut problem, &noiseless, &case.options.fit, &stop)?;
+    let candidates = Candidates::new(&problem, &noiseless, &case.options.fit, &stop)?;
     let spurious_decrease = candidates.ranked(&problem.targets()?, 1).first().map_or(0.0, |(gain, _)| *gain);
     fits.push(noiseless.clone());
     let reference = Reference { fits, candidates };
@@ -232,9 +235,9 @@ pub fn study(
             let mut done = Vec::new();
             for draw in first..(first + chunk).min(case.draws) {
                 let data = observe(&synthetic.draw(case.seed, draw as u64))?;
-                let mut present = problem.with_data(&data)?;
+                let present = problem.with_data(&data)?;
                 let is_blind = draw < case.blind_draws;
-                done.push(one_draw(&mut present, case, &reference, is_blind, is_cancelled)?);
+                done.push(one_draw(&present, case, &reference, is_blind, is_cancelled)?);
                 problem = present.with_data(&clean)?;
                 on_draw();
             }
@@ -242,7 +245,8 @@ pub fn study(
         })
         .collect::<Result<_, CalibrationError>>()?;
     let draws: Vec<Draw> = draws.into_iter().flatten().collect();
-    let mut found = summarise(&draws, &truth, &noiseless, &coarse, case.options.discretisation_factor);
+    let allowance = Allowance::new(&noiseless, &coarse, &problem.targets()?, case.options.discretisation_factor);
+    let mut found = summarise(&draws, &truth, &noiseless, &coarse.material, &allowance);
     found.expected_decrease = expected_decrease;
     found.needed_decrease = needed_decrease;
     found.detection_probability = expected_decrease.map(|d| detection_probability(d, needed_decrease));
@@ -251,7 +255,7 @@ pub fn study(
 }
 
 fn one_draw(
-    problem: &mut CalibrationProblem,
+    problem: &CalibrationProblem,
     case: &StudyCase,
     reference: &Reference,
     is_blind: bool,
@@ -298,7 +302,13 @@ fn one_draw(
     Ok(Draw { fit: Some(fit), chosen, is_alike })
 }
 
-fn summarise(draws: &[Draw], truth: &Material, noiseless: &RecordingFit, coarse: &RecordingFit, factor: f64) -> Study {
+fn summarise(
+    draws: &[Draw],
+    truth: &Material,
+    noiseless: &RecordingFit,
+    coarse: &Material,
+    allowance: &Allowance,
+) -> Study {
     let fitted: Vec<&DrawFit> = draws.iter().filter_map(|d| d.fit.as_ref()).collect();
     // 0/0 is the NaN that is meant.
     let mean = |values: &mut dyn Iterator<Item = f64>| {
@@ -317,7 +327,7 @@ fn summarise(draws: &[Draw], truth: &Material, noiseless: &RecordingFit, coarse:
             let at = noiseless.material.value(parameter);
             let values: Vec<f64> = fitted.iter().map(|d| d.values[i]).collect();
             let stated = || fitted.iter().filter_map(|d| d.ends[i].map(|ends| (d.values[i], ends)));
-            let discretisation_sd = factor * error_over_shift() * (at - coarse.material.value(parameter)).abs();
+            let discretisation_sd = allowance.factor * allowance.mesh_error_of(parameter, noiseless, coarse);
             let true_value = truth.value(parameter);
             let covers = |v: f64, center: f64, ends: Ends, discretisation_sd: f64| {
                 let [low, high] = widened(parameter, v, ends, discretisation_sd, 0.0);
@@ -327,6 +337,7 @@ fn summarise(draws: &[Draw], truth: &Material, noiseless: &RecordingFit, coarse:
                 parameter: parameter.name(),
                 truth: truth.value(parameter),
                 mesh_shift: at - truth.value(parameter),
+                is_identifiable: is_identifiable(noiseless, parameter),
                 mean_shift: mean(&mut values.iter().copied()) - at,
                 found_sd: spread(&values),
                 promised_sd: mean(&mut fitted.iter().filter_map(|d| d.sd[i])),

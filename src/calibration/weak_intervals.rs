@@ -87,7 +87,7 @@ fn linear(fit: &RecordingFit, parameter: Parameter) -> Option<Ends> {
 /// # Errors
 /// [`CalibrationError`].
 pub(super) fn ends_by_noise(
-    problem: &mut CalibrationProblem,
+    problem: &CalibrationProblem,
     fit: &RecordingFit,
     options: &FitOptions,
     is_cancelled: &(dyn Fn() -> bool + Sync),
@@ -99,7 +99,7 @@ pub(super) fn ends_by_noise(
 }
 
 fn ends_of_profiles(
-    problem: &mut CalibrationProblem,
+    problem: &CalibrationProblem,
     fit: &RecordingFit,
     options: &FitOptions,
     is_cancelled: &(dyn Fn() -> bool + Sync),

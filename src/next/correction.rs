@@ -264,7 +264,7 @@ mod tests {
         CalibrationProblem::new(observed, &mesh, Objective::Weighted).unwrap()
     }
 
-    fn fit(problem: &mut CalibrationProblem) -> RecordingFit {
+    fn fit(problem: &CalibrationProblem) -> RecordingFit {
         problem.fit(&one_term(), None, &FitOptions::default(), &|| false).unwrap()
     }
 
@@ -283,9 +283,9 @@ mod tests {
             let sds = |p: &Parameter| ((fit.material.value(*p) - truth.value(*p)) / fit.sd(*p).unwrap()).abs();
             fit.material.parameters().iter().skip(1).map(sds).fold(0.0, f64::max)
         };
-        let coarse = fit(&mut problem(&observed));
+        let coarse = fit(&problem(&observed));
         let corrected = FinerMeshes::new(&observed, COARSE).unwrap().without_mesh_error(&coarse, &|| false).unwrap();
-        let [before, after] = [&coarse, &fit(&mut problem(&corrected))].map(missed_by);
+        let [before, after] = [&coarse, &fit(&problem(&corrected))].map(missed_by);
         assert!(before > 1.0 && after < before / 3.0, "{before} {after}");
     }
 
@@ -330,7 +330,7 @@ mod tests {
         let truth = one_term();
         let observed = scanned(&truth, 0.05);
         let scan = observed.each_ref().map(Observed::without_readings);
-        let told = fit(&mut problem(&scan));
+        let told = fit(&problem(&scan));
         let corrected = FinerMeshes::new(&observed, COARSE).unwrap().without_mesh_error(&told, &|| false).unwrap();
         let coarse_n = &problem(&observed).force_at(&truth, &|| false).unwrap()[0];
         let errors_n = |o: &Observed| -> Vec<f64> {
@@ -352,10 +352,10 @@ mod tests {
         let of = |truth: &Material| -> [f64; 2] {
             let observed = scanned(truth, NOISE_MM);
             let mut finer = FinerMeshes::new(&observed, COARSE).unwrap();
-            let coarse = fit(&mut problem(&observed));
+            let coarse = fit(&problem(&observed));
             let corrected = finer.without_mesh_error(&coarse, &|| false).unwrap();
-            let mut problem = problem(&corrected);
-            let fit = fit(&mut problem);
+            let problem = problem(&corrected);
+            let fit = fit(&problem);
             let left = finer.error_left(&problem, &fit, &corrected).unwrap();
             let nothing = ErrorLeft::none(&corrected, fit.material.parameters().len());
             [&nothing, &left].map(|mesh| largest(&Discrepancy::of(&corrected, &fit, mesh)))

@@ -179,7 +179,7 @@ fn fit_together<'a>(
     is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Fitted<'a>, NextError> {
     let num_data: usize = means.iter().map(|o| 3 * o.mask.num_voxels() * o.steps.len()).sum();
-    let fit = |problem: &mut CalibrationProblem, terms: TermCount, iterations: usize, earlier: &[RecordingFit]| {
+    let fit = |problem: &CalibrationProblem, terms: TermCount, iterations: usize, earlier: &[RecordingFit]| {
         let settings = CalibrateOptions {
             terms,
             num_starts: NUM_STARTS,
@@ -196,11 +196,11 @@ fn fit_together<'a>(
     };
     let FitOptions { max_iterations, .. } = FitOptions::default();
     let mesh = |s: &Specimen| MeshOptions::scaled(s, options.mesh_factor);
-    let mut problem = CalibrationProblem::new(means, &mesh, Objective::Weighted)?;
+    let problem = CalibrationProblem::new(means, &mesh, Objective::Weighted)?;
     let terms = options.num_terms.map_or(TermCount::Auto { max: MAX_TERMS }, TermCount::Fixed);
     if !options.has_mesh_correction {
         on_stage("what is known so far");
-        let law = fit(&mut problem, terms, max_iterations, &[])?;
+        let law = fit(&problem, terms, max_iterations, &[])?;
         law.fit.settled(TOLERANCE)?;
         let error_left = ErrorLeft::none(means, law.fit.material.parameters().len());
         return Ok(Fitted { corrected: means.to_vec(), law, error_left, models: problem });
@@ -211,7 +211,7 @@ fn fit_together<'a>(
     let has_readings = means.iter().any(|o| !o.on_the_way.is_empty());
     let scans: Vec<Observed> = means.iter().map(Observed::without_readings).collect();
     let mut problem = problem.with_data(&scans)?;
-    let mut before = fit(&mut problem, TermCount::Fixed(1), FIRST_ITERATIONS, &[])?;
+    let mut before = fit(&problem, TermCount::Fixed(1), FIRST_ITERATIONS, &[])?;
     let mut finer = FinerMeshes::new(means, options.mesh_factor)?;
     let mut round = 0;
     loop {
@@ -219,15 +219,15 @@ fn fit_together<'a>(
         let knows_all = round > 1 || !has_readings;
         let corrected = finer.without_mesh_error(&before.fit, is_cancelled)?;
         on_stage("what is known so far");
-        let mut present = problem.with_data(&corrected)?;
-        let mut law = fit(&mut present, terms, max_iterations, &before.by_num_terms)?;
+        let present = problem.with_data(&corrected)?;
+        let mut law = fit(&present, terms, max_iterations, &before.by_num_terms)?;
         // A law of more terms tells the error better: large strains and small ones no longer share an exponent. So does
         // one that has settled, and one that knows of all forces.
         let is_told =
             law.fit.material.terms.len() <= before.fit.material.terms.len() && before.fit.is_settled() && knows_all;
         if is_told || round == MOST_ROUNDS {
             if !law.fit.is_settled() {
-                law = fit(&mut present, terms, max_iterations, &[])?;
+                law = fit(&present, terms, max_iterations, &[])?;
             }
             law.fit.settled(TOLERANCE)?;
             let error_left = finer.error_left(&present, &law.fit, &corrected)?;

@@ -289,3 +289,15 @@ pub fn random_material(random: &mut Random) -> Material {
     material.validate().expect("stable by construction");
     material
 }
+
+/// A specimen with at most two holes and its drive, a quarter to four fifths of the largest, and a material of one or
+/// two terms: one scan tells no three apart.
+pub fn random_scanned_case(random: &mut Random) -> (Specimen, Material) {
+    loop {
+        let (mut specimen, material) = (random_specimen(random), random_material(random));
+        if material.terms.len() < 3 && specimen.holes.len() < 3 {
+            specimen.drive_mm[0] *= random.between(0.25, 0.8);
+            return (specimen, material);
+        }
+    }
+}
