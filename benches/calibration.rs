@@ -26,12 +26,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let begin = std::time::Instant::now();
     let mut specimen = Specimen::from_json(include_str!("../geometries/two-hole-shear.json"))?;
     specimen.drive_mm = vec![5.0];
-    let scan = ScanSettings {
-        voxel_mm: [1.0, 0.1875, 0.75],
-        noise_sd_mm: [0.05; 3],
-        force_sd_n: 0.02,
-        ..ScanSettings::default()
-    };
+    let scan = ScanSettings::default();
     let never = || false;
     let cases = [
         ("one term", include_str!("../geometries/materials/ecoflex-0020.json"), 37.0, 50.0),

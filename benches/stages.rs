@@ -53,12 +53,7 @@ fn multiplication_rate<T: ComplexField + From<f32>>() -> f64 {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let specimen = Specimen::from_json(include_str!("../geometries/two-hole-shear.json"))?;
     let material = Material::from_json(include_str!("../geometries/materials/ecoflex-0020.json"))?;
-    let scan = ScanSettings {
-        voxel_mm: [1.0, 0.1875, 0.75],
-        noise_sd_mm: [0.05; 3],
-        force_sd_n: 0.02,
-        ..ScanSettings::default()
-    };
+    let scan = ScanSettings::default();
     let (single_rate, double_rate) = (multiplication_rate::<f32>(), multiplication_rate::<f64>());
     let chosen: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     for (label, factor, runs) in [("search", 1.8, 9), ("20k", 1.15, 5), ("70k", 0.73, 3), ("200k", 0.5, 1)] {

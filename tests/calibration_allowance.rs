@@ -56,12 +56,7 @@ fn parameters((specimen, material): &(Specimen, Material)) -> Option<Vec<Allowed
         seed: 0,
         truth_mesh: MeshOptions { grading: 0.4, max_elements: 1_000_000, ..fine },
         fit_mesh: MeshOptions::scaled,
-        scan: ScanSettings {
-            voxel_mm: [1.0, 0.1875, 0.75],
-            noise_sd_mm: [0.05; 3],
-            force_sd_n: 0.02,
-            ..ScanSettings::default()
-        },
+        scan: ScanSettings::default(),
         options: CalibrateOptions { terms: TermCount::Fixed(material.terms.len()), ..CalibrateOptions::default() },
         specimen,
     };

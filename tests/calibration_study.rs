@@ -44,12 +44,7 @@ fn published_scan() {
             // Other section, layers and grading than the mesh of the fits.
             truth_mesh: MeshOptions { grading: 0.4, ..MeshOptions::scaled(&specimen, 1.3) },
             fit_mesh: |s, factor| MeshOptions::scaled(s, 1.5 * factor),
-            scan: ScanSettings {
-                voxel_mm: [1.0, 0.1875, 0.75],
-                noise_sd_mm: [0.05; 3],
-                force_sd_n: 0.02,
-                ..ScanSettings::default()
-            },
+            scan: ScanSettings::default(),
             options: CalibrateOptions {
                 terms: TermCount::Auto { max: num_terms + 1 },
                 num_starts: 2,

@@ -36,12 +36,7 @@ struct Bounded {
 const KINDS: [&str; 3] = ["force", "integrated sensitivity", "promised standard deviation"];
 
 fn evaluated(specimen: &Specimen, material: &Material, options: &EvaluationOptions) -> Option<Evaluation> {
-    let scan = ScanSettings {
-        voxel_mm: [1.0, 0.1875, 0.75],
-        noise_sd_mm: [0.05; 3],
-        force_sd_n: 0.02,
-        ..ScanSettings::default()
-    };
+    let scan = ScanSettings::default();
     let start = Instant::now();
     let is_over = || start.elapsed() > PATIENCE;
     let mut fixture = Fixture::new(specimen, &scan, options).ok()?;

@@ -16,6 +16,8 @@ use utoipa::ToSchema;
 pub struct ContourOptions {
     /// Values per axis, at least 2; odd numbers hold the estimate itself.
     pub num_values: usize,
+    /// The same where every place has to be solved.
+    pub num_values_solved: usize,
     /// κ runs from the estimate over this to the estimate times this, in equal ratios.
     pub bulk_factor: f64,
     /// μ₁ runs by this fraction to both sides.
@@ -28,7 +30,14 @@ pub struct ContourOptions {
 
 impl Default for ContourOptions {
     fn default() -> Self {
-        ContourOptions { num_values: 9, bulk_factor: 4.0, mu_range: 0.1, alpha_range: 0.3, beta: super::PAPER_BETA }
+        ContourOptions {
+            num_values: 25,
+            num_values_solved: 9,
+            bulk_factor: 4.0,
+            mu_range: 0.1,
+            alpha_range: 0.3,
+            beta: super::PAPER_BETA,
+        }
     }
 }
 
@@ -79,16 +88,12 @@ impl Axis {
             _ => self.at * self.options.alpha_range,
         }
     }
+}
 
-    /// All values along it.
-    fn values(&self) -> Vec<f64> {
-        self.parts().into_iter().map(|part| self.value(part)).collect()
-    }
-
-    fn parts(&self) -> Vec<f64> {
-        let n = self.options.num_values.max(2);
-        (0..n).map(|i| 2.0 * i as f64 / (n - 1) as f64 - 1.0).collect()
-    }
+/// The parts of so many places along an axis.
+fn parts(num_values: usize) -> Vec<f64> {
+    let n = num_values.max(2);
+    (0..n).map(|i| 2.0 * i as f64 / (n - 1) as f64 - 1.0).collect()
 }
 
 /// `material` at a place over two axes.
@@ -151,18 +156,23 @@ pub fn contours(
             places.push(([0.0, x], &ends[2 * second + i]));
             places.extend(SIDES.into_iter().enumerate().map(|(j, y)| ([x, y], &corners[2 * i + j])));
         }
-        let losses = polynomials(problem.observed(), fit, pair, &places);
-        let [along, across] = pair.map(Axis::parts);
-        let losses: Vec<Option<[f64; 2]>> = match losses {
+        let (parts, losses) = match polynomials(problem.observed(), fit, pair, &places) {
             Some(losses) => {
-                across.iter().flat_map(|&y| along.iter().map(move |&x| [x, y])).map(|at| Some(losses.at(at))).collect()
+                let parts = parts(options.num_values);
+                let places = parts.iter().flat_map(|&y| parts.iter().map(move |&x| [x, y]));
+                let losses: Vec<Option<[f64; 2]>> = places.map(|place| Some(losses.at(place))).collect();
+                (parts, losses)
             }
-            None => place_by_place(problem, fit, pair, is_cancelled)?,
+            None => {
+                let parts = parts(options.num_values_solved);
+                let losses = place_by_place(problem, fit, pair, &parts, is_cancelled)?;
+                (parts, losses)
+            }
         };
         let total = |[u, f]: [f64; 2]| u + options.beta * f;
         all.push(Contour {
             parameters: pair.map(|axis| axis.parameter.name()),
-            values: pair.map(Axis::values),
+            values: pair.map(|axis| parts.iter().map(|&part| axis.value(part)).collect()),
             loss_u: losses.iter().map(|l| l.map(|l| l[0])).collect(),
             loss_f: losses.iter().map(|l| l.map(|l| l[1])).collect(),
             total: losses.iter().map(|l| l.map(total)).collect(),
@@ -188,22 +198,22 @@ fn polynomials(
     patch.losses()
 }
 
-/// The losses at all places, the first axis fastest, each solved from its neighbour.
+/// The losses at `parts` of two axes, the first fastest, each place solved from its neighbour.
 fn place_by_place(
     problem: &CalibrationProblem,
     fit: &RecordingFit,
     axes: [&Axis; 2],
+    parts: &[f64],
     is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<Option<[f64; 2]>>, CalibrationError> {
-    let [along, across] = axes.map(Axis::parts);
-    let n = along.len();
-    let mut losses = vec![None; n * across.len()];
+    let n = parts.len();
+    let mut losses = vec![None; n * n];
     let mut near: Vec<Vec<Equilibrium>> = fit.predictions.iter().map(|p| p.states.clone()).collect();
-    for (j, &second) in across.iter().enumerate() {
+    for (j, &second) in parts.iter().enumerate() {
         for step in 0..n {
             // There and back again, so that neighbours are solved one after the other.
             let i = if j % 2 == 0 { step } else { n - 1 - step };
-            let material = moved(&fit.material, axes, [along[i], second]);
+            let material = moved(&fit.material, axes, [parts[i], second]);
             losses[i + n * j] = match losses_at(problem, &material, &mut near, is_cancelled) {
                 Ok(found) => Some(found),
                 Err(e) if e.is_of_the_data() => None,

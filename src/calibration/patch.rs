@@ -12,7 +12,8 @@ use nalgebra::{DMatrix, DVector};
 
 /// Degree of the polynomials.
 const DEGREE: i32 = 5;
-/// The losses of the polynomials may differ from those solved at the nine places by this part.
+/// The roots of the losses by the polynomials (misfits as parts of what is measured) may differ from those solved at the
+/// nine places by this part of the largest.
 const FOLLOWED: f64 = 1e-3;
 /// Singular values below this part of the largest are rounding.
 const ROUNDING: f64 = 1e-12;
@@ -126,11 +127,10 @@ impl<'a> Patch<'a> {
                 (losses.at(datum.parts), losses.of_weights(&alone))
             })
             .collect();
-        let largest = [0, 1].map(|k| solved.iter().map(|(_, solved)| solved[k]).fold(0.0, f64::max));
-        // A loss that is nothing beside the others need not be right to a part of itself.
+        let largest = [0, 1].map(|k| solved.iter().map(|(_, solved)| solved[k].sqrt()).fold(0.0, f64::max));
         let is_near =
-            |found: f64, solved: f64, largest: f64| (found - solved).abs() <= FOLLOWED * solved.max(FOLLOWED * largest);
-        let is_followed = solved.iter().all(|(f, s)| (0..2).all(|k| is_near(f[k], s[k], largest[k])));
+            |k: usize, found: f64, solved: f64| (found.max(0.0).sqrt() - solved.sqrt()).abs() <= FOLLOWED * largest[k];
+        let is_followed = solved.iter().all(|(found, solved)| (0..2).all(|k| is_near(k, found[k], solved[k])));
         is_followed.then_some(losses)
     }
 }

@@ -6,7 +6,7 @@ use super::options::FitOptions;
 use super::problem::CalibrationProblem;
 use super::recording_fit::RecordingFit;
 use crate::fem::side_by_side;
-use crate::material::Parameter;
+use crate::material::{Material, Parameter};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -33,49 +33,43 @@ pub struct Profile {
     pub interval_95: [Option<f64>; 2],
 }
 
-/// Refits with one parameter (`index` in κ, μ₁, α₁, …) held at `value`.
-fn held_at(
+/// Refits from `start` with one parameter (`index` in κ, μ₁, α₁, …) held where it is.
+fn held(
     problem: &CalibrationProblem,
     fit: &RecordingFit,
     index: usize,
-    value: f64,
+    start: &Material,
     options: &FitOptions,
     is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<RecordingFit, CalibrationError> {
-    let mut start = fit.material.clone();
-    let parameter = start.parameters()[index];
-    start.set(parameter, value);
-    problem.fit(&start, Some(fit), &FitOptions { held: options.held.with(index), ..*options }, is_cancelled)
+    problem.fit(start, Some(fit), &FitOptions { held: options.held.with(index), ..*options }, is_cancelled)
 }
 
-/// As [`held_at`] for a value a few standard deviations away, from where the linear model has the other parameters.
-fn held_near(
-    problem: &CalibrationProblem,
-    fit: &RecordingFit,
-    index: usize,
-    value: f64,
-    options: &FitOptions,
-    is_cancelled: &(dyn Fn() -> bool + Sync),
-) -> Result<RecordingFit, CalibrationError> {
-    let mut start = fit.material.clone();
-    let parameters = start.parameters();
-    let change = value - start.value(parameters[index]);
+/// The material of `fit` with one parameter at `value`.
+fn with_value(fit: &RecordingFit, index: usize, value: f64) -> Material {
+    let mut moved = fit.material.clone();
+    moved.set(moved.parameters()[index], value);
+    moved
+}
+
+/// The same with the other parameters where the linear model has them then.
+fn along_linear_model(fit: &RecordingFit, index: usize, value: f64) -> Material {
+    let mut moved = with_value(fit, index, value);
+    let parameters = moved.parameters();
+    let change = value - fit.material.value(parameters[index]);
     let covariance = fit.information.covariance();
-    let variance = covariance.covariance(index, index);
-    for (other, &parameter) in parameters.iter().enumerate().filter(|(other, _)| *other != index) {
-        let Some((shared, variance)) = covariance.covariance(other, index).zip(variance) else { continue };
-        if options.held.contains(other) {
+    let Some(variance) = covariance.covariance(index, index) else { return moved };
+    for (other, &parameter) in parameters.iter().enumerate() {
+        let Some(shared) = covariance.covariance(other, index) else { continue };
+        if other == index || fit.held.contains(other) {
             continue;
         }
-        let (at, moved) = (start.value(parameter), change * shared / variance);
+        let (at, shift) = (fit.material.value(parameter), change * shared / variance);
         // What keeps its sign moves in its logarithm.
         let keeps_its_sign = parameter.is_modulus() && !parameter.has_any_sign();
-        start.set(parameter, if keeps_its_sign { at * (moved / at).exp() } else { at + moved });
+        moved.set(parameter, if keeps_its_sign { at * (shift / at).exp() } else { at + shift });
     }
-    start.set(parameters[index], value);
-    let options =
-        FitOptions { held: options.held.with(index), tolerance: options.tolerance.max(TOLERANCE), ..*options };
-    problem.fit(&start, Some(fit), &options, is_cancelled)
+    moved
 }
 
 /// The increase of the objective in units in which one sandwich standard deviation is one.
@@ -107,10 +101,11 @@ pub fn profile(
         .iter()
         .flat_map(|&(index, parameter, sd)| PLACES.map(|place| (index, fit.material.value(parameter) + place * sd)))
         .collect();
+    let options = FitOptions { tolerance: options.tolerance.max(TOLERANCE), ..*options };
     let mut found = side_by_side(places, |(index, value)| {
         // Along a curved valley the linear model may lead nowhere.
-        let near = held_near(problem, fit, index, value, options, is_cancelled);
-        match near.or_else(|_| held_at(problem, fit, index, value, options, is_cancelled)) {
+        let near = held(problem, fit, index, &along_linear_model(fit, index, value), &options, is_cancelled);
+        match near.or_else(|_| held(problem, fit, index, &with_value(fit, index, value), &options, is_cancelled)) {
             Ok(held) => Ok(held.is_converged.then(|| (value, increase(fit, &held, index)))),
             Err(e) if e.is_of_the_data() => Ok(None),
             Err(e) => Err(e),
@@ -162,7 +157,7 @@ pub fn bulk_lower_bound_kpa(
     let mut near = fit.clone();
     for _ in 0..MAX_HALVINGS {
         let low = high - std::f64::consts::LN_2;
-        let held = match held_at(problem, &near, 0, low.exp(), options, is_cancelled) {
+        let held = match held(problem, &near, 0, &with_value(&near, 0, low.exp()), options, is_cancelled) {
             Ok(held) if held.is_converged => held,
             Ok(_) => return Ok(None),
             Err(e) if e.is_of_the_data() => return Ok(None),

@@ -220,12 +220,7 @@ fn measure_two_hole_shear() {
     let text = include_str!("../../geometries/two-hole-shear.json");
     let mut specimen = Specimen::from_json(text).unwrap();
     specimen.drive_mm = vec![7.0];
-    let scan = ScanSettings {
-        voxel_mm: [1.0, 0.1875, 0.75],
-        noise_sd_mm: [0.05; 3],
-        force_sd_n: 0.02,
-        ..ScanSettings::default()
-    };
+    let scan = ScanSettings::default();
     let one = include_str!("../../geometries/materials/ecoflex-0020.json");
     let two = include_str!("../../geometries/materials/ecoflex-0020-two-term.json");
     let factor = |name: &str, usual: f64| std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(usual);

@@ -451,12 +451,7 @@ mod tests {
     /// 29.5 mm are 29.5 voxels, of which the outermost are kept by a hair; of 29.8 mm there is enough.
     #[test]
     fn factors_that_hang_on_the_grid_are_said() {
-        let scan = ScanSettings {
-            voxel_mm: [1.0, 0.1875, 0.75],
-            noise_sd_mm: [0.05; 3],
-            force_sd_n: 0.02,
-            ..ScanSettings::default()
-        };
+        let scan = ScanSettings::default();
         let mut specimen = Specimen::from_json(include_str!("../../geometries/solid-shear.json")).expect("valid");
         (specimen.block.length_mm, specimen.block.width_mm) = (29.5, 21.75);
         let said = where_voxels_end(&specimen, scan).expect("the length is close");

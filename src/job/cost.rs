@@ -16,10 +16,10 @@ const FIRST_TERM: f64 = 5.5;
 const START_OF_A_TERM: f64 = 2.2;
 /// Terms tried where a rule decides their number (7 to 45 equilibria in all).
 const TERMS_OF_A_RULE: usize = 3;
-/// The same of each parameter's profile (2.4 to 4).
-const PROFILE: f64 = 3.0;
-/// The same of the contours of the losses (42 and 46).
-const CONTOURS: f64 = 45.0;
+/// The same of each parameter's profile (2.7 on the two-hole block at three drives).
+const PROFILE: f64 = 2.7;
+/// The same of the contours of the losses (12 there).
+const CONTOURS: f64 = 12.0;
 /// The same of a diagnosis: 28 and 52 on those blocks, where nothing was wrong; about 140 with two to four causes at
 /// once.
 const DIAGNOSIS: f64 = 60.0;
