@@ -12,8 +12,8 @@ use nalgebra::{DMatrix, DVector};
 
 /// Degree of the polynomials.
 const DEGREE: i32 = 5;
-/// The roots of the losses by the polynomials (misfits as parts of what is measured) may differ from those solved at the
-/// nine places by this part of the largest.
+/// The roots of the losses by the polynomials (misfits as parts of what is measured) may differ from those solved at
+/// the nine places by this part of the largest.
 const FOLLOWED: f64 = 1e-3;
 /// Singular values below this part of the largest are rounding.
 const ROUNDING: f64 = 1e-12;
