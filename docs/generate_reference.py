@@ -218,7 +218,7 @@ EXPLAINED = {
     "sweep": "sweeps.md", "sweep merge": "sweeps.md#shards-without-a-clusters-scheduler", "compare": "sweeps.md#comparison",
     "uniaxial": "tutorial-curves.md#one-curve", "curves": "tutorial-curves.md#several-tests-together-one-kept-back",
     "export material": "export.md", "export model": "export.md#models", "export recording": "export.md#results", "paper-tables": "paper-comparison.md#tables-1-to-3-and-figure-8",
-    "prove-diagnosis": "diagnosis.md#proof", "run": "requests.md", "serve": "service.md", "worker": "service.md#workers",
+    "prove-diagnosis": "diagnosis-proof.md", "run": "requests.md", "serve": "service.md", "worker": "service.md#workers",
 }
 
 
