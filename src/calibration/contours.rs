@@ -117,8 +117,8 @@ type Solved = Option<Vec<Prediction>>;
 /// the estimate.
 ///
 /// What a material predicts is smooth in its parameters: it is solved, with its derivatives, at the estimate and at the
-/// ends and the corners of each pair, and is a polynomial in between (`calibration::patch`). A pair that has an end or a
-/// corner without an equilibrium, or that polynomials do not follow, is solved place by place.
+/// ends and the corners of each pair, and is a polynomial in between (`calibration::patch`). A pair that has an end or
+/// a corner without an equilibrium, or that polynomials do not follow, is solved place by place.
 ///
 /// # Errors
 /// [`CalibrationError`].
